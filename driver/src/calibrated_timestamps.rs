@@ -16,12 +16,8 @@ const HOST: [(vk::TimeDomainKHR, fn() -> u64); 2] = {
         time.tv_sec.unsigned_abs() * 1_000_000_000 + time.tv_nsec.unsigned_abs()
     }
     [
-        (vk::TimeDomainKHR::CLOCK_MONOTONIC, || {
-            nanoseconds(ClockId::Monotonic)
-        }),
-        (vk::TimeDomainKHR::CLOCK_MONOTONIC_RAW, || {
-            nanoseconds(ClockId::MonotonicRaw)
-        }),
+        (vk::TimeDomainKHR::CLOCK_MONOTONIC, || nanoseconds(ClockId::Monotonic)),
+        (vk::TimeDomainKHR::CLOCK_MONOTONIC_RAW, || nanoseconds(ClockId::MonotonicRaw)),
     ]
 };
 #[cfg(not(target_os = "linux"))]
@@ -29,8 +25,7 @@ const HOST: [(vk::TimeDomainKHR, fn() -> u64); 0] = [];
 
 /// Lists the host's clocks, and the device's unless it counts the simulated hardware's time.
 #[doc(alias = "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT")]
-pub(crate) fn get_physical_device_calibrateable_time_domains()
--> Result<Vec<vk::TimeDomainKHR>, Error> {
+pub(crate) fn get_physical_device_calibrateable_time_domains() -> Result<Vec<vk::TimeDomainKHR>, Error> {
     let host = HOST.map(|(domain, _)| domain);
     let device = (!environment::has_simulated_timestamps()?).then_some(vk::TimeDomainKHR::DEVICE);
     Ok(device.into_iter().chain(host).collect())
@@ -60,10 +55,7 @@ pub(crate) unsafe fn get_calibrated_timestamps(
             None => {
                 return Err(Error::usage(
                     "VUID-VkCalibratedTimestampInfoEXT-timeDomain-02354",
-                    format!(
-                        "{:?} is none of the device's time domains",
-                        info.time_domain
-                    ),
+                    format!("{:?} is none of the device's time domains", info.time_domain),
                 ));
             }
         };

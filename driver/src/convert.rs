@@ -6,8 +6,8 @@ use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode,
-    StencilFace, StencilOp, Topology, Viewport,
+    BlendEquation, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode, StencilFace, StencilOp,
+    Topology, Viewport,
 };
 use simdevice::texture::{
     AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
@@ -42,10 +42,7 @@ pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Erro
         T::TRIANGLE_LIST_WITH_ADJACENCY => Ok(Topology::TriangleListWithAdjacency),
         T::TRIANGLE_STRIP_WITH_ADJACENCY => Ok(Topology::TriangleStripWithAdjacency),
         T::PATCH_LIST => Ok(Topology::PatchList { control_points: 0 }),
-        other => Err(unknown(
-            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter",
-            &other,
-        )),
+        other => Err(unknown("VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter", &other)),
     }
 }
 
@@ -174,10 +171,7 @@ pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
         vk::LogicOp::OR_INVERTED => Ok(LogicOp::OrInverted),
         vk::LogicOp::NAND => Ok(LogicOp::Nand),
         vk::LogicOp::SET => Ok(LogicOp::Set),
-        other => Err(unknown(
-            "VUID-VkPipelineColorBlendStateCreateInfo-logicOpEnable-00607",
-            &other,
-        )),
+        other => Err(unknown("VUID-VkPipelineColorBlendStateCreateInfo-logicOpEnable-00607", &other)),
     }
 }
 
@@ -250,10 +244,7 @@ fn factor(factor: vk::BlendFactor, vuid: &'static str) -> Result<BlendFactor, Er
         F::SRC1_ALPHA => BlendFactor::Src1Alpha,
         F::ONE_MINUS_SRC1_ALPHA => BlendFactor::OneMinusSrc1Alpha,
         other => {
-            return Err(Error::usage(
-                vuid,
-                format!("{other:?} is not a VkBlendFactor"),
-            ));
+            return Err(Error::usage(vuid, format!("{other:?} is not a VkBlendFactor")));
         }
     })
 }
@@ -266,9 +257,7 @@ fn operation(op: vk::BlendOp) -> Result<BlendOp, Error> {
         vk::BlendOp::MIN => BlendOp::Min,
         vk::BlendOp::MAX => BlendOp::Max,
         other => {
-            return Err(Error::FeatureNotPresent(format!(
-                "blend operation {other:?}"
-            )));
+            return Err(Error::FeatureNotPresent(format!("blend operation {other:?}")));
         }
     })
 }
@@ -340,9 +329,7 @@ pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<Reduction, Err
         vk::SamplerReductionMode::WEIGHTED_AVERAGE => Ok(Reduction::WeightedAverage),
         vk::SamplerReductionMode::MIN => Ok(Reduction::Min),
         vk::SamplerReductionMode::MAX => Ok(Reduction::Max),
-        other => Err(Error::FeatureNotPresent(format!(
-            "reduction mode {other:?}"
-        ))),
+        other => Err(Error::FeatureNotPresent(format!("reduction mode {other:?}"))),
     }
 }
 
@@ -378,14 +365,8 @@ pub(crate) fn aspects(format: Format, mask: vk::ImageAspectFlags) -> Option<Vec<
         (vk::ImageAspectFlags::DEPTH, Aspect::Depth),
         (vk::ImageAspectFlags::STENCIL, Aspect::Stencil),
     ];
-    let known = named
-        .iter()
-        .fold(vk::ImageAspectFlags::empty(), |all, &(flag, _)| all | flag);
-    let chosen: Vec<_> = named
-        .iter()
-        .filter(|(flag, _)| mask.contains(*flag))
-        .map(|&(_, aspect)| aspect)
-        .collect();
+    let known = named.iter().fold(vk::ImageAspectFlags::empty(), |all, &(flag, _)| all | flag);
+    let chosen: Vec<_> = named.iter().filter(|(flag, _)| mask.contains(*flag)).map(|&(_, aspect)| aspect).collect();
     let has = |aspect| format.aspects().contains(aspect);
     let are_there = !mask.is_empty() && known.contains(mask) && chosen.iter().all(has);
     are_there.then_some(chosen)
@@ -405,12 +386,7 @@ pub(crate) fn viewport(viewport: vk::Viewport) -> Viewport {
 
 /// A rectangle for the device.
 pub(crate) fn rect(rect: vk::Rect2D) -> Rect {
-    Rect {
-        x: rect.offset.x,
-        y: rect.offset.y,
-        width: rect.extent.width,
-        height: rect.extent.height,
-    }
+    Rect { x: rect.offset.x, y: rect.offset.y, width: rect.extent.width, height: rect.extent.height }
 }
 
 /// A colour clear value for an image of that format.
@@ -428,10 +404,7 @@ pub(crate) fn clear_color(format: Format, value: vk::ClearColorValue) -> ClearVa
 
 /// A depth and stencil clear value.
 pub(crate) fn clear_depth_stencil(value: vk::ClearDepthStencilValue) -> ClearValue {
-    ClearValue::DepthStencil {
-        depth: value.depth,
-        stencil: value.stencil,
-    }
+    ClearValue::DepthStencil { depth: value.depth, stencil: value.stencil }
 }
 
 /// An attachment's clear value, read as its format calls for.

@@ -68,19 +68,13 @@ impl Device {
         });
         let start = |&family: &u32| {
             let processor = CommandProcessor::new(Arc::clone(&device.simulated));
-            let queue = Queue::start(
-                Arc::clone(&device.instance),
-                Arc::clone(&device.sync),
-                processor,
-            );
+            let queue = Queue::start(Arc::clone(&device.instance), Arc::clone(&device.sync), processor);
             queue.map(|queue| (family, queue))
         };
         let queues: Vec<_> = families.iter().map(start).collect::<Result<_, _>>()?;
         device.queues.get_or_init(|| {
             let queues = queues.into_iter();
-            queues
-                .map(|(family, queue)| (family, handle::create(queue)))
-                .collect()
+            queues.map(|(family, queue)| (family, handle::create(queue))).collect()
         });
         Ok(device)
     }
@@ -137,10 +131,7 @@ impl Device {
 
     /// The version and extensions under which commands are looked up through this device.
     pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
-        EnabledExtensions {
-            device_extensions: &self.extensions,
-            ..self.instance.enabled()
-        }
+        EnabledExtensions { device_extensions: &self.extensions, ..self.instance.enabled() }
     }
 
     /// Executes the work of its queues and joins their threads.
@@ -179,10 +170,7 @@ impl Drop for Device {
 ///
 /// # Safety
 /// The creation info is valid.
-unsafe fn requested_features(
-    info: &vk::DeviceCreateInfo<'_>,
-    extensions: &[&CStr],
-) -> Result<Features, Error> {
+unsafe fn requested_features(info: &vk::DeviceCreateInfo<'_>, extensions: &[&CStr]) -> Result<Features, Error> {
     let mut enabled = Features::NONE;
     // SAFETY: the pointer is null or valid in a valid creation info.
     if let Some(features) = unsafe { info.p_enabled_features.as_ref() } {
@@ -205,24 +193,15 @@ unsafe fn requested_features(
 /// Refuses features that are not supported.
 fn require_supported(requested: &Features) -> Result<(), Error> {
     let supported = SUPPORTED.list();
-    match requested
-        .list()
-        .into_iter()
-        .zip(supported)
-        .find(|((_, is_requested), (_, works))| *is_requested && !works)
-    {
+    match requested.list().into_iter().zip(supported).find(|((_, is_requested), (_, works))| *is_requested && !works) {
         None => Ok(()),
         Some(((name, _), _)) => Err(Error::FeatureNotPresent(format!("the feature {name}"))),
     }
 }
 
 /// Refuses features of an extension that isn't enabled.
-fn require_extension(
-    structure: &vk::BaseInStructure<'_>,
-    extensions: &[&CStr],
-) -> Result<(), Error> {
-    let Some(needed) = extension_of(structure.s_type).filter(|name| !extensions.contains(name))
-    else {
+fn require_extension(structure: &vk::BaseInStructure<'_>, extensions: &[&CStr]) -> Result<(), Error> {
+    let Some(needed) = extension_of(structure.s_type).filter(|name| !extensions.contains(name)) else {
         return Ok(());
     };
     let mut requested = Features::NONE;
@@ -261,8 +240,7 @@ impl PrivateDataSlot {
 /// The creation info is valid.
 unsafe fn queue_families(info: &vk::DeviceCreateInfo<'_>) -> Result<Vec<u32>, Error> {
     // SAFETY: the caller promises a valid creation info.
-    let families =
-        unsafe { valid::slice(info.p_queue_create_infos, info.queue_create_info_count)? };
+    let families = unsafe { valid::slice(info.p_queue_create_infos, info.queue_create_info_count)? };
     let mut queues = Vec::new();
     for family in families {
         let exists = (family.queue_family_index as usize) < QUEUE_FAMILIES.len();
@@ -276,9 +254,7 @@ unsafe fn queue_families(info: &vk::DeviceCreateInfo<'_>) -> Result<Vec<u32>, Er
         }
         queues.extend((0..family.queue_count).map(|_| family.queue_family_index));
         if !family.flags.is_empty() {
-            return Err(Error::FeatureNotPresent(
-                "a queue's creation flag".to_owned(),
-            ));
+            return Err(Error::FeatureNotPresent("a queue's creation flag".to_owned()));
         }
     }
     Ok(queues)
@@ -294,10 +270,7 @@ pub(crate) unsafe fn create_device(
     let info = create_info;
     // SAFETY: the caller's promise.
     unsafe {
-        let names = valid::strings(
-            info.pp_enabled_extension_names,
-            info.enabled_extension_count,
-        )?;
+        let names = valid::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?;
         let extensions = resolve_extensions(registry::extensions::DEVICE, &names)?;
         let features = requested_features(info, &extensions)?;
         let instance = physical_device.require_instance()?;
@@ -306,13 +279,7 @@ pub(crate) unsafe fn create_device(
         {
             warn_of_lost_features(&instance);
         }
-        Device::new(
-            instance,
-            extensions,
-            features,
-            environment::open_device()?,
-            &queue_families(info)?,
-        )
+        Device::new(instance, extensions, features, environment::open_device()?, &queue_families(info)?)
     }
 }
 
@@ -342,26 +309,15 @@ pub(crate) fn destroy_device(device: Option<Arc<Device>>) -> Result<(), Error> {
 }
 
 #[doc(alias = "vkGetDeviceQueue")]
-pub(crate) fn get_device_queue(
-    device: &Device,
-    queue_family_index: u32,
-    queue_index: u32,
-) -> Result<vk::Queue, Error> {
+pub(crate) fn get_device_queue(device: &Device, queue_family_index: u32, queue_index: u32) -> Result<vk::Queue, Error> {
     let found = device.queue(queue_family_index, queue_index);
     Ok(found.unwrap_or_default())
 }
 
 #[doc(alias = "vkGetDeviceQueue2")]
-pub(crate) fn get_device_queue2(
-    device: &Device,
-    queue_info: &vk::DeviceQueueInfo2<'_>,
-) -> Result<vk::Queue, Error> {
+pub(crate) fn get_device_queue2(device: &Device, queue_info: &vk::DeviceQueueInfo2<'_>) -> Result<vk::Queue, Error> {
     if queue_info.flags.is_empty() {
-        get_device_queue(
-            device,
-            queue_info.queue_family_index,
-            queue_info.queue_index,
-        )
+        get_device_queue(device, queue_info.queue_family_index, queue_info.queue_index)
     } else {
         Ok(vk::Queue::null())
     }
@@ -434,10 +390,7 @@ mod tests {
     /// The number of supported features of a structure.
     fn count<T: vk::TaggedStructure + Default>() -> usize {
         let mut structure = T::default();
-        let mut head = vk::PhysicalDeviceFeatures2 {
-            p_next: (&raw mut structure).cast(),
-            ..Default::default()
-        };
+        let mut head = vk::PhysicalDeviceFeatures2 { p_next: (&raw mut structure).cast(), ..Default::default() };
         let mut features = Features::NONE;
         // SAFETY: the structure is alone in its chain.
         unsafe {
@@ -498,8 +451,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                42, 9, 43, 14, 1, 1, 1, 2, 3, 1, 1, 3, 1, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1,
-                6, 3, 4, 1, 16, 1, 1, 2, 1, 26
+                42, 9, 43, 14, 1, 1, 1, 2, 3, 1, 1, 3, 1, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1, 16, 1,
+                1, 2, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
@@ -508,11 +461,8 @@ mod tests {
     #[test]
     fn missing_features_are_listed_truly() {
         let supported: HashMap<_, _> = SUPPORTED.list().into_iter().collect();
-        let mut missing: Vec<_> = MANDATORY
-            .iter()
-            .flat_map(|(_, names)| names.iter().copied())
-            .filter(|name| !supported[name])
-            .collect();
+        let mut missing: Vec<_> =
+            MANDATORY.iter().flat_map(|(_, names)| names.iter().copied()).filter(|name| !supported[name]).collect();
         missing.sort_unstable();
         assert_eq!(missing, REQUIRED_BUT_MISSING);
     }
@@ -525,9 +475,7 @@ mod tests {
         };
         let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
-        let info = vk::DeviceCreateInfo::default()
-            .enabled_features(&core)
-            .push_next(&mut works);
+        let info = vk::DeviceCreateInfo::default().enabled_features(&core).push_next(&mut works);
         let enabled = request(&info).unwrap();
         assert!(enabled.dynamic_rendering && enabled.robust_buffer_access);
         assert!(!enabled.synchronization2);
@@ -538,26 +486,15 @@ mod tests {
             assert!(error.to_string().contains(name), "{error}");
         };
         let core = vk::PhysicalDeviceFeatures::default().sparse_residency_buffer(true);
-        refused(
-            request(&vk::DeviceCreateInfo::default().enabled_features(&core)),
-            "sparseResidencyBuffer",
-        );
+        refused(request(&vk::DeviceCreateInfo::default().enabled_features(&core)), "sparseResidencyBuffer");
         let mut core = vk::PhysicalDeviceFeatures2::default();
         core.features.sparse_binding = vk::TRUE;
-        refused(
-            request(&vk::DeviceCreateInfo::default().push_next(&mut core)),
-            "sparseBinding",
-        );
-        let mut missing = vk::PhysicalDeviceVulkan13Features::default()
-            .dynamic_rendering(true)
-            .texture_compression_astc_hdr(true);
-        refused(
-            request(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "textureCompressionASTC_HDR",
-        );
+        refused(request(&vk::DeviceCreateInfo::default().push_next(&mut core)), "sparseBinding");
+        let mut missing =
+            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).texture_compression_astc_hdr(true);
+        refused(request(&vk::DeviceCreateInfo::default().push_next(&mut missing)), "textureCompressionASTC_HDR");
 
-        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
-            .performance_counter_query_pools(true);
+        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default().performance_counter_query_pools(true);
         let error = request(&vk::DeviceCreateInfo::default().push_next(&mut other)).unwrap_err();
         assert!(error.is_usage(), "{error}");
     }

@@ -26,11 +26,7 @@ struct Given {
 
 impl Default for Addresses {
     fn default() -> Self {
-        Self(Mutex::new(Given {
-            next: FIRST,
-            buffers: BTreeMap::new(),
-            table: None,
-        }))
+        Self(Mutex::new(Given { next: FIRST, buffers: BTreeMap::new(), table: None }))
     }
 }
 
@@ -80,11 +76,7 @@ mod tests {
     fn addresses_are_of_buffers_that_live() {
         let addresses = Addresses::default();
         let memory = Allocation::new_zeroed(4096).unwrap();
-        let range = |offset, size| BufferRange {
-            memory: memory.clone(),
-            offset,
-            size,
-        };
+        let range = |offset, size| BufferRange { memory: memory.clone(), offset, size };
         let first = addresses.add(range(0, 100));
         let second = addresses.add(range(512, 64));
         let found = |address| {

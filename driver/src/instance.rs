@@ -21,27 +21,21 @@ pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
 
 /// The names of all device extensions.
 pub(crate) fn device_extension_names() -> &'static [&'static CStr] {
-    static NAMES: LazyLock<Vec<&'static CStr>> =
-        LazyLock::new(|| DEVICE.iter().map(|&(name, _)| name).collect());
+    static NAMES: LazyLock<Vec<&'static CStr>> = LazyLock::new(|| DEVICE.iter().map(|&(name, _)| name).collect());
     &NAMES
 }
 
 /// The instance extensions; those of window systems only if there are window systems.
 fn instance_extensions() -> Vec<Extension> {
     let listed = INSTANCE.iter().copied();
-    listed
-        .filter(|(name, _)| window::is_available(name))
-        .collect()
+    listed.filter(|(name, _)| window::is_available(name)).collect()
 }
 
 /// The requested extensions, as the driver's own names.
 ///
 /// # Errors
 /// [`Error::ExtensionNotPresent`] for the first that isn't in `available`.
-pub(crate) fn resolve_extensions(
-    available: &[Extension],
-    requested: &[&CStr],
-) -> Result<Vec<&'static CStr>, Error> {
+pub(crate) fn resolve_extensions(available: &[Extension], requested: &[&CStr]) -> Result<Vec<&'static CStr>, Error> {
     requested
         .iter()
         .map(|&name| {
@@ -188,10 +182,7 @@ impl PhysicalDevice {
     /// # Errors
     /// [`Error::InvalidHandle`] if the instance has been destroyed.
     pub(crate) fn require_instance(&self) -> Result<Arc<Instance>, Error> {
-        self.instance.upgrade().ok_or(Error::InvalidHandle {
-            expected: vk::ObjectType::INSTANCE,
-            raw: 0,
-        })
+        self.instance.upgrade().ok_or(Error::InvalidHandle { expected: vk::ObjectType::INSTANCE, raw: 0 })
     }
 }
 
@@ -201,10 +192,7 @@ unsafe fn new_instance(info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance
     let (layers, names) = unsafe {
         (
             valid::slice(info.pp_enabled_layer_names, info.enabled_layer_count)?,
-            valid::strings(
-                info.pp_enabled_extension_names,
-                info.enabled_extension_count,
-            )?,
+            valid::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?,
         )
     };
     if !layers.is_empty() {
@@ -212,10 +200,7 @@ unsafe fn new_instance(info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance
     }
     // SAFETY: as above.
     let application = unsafe { valid::optional(info.p_application_info) };
-    Instance::new(
-        application.map_or(0, |application| application.api_version),
-        &names,
-    )
+    Instance::new(application.map_or(0, |application| application.api_version), &names)
 }
 
 #[doc(alias = "vkEnumerateInstanceVersion")]
@@ -241,9 +226,7 @@ pub(crate) fn enumerate_instance_layer_properties() -> Result<[vk::LayerProperti
 /// # Safety
 /// The create info and its chain are valid.
 #[doc(alias = "vkCreateInstance")]
-pub(crate) unsafe fn create_instance(
-    create_info: &vk::InstanceCreateInfo<'_>,
-) -> Result<Arc<Instance>, Error> {
+pub(crate) unsafe fn create_instance(create_info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance>, Error> {
     // SAFETY: the caller's promise.
     unsafe { new_instance(create_info) }.inspect_err(|error| {
         // Listeners in the chain receive errors of the creation of the instance itself.
@@ -261,9 +244,7 @@ pub(crate) unsafe fn create_instance(
 }
 
 #[doc(alias = "vkEnumeratePhysicalDevices")]
-pub(crate) fn enumerate_physical_devices(
-    instance: &Instance,
-) -> Result<[vk::PhysicalDevice; 1], Error> {
+pub(crate) fn enumerate_physical_devices(instance: &Instance) -> Result<[vk::PhysicalDevice; 1], Error> {
     Ok([instance.physical_device()])
 }
 
@@ -349,13 +330,7 @@ pub(crate) fn debug_report_message(
     layer_prefix: &CStr,
     message: &CStr,
 ) -> Result<(), Error> {
-    let origin = ReportOrigin {
-        object_type,
-        object,
-        location,
-        message_code,
-        layer_prefix,
-    };
+    let origin = ReportOrigin { object_type, object, location, message_code, layer_prefix };
     for callback in instance.report_callbacks.all() {
         // SAFETY: the callback is registered, so it is callable.
         unsafe { callback.submit(flags, origin, message) };

@@ -39,9 +39,5 @@ pub use abi::handle::live_handles;
 /// any thread, as Vulkan allows.
 pub fn entry() -> ash::Entry {
     // SAFETY: the function behaves as Vulkan specifies and exists as long as the program.
-    unsafe {
-        ash::Entry::from_static_fn(ash::StaticFn {
-            get_instance_proc_addr: dispatch::vkGetInstanceProcAddr,
-        })
-    }
+    unsafe { ash::Entry::from_static_fn(ash::StaticFn { get_instance_proc_addr: dispatch::vkGetInstanceProcAddr }) }
 }

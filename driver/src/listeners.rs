@@ -22,12 +22,7 @@ impl Message {
         id: &str,
         text: &str,
     ) -> Self {
-        Self {
-            severity,
-            types,
-            id: c_string(id),
-            text: c_string(text),
-        }
+        Self { severity, types, id: c_string(id), text: c_string(text) }
     }
 
     /// The message about an error of the Vulkan command `command`.
@@ -49,9 +44,7 @@ impl Message {
     fn flags(&self) -> vk::DebugReportFlagsEXT {
         use vk::DebugReportFlagsEXT as Flags;
         use vk::DebugUtilsMessageSeverityFlagsEXT as Severity;
-        let is_of_performance = self
-            .types
-            .contains(vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE);
+        let is_of_performance = self.types.contains(vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE);
         match self.severity {
             Severity::ERROR => Flags::ERROR,
             Severity::WARNING if is_of_performance => Flags::PERFORMANCE_WARNING,
@@ -140,9 +133,8 @@ impl DebugMessenger {
 
     /// As [`DebugMessenger::submit`], with a message of the driver.
     pub(crate) fn report(&self, message: &Message) {
-        let data = vk::DebugUtilsMessengerCallbackDataEXT::default()
-            .message_id_name(&message.id)
-            .message(&message.text);
+        let data =
+            vk::DebugUtilsMessengerCallbackDataEXT::default().message_id_name(&message.id).message(&message.text);
         // SAFETY: the strings outlive the call; the messenger is registered, so its callback is callable.
         unsafe { self.submit(message.severity, message.types, &data) };
     }
@@ -173,23 +165,14 @@ pub(crate) struct ReportOrigin<'a> {
 impl DebugReportCallback {
     /// The callback that the application describes.
     pub(crate) fn new(info: &vk::DebugReportCallbackCreateInfoEXT<'_>) -> Self {
-        Self {
-            flags: info.flags,
-            callback: info.pfn_callback,
-            user_data: info.p_user_data,
-        }
+        Self { flags: info.flags, callback: info.pfn_callback, user_data: info.p_user_data }
     }
 
     /// Calls the application's callback if its filter accepts one of the flags.
     ///
     /// # Safety
     /// The application keeps its callback callable while it is registered.
-    pub(crate) unsafe fn submit(
-        &self,
-        flags: vk::DebugReportFlagsEXT,
-        origin: ReportOrigin<'_>,
-        text: &CStr,
-    ) {
+    pub(crate) unsafe fn submit(&self, flags: vk::DebugReportFlagsEXT, origin: ReportOrigin<'_>, text: &CStr) {
         let wanted = self.flags.intersects(flags);
         if let Some(callback) = self.callback.filter(|_| wanted) {
             // SAFETY: the caller's promise; the strings outlive the call. The callback's result, which asks to abort the

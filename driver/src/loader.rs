@@ -22,11 +22,7 @@ pub unsafe fn negotiate_interface_version(version: *mut u32) -> vk::Result {
         // SAFETY: the caller's promise.
         let version = unsafe { valid::output_structure(version)? };
         *version = NEWEST_INTERFACE.min(*version);
-        Ok(if *version < OLDEST_INTERFACE {
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER
-        } else {
-            vk::Result::SUCCESS
-        })
+        Ok(if *version < OLDEST_INTERFACE { vk::Result::ERROR_INCOMPATIBLE_DRIVER } else { vk::Result::SUCCESS })
     })
 }
 
@@ -34,10 +30,7 @@ pub unsafe fn negotiate_interface_version(version: *mut u32) -> vk::Result {
 ///
 /// # Safety
 /// `instance` is null or valid, and `name` is a string.
-pub unsafe fn get_instance_proc_addr(
-    instance: vk::Instance,
-    name: *const c_char,
-) -> vk::PFN_vkVoidFunction {
+pub unsafe fn get_instance_proc_addr(instance: vk::Instance, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the caller's promise.
     unsafe { dispatch::vkGetInstanceProcAddr(instance, name) }
 }
@@ -46,10 +39,7 @@ pub unsafe fn get_instance_proc_addr(
 ///
 /// # Safety
 /// `instance` is valid, and `name` is a string.
-pub unsafe fn get_physical_device_proc_addr(
-    instance: vk::Instance,
-    name: *const c_char,
-) -> vk::PFN_vkVoidFunction {
+pub unsafe fn get_physical_device_proc_addr(instance: vk::Instance, name: *const c_char) -> vk::PFN_vkVoidFunction {
     guard(instance, "vk_icdGetPhysicalDeviceProcAddr", || {
         // SAFETY: the caller's promise.
         let (instance, name) = unsafe { (handle::get(instance)?, valid::string(name)) };

@@ -54,50 +54,17 @@ impl QueryType {
     /// Pipeline statistics, from the lowest flag to the highest.
     pub(crate) fn statistics(flags: Statistic) -> Self {
         const ALL: [(Statistic, Option<Counter>); 11] = [
-            (
-                Statistic::INPUT_ASSEMBLY_VERTICES,
-                Some(Counter::InputVertices),
-            ),
-            (
-                Statistic::INPUT_ASSEMBLY_PRIMITIVES,
-                Some(Counter::InputPrimitives),
-            ),
-            (
-                Statistic::VERTEX_SHADER_INVOCATIONS,
-                Some(Counter::VertexInvocations),
-            ),
-            (
-                Statistic::GEOMETRY_SHADER_INVOCATIONS,
-                Some(Counter::GeometryInvocations),
-            ),
-            (
-                Statistic::GEOMETRY_SHADER_PRIMITIVES,
-                Some(Counter::GeometryPrimitives),
-            ),
-            (
-                Statistic::CLIPPING_INVOCATIONS,
-                Some(Counter::ClippingInvocations),
-            ),
-            (
-                Statistic::CLIPPING_PRIMITIVES,
-                Some(Counter::ClippingPrimitives),
-            ),
-            (
-                Statistic::FRAGMENT_SHADER_INVOCATIONS,
-                Some(Counter::FragmentInvocations),
-            ),
-            (
-                Statistic::TESSELLATION_CONTROL_SHADER_PATCHES,
-                Some(Counter::TessellationPatches),
-            ),
-            (
-                Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS,
-                Some(Counter::TessellationInvocations),
-            ),
-            (
-                Statistic::COMPUTE_SHADER_INVOCATIONS,
-                Some(Counter::ComputeInvocations),
-            ),
+            (Statistic::INPUT_ASSEMBLY_VERTICES, Some(Counter::InputVertices)),
+            (Statistic::INPUT_ASSEMBLY_PRIMITIVES, Some(Counter::InputPrimitives)),
+            (Statistic::VERTEX_SHADER_INVOCATIONS, Some(Counter::VertexInvocations)),
+            (Statistic::GEOMETRY_SHADER_INVOCATIONS, Some(Counter::GeometryInvocations)),
+            (Statistic::GEOMETRY_SHADER_PRIMITIVES, Some(Counter::GeometryPrimitives)),
+            (Statistic::CLIPPING_INVOCATIONS, Some(Counter::ClippingInvocations)),
+            (Statistic::CLIPPING_PRIMITIVES, Some(Counter::ClippingPrimitives)),
+            (Statistic::FRAGMENT_SHADER_INVOCATIONS, Some(Counter::FragmentInvocations)),
+            (Statistic::TESSELLATION_CONTROL_SHADER_PATCHES, Some(Counter::TessellationPatches)),
+            (Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS, Some(Counter::TessellationInvocations)),
+            (Statistic::COMPUTE_SHADER_INVOCATIONS, Some(Counter::ComputeInvocations)),
         ];
         let counted = ALL.iter().filter(|(flag, _)| flags.contains(*flag));
         Self::Words(counted.map(|(_, counter)| *counter).collect())
@@ -106,12 +73,8 @@ impl QueryType {
     fn kind(&self) -> QueryKind {
         match self {
             Self::Timestamp => QueryKind::Timestamp,
-            Self::Performance(counters) if counters.iter().any(is_simulated) => {
-                QueryKind::Simulated
-            }
-            Self::Words(counters) if counters.contains(&Some(Counter::FragmentInvocations)) => {
-                QueryKind::Fragments
-            }
+            Self::Performance(counters) if counters.iter().any(is_simulated) => QueryKind::Simulated,
+            Self::Words(counters) if counters.contains(&Some(Counter::FragmentInvocations)) => QueryKind::Fragments,
             Self::Performance(_) | Self::Words(_) | Self::OfStream(_) => QueryKind::Performance,
         }
     }
@@ -174,22 +137,15 @@ impl QueryPool {
         flags: QueryResultFlags,
     ) -> Vec<(u64, Vec<u8>)> {
         // A VkPerformanceCounterResultKHR has eight bytes, whatever the flags say.
-        let wide = flags.contains(QueryResultFlags::TYPE_64)
-            || matches!(self.query_type, QueryType::Performance(_));
+        let wide = flags.contains(QueryResultFlags::TYPE_64) || matches!(self.query_type, QueryType::Performance(_));
         let word = |value: u64| {
-            if wide {
-                value.to_ne_bytes().to_vec()
-            } else {
-                (value as u32).to_ne_bytes().to_vec()
-            }
+            if wide { value.to_ne_bytes().to_vec() } else { (value as u32).to_ne_bytes().to_vec() }
         };
         let mut written = Vec::new();
         let values = match result {
             Some(result) => Some(self.values(query, result)),
             // The partial result is zero: counters are only known when the query ends.
-            None if flags.contains(QueryResultFlags::PARTIAL) => {
-                Some(vec![0; self.query_type.count()])
-            }
+            None if flags.contains(QueryResultFlags::PARTIAL) => Some(vec![0; self.query_type.count()]),
             None => None,
         };
         if let Some(values) = values {
@@ -216,15 +172,11 @@ impl QueryPool {
             }
             QueryType::Performance(indices) => {
                 let value = |&index: &u32| counters.values().get(index as usize).copied();
-                indices
-                    .iter()
-                    .map(|index| value(index).unwrap_or(0))
-                    .collect()
+                indices.iter().map(|index| value(index).unwrap_or(0)).collect()
             }
-            QueryType::Words(counted) => counted
-                .iter()
-                .map(|counter| counter.map_or(0, |counter| counters.get(counter)))
-                .collect(),
+            QueryType::Words(counted) => {
+                counted.iter().map(|counter| counter.map_or(0, |counter| counters.get(counter))).collect()
+            }
         }
     }
 }
@@ -250,22 +202,11 @@ fn result(
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] with the id `vuid`.
-pub(crate) fn require_queries(
-    pool: &QueryPool,
-    first: u32,
-    count: u32,
-    vuid: &'static str,
-) -> Result<(), Error> {
+pub(crate) fn require_queries(pool: &QueryPool, first: u32, count: u32, vuid: &'static str) -> Result<(), Error> {
     if pool.has(first, count) {
         return Ok(());
     }
-    Err(Error::usage(
-        vuid,
-        format!(
-            "{count} queries from {first} on of a pool of {}",
-            pool.queries.count()
-        ),
-    ))
+    Err(Error::usage(vuid, format!("{count} queries from {first} on of a pool of {}", pool.queries.count())))
 }
 
 /// The pool of a create info.
@@ -280,9 +221,7 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
         vk::QueryType::TRANSFORM_FEEDBACK_STREAM_EXT => {
             QueryType::OfStream(&[Counter::CAPTURED, Counter::CAPTURE_NEEDED])
         }
-        vk::QueryType::PRIMITIVES_GENERATED_EXT => {
-            QueryType::OfStream(&[Counter::PRIMITIVES_OF_STREAMS])
-        }
+        vk::QueryType::PRIMITIVES_GENERATED_EXT => QueryType::OfStream(&[Counter::PRIMITIVES_OF_STREAMS]),
         vk::QueryType::PERFORMANCE_QUERY_KHR => {
             // SAFETY: the caller's promise.
             let counters = unsafe {
@@ -306,9 +245,7 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
             QueryType::Performance(counters.to_vec())
         }
         other => {
-            return Err(Error::FeatureNotPresent(format!(
-                "a query pool of type {other:?}"
-            )));
+            return Err(Error::FeatureNotPresent(format!("a query pool of type {other:?}")));
         }
     };
     Ok(QueryPool::new(query_type, info.query_count))
@@ -317,19 +254,13 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
 /// # Safety
 /// The create info's chain is valid.
 #[doc(alias = "vkCreateQueryPool")]
-pub(crate) unsafe fn create_query_pool(
-    create_info: &vk::QueryPoolCreateInfo<'_>,
-) -> Result<Arc<QueryPool>, Error> {
+pub(crate) unsafe fn create_query_pool(create_info: &vk::QueryPoolCreateInfo<'_>) -> Result<Arc<QueryPool>, Error> {
     // SAFETY: the caller's promise.
     unsafe { new_pool(create_info) }.map(Arc::new)
 }
 
 #[doc(alias = "vkResetQueryPool")]
-pub(crate) fn reset_query_pool(
-    query_pool: &QueryPool,
-    first_query: u32,
-    query_count: u32,
-) -> Result<(), Error> {
+pub(crate) fn reset_query_pool(query_pool: &QueryPool, first_query: u32, query_count: u32) -> Result<(), Error> {
     query_pool.queries.reset(first_query, query_count);
     Ok(())
 }
@@ -344,12 +275,7 @@ pub(crate) fn get_query_pool_results(
     stride: vk::DeviceSize,
     flags: QueryResultFlags,
 ) -> Result<vk::Result, Error> {
-    require_queries(
-        query_pool,
-        first_query,
-        query_count,
-        "VUID-vkGetQueryPoolResults-firstQuery-00816",
-    )?;
+    require_queries(query_pool, first_query, query_count, "VUID-vkGetQueryPoolResults-firstQuery-00816")?;
     let mut all_available = true;
     for index in 0..query_count {
         let result = result(query_pool, first_query + index, flags, device.sync())?;
@@ -359,10 +285,7 @@ pub(crate) fn get_query_pool_results(
             let Some(target) = data.get_mut(offset..offset + bytes.len()) else {
                 return Err(Error::usage(
                     "VUID-vkGetQueryPoolResults-dataSize-00817",
-                    format!(
-                        "dataSize is {}, too small for {query_count} queries",
-                        data.len()
-                    ),
+                    format!("dataSize is {}, too small for {query_count} queries", data.len()),
                 ));
             };
             for (byte, value) in target.iter_mut().zip(bytes) {
@@ -370,11 +293,7 @@ pub(crate) fn get_query_pool_results(
             }
         }
     }
-    Ok(if all_available {
-        vk::Result::SUCCESS
-    } else {
-        vk::Result::NOT_READY
-    })
+    Ok(if all_available { vk::Result::SUCCESS } else { vk::Result::NOT_READY })
 }
 
 #[cfg(test)]
@@ -387,10 +306,7 @@ mod tests {
         let mut counters = Counters::default();
         counters.add(Counter::GaussiansRead, 7);
         counters.add(Counter::GaussiansDrawn, 5);
-        let order = vec![
-            Counter::GaussiansDrawn as u32,
-            Counter::GaussiansRead as u32,
-        ];
+        let order = vec![Counter::GaussiansDrawn as u32, Counter::GaussiansRead as u32];
         let pool = QueryPool::new(QueryType::Performance(order), 1);
         let result = QueryResult::Performance(Box::new(counters));
         let written = pool.written(0, Some(&result), QueryResultFlags::empty());
@@ -405,15 +321,9 @@ mod tests {
         let result = QueryResult::Timestamp((1 << 32) + 9);
         assert_eq!(
             pool.written(0, Some(&result), flags),
-            [
-                (0, 9u32.to_ne_bytes().to_vec()),
-                (4, 1u32.to_ne_bytes().to_vec())
-            ]
+            [(0, 9u32.to_ne_bytes().to_vec()), (4, 1u32.to_ne_bytes().to_vec())]
         );
-        assert_eq!(
-            pool.written(0, None, flags | QueryResultFlags::TYPE_64),
-            [(8, 0u64.to_ne_bytes().to_vec())]
-        );
+        assert_eq!(pool.written(0, None, flags | QueryResultFlags::TYPE_64), [(8, 0u64.to_ne_bytes().to_vec())]);
         assert!(pool.written(0, None, QueryResultFlags::TYPE_64).is_empty());
         assert!(pool.has(1, 2) && !pool.has(2, 2) && !pool.has(u32::MAX, 2));
     }
@@ -430,10 +340,7 @@ mod tests {
         let result = QueryResult::Performance(Box::new(counters));
         let words = |words: [u32; 3]| words.map(u32::to_ne_bytes).concat();
         let none = QueryResultFlags::empty();
-        assert_eq!(
-            pool.written(0, Some(&result), none),
-            [(0, words([3, 0, 7]))]
-        );
+        assert_eq!(pool.written(0, Some(&result), none), [(0, words([3, 0, 7]))]);
         assert!(pool.written(0, None, none).is_empty());
         let partial = pool.written(0, None, QueryResultFlags::PARTIAL);
         assert_eq!(partial, [(0, words([0; 3]))]);

@@ -55,14 +55,8 @@ impl Queue {
         let thread = std::thread::Builder::new()
             .name("gaurast-queue".to_owned())
             .spawn(move || run(&receiver, processor, &thread_sync))
-            .map_err(|error| {
-                Error::InitializationFailed(format!("the queue's thread cannot start: {error}"))
-            })?;
-        Ok(Arc::new(Self {
-            instance,
-            sync,
-            worker: Mutex::new(Some(Worker { work, thread })),
-        }))
+            .map_err(|error| Error::InitializationFailed(format!("the queue's thread cannot start: {error}")))?;
+        Ok(Arc::new(Self { instance, sync, worker: Mutex::new(Some(Worker { work, thread })) }))
     }
 
     /// The instance of its device.
@@ -106,11 +100,7 @@ impl Queue {
 
     /// Executes the submitted work, ends the thread and joins it.
     pub(crate) fn stop(&self) {
-        let worker = self
-            .worker
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(Worker { work, thread }) = worker else {
             return;
         };
@@ -149,12 +139,8 @@ mod tests {
 
     fn queue() -> Arc<Queue> {
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        Queue::start(
-            Instance::new(0, &[]).unwrap(),
-            Arc::default(),
-            CommandProcessor::new(Arc::new(simulated)),
-        )
-        .unwrap()
+        Queue::start(Instance::new(0, &[]).unwrap(), Arc::default(), CommandProcessor::new(Arc::new(simulated)))
+            .unwrap()
     }
 
     #[test]
@@ -163,15 +149,10 @@ mod tests {
         let (sent, received) = channel();
         for index in 0..10 {
             let sent = sent.clone();
-            queue
-                .submit(Box::new(move |_| sent.send(index).unwrap()))
-                .unwrap();
+            queue.submit(Box::new(move |_| sent.send(index).unwrap())).unwrap();
         }
         queue.wait_idle().unwrap();
-        assert_eq!(
-            received.try_iter().collect::<Vec<_>>(),
-            (0..10).collect::<Vec<_>>()
-        );
+        assert_eq!(received.try_iter().collect::<Vec<_>>(), (0..10).collect::<Vec<_>>());
         queue.stop();
         queue.stop();
         assert!(queue.submit(Box::new(|_| ())).is_err());

@@ -96,8 +96,7 @@ impl Subpass {
         let whole = resolve.filter(|it| it.depth.is_some() && it.stencil.is_some());
         let resolved = whole.map(|resolve| resolve.attachment);
         let lists = [&self.color, &self.resolve];
-        lists.iter().any(|list| list.contains(&Some(index)))
-            || [self.depth_stencil, resolved].contains(&Some(index))
+        lists.iter().any(|list| list.contains(&Some(index))) || [self.depth_stencil, resolved].contains(&Some(index))
     }
 }
 
@@ -111,33 +110,23 @@ impl RenderPass {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if there is no subpass or a subpass names an attachment that doesn't exist.
-    pub(crate) fn new(
-        attachments: Vec<AttachmentDescription>,
-        subpasses: Vec<Subpass>,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(attachments: Vec<AttachmentDescription>, subpasses: Vec<Subpass>) -> Result<Self, Error> {
         let exists = |index: usize| index < attachments.len();
-        let valid = subpasses
-            .iter()
-            .all(|subpass| subpass.attachments().into_iter().all(exists));
+        let valid = subpasses.iter().all(|subpass| subpass.attachments().into_iter().all(exists));
         if subpasses.is_empty() || !valid {
             return Err(Error::usage(
                 "VUID-VkRenderPassCreateInfo-attachment-00834",
                 "a render pass has no subpass, or one that names an attachment that isn't there",
             ));
         }
-        Ok(Self {
-            attachments,
-            subpasses,
-        })
+        Ok(Self { attachments, subpasses })
     }
 
     /// The views, a bit each, for which `subpass` is the first to use attachment number `index`. A pass without views
     /// counts as one with one view.
     pub(crate) fn first_views(&self, subpass: usize, index: usize) -> u32 {
         let earlier = self.subpasses[..subpass].iter();
-        let used = earlier
-            .filter(|s| s.uses(index))
-            .fold(0, |used, s| used | s.views());
+        let used = earlier.filter(|s| s.uses(index)).fold(0, |used, s| used | s.views());
         self.subpasses[subpass].views() & !used
     }
 
@@ -166,11 +155,7 @@ impl RenderPass {
     /// The formats of a subpass's colour attachments; undefined if unused.
     pub(crate) fn color_formats(&self, subpass: usize) -> Option<Vec<vk::Format>> {
         let subpass = self.subpasses.get(subpass)?;
-        let format = |used: &Option<usize>| {
-            used.map_or(vk::Format::UNDEFINED, |index| {
-                self.attachments[index].format
-            })
-        };
+        let format = |used: &Option<usize>| used.map_or(vk::Format::UNDEFINED, |index| self.attachments[index].format);
         Some(subpass.color.iter().map(format).collect())
     }
 }
@@ -210,10 +195,7 @@ macro_rules! subpass {
         let resolve_count = if has_resolve { count } else { 0 };
         let color = valid::slice(description.p_color_attachments, count)?;
         let resolve = valid::slice(description.p_resolve_attachments, resolve_count)?;
-        let input = valid::slice(
-            description.p_input_attachments,
-            description.input_attachment_count,
-        )?;
+        let input = valid::slice(description.p_input_attachments, description.input_attachment_count)?;
         let depth_stencil = valid::optional(description.p_depth_stencil_attachment);
         Subpass {
             color: color.iter().map(|r| used(r.attachment)).collect(),
@@ -281,10 +263,7 @@ pub(crate) unsafe fn create_render_pass(
         };
         let mut masks = masks.iter();
         let mut subpass = |description: &vk::SubpassDescription<'_>| {
-            Ok::<_, Error>(Subpass {
-                view_mask: masks.next().copied().unwrap_or(0),
-                ..subpass!(description)
-            })
+            Ok::<_, Error>(Subpass { view_mask: masks.next().copied().unwrap_or(0), ..subpass!(description) })
         };
         render_pass!(create_info, subpass)
     }
@@ -316,10 +295,7 @@ pub(crate) unsafe fn create_render_pass2(
 /// Returns a granularity of one pixel: no area is faster than another.
 #[doc(alias = "vkGetRenderAreaGranularity")]
 pub(crate) fn get_render_area_granularity() -> Result<vk::Extent2D, Error> {
-    Ok(vk::Extent2D {
-        width: 1,
-        height: 1,
-    })
+    Ok(vk::Extent2D { width: 1, height: 1 })
 }
 
 /// # Safety
@@ -333,16 +309,12 @@ pub(crate) unsafe fn create_framebuffer(
         None
     } else {
         // SAFETY: the caller's promise.
-        let views =
-            unsafe { handle::get_all(valid::slice(info.p_attachments, info.attachment_count)?)? };
+        let views = unsafe { handle::get_all(valid::slice(info.p_attachments, info.attachment_count)?)? };
         Some(views)
     };
     Ok(Arc::new(Framebuffer {
         views,
-        extent: vk::Extent2D {
-            width: info.width,
-            height: info.height,
-        },
+        extent: vk::Extent2D { width: info.width, height: info.height },
         layers: info.layers,
     }))
 }
@@ -360,41 +332,25 @@ mod tests {
     };
 
     fn subpass(color: &[Option<usize>]) -> Subpass {
-        Subpass {
-            color: color.to_vec(),
-            ..Subpass::default()
-        }
+        Subpass { color: color.to_vec(), ..Subpass::default() }
     }
 
     #[test]
     fn attachments_are_loaded_by_their_first_use_and_stored_by_their_last() {
-        let subpasses = vec![
-            subpass(&[Some(0)]),
-            subpass(&[None, Some(1)]),
-            subpass(&[Some(0)]),
-        ];
+        let subpasses = vec![subpass(&[Some(0)]), subpass(&[None, Some(1)]), subpass(&[Some(0)])];
         let pass = RenderPass::new(vec![DESCRIPTION; 2], subpasses).unwrap();
         assert!(pass.is_first_use(0, 0) && !pass.is_last_use(0, 0));
         assert!(pass.is_first_use(1, 1) && pass.is_last_use(1, 1));
         assert!(!pass.is_first_use(2, 0) && pass.is_last_use(2, 0));
-        assert_eq!(
-            pass.color_formats(1).unwrap(),
-            [vk::Format::UNDEFINED, vk::Format::R8G8B8A8_UNORM]
-        );
+        assert_eq!(pass.color_formats(1).unwrap(), [vk::Format::UNDEFINED, vk::Format::R8G8B8A8_UNORM]);
         assert!(pass.color_formats(3).is_none());
     }
 
     #[test]
     fn input_and_resolve_attachments_are_used_too() {
         let subpasses = vec![
-            Subpass {
-                resolve: vec![None, Some(2)],
-                ..subpass(&[Some(0)])
-            },
-            Subpass {
-                input: vec![Some(2), None, Some(3)],
-                ..subpass(&[Some(1)])
-            },
+            Subpass { resolve: vec![None, Some(2)], ..subpass(&[Some(0)]) },
+            Subpass { input: vec![Some(2), None, Some(3)], ..subpass(&[Some(1)]) },
             Subpass {
                 depth_stencil_resolve: Some(DepthStencilResolve {
                     attachment: 0,
@@ -410,10 +366,7 @@ mod tests {
         assert!(!pass.is_last_use(0, 0) && pass.is_last_use(2, 0));
         let read: Vec<_> = (0..4).map(|subpass| pass.loaded_before(subpass)).collect();
         assert_eq!(read, [vec![], vec![3], vec![], vec![]]);
-        let outside = Subpass {
-            input: vec![Some(1)],
-            ..subpass(&[])
-        };
+        let outside = Subpass { input: vec![Some(1)], ..subpass(&[]) };
         assert!(RenderPass::new(vec![DESCRIPTION], vec![outside]).is_err());
     }
 

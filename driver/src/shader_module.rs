@@ -36,15 +36,10 @@ impl ShaderModule {
     /// a capability whose feature isn't enabled.
     fn new(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
-            return Err(Error::usage(
-                "VUID-VkShaderModuleCreateInfo-pCode-08738",
-                "the code is not SPIR-V",
-            ));
+            return Err(Error::usage("VUID-VkShaderModuleCreateInfo-pCode-08738", "the code is not SPIR-V"));
         }
         check_capabilities(words, features, extensions)?;
-        Ok(Self {
-            words: host::boxed(words),
-        })
+        Ok(Self { words: host::boxed(words) })
     }
 
     /// Translates an entry point for the device.
@@ -69,11 +64,7 @@ impl ShaderModule {
 ///
 /// # Errors
 /// [`Error::FeatureNotEnabled`] names the capability and the features or extensions that enable it.
-fn check_capabilities(
-    words: &[u32],
-    features: &Features,
-    extensions: &[&CStr],
-) -> Result<(), Error> {
+fn check_capabilities(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<(), Error> {
     match declared(words)
         .filter(|&capability| is_supported(capability))
         .find(|&capability| !is_enabled(capability, features, extensions))
@@ -175,18 +166,15 @@ impl ShaderStage {
     ) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
         unsafe {
-            let name = valid::string(info.p_name).ok_or(Error::NullPointer {
-                what: "an entry point's name",
-            })?;
+            let name = valid::string(info.p_name).ok_or(Error::NullPointer { what: "an entry point's name" })?;
             let name = name.to_str().map_err(|_| {
                 Error::usage(
                     "VUID-VkPipelineShaderStageCreateInfo-pName-parameter",
                     "the entry point's name is not UTF-8",
                 )
             })?;
-            let required = valid::find_in_chain::<
-                vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
-            >(info.p_next);
+            let required =
+                valid::find_in_chain::<vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>>(info.p_next);
             Ok(Self {
                 module: module(device, info)?,
                 name: name.to_owned(),
@@ -232,10 +220,7 @@ impl ShaderStage {
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn module(
-    device: &Device,
-    info: &vk::PipelineShaderStageCreateInfo<'_>,
-) -> Result<Arc<ShaderModule>, Error> {
+unsafe fn module(device: &Device, info: &vk::PipelineShaderStageCreateInfo<'_>) -> Result<Arc<ShaderModule>, Error> {
     // SAFETY: the caller's promise.
     unsafe {
         if let Some(module) = handle::get_optional(info.module)? {
@@ -258,19 +243,14 @@ unsafe fn module(
     }
 }
 
-fn subgroup_size(
-    required: &vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
-) -> Result<u32, Error> {
+fn subgroup_size(required: &vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>) -> Result<u32, Error> {
     let size = required.required_subgroup_size;
     if size.is_power_of_two() && limits::SUBGROUP_SIZES.contains(&size) {
         return Ok(size);
     }
     Err(Error::usage(
         "VUID-VkPipelineShaderStageRequiredSubgroupSizeCreateInfo-requiredSubgroupSize-02760",
-        format!(
-            "the subgroup size {size} is not a power of two in {:?}",
-            limits::SUBGROUP_SIZES
-        ),
+        format!("the subgroup size {size} is not a power of two in {:?}", limits::SUBGROUP_SIZES),
     ))
 }
 
@@ -278,9 +258,7 @@ fn subgroup_size(
 ///
 /// # Safety
 /// The specialization info is valid.
-unsafe fn specialization(
-    info: Option<&vk::SpecializationInfo<'_>>,
-) -> Result<Specialization, Error> {
+unsafe fn specialization(info: Option<&vk::SpecializationInfo<'_>>) -> Result<Specialization, Error> {
     let mut specialization = Specialization::default();
     let Some(info) = info else {
         return Ok(specialization);
@@ -288,10 +266,7 @@ unsafe fn specialization(
     let size = u32::try_from(info.data_size).unwrap_or(u32::MAX);
     // SAFETY: the caller's promise.
     let (data, entries) = unsafe {
-        (
-            valid::slice(info.p_data.cast::<u8>(), size)?,
-            valid::slice(info.p_map_entries, info.map_entry_count)?,
-        )
+        (valid::slice(info.p_data.cast::<u8>(), size)?, valid::slice(info.p_map_entries, info.map_entry_count)?)
     };
     for entry in entries {
         let offset = entry.offset as usize;
@@ -340,23 +315,14 @@ mod tests {
 
     #[test]
     fn capabilities_need_their_features() {
-        let enabled = Features {
-            shader_int64: true,
-            shader_output_layer: true,
-            ..Features::NONE
-        };
-        let check = |capability| {
-            check_capabilities(&module(&[Capability::Shader, capability]), &enabled, &[])
-        };
+        let enabled = Features { shader_int64: true, shader_output_layer: true, ..Features::NONE };
+        let check = |capability| check_capabilities(&module(&[Capability::Shader, capability]), &enabled, &[]);
         assert!(check(Capability::Int64).is_ok());
         assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
         assert!(check(Capability::GroupNonUniformArithmetic).is_ok());
         for (capability, words) in [
             (Capability::Float64, "shaderFloat64, which is not enabled"),
-            (
-                Capability::PhysicalStorageBufferAddresses,
-                "bufferDeviceAddress, which is not enabled",
-            ),
+            (Capability::PhysicalStorageBufferAddresses, "bufferDeviceAddress, which is not enabled"),
         ] {
             let error = check(capability).unwrap_err();
             assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);

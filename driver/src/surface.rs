@@ -5,9 +5,7 @@ use crate::abi::handle::objects;
 use crate::abi::valid::{OutputChain, Structures};
 use crate::physical_device::formats::{self, ImageQuery};
 use crate::physical_device::limits;
-use crate::window::{
-    Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, window_system,
-};
+use crate::window::{Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, window_system};
 use ash::vk;
 use std::ffi::{CStr, c_void};
 use std::ptr::NonNull;
@@ -16,21 +14,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The extent of a surface whose size is that of its swapchain's images.
-const OF_THE_SWAPCHAIN: vk::Extent2D = vk::Extent2D {
-    width: u32::MAX,
-    height: u32::MAX,
-};
+const OF_THE_SWAPCHAIN: vk::Extent2D = vk::Extent2D { width: u32::MAX, height: u32::MAX };
 
 /// The formats of presented images: those that window systems accept without a conversion.
 const FORMATS: [vk::SurfaceFormatKHR; 2] = [
-    vk::SurfaceFormatKHR {
-        format: vk::Format::B8G8R8A8_UNORM,
-        color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR,
-    },
-    vk::SurfaceFormatKHR {
-        format: vk::Format::B8G8R8A8_SRGB,
-        color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR,
-    },
+    vk::SurfaceFormatKHR { format: vk::Format::B8G8R8A8_UNORM, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR },
+    vk::SurfaceFormatKHR { format: vk::Format::B8G8R8A8_SRGB, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR },
 ];
 
 /// A surface.
@@ -44,10 +33,7 @@ objects! { vk::SurfaceKHR => Surface; }
 
 impl Surface {
     fn new(window: Box<dyn Window>) -> Arc<Self> {
-        Arc::new(Self {
-            window,
-            is_taken: AtomicBool::new(false),
-        })
+        Arc::new(Self { window, is_taken: AtomicBool::new(false) })
     }
 
     /// Reserves it for a swapchain; only one at a time can have it.
@@ -109,18 +95,11 @@ impl Surface {
             }
             None => (
                 OF_THE_SWAPCHAIN,
-                vk::Extent2D {
-                    width: 1,
-                    height: 1,
-                },
-                vk::Extent2D {
-                    width: largest,
-                    height: largest,
-                },
+                vk::Extent2D { width: 1, height: 1 },
+                vk::Extent2D { width: largest, height: largest },
             ),
         };
-        let mut supported_composite_alpha =
-            vk::CompositeAlphaFlagsKHR::OPAQUE | vk::CompositeAlphaFlagsKHR::INHERIT;
+        let mut supported_composite_alpha = vk::CompositeAlphaFlagsKHR::OPAQUE | vk::CompositeAlphaFlagsKHR::INHERIT;
         if self.window.has_alpha() {
             supported_composite_alpha |= vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED;
         }
@@ -180,11 +159,7 @@ impl Window for Headless {
     }
 
     fn present_modes(&self) -> &'static [PresentMode] {
-        &[
-            PresentMode::Fifo,
-            PresentMode::Mailbox,
-            PresentMode::Immediate,
-        ]
+        &[PresentMode::Fifo, PresentMode::Mailbox, PresentMode::Immediate]
     }
 
     fn has_alpha(&self) -> bool {
@@ -216,8 +191,8 @@ pub(crate) fn create_headless_surface() -> Result<Arc<Surface>, Error> {
 /// # Safety
 /// The window's pointers are live until the surface and its swapchains are destroyed.
 unsafe fn create_surface(extension: &CStr, window: NativeWindow) -> Result<Arc<Surface>, Error> {
-    let system = window_system(extension)
-        .ok_or_else(|| Error::ExtensionNotPresent(extension.to_string_lossy().into_owned()))?;
+    let system =
+        window_system(extension).ok_or_else(|| Error::ExtensionNotPresent(extension.to_string_lossy().into_owned()))?;
     // SAFETY: the caller's promise.
     let window = unsafe { system.open(window) }.map_err(Error::SurfaceLost)?;
     Ok(Surface::new(window))
@@ -230,9 +205,7 @@ fn not_null(pointer: *mut c_void, what: &'static str) -> Result<NonNull<c_void>,
 /// # Safety
 /// The connection is live until the surface and its swapchains are destroyed.
 #[doc(alias = "vkCreateXcbSurfaceKHR")]
-pub(crate) unsafe fn create_xcb_surface(
-    create_info: &vk::XcbSurfaceCreateInfoKHR<'_>,
-) -> Result<Arc<Surface>, Error> {
+pub(crate) unsafe fn create_xcb_surface(create_info: &vk::XcbSurfaceCreateInfoKHR<'_>) -> Result<Arc<Surface>, Error> {
     let window = NativeWindow::Xcb {
         connection: not_null(create_info.connection, "xcb_connection_t")?,
         window: create_info.window,
@@ -280,16 +253,12 @@ pub(crate) fn get_physical_device_surface_support(_surface: &Surface) -> Result<
 #[doc(alias = "vkGetPhysicalDeviceXcbPresentationSupportKHR")]
 #[doc(alias = "vkGetPhysicalDeviceXlibPresentationSupportKHR")]
 #[doc(alias = "vkGetPhysicalDeviceWaylandPresentationSupportKHR")]
-pub(crate) fn get_physical_device_presentation_support(
-    _queue_family_index: u32,
-) -> Result<vk::Bool32, Error> {
+pub(crate) fn get_physical_device_presentation_support(_queue_family_index: u32) -> Result<vk::Bool32, Error> {
     Ok(vk::TRUE)
 }
 
 #[doc(alias = "vkGetPhysicalDeviceSurfaceCapabilitiesKHR")]
-pub(crate) fn get_physical_device_surface_capabilities(
-    surface: &Surface,
-) -> Result<vk::SurfaceCapabilitiesKHR, Error> {
+pub(crate) fn get_physical_device_surface_capabilities(surface: &Surface) -> Result<vk::SurfaceCapabilitiesKHR, Error> {
     surface.capabilities()
 }
 
@@ -319,22 +288,15 @@ pub(crate) fn get_physical_device_surface_formats2(
 }
 
 #[doc(alias = "vkGetPhysicalDeviceSurfacePresentModesKHR")]
-pub(crate) fn get_physical_device_surface_present_modes(
-    surface: &Surface,
-) -> Result<Vec<vk::PresentModeKHR>, Error> {
+pub(crate) fn get_physical_device_surface_present_modes(surface: &Surface) -> Result<Vec<vk::PresentModeKHR>, Error> {
     let modes = surface.window.present_modes().iter();
     Ok(modes.copied().map(present_mode).collect())
 }
 
 /// Returns one rectangle, the whole window.
 #[doc(alias = "vkGetPhysicalDevicePresentRectanglesKHR")]
-pub(crate) fn get_physical_device_present_rectangles(
-    surface: &Surface,
-) -> Result<Vec<vk::Rect2D>, Error> {
-    Ok(vec![vk::Rect2D {
-        offset: vk::Offset2D::default(),
-        extent: surface.capabilities()?.current_extent,
-    }])
+pub(crate) fn get_physical_device_present_rectangles(surface: &Surface) -> Result<Vec<vk::Rect2D>, Error> {
+    Ok(vec![vk::Rect2D { offset: vk::Offset2D::default(), extent: surface.capabilities()?.current_extent }])
 }
 
 /// Returns that the group's only device presents its own images.

@@ -226,10 +226,7 @@ fn check_info(info: &vk::SwapchainCreateInfoKHR<'_>) -> Result<(), Error> {
         return Err(Error::FeatureNotPresent(what));
     }
     if info.image_extent.width == 0 || info.image_extent.height == 0 {
-        return Err(Error::usage(
-            "VUID-VkSwapchainCreateInfoKHR-imageExtent-01689",
-            "imageExtent is empty",
-        ));
+        return Err(Error::usage("VUID-VkSwapchainCreateInfoKHR-imageExtent-01689", "imageExtent is empty"));
     }
     if info.image_array_layers != 1 {
         return Err(Error::usage(
@@ -268,10 +265,7 @@ pub(crate) fn create_swapchain(
     }
     check_info(info)?;
     let mut flags = vk::ImageCreateFlags::empty();
-    if info
-        .flags
-        .contains(vk::SwapchainCreateFlagsKHR::MUTABLE_FORMAT)
-    {
+    if info.flags.contains(vk::SwapchainCreateFlagsKHR::MUTABLE_FORMAT) {
         flags |= vk::ImageCreateFlags::MUTABLE_FORMAT | vk::ImageCreateFlags::EXTENDED_USAGE;
     }
     let image_info = vk::ImageCreateInfo {
@@ -292,16 +286,12 @@ pub(crate) fn create_swapchain(
         images.push(image);
         on_device.push(device_image);
     }
-    let (mut canvas, present_mode) =
-        surface.canvas(info.image_extent, info.present_mode, info.composite_alpha)?;
+    let (mut canvas, present_mode) = surface.canvas(info.image_extent, info.present_mode, info.composite_alpha)?;
     let shared = Arc::new(Shared {
         sync: Arc::clone(device.sync()),
         present_mode,
         images: on_device,
-        state: Mutex::new(State {
-            free: (0..count).collect(),
-            ..State::default()
-        }),
+        state: Mutex::new(State { free: (0..count).collect(), ..State::default() }),
         changed: Condvar::new(),
         lost: OnceLock::new(),
     });
@@ -349,9 +339,7 @@ pub(crate) fn acquire_next_image(
     if status == vk::Result::ERROR_OUT_OF_DATE_KHR {
         return Ok(status);
     }
-    let waited = shared.sync.wait(deadline(timeout), || {
-        shared.lost.get().is_some() || !shared.state().free.is_empty()
-    });
+    let waited = shared.sync.wait(deadline(timeout), || shared.lost.get().is_some() || !shared.state().free.is_empty());
     match waited {
         WaitResult::Ready => swapchain.check()?,
         WaitResult::TimedOut if timeout == 0 => return Ok(vk::Result::NOT_READY),
@@ -383,10 +371,7 @@ pub(crate) fn acquire_next_image(
 fn present_one(queue: &Queue, swapchain: &Swapchain, index: u32) -> Result<vk::Result, Error> {
     let shared = &swapchain.shared;
     let mut state = shared.state();
-    let place = state
-        .acquired
-        .iter()
-        .position(|&acquired| acquired == index);
+    let place = state.acquired.iter().position(|&acquired| acquired == index);
     let Some(place) = place else {
         return Err(Error::usage(
             "VUID-VkPresentInfoKHR-pImageIndices-01430",
@@ -405,10 +390,7 @@ fn present_one(queue: &Queue, swapchain: &Swapchain, index: u32) -> Result<vk::R
 /// # Safety
 /// The info, its chain and its handles are valid, and its results are null or have enough elements.
 #[doc(alias = "vkQueuePresentKHR")]
-pub(crate) unsafe fn queue_present(
-    queue: &Queue,
-    present_info: &vk::PresentInfoKHR<'_>,
-) -> Result<vk::Result, Error> {
+pub(crate) unsafe fn queue_present(queue: &Queue, present_info: &vk::PresentInfoKHR<'_>) -> Result<vk::Result, Error> {
     let info = present_info;
     // SAFETY: the caller's promise.
     let (waits, swapchains, indices) = unsafe {
@@ -426,10 +408,7 @@ pub(crate) unsafe fn queue_present(
         // SAFETY: the caller's promise.
         unsafe { valid::output_slice(info.p_results, swapchains.len())? }
     };
-    let batch = Batch {
-        waits: waits.into_iter().map(|semaphore| (semaphore, 0)).collect(),
-        ..Batch::default()
-    };
+    let batch = Batch { waits: waits.into_iter().map(|semaphore| (semaphore, 0)).collect(), ..Batch::default() };
     enqueue(queue, vec![batch], None)?;
     let mut results = results.iter_mut();
     let mut whole = Ok(vk::Result::SUCCESS);
@@ -454,14 +433,11 @@ pub(crate) unsafe fn queue_present(
 /// # Safety
 /// The infos, their chains and their handles are valid.
 #[doc(alias = "vkBindImageMemory2")]
-pub(crate) unsafe fn bind_image_memory2(
-    bind_infos: &[vk::BindImageMemoryInfo<'_>],
-) -> Result<(), Error> {
+pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_>]) -> Result<(), Error> {
     bind_infos.iter().try_for_each(|info| {
         // SAFETY: the caller's promise.
         let (image, of_swapchain) = unsafe {
-            let of_swapchain =
-                valid::find_in_chain::<vk::BindImageMemorySwapchainInfoKHR<'_>>(info.p_next);
+            let of_swapchain = valid::find_in_chain::<vk::BindImageMemorySwapchainInfoKHR<'_>>(info.p_next);
             (handle::get(info.image)?, of_swapchain)
         };
         if let Some(info) = of_swapchain {

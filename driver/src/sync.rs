@@ -24,10 +24,7 @@ pub(crate) struct Fence {
 impl Fence {
     /// A fence, signaled or not.
     pub(crate) fn new(sync: Arc<DeviceSync>, signaled: bool) -> Self {
-        Self {
-            sync,
-            signaled: AtomicBool::new(signaled),
-        }
+        Self { sync, signaled: AtomicBool::new(signaled) }
     }
 
     /// Reports whether it is signaled.
@@ -37,8 +34,7 @@ impl Fence {
 
     /// Signals the fence.
     pub(crate) fn signal(&self) {
-        self.sync
-            .update(|| self.signaled.store(true, Ordering::Release));
+        self.sync.update(|| self.signaled.store(true, Ordering::Release));
     }
 
     /// Resets the fence.
@@ -63,18 +59,12 @@ enum Payload {
 impl Semaphore {
     /// An unsignaled binary semaphore.
     pub(crate) fn new_binary(sync: Arc<DeviceSync>) -> Self {
-        Self {
-            sync,
-            payload: Payload::Binary(AtomicBool::new(false)),
-        }
+        Self { sync, payload: Payload::Binary(AtomicBool::new(false)) }
     }
 
     /// A timeline semaphore with an initial value.
     pub(crate) fn new_timeline(sync: Arc<DeviceSync>, value: u64) -> Self {
-        Self {
-            sync,
-            payload: Payload::Timeline(AtomicU64::new(value)),
-        }
+        Self { sync, payload: Payload::Timeline(AtomicU64::new(value)) }
     }
 
     /// The value of a timeline semaphore; `None` for a binary one.
@@ -122,10 +112,7 @@ pub(crate) struct Event {
 impl Event {
     /// An event that is not set.
     pub(crate) fn new(sync: Arc<DeviceSync>) -> Self {
-        Self {
-            sync,
-            value: AtomicBool::new(false),
-        }
+        Self { sync, value: AtomicBool::new(false) }
     }
 
     /// Reports whether it is set.
@@ -135,16 +122,12 @@ impl Event {
 
     /// Sets or resets the event.
     pub(crate) fn set(&self, value: bool) {
-        self.sync
-            .update(|| self.value.store(value, Ordering::Release));
+        self.sync.update(|| self.value.store(value, Ordering::Release));
     }
 }
 
 /// The result of a wait.
-fn wait_result(
-    waited: WaitResult,
-    loss: impl FnOnce() -> Result<(), Error>,
-) -> Result<vk::Result, Error> {
+fn wait_result(waited: WaitResult, loss: impl FnOnce() -> Result<(), Error>) -> Result<vk::Result, Error> {
     match waited {
         WaitResult::Ready => Ok(vk::Result::SUCCESS),
         WaitResult::TimedOut => Ok(vk::Result::TIMEOUT),
@@ -162,10 +145,7 @@ fn timeline_value(semaphore: &Semaphore) -> Result<u64, Error> {
 }
 
 #[doc(alias = "vkCreateFence")]
-pub(crate) fn create_fence(
-    device: &Device,
-    create_info: &vk::FenceCreateInfo<'_>,
-) -> Result<Arc<Fence>, Error> {
+pub(crate) fn create_fence(device: &Device, create_info: &vk::FenceCreateInfo<'_>) -> Result<Arc<Fence>, Error> {
     let signaled = create_info.flags.contains(vk::FenceCreateFlags::SIGNALED);
     Ok(Arc::new(Fence::new(Arc::clone(device.sync()), signaled)))
 }
@@ -195,11 +175,7 @@ pub(crate) fn wait_for_fences(
     let sync = device.sync();
     let waited = sync.wait(deadline(timeout), || {
         let mut signaled = fences.iter().map(|fence| fence.is_signaled());
-        if wait_all {
-            signaled.all(|s| s)
-        } else {
-            signaled.any(|s| s)
-        }
+        if wait_all { signaled.all(|s| s) } else { signaled.any(|s| s) }
     });
     wait_result(waited, || sync.check())
 }
@@ -223,10 +199,7 @@ pub(crate) fn create_semaphore(
 }
 
 #[doc(alias = "vkGetSemaphoreCounterValue")]
-pub(crate) fn get_semaphore_counter_value(
-    device: &Device,
-    semaphore: &Semaphore,
-) -> Result<u64, Error> {
+pub(crate) fn get_semaphore_counter_value(device: &Device, semaphore: &Semaphore) -> Result<u64, Error> {
     device.sync().check()?;
     timeline_value(semaphore)
 }
@@ -245,15 +218,8 @@ pub(crate) fn wait_semaphores(
     }
     let any = flags.contains(vk::SemaphoreWaitFlags::ANY);
     let waited = sync.wait(deadline(timeout), || {
-        let mut reached = semaphores
-            .iter()
-            .zip(values)
-            .map(|(s, &value)| s.is_reached(value));
-        if any {
-            reached.any(|r| r)
-        } else {
-            reached.all(|r| r)
-        }
+        let mut reached = semaphores.iter().zip(values).map(|(s, &value)| s.is_reached(value));
+        if any { reached.any(|r| r) } else { reached.all(|r| r) }
     });
     wait_result(waited, || sync.check())
 }
@@ -266,21 +232,14 @@ pub(crate) fn signal_semaphore(semaphore: &Semaphore, value: u64) -> Result<(), 
 }
 
 #[doc(alias = "vkCreateEvent")]
-pub(crate) fn create_event(
-    device: &Device,
-    _create_info: &vk::EventCreateInfo<'_>,
-) -> Result<Arc<Event>, Error> {
+pub(crate) fn create_event(device: &Device, _create_info: &vk::EventCreateInfo<'_>) -> Result<Arc<Event>, Error> {
     Ok(Arc::new(Event::new(Arc::clone(device.sync()))))
 }
 
 #[doc(alias = "vkGetEventStatus")]
 pub(crate) fn get_event_status(device: &Device, event: &Event) -> Result<vk::Result, Error> {
     device.sync().check()?;
-    Ok(if event.is_set() {
-        vk::Result::EVENT_SET
-    } else {
-        vk::Result::EVENT_RESET
-    })
+    Ok(if event.is_set() { vk::Result::EVENT_SET } else { vk::Result::EVENT_RESET })
 }
 
 #[doc(alias = "vkSetEvent")]

@@ -113,11 +113,8 @@ pub trait Canvas: Send {
 }
 
 /// The surface extensions that are available only if a window system for them is registered.
-const OF_WINDOW_SYSTEMS: [&CStr; 3] = [
-    ash::khr::wayland_surface::NAME,
-    ash::khr::xcb_surface::NAME,
-    ash::khr::xlib_surface::NAME,
-];
+const OF_WINDOW_SYSTEMS: [&CStr; 3] =
+    [ash::khr::wayland_surface::NAME, ash::khr::xcb_surface::NAME, ash::khr::xlib_surface::NAME];
 
 static WINDOW_SYSTEMS: OnceLock<&[&dyn WindowSystem]> = OnceLock::new();
 
@@ -129,10 +126,7 @@ pub fn use_window_systems(systems: &'static [&'static dyn WindowSystem]) {
 /// The window system of an extension.
 pub(crate) fn window_system(extension: &CStr) -> Option<&'static dyn WindowSystem> {
     let systems = WINDOW_SYSTEMS.get()?;
-    systems
-        .iter()
-        .copied()
-        .find(|system| system.extension() == extension)
+    systems.iter().copied().find(|system| system.extension() == extension)
 }
 
 /// Reports whether an instance extension is available: those of window systems are, if a window system is registered.

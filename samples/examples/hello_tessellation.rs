@@ -5,9 +5,7 @@
 //! corners of each triangle. It writes hello_tessellation.png. It uses this driver or, with the argument `--loader`, the first device that the Vulkan
 //! loader finds: the same program runs on both.
 
-use ash::vk::{
-    self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage, ShaderStageFlags as F,
-};
+use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage, ShaderStageFlags as F};
 
 const SIZE: u32 = 512;
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;

@@ -16,8 +16,7 @@ const SIDE: i32 = 24;
 const STEP: f32 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (options, folders): (Vec<_>, Vec<_>) =
-        (std::env::args().skip(1)).partition(|argument| argument == "--loader");
+    let (options, folders): (Vec<_>, Vec<_>) = (std::env::args().skip(1)).partition(|argument| argument == "--loader");
     let folder = folders.first().ok_or("a folder for the pictures")?;
     let mut scene = Scene::with_capacity(0, (SIDE * SIDE) as usize);
     for row in 0..SIDE {
@@ -30,21 +29,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 opacity: 0.98,
             };
             let bright = (row + column) % 2 == 0;
-            let color = if bright {
-                [1.6, 1.3, 0.7]
-            } else {
-                [-0.6, -1.2, -0.4]
-            };
+            let color = if bright { [1.6, 1.3, 0.7] } else { [-0.6, -1.2, -0.4] };
             scene.push(position, shape, &[color]);
         }
     }
-    let camera = Camera::look_at(
-        [0.0, -0.8, -0.4],
-        [0.0, 0.3, 3.0],
-        [0.0, -1.0, 0.0],
-        75.0,
-        [960, 540],
-    )?;
+    let camera = Camera::look_at([0.0, -0.8, -0.4], [0.0, 0.3, 3.0], [0.0, -1.0, 0.0], 75.0, [960, 540])?;
     let entry = if options.is_empty() {
         vulkan_gaurast::entry()
     } else {
@@ -53,21 +42,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let mut renderer = Renderer::new(entry)?;
     let mut uploaded = renderer.upload(&scene, None)?;
-    for (name, geometry) in [
-        ("surfels.png", Geometry::Surfel),
-        ("ellipses.png", Geometry::Volume),
-    ] {
-        let settings = Settings {
-            geometry,
-            ..Settings::default()
-        };
+    for (name, geometry) in [("surfels.png", Geometry::Surfel), ("ellipses.png", Geometry::Volume)] {
+        let settings = Settings { geometry, ..Settings::default() };
         renderer.set(&mut uploaded, settings)?;
         let frame = renderer.render(&uploaded, &camera)?;
-        gaurast_picture::write(
-            &Path::new(folder).join(name),
-            &frame.picture,
-            Some([0.1; 3]),
-        )?;
+        gaurast_picture::write(&Path::new(folder).join(name), &frame.picture, Some([0.1; 3]))?;
     }
     Ok(())
 }

@@ -88,11 +88,7 @@ fn append(gaussians: &[Gaussian], degree: u32) -> GaussianAppend {
     let size = size_of_val(gaussians) as u64;
     let memory = Allocation::new(size, false).expect("memory");
     memory.write(0, gaussians).expect("it fits");
-    let buffer = BufferRange {
-        memory,
-        offset: 0,
-        size,
-    };
+    let buffer = BufferRange { memory, offset: 0, size };
     let stream = |float: u32, format| AttributeStream {
         buffer: buffer.clone(),
         stride: size_of::<Gaussian>() as u32,
@@ -121,20 +117,12 @@ fn append(gaussians: &[Gaussian], degree: u32) -> GaussianAppend {
 }
 
 fn area() -> Rect {
-    Rect {
-        x: 0,
-        y: 0,
-        width: WIDTH,
-        height: HEIGHT,
-    }
+    Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT }
 }
 
 fn begin(degree: u32) -> GaussianBegin {
     GaussianBegin {
-        state: Arc::new(GaussianState {
-            sh_degree: degree,
-            ..GaussianState::default()
-        }),
+        state: Arc::new(GaussianState { sh_degree: degree, ..GaussianState::default() }),
         further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
@@ -172,9 +160,7 @@ const COUNT: usize = 50_000;
 fn project_off_screen(bencher: Bencher) {
     let (device, begin) = (device(), begin(3));
     let append = append(&cloud(COUNT, false), 3);
-    bencher
-        .counter(ItemsCount::new(COUNT))
-        .bench_local(|| resolve(&device, &begin, &append));
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| resolve(&device, &begin, &append));
 }
 
 /// Everything up to tile lists: reading, projection, colours of the degree, sorting, binning.
@@ -182,9 +168,7 @@ fn project_off_screen(bencher: Bencher) {
 fn project_sort_and_bin(bencher: Bencher, degree: u32) {
     let (device, begin) = (device(), begin(degree));
     let append = append(&cloud(COUNT, true), degree);
-    bencher
-        .counter(ItemsCount::new(COUNT))
-        .bench_local(|| resolve(&device, &begin, &append));
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| resolve(&device, &begin, &append));
 }
 
 #[divan::bench(args = [1000, 100_000, 1_000_000])]
@@ -192,26 +176,19 @@ fn depth_sort(bencher: Bencher, count: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let depth = |rng: &mut ChaCha8Rng| rng.random_range(0.2..100.0_f32).to_bits();
     let pairs: Vec<(u32, u32)> = (0..count as u32).map(|i| (depth(&mut rng), i)).collect();
-    bencher
-        .counter(ItemsCount::new(count))
-        .with_inputs(|| pairs.clone())
-        .bench_local_refs(sort::sort_by_key);
+    bencher.counter(ItemsCount::new(count)).with_inputs(|| pairs.clone()).bench_local_refs(sort::sort_by_key);
 }
 
 /// Items are pairs of the tile and a Gaussian.
 #[divan::bench(args = [false, true])]
 fn tile_pairs(bencher: Bencher, whole: bool) {
-    tile_kernel(bencher, whole, |counters| {
-        counters.get(Counter::TilePairsEvaluated)
-    });
+    tile_kernel(bencher, whole, |counters| counters.get(Counter::TilePairsEvaluated));
 }
 
 /// Items are evaluations of a Gaussian at a pixel.
 #[divan::bench(args = [false, true])]
 fn tile_pixels(bencher: Bencher, whole: bool) {
-    tile_kernel(bencher, whole, |counters| {
-        16 * counters.get(Counter::BlockEvaluations)
-    });
+    tile_kernel(bencher, whole, |counters| 16 * counters.get(Counter::BlockEvaluations));
 }
 
 fn tile_kernel(bencher: Bencher, whole: bool, items: impl Fn(&Counters) -> u64) {

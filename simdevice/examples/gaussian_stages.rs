@@ -38,28 +38,16 @@ fn gaussian(rng: &mut ChaCha8Rng) -> [f32; FLOATS] {
         let norm = v.iter().map(|v| v * v).sum::<f64>().sqrt();
         v.map(|v| 1.5 * v / norm)
     } else if which < 0.7 {
-        [
-            rng.random_range(-5.0..5.0),
-            1.6,
-            rng.random_range(-6.0..6.0),
-        ]
+        [rng.random_range(-5.0..5.0), 1.6, rng.random_range(-6.0..6.0)]
     } else {
-        [
-            rng.random_range(-4.0..4.0),
-            rng.random_range(-2.2..2.2),
-            rng.random_range(-5.0..5.0),
-        ]
+        [rng.random_range(-4.0..4.0), rng.random_range(-2.2..2.2), rng.random_range(-5.0..5.0)]
     };
     let mut scale = [0; 3].map(|_| normal(rng, 0.012f64.ln(), 0.6).exp());
     scale[2] *= normal(rng, -0.7, 0.5).exp();
     let rotation = [0; 4].map(|_| normal(rng, 0.0, 1.0));
     let opacity = 1.0 / (1.0 + (-normal(rng, 0.5, 2.0)).exp());
     let mut out = [0.0; FLOATS];
-    let head = position
-        .into_iter()
-        .chain(scale)
-        .chain(rotation)
-        .chain([opacity]);
+    let head = position.into_iter().chain(scale).chain(rotation).chain([opacity]);
     for (out, value) in out.iter_mut().zip(head) {
         *out = value as f32;
     }
@@ -80,12 +68,7 @@ struct Depth {
 
 impl Depth {
     fn new(name: &str) -> Result<Self, String> {
-        let test = |write| {
-            Some(DepthTest {
-                compare: CompareOp::Less,
-                write,
-            })
-        };
+        let test = |write| Some(DepthTest { compare: CompareOp::Less, write });
         // The camera is 6 before the scene's middle, and depths are 1 - 0.2 / z.
         let (test, stored) = match name {
             "none" => (None, 1.0),
@@ -116,12 +99,7 @@ fn attachment(format: Format, clear: ClearValue) -> Result<Attachment, Box<dyn s
         base_layer: 0,
         layer_count: 1,
     };
-    Ok(Attachment {
-        view,
-        load: LoadOp::Clear(clear),
-        store: StoreOp::Store,
-        resolve: None,
-    })
+    Ok(Attachment { view, load: LoadOp::Clear(clear), store: StoreOp::Store, resolve: None })
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -131,30 +109,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let simd = SimdLevel::from_name(&simd).ok_or("an unknown SIMD level")?;
     let threads = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let depth = Depth::new(arguments.next().as_deref().unwrap_or("none"))?;
-    let device = Device::new(&Config {
-        threads,
-        simd,
-        ..Config::default()
-    })?;
+    let device = Device::new(&Config { threads, simd, ..Config::default() })?;
 
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let scene: Vec<[f32; FLOATS]> = (0..count).map(|_| gaussian(&mut rng)).collect();
     let part = |range: std::ops::Range<usize>| -> Result<_, Box<dyn std::error::Error>> {
-        let floats: Vec<f32> = scene
-            .iter()
-            .flat_map(|g| g[range.clone()].to_vec())
-            .collect();
+        let floats: Vec<f32> = scene.iter().flat_map(|g| g[range.clone()].to_vec()).collect();
         let size = 4 * floats.len() as u64;
         let memory = Allocation::new(size, false)?;
         memory.write(0, &floats)?;
-        Ok((
-            BufferRange {
-                memory,
-                offset: 0,
-                size,
-            },
-            4 * range.len() as u32,
-        ))
+        Ok((BufferRange { memory, offset: 0, size }, 4 * range.len() as u32))
     };
     let stream = |(buffer, stride): &(BufferRange, u32), offset, format| AttributeStream {
         buffer: buffer.clone(),
@@ -172,9 +136,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             opacity: stream(&shape, 28, Format::R32Sfloat),
             model: ModelAttributes::default(),
             activations: Default::default(),
-            spherical_harmonics: (0..16)
-                .map(|k| stream(&harmonics, 12 * k, Format::R32G32B32Sfloat))
-                .collect(),
+            spherical_harmonics: (0..16).map(|k| stream(&harmonics, 12 * k, Format::R32G32B32Sfloat)).collect(),
         },
         indices: None,
         first: 0,
@@ -182,19 +144,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         first_instance: 0,
         instance_count: 1,
     };
-    let area = Rect {
-        x: 0,
-        y: 0,
-        width: WIDTH,
-        height: HEIGHT,
-    };
+    let area = Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT };
     let begin = GaussianBegin {
         state: Arc::new(GaussianState {
             sh_degree: 3,
-            depth_stencil: DepthStencil {
-                depth: depth.test,
-                ..DepthStencil::default()
-            },
+            depth_stencil: DepthStencil { depth: depth.test, ..DepthStencil::default() },
             ..GaussianState::default()
         }),
         further_cameras: Vec::new(),
@@ -222,17 +176,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         area,
         layer_count: 1,
         view_mask: 0,
-        color: vec![Some(attachment(
-            Format::R8G8B8A8Unorm,
-            ClearValue::Float([0.0; 4]),
-        )?)],
-        depth: Some(attachment(
-            Format::D32Sfloat,
-            ClearValue::DepthStencil {
-                depth: depth.stored,
-                stencil: 0,
-            },
-        )?),
+        color: vec![Some(attachment(Format::R8G8B8A8Unorm, ClearValue::Float([0.0; 4]))?)],
+        depth: Some(attachment(Format::D32Sfloat, ClearValue::DepthStencil { depth: depth.stored, stencil: 0 })?),
         stencil: None,
     };
     let mut times: Vec<[f64; 4]> = Vec::new();
@@ -244,26 +189,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let draw = sort_and_bin(set, device.runtime(), device.caches(), &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
-        pass.push(
-            PassDraw::Gaussians(Box::new(draw)),
-            device.runtime(),
-            &mut counters,
-        )?;
+        pass.push(PassDraw::Gaussians(Box::new(draw)), device.runtime(), &mut counters)?;
         pass.end(device.runtime(), &mut counters)?;
         let raster = started.elapsed().as_secs_f64() * 1e3;
         let ms = |counter| counters.get(counter) as f64 / 1e6;
-        times.push([
-            ms(Counter::PreprocessTime),
-            ms(Counter::SortTime),
-            ms(Counter::BinningTime),
-            raster,
-        ]);
+        times.push([ms(Counter::PreprocessTime), ms(Counter::SortTime), ms(Counter::BinningTime), raster]);
         last = counters;
     }
-    for (stage, name) in ["preprocess", "sort", "binning", "raster"]
-        .iter()
-        .enumerate()
-    {
+    for (stage, name) in ["preprocess", "sort", "binning", "raster"].iter().enumerate() {
         let mut stage: Vec<f64> = times.iter().map(|time| time[stage]).collect();
         stage.sort_by(f64::total_cmp);
         println!("{name:>18}: {:8.2} ms (median of 9)", stage[4]);

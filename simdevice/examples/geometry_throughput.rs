@@ -9,8 +9,7 @@ use simdevice::isa::op::Op;
 use simdevice::packet::*;
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{
-    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
-    VertexOutput,
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{BlendState, DrawState, Topology};
@@ -24,14 +23,8 @@ const HEIGHT: u32 = 1080;
 /// Position times a 4x4 matrix of push constants; a normal is passed on.
 fn vertex_program() -> Program {
     let mut b = Builder::new();
-    let inputs: Vec<_> = (0..6)
-        .map(|slot| b.input(slot, Type::B32, Rate::Varying))
-        .collect();
-    let address = Address {
-        space: Space::PushConstants,
-        base: None,
-        offset: 0,
-    };
+    let inputs: Vec<_> = (0..6).map(|slot| b.input(slot, Type::B32, Rate::Varying)).collect();
+    let address = Address { space: Space::PushConstants, base: None, offset: 0 };
     let matrix = b.load(address, Element::B32, 16);
     for row in 0..4 {
         let mut sum = matrix[4 * row + 3];
@@ -49,16 +42,11 @@ fn vertex_program() -> Program {
 }
 
 fn programs() -> DrawPrograms {
-    let attribute =
-        |stream| (0..3).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let attribute = |stream| (0..3).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
     let varyings = (0..3).map(|index| Some(VertexOutput::Varying(index)));
     let inputs = (0..3).map(|index| {
-        Some(FragmentInput::Varying {
-            index,
-            interpolation: Interpolation::Perspective,
-            sampling: Sampling::Center,
-        })
+        Some(FragmentInput::Varying { index, interpolation: Interpolation::Perspective, sampling: Sampling::Center })
     });
     DrawPrograms {
         vertex: vertex_program(),
@@ -84,10 +72,7 @@ fn state(cull_back: bool) -> DrawState {
     DrawState {
         cull_back,
         // No fragment work: what is measured comes before it.
-        blend: vec![BlendState {
-            equations: None,
-            write_mask: 0,
-        }],
+        blend: vec![BlendState { equations: None, write_mask: 0 }],
         ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }
@@ -96,11 +81,7 @@ fn buffer<T: bytemuck::NoUninit>(elements: &[T]) -> BufferRange {
     let size = size_of_val(elements) as u64;
     let memory = Allocation::new_zeroed(size).expect("memory");
     memory.write(0, elements).expect("it fits");
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 /// A grid of `side` x `side` quads that fills the screen, as vertices of position and normal, and indices.
@@ -138,17 +119,11 @@ fn target() -> ImageView {
 
 fn main() {
     let threads = std::env::args().nth(1).and_then(|word| word.parse().ok());
-    let config = Config {
-        threads: threads.unwrap_or(0),
-        ..Config::default()
-    };
+    let config = Config { threads: threads.unwrap_or(0), ..Config::default() };
     let device = Arc::new(Device::new(&config).expect("a device"));
     println!("{} workers", device.runtime().threads());
-    let pipeline =
-        Arc::new(DrawPipeline::new(device.level(), &programs()).expect("valid programs"));
-    let identity: Vec<u8> = (0..16)
-        .flat_map(|at| f32::to_le_bytes(if at % 5 == 0 { 1.0 } else { 0.0 }))
-        .collect();
+    let pipeline = Arc::new(DrawPipeline::new(device.level(), &programs()).expect("valid programs"));
+    let identity: Vec<u8> = (0..16).flat_map(|at| f32::to_le_bytes(if at % 5 == 0 { 1.0 } else { 0.0 })).collect();
     let scenes = [
         ("tiny, shared", 708, true, false),
         ("tiny, not indexed", 708, false, false),
@@ -172,17 +147,10 @@ fn main() {
             pipeline: Arc::clone(&pipeline),
             state: Arc::new(state),
             attributes: vec![stream(0), stream(12)],
-            vertex_bindings: Bindings {
-                push_constants: identity.clone(),
-                ..Bindings::default()
-            },
+            vertex_bindings: Bindings { push_constants: identity.clone(), ..Bindings::default() },
             primitive_bindings: PrimitiveBindings::default(),
             fragment_bindings: Bindings::default(),
-            indices: indexed.then(|| IndexStream {
-                buffer: buffer(&list),
-                index_size: 4,
-                vertex_offset: 0,
-            }),
+            indices: indexed.then(|| IndexStream { buffer: buffer(&list), index_size: 4, vertex_offset: 0 }),
             first: 0,
             count: list.len() as u32,
             first_instance: 0,
@@ -201,12 +169,8 @@ fn measure(name: &str, device: &Arc<Device>, draw: &Draw) {
     let mut line = String::new();
     for _ in 0..9 {
         let mut processor = CommandProcessor::new(Arc::clone(device));
-        let attachment = Attachment {
-            resolve: None,
-            view: view.clone(),
-            load: LoadOp::DontCare,
-            store: StoreOp::DontCare,
-        };
+        let attachment =
+            Attachment { resolve: None, view: view.clone(), load: LoadOp::DontCare, store: StoreOp::DontCare };
         let rendering = Rendering {
             area: draw.state.scissors[0],
             layer_count: 1,
@@ -215,10 +179,7 @@ fn measure(name: &str, device: &Arc<Device>, draw: &Draw) {
             depth: None,
             stencil: None,
         };
-        for packet in [
-            Packet::BeginRendering(Box::new(rendering)),
-            Packet::Draw(Box::new(draw.clone())),
-        ] {
+        for packet in [Packet::BeginRendering(Box::new(rendering)), Packet::Draw(Box::new(draw.clone()))] {
             processor.execute(&packet).expect("it is drawn");
         }
         let counters = processor.counters();

@@ -10,13 +10,11 @@ use simdevice::isa::op::Op;
 use simdevice::packet::*;
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{
-    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
-    VertexInput, VertexOutput,
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
-    Rect, Topology,
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, Topology,
 };
 use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
@@ -55,24 +53,13 @@ fn fragment_program(rounds: u32) -> Program {
 }
 
 fn programs(rounds: u32) -> DrawPrograms {
-    let attribute =
-        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let attribute = |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
     let varyings = (0..4).map(|index| Some(VertexOutput::Varying(index)));
     let inputs = (0..4).map(|index| {
-        Some(FragmentInput::Varying {
-            index,
-            interpolation: Interpolation::Perspective,
-            sampling: Sampling::Center,
-        })
+        Some(FragmentInput::Varying { index, interpolation: Interpolation::Perspective, sampling: Sampling::Center })
     });
-    let outputs = (0..4).map(|component| {
-        Some(FragmentOutput::Color {
-            attachment: 0,
-            component,
-            index: 0,
-        })
-    });
+    let outputs = (0..4).map(|component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 }));
     DrawPrograms {
         vertex: vertex_program(),
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
@@ -104,25 +91,15 @@ struct Scene {
 }
 
 fn state(scene: &Scene) -> DrawState {
-    let over = BlendEquation {
-        source: BlendFactor::One,
-        destination: BlendFactor::OneMinusSrcAlpha,
-        op: BlendOp::Add,
-    };
+    let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
     DrawState {
         samples: scene.samples,
         depth_stencil: DepthStencil {
-            depth: scene.depth.then_some(DepthTest {
-                compare: CompareOp::LessOrEqual,
-                write: true,
-            }),
+            depth: scene.depth.then_some(DepthTest { compare: CompareOp::LessOrEqual, write: true }),
             bounds: None,
             stencil: None,
         },
-        blend: vec![BlendState {
-            equations: scene.blend.then_some((over, over)),
-            write_mask: 0xF,
-        }],
+        blend: vec![BlendState { equations: scene.blend.then_some((over, over)), write_mask: 0xF }],
         ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }
@@ -131,22 +108,12 @@ fn buffer<T: bytemuck::NoUninit>(elements: &[T]) -> BufferRange {
     let size = size_of_val(elements) as u64;
     let memory = Allocation::new_zeroed(size).expect("memory");
     memory.write(0, elements).expect("it fits");
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 fn target(format: Format, samples: u32) -> ImageView {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [WIDTH, HEIGHT, 1],
-        mip_levels: 1,
-        array_layers: 1,
-        samples,
-    };
+    let desc =
+        ImageDesc { kind: ImageKind::D2, format, extent: [WIDTH, HEIGHT, 1], mip_levels: 1, array_layers: 1, samples };
     let memory = Allocation::new_zeroed(desc.memory_size().expect("it fits")).expect("memory");
     ImageView {
         image: Arc::new(Image::new(desc, memory, 0).expect("an image")),
@@ -167,15 +134,8 @@ fn layers(layers: u32) -> Vec<[f32; FLOATS]> {
     };
     (0..layers)
         .flat_map(|layer| {
-            [
-                [-1.0, -1.0],
-                [1.0, -1.0],
-                [-1.0, 1.0],
-                [-1.0, 1.0],
-                [1.0, -1.0],
-                [1.0, 1.0],
-            ]
-            .map(|[x, y]| corner(x, y, layer))
+            [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+                .map(|[x, y]| corner(x, y, layer))
         })
         .collect()
 }
@@ -187,55 +147,22 @@ fn grid(columns: u32, rows: u32) -> Vec<[f32; FLOATS]> {
         let z = 0.5 + 0.3 * (x * 40.0).sin() * (y * 40.0).cos();
         [2.0 * x - 1.0, 2.0 * y - 1.0, z, 1.0, x, y, 1.0 - x, 1.0]
     };
-    let quad = |column, row| {
-        [[0, 0], [1, 0], [0, 1], [0, 1], [1, 0], [1, 1]].map(|[x, y]| vertex(column + x, row + y))
-    };
-    (0..rows)
-        .flat_map(|row| (0..columns).flat_map(move |column| quad(column, row)))
-        .collect()
+    let quad = |column, row| [[0, 0], [1, 0], [0, 1], [0, 1], [1, 0], [1, 1]].map(|[x, y]| vertex(column + x, row + y));
+    (0..rows).flat_map(|row| (0..columns).flat_map(move |column| quad(column, row))).collect()
 }
 
 fn scenes() -> Vec<Scene> {
-    let scene = |name, vertices| Scene {
-        name,
-        vertices,
-        samples: 1,
-        depth: false,
-        blend: false,
-        rounds: 0,
-    };
+    let scene = |name, vertices| Scene { name, vertices, samples: 1, depth: false, blend: false, rounds: 0 };
     vec![
         scene("fill", layers(1)),
         scene("fill, 8 layers", layers(8)),
-        Scene {
-            depth: true,
-            ..scene("fill with depth, 8 layers", layers(8))
-        },
-        Scene {
-            blend: true,
-            ..scene("overdraw, 32 layers blended", layers(32))
-        },
-        Scene {
-            rounds: 16,
-            ..scene("arithmetic, 8 layers", layers(8))
-        },
-        Scene {
-            depth: true,
-            ..scene("tiny, 1M triangles", grid(960, 540))
-        },
-        Scene {
-            depth: true,
-            ..scene("small, 65k triangles", grid(240, 135))
-        },
-        Scene {
-            samples: 4,
-            depth: true,
-            ..scene("4 samples, 65k triangles", grid(240, 135))
-        },
-        Scene {
-            samples: 4,
-            ..scene("4 samples, fill 8 layers", layers(8))
-        },
+        Scene { depth: true, ..scene("fill with depth, 8 layers", layers(8)) },
+        Scene { blend: true, ..scene("overdraw, 32 layers blended", layers(32)) },
+        Scene { rounds: 16, ..scene("arithmetic, 8 layers", layers(8)) },
+        Scene { depth: true, ..scene("tiny, 1M triangles", grid(960, 540)) },
+        Scene { depth: true, ..scene("small, 65k triangles", grid(240, 135)) },
+        Scene { samples: 4, depth: true, ..scene("4 samples, 65k triangles", grid(240, 135)) },
+        Scene { samples: 4, ..scene("4 samples, fill 8 layers", layers(8)) },
     ]
 }
 
@@ -243,10 +170,7 @@ fn main() {
     let mut words = std::env::args().skip(1);
     let threads = words.next().and_then(|word| word.parse().ok());
     let wanted: Vec<String> = words.collect();
-    let config = Config {
-        threads: threads.unwrap_or(0),
-        ..Config::default()
-    };
+    let config = Config { threads: threads.unwrap_or(0), ..Config::default() };
     let device = Arc::new(Device::new(&config).expect("a device"));
     println!("{} workers", device.runtime().threads());
     for scene in scenes() {
@@ -258,8 +182,7 @@ fn main() {
 
 /// Draws a scene a few times, and prints the best time of the tile engine.
 fn measure(device: &Arc<Device>, scene: &Scene) {
-    let pipeline =
-        DrawPipeline::new(device.level(), &programs(scene.rounds)).expect("valid programs");
+    let pipeline = DrawPipeline::new(device.level(), &programs(scene.rounds)).expect("valid programs");
     let vertices = buffer(&scene.vertices);
     let stream = |offset| AttributeStream {
         buffer: vertices.clone(),
@@ -289,31 +212,16 @@ fn measure(device: &Arc<Device>, scene: &Scene) {
         store: StoreOp::Store,
         resolve: None,
     };
-    let depth = ClearValue::DepthStencil {
-        depth: 1.0,
-        stencil: 0,
-    };
+    let depth = ClearValue::DepthStencil { depth: 1.0, stencil: 0 };
     let rendering = Rendering {
-        area: Rect {
-            x: 0,
-            y: 0,
-            width: WIDTH,
-            height: HEIGHT,
-        },
+        area: Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT },
         layer_count: 1,
         view_mask: 0,
-        color: vec![Some(attachment(
-            Format::R8G8B8A8Unorm,
-            ClearValue::Float([0.0; 4]),
-        ))],
+        color: vec![Some(attachment(Format::R8G8B8A8Unorm, ClearValue::Float([0.0; 4])))],
         depth: scene.depth.then(|| attachment(Format::D32Sfloat, depth)),
         stencil: None,
     };
-    let packets = [
-        Packet::BeginRendering(Box::new(rendering)),
-        Packet::Draw(Box::new(draw)),
-        Packet::EndRendering,
-    ];
+    let packets = [Packet::BeginRendering(Box::new(rendering)), Packet::Draw(Box::new(draw)), Packet::EndRendering];
     let mut best: Option<(u64, CommandProcessor)> = None;
     for _ in 0..12 {
         let mut processor = CommandProcessor::new(Arc::clone(device));

@@ -3,18 +3,10 @@
 //! `valgrind --tool=callgrind --callgrind-out-file=/dev/null`. The difference of two counts of times is the draws' alone.
 
 #[path = "../tests/common/mod.rs"]
-#[allow(
-    dead_code,
-    missing_docs,
-    reason = "the tests use all of it and document none"
-)]
+#[allow(dead_code, missing_docs, reason = "the tests use all of it and document none")]
 mod common;
 #[path = "../tests/common/scenes.rs"]
-#[allow(
-    dead_code,
-    missing_docs,
-    reason = "the tests use all of it and document none"
-)]
+#[allow(dead_code, missing_docs, reason = "the tests use all of it and document none")]
 mod scenes;
 
 use simdevice::runtime::SimdLevel;
@@ -28,15 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kind = scenes::KINDS.iter().find(|(_, known)| *known == name);
     let (kind, _) = kind.ok_or("there is no such scene")?;
     let (recording, recorder) = scenes::recording();
-    let config = Config {
-        threads: 1,
-        simd: SimdLevel::Avx2,
-        ..if on == "on" {
-            recording
-        } else {
-            Config::default()
-        }
-    };
+    let config = Config { threads: 1, simd: SimdLevel::Avx2, ..if on == "on" { recording } else { Config::default() } };
     let device = Arc::new(Device::new(&config)?);
     for _ in 0..times.parse()? {
         scenes::draw_on(&device, *kind, [&[], &[]]);

@@ -13,9 +13,7 @@ use simdevice::isa::ir::{Dimension, ImageShape};
 use simdevice::isa::resources::{ImageUnit, LodRequest, SampleRequest};
 use simdevice::runtime::SimdLevel;
 use simdevice::state::CompareOp;
-use simdevice::texture::{
-    AddressMode, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage, Sampler,
-};
+use simdevice::texture::{AddressMode, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage, Sampler};
 use simdevice::{Allocation, Format, Image, ImageView};
 
 const SIZE: u32 = 1024;
@@ -35,11 +33,7 @@ fn image(format: Format) -> ImageBinding {
     let mut state = 1u32;
     for offset in (0..size).step_by(4) {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let word = if format == Format::D32Sfloat {
-            ((state >> 8) as f32 / 16_777_216.0).to_bits()
-        } else {
-            state
-        };
+        let word = if format == Format::D32Sfloat { ((state >> 8) as f32 / 16_777_216.0).to_bits() } else { state };
         memory.store_u32(offset, word);
     }
     let image = Image::new(desc, memory, 0).expect("it fits");
@@ -72,11 +66,7 @@ fn request(texels_per_pixel: f32) -> SampleRequest {
     };
     SampleRequest {
         mask: u16::MAX,
-        shape: ImageShape {
-            dimension: Dimension::D2,
-            arrayed: false,
-            multisampled: false,
-        },
+        shape: ImageShape { dimension: Dimension::D2, arrayed: false, multisampled: false },
         coordinate: [
             std::array::from_fn(|lane| at(lane)[0].to_bits()),
             std::array::from_fn(|lane| at(lane)[1].to_bits()),
@@ -129,24 +119,11 @@ fn measure(table: &ImageTable, first: &SampleRequest, texels_per_pixel: f32) -> 
 
 fn main() {
     assert_eq!(Format::R8G8B8A8Unorm.aspects(), [Aspect::Color]);
-    let linear = Sampler {
-        mag_filter: Filter::Linear,
-        min_filter: Filter::Linear,
-        ..Sampler::default()
-    };
-    let trilinear = Sampler {
-        mipmap_mode: MipmapMode::Linear,
-        ..linear
-    };
-    let clamped = Sampler {
-        address_modes: [AddressMode::ClampToEdge; 3],
-        ..linear
-    };
-    let shadow = Sampler {
-        address_modes: [AddressMode::ClampToBorder; 3],
-        compare_op: Some(CompareOp::LessOrEqual),
-        ..linear
-    };
+    let linear = Sampler { mag_filter: Filter::Linear, min_filter: Filter::Linear, ..Sampler::default() };
+    let trilinear = Sampler { mipmap_mode: MipmapMode::Linear, ..linear };
+    let clamped = Sampler { address_modes: [AddressMode::ClampToEdge; 3], ..linear };
+    let shadow =
+        Sampler { address_modes: [AddressMode::ClampToBorder; 3], compare_op: Some(CompareOp::LessOrEqual), ..linear };
     let rgba = Format::R8G8B8A8Unorm;
     let cases = [
         ("nearest RGBA8", rgba, Sampler::default(), 0.8),
@@ -160,20 +137,13 @@ fn main() {
     ];
     // Only the lines that contain this, if it is given, and only that level.
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let skipped = |place: usize, name: &str| {
-        wanted
-            .get(place)
-            .is_some_and(|wanted| !name.contains(wanted.as_str()))
-    };
+    let skipped = |place: usize, name: &str| wanted.get(place).is_some_and(|wanted| !name.contains(wanted.as_str()));
     for (name, format, sampler, texels_per_pixel) in cases {
         if skipped(0, name) {
             continue;
         }
         let compare = sampler.compare_op.map(|_| [0.5f32.to_bits(); 16]);
-        let first = SampleRequest {
-            compare,
-            ..request(texels_per_pixel)
-        };
+        let first = SampleRequest { compare, ..request(texels_per_pixel) };
         let mut line = format!("{name:24}");
         for (level_name, level) in SimdLevel::supported() {
             let Some(level) = level.resolve().filter(|_| !skipped(1, level_name)) else {

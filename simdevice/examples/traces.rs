@@ -3,11 +3,7 @@
 //! given or the current one.
 
 #[path = "../tests/common/mod.rs"]
-#[allow(
-    dead_code,
-    missing_docs,
-    reason = "the tests use all of it and document none"
-)]
+#[allow(dead_code, missing_docs, reason = "the tests use all of it and document none")]
 mod common;
 #[path = "../tests/common/scenes.rs"]
 #[allow(missing_docs, reason = "the tests document none of it")]

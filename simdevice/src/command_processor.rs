@@ -128,12 +128,8 @@ impl CommandProcessor {
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
             Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
             Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),
-            Packet::FillBuffer { target, word } => {
-                self.transfer(|| transfer::fill_buffer(target, *word))
-            }
-            Packet::UpdateBuffer { target, data } => {
-                self.transfer(|| transfer::update_buffer(target, data))
-            }
+            Packet::FillBuffer { target, word } => self.transfer(|| transfer::fill_buffer(target, *word)),
+            Packet::UpdateBuffer { target, data } => self.transfer(|| transfer::update_buffer(target, data)),
             Packet::ClearImage(clear) => self.transfer(|| transfer::clear_image(clear)),
             Packet::BeginRendering(rendering) => {
                 if self.pass.is_some() {
@@ -199,8 +195,7 @@ impl CommandProcessor {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
                 pass.end(self.device.runtime(), &mut self.counters)?;
-                self.model
-                    .account(self.device.runtime(), &mut self.counters, None);
+                self.model.account(self.device.runtime(), &mut self.counters, None);
                 Ok(())
             }
             // A query measures the work that was done, so draws that wait are rendered first.
@@ -208,8 +203,7 @@ impl CommandProcessor {
                 self.flush()?;
                 if pool.kind() == QueryKind::Simulated {
                     let area = self.pass.as_ref().map(Pass::area);
-                    self.model
-                        .begin(self.device.runtime(), &mut self.counters, area);
+                    self.model.begin(self.device.runtime(), &mut self.counters, area);
                 }
                 if pool.kind() == QueryKind::Fragments {
                     self.fragment_queries += 1;
@@ -221,8 +215,7 @@ impl CommandProcessor {
                 self.flush()?;
                 if pool.kind() == QueryKind::Simulated {
                     let area = self.pass.as_ref().map(Pass::area);
-                    self.model
-                        .end(self.device.runtime(), &mut self.counters, area);
+                    self.model.end(self.device.runtime(), &mut self.counters, area);
                 }
                 if pool.kind() == QueryKind::Fragments {
                     self.fragment_queries = self.fragment_queries.saturating_sub(1);
@@ -278,12 +271,7 @@ impl CommandProcessor {
 
     /// Sorts and bins one view's set of Gaussians and adds it to the pass.
     fn gaussians(&mut self, set: GaussianSet) -> Result<(), ExecutionError> {
-        let draw = gaussian::sort_and_bin(
-            set,
-            self.device.runtime(),
-            self.device.caches(),
-            &mut self.counters,
-        )?;
+        let draw = gaussian::sort_and_bin(set, self.device.runtime(), self.device.caches(), &mut self.counters)?;
         let recorder = self.device.runtime().recorder();
         if let Some((recorder, record)) = recorder.zip(draw.record.as_ref()) {
             recorder.add_draw(self.owner, record);
@@ -325,12 +313,7 @@ impl CommandProcessor {
     /// end yields the draw in parts.
     fn primitives_of_view(&mut self, draw: &Draw, view: Option<u32>) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
-        let surface = Surface {
-            area: pass.area(),
-            layers: pass.layer_count(),
-            view,
-            depth: pass.depth_format(),
-        };
+        let surface = Surface { area: pass.area(), layers: pass.layer_count(), view, depth: pass.depth_format() };
         let device = Arc::clone(&self.device);
         let recorder = device.runtime().recorder();
         let record = recorder.map(|recorder| {
@@ -359,8 +342,7 @@ impl CommandProcessor {
             return host_time();
         }
         let area = self.pass.as_ref().map(Pass::area);
-        self.model
-            .account(self.device.runtime(), &mut self.counters, area);
+        self.model.account(self.device.runtime(), &mut self.counters, area);
         self.counters.get(Counter::SimulatedTime)
     }
 

@@ -19,11 +19,7 @@ const PIECES_PER_WORKER: u64 = 16;
 ///
 /// # Errors
 /// [`Stopped`] if a workgroup ran for too long. The memory that was written until then stays written.
-pub(crate) fn dispatch(
-    dispatch: &Dispatch,
-    runtime: &Runtime,
-    counters: &mut Counters,
-) -> Result<(), Stopped> {
+pub(crate) fn dispatch(dispatch: &Dispatch, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
     let Some(groups) = group_count(dispatch.count).filter(|&groups| groups > 0) else {
         return Ok(());
     };
@@ -33,10 +29,7 @@ pub(crate) fn dispatch(
     let run = DispatchRun {
         dispatch,
         resources: prepared.resources(),
-        watchdog: Watchdog {
-            limit: runtime.config().shader_timeout,
-            cancel: Some(&cancel),
-        },
+        watchdog: Watchdog { limit: runtime.config().shader_timeout, cancel: Some(&cancel) },
     };
     let started = Instant::now();
     let (machines, ran) = runtime.share(
@@ -48,10 +41,7 @@ pub(crate) fn dispatch(
     );
     dispatch.bindings.bump_generations();
     counters.add(Counter::ShaderTime, started.elapsed().as_nanos() as u64);
-    counters.add(
-        Counter::ComputeInvocations,
-        groups.saturating_mul(dispatch.program.invocations as u64),
-    );
+    counters.add(Counter::ComputeInvocations, groups.saturating_mul(dispatch.program.invocations as u64));
     for mut machine in machines {
         let work = machine.take_work();
         if ran.is_ok() {
@@ -63,9 +53,7 @@ pub(crate) fn dispatch(
 
 /// The number of workgroups of a dispatch; `None` if it exceeds 64 bits.
 fn group_count(count: [u32; 3]) -> Option<u64> {
-    count
-        .into_iter()
-        .try_fold(1u64, |product, count| product.checked_mul(count.into()))
+    count.into_iter().try_fold(1u64, |product, count| product.checked_mul(count.into()))
 }
 
 /// A dispatch that workers share.
@@ -88,11 +76,7 @@ impl DispatchRun<'_> {
 
     fn run_group(&self, machine: &mut Machine, group: u64) -> Result<(), Stopped> {
         let [width, height, _] = self.dispatch.count.map(u64::from);
-        let number = [
-            group % width,
-            group / width % height,
-            group / width / height,
-        ];
+        let number = [group % width, group / width % height, group / width / height];
         let base = self.dispatch.base;
         self.set_inputs(machine, |input| match input {
             ComputeInput::WorkgroupId(axis) => Some(base[axis].wrapping_add(number[axis] as u32)),

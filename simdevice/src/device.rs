@@ -18,10 +18,7 @@ impl Device {
     /// [`DeviceError`] if the processor lacks the SIMD level, the macro-tile's size is impossible or the host refuses
     /// threads.
     pub fn new(config: &Config) -> Result<Self, DeviceError> {
-        Ok(Self {
-            runtime: Runtime::new(config)?,
-            caches: Caches::default(),
-        })
+        Ok(Self { runtime: Runtime::new(config)?, caches: Caches::default() })
     }
 
     /// The runtime: the workers, the SIMD level and the configuration.

@@ -24,12 +24,7 @@ pub(crate) struct HardwareModel {
 impl HardwareModel {
     /// Makes a model of the work of `owner`.
     pub(crate) fn new(owner: Owner) -> Self {
-        Self {
-            owner,
-            config: None,
-            queries: 0,
-            next: 0,
-        }
+        Self { owner, config: None, queries: 0, next: 0 }
     }
 
     /// True if work is accounted for at present.
@@ -63,12 +58,7 @@ impl HardwareModel {
 
     /// Adds the cost of the work that was recorded since the last call to the counters. In a pass, whose area is
     /// `area`, the work after this call is a frame of its own, because its tiles have been written.
-    pub(crate) fn account(
-        &mut self,
-        runtime: &Runtime,
-        counters: &mut Counters,
-        area: Option<Rect>,
-    ) {
+    pub(crate) fn account(&mut self, runtime: &Runtime, counters: &mut Counters, area: Option<Rect>) {
         if !self.is_on(runtime) {
             return;
         }

@@ -104,10 +104,7 @@ static MADE: AtomicUsize = AtomicUsize::new(0);
 
 /// Makes the device make a mistake from now on, or none.
 pub fn make(mistake: Option<Mistake>) {
-    MADE.store(
-        mistake.map_or(0, |mistake| mistake as usize + 1),
-        Ordering::SeqCst,
-    );
+    MADE.store(mistake.map_or(0, |mistake| mistake as usize + 1), Ordering::SeqCst);
 }
 
 impl Mistake {

@@ -80,8 +80,7 @@ pub struct Pass {
 /// True if [`FlushPolicy::SomeDraws`] flushes after this draw: after about one draw in three, pseudo-randomly.
 fn flushes(seed: u64, draw: u64) -> bool {
     // Multiplication by an odd constant carries low bits into high bits.
-    let mixed =
-        (seed ^ draw.wrapping_mul(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xD134_2543_DE82_EF95);
+    let mixed = (seed ^ draw.wrapping_mul(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xD134_2543_DE82_EF95);
     (mixed >> 32).is_multiple_of(3)
 }
 
@@ -92,10 +91,7 @@ impl Pass {
     /// [`AttachmentError`] if an attachment cannot be rendered to.
     pub fn begin(rendering: &Rendering) -> Result<Self, AttachmentError> {
         let target = |attachment: &Option<Attachment>, aspect| {
-            attachment
-                .as_ref()
-                .map(|attachment| bind(attachment, aspect, rendering.layer_count))
-                .transpose()
+            attachment.as_ref().map(|attachment| bind(attachment, aspect, rendering.layer_count)).transpose()
         };
         let resolve = |attachment: &Option<Attachment>, aspect| {
             attachment
@@ -148,12 +144,7 @@ impl Pass {
         }
         pass.samples = samples;
         let [width, height] = extent;
-        pass.area = pass.area.intersect(Rect {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        });
+        pass.area = pass.area.intersect(Rect { x: 0, y: 0, width, height });
         pass.layer_count = pass.layer_count.min(layers);
         Ok(pass)
     }
@@ -191,12 +182,7 @@ impl Pass {
     ///
     /// # Errors
     /// As [`Pass::flush`].
-    pub fn push(
-        &mut self,
-        draw: PassDraw,
-        runtime: &Runtime,
-        counters: &mut Counters,
-    ) -> Result<(), Stopped> {
+    pub fn push(&mut self, draw: PassDraw, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
         host::push(&mut self.draws, draw);
         self.pushed += 1;
@@ -244,14 +230,9 @@ impl Pass {
         self.color.iter_mut().chain(rest).flatten()
     }
 
-    fn render(
-        &mut self,
-        runtime: &Runtime,
-        counters: &mut Counters,
-        last: bool,
-    ) -> Result<(), Stopped> {
-        let pending = self.targets().any(|target| target.clear.is_some())
-            || last && self.resolve_targets().next().is_some();
+    fn render(&mut self, runtime: &Runtime, counters: &mut Counters, last: bool) -> Result<(), Stopped> {
+        let pending =
+            self.targets().any(|target| target.clear.is_some()) || last && self.resolve_targets().next().is_some();
         let mut done = Ok(());
         if !self.area.is_empty() && (pending || !self.draws.is_empty()) {
             let started = Instant::now();
@@ -272,12 +253,7 @@ impl Pass {
     }
 
     /// Renders all macro-tiles. Each is rendered by the next free worker.
-    fn render_macro_tiles(
-        &self,
-        runtime: &Runtime,
-        counters: &mut Counters,
-        last: bool,
-    ) -> Result<(), Stopped> {
+    fn render_macro_tiles(&self, runtime: &Runtime, counters: &mut Counters, last: bool) -> Result<(), Stopped> {
         let size = runtime.config().macro_tile_size;
         // The area's corner is not negative.
         let range = |start: i32, length: u32| {
@@ -288,13 +264,8 @@ impl Pass {
         let rows = range(self.area.y, self.area.height);
         let (width, height) = (columns.len() as u64, rows.len() as u64);
         let count = width * height * u64::from(self.layer_count);
-        let flush = Flush {
-            pass: self,
-            runtime,
-            last,
-            draws: self.tile_draws(runtime),
-            cancel: AtomicBool::new(false),
-        };
+        let flush =
+            Flush { pass: self, runtime, last, draws: self.tile_draws(runtime), cancel: AtomicBool::new(false) };
         let (workers, done) = runtime.share(
             0..count,
             1,
@@ -302,10 +273,7 @@ impl Pass {
             || Worker::new(self, size),
             |worker, task| {
                 let (layer, place) = (task / (width * height), task % (width * height));
-                let at = [
-                    columns.start + (place % width) as u32,
-                    rows.start + (place / width) as u32,
-                ];
+                let at = [columns.start + (place % width) as u32, rows.start + (place / width) as u32];
                 flush.render_macro_tile(worker, layer as u32, at)
             },
         );
@@ -324,27 +292,16 @@ impl Pass {
 
     /// The waiting draws, prepared for tiles.
     fn tile_draws<'a>(&'a self, runtime: &Runtime) -> Vec<Ready<'a>> {
-        let targets = Targets {
-            color: &self.color,
-            depth: self.depth.as_ref(),
-            stencil: self.stencil.as_ref(),
-        };
+        let targets = Targets { color: &self.color, depth: self.depth.as_ref(), stencil: self.stencil.as_ref() };
         let ready = |draw: &'a PassDraw| match draw {
             PassDraw::Clear(clear) => Ready::Clear(clear),
-            PassDraw::Gaussians(draw) => Ready::Gaussians(Box::new(GaussianTileDraw::new(
-                draw,
-                targets,
-                self.samples,
-                runtime,
-            ))),
+            PassDraw::Gaussians(draw) => {
+                Ready::Gaussians(Box::new(GaussianTileDraw::new(draw, targets, self.samples, runtime)))
+            }
             PassDraw::Primitives(draw) if draw.segments.is_empty() => Ready::Nothing,
-            PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TriangleTileDraw::new(
-                draw,
-                targets,
-                self.samples,
-                self.area,
-                runtime,
-            ))),
+            PassDraw::Primitives(draw) => {
+                Ready::Primitives(Box::new(TriangleTileDraw::new(draw, targets, self.samples, self.area, runtime)))
+            }
         };
         host::collect(self.draws.iter().map(ready))
     }
@@ -378,11 +335,7 @@ fn bind_resolve(
 }
 
 /// Prepares an attachment's aspect.
-fn bind(
-    attachment: &Attachment,
-    aspect: Aspect,
-    layer_count: u32,
-) -> Result<Target, AttachmentError> {
+fn bind(attachment: &Attachment, aspect: Aspect, layer_count: u32) -> Result<Target, AttachmentError> {
     let view = &attachment.view;
     let mut target = Target::new(view, aspect, layer_count, attachment.store)?;
     target.clear = match attachment.load {
@@ -405,11 +358,7 @@ impl Worker {
     fn new(pass: &Pass, size: u32) -> Self {
         Self {
             buffers: Buffers {
-                color: pass
-                    .color
-                    .iter()
-                    .map(|target| TileBuffer::new(size, target.as_ref()))
-                    .collect(),
+                color: pass.color.iter().map(|target| TileBuffer::new(size, target.as_ref())).collect(),
                 depth: TileBuffer::new(size, pass.depth.as_ref()),
                 stencil: TileBuffer::new(size, pass.stencil.as_ref()),
             },
@@ -433,12 +382,7 @@ struct Flush<'a> {
 
 impl Flush<'_> {
     /// Runs all draws in one macro-tile, then stores the macro-tile's tiles.
-    fn render_macro_tile(
-        &self,
-        worker: &mut Worker,
-        layer: u32,
-        at: [u32; 2],
-    ) -> Result<(), Stopped> {
+    fn render_macro_tile(&self, worker: &mut Worker, layer: u32, at: [u32; 2]) -> Result<(), Stopped> {
         let pass = self.pass;
         if !pass.renders(layer) {
             return Ok(());
@@ -470,12 +414,7 @@ impl Flush<'_> {
                 )?,
             }
         }
-        if !self
-            .runtime
-            .config()
-            .optimizations
-            .has(Optimization::EmptyTiles)
-        {
+        if !self.runtime.config().optimizations.has(Optimization::EmptyTiles) {
             tiles().for_each(|tile| self.load_all(worker, layer, &tile));
         }
         for tile in tiles() {
@@ -488,10 +427,7 @@ impl Flush<'_> {
     fn load_all(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
         let (pass, buffers) = (self.pass, &mut worker.buffers);
         let colors = buffers.color.iter_mut().zip(&pass.color);
-        let rest = [
-            (&mut buffers.depth, &pass.depth),
-            (&mut buffers.stencil, &pass.stencil),
-        ];
+        let rest = [(&mut buffers.depth, &pass.depth), (&mut buffers.stencil, &pass.stencil)];
         for (plane, target) in colors.chain(rest) {
             if let Some(target) = target {
                 plane.load_or_clear(target, layer, tile);
@@ -504,26 +440,14 @@ impl Flush<'_> {
         let (pass, buffers) = (self.pass, &mut worker.buffers);
         let colors = pass.color.iter().zip(&pass.resolve.color);
         let planes = buffers.color.iter_mut().zip(colors);
-        let planes = planes
-            .map(|(plane, (target, resolve))| (plane, target.as_ref(), resolve.as_ref()))
-            .chain([
-                (
-                    &mut buffers.depth,
-                    pass.depth.as_ref(),
-                    pass.resolve.depth.as_ref(),
-                ),
-                (
-                    &mut buffers.stencil,
-                    pass.stencil.as_ref(),
-                    pass.resolve.stencil.as_ref(),
-                ),
-            ]);
+        let planes = planes.map(|(plane, (target, resolve))| (plane, target.as_ref(), resolve.as_ref())).chain([
+            (&mut buffers.depth, pass.depth.as_ref(), pass.resolve.depth.as_ref()),
+            (&mut buffers.stencil, pass.stencil.as_ref(), pass.resolve.stencil.as_ref()),
+        ]);
         for (plane, target, resolve) in planes {
             let Some(target) = target else { continue };
             let untouched = !plane.is_touched(tile.index);
-            worker
-                .counters
-                .add(Counter::TilesUntouched, untouched.into());
+            worker.counters.add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.load_or_clear(target, layer, tile);
                 let level = self.runtime.level();
@@ -539,10 +463,7 @@ impl Flush<'_> {
         let pass = self.pass;
         for &(rect, first_layer, layers) in &clear.rects {
             // In a pass with views, a clear applies to all of them.
-            let in_layers = pass.view_mask != 0
-                || layer
-                    .checked_sub(first_layer)
-                    .is_some_and(|index| index < layers);
+            let in_layers = pass.view_mask != 0 || layer.checked_sub(first_layer).is_some_and(|index| index < layers);
             if !in_layers || tile.pixels.intersect(rect).is_empty() {
                 continue;
             }
@@ -559,10 +480,7 @@ impl Flush<'_> {
                         (pass.depth.as_ref(), plane, Aspect::Depth, value)
                     }
                     AttachmentClear::Stencil(stencil) => {
-                        let value = ClearValue::DepthStencil {
-                            depth: 0.0,
-                            stencil,
-                        };
+                        let value = ClearValue::DepthStencil { depth: 0.0, stencil };
                         let plane = Some(&mut buffers.stencil);
                         (pass.stencil.as_ref(), plane, Aspect::Stencil, value)
                     }
@@ -584,12 +502,7 @@ mod tests {
     #[gaurast_runner::test]
     fn without_attachments_there_are_as_many_layers_as_a_framebuffer_may_have() {
         let rendering = |layer_count| Rendering {
-            area: Rect {
-                x: 0,
-                y: 0,
-                width: 40,
-                height: 30,
-            },
+            area: Rect { x: 0, y: 0, width: 40, height: 30 },
             layer_count,
             view_mask: 0,
             color: Vec::new(),

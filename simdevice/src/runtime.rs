@@ -101,10 +101,7 @@ impl Runtime {
     /// [`DeviceError`] if the processor lacks the SIMD level, the macro-tile's side is impossible or the host refuses
     /// threads.
     pub fn new(config: &Config) -> Result<Self, DeviceError> {
-        let level = config
-            .simd
-            .resolve()
-            .ok_or(DeviceError::UnsupportedSimdLevel(config.simd))?;
+        let level = config.simd.resolve().ok_or(DeviceError::UnsupportedSimdLevel(config.simd))?;
         let size = config.macro_tile_size;
         if !(TILE_SIZE..=MAX_MACRO_TILE_SIZE).contains(&size) || !size.is_multiple_of(TILE_SIZE) {
             return Err(DeviceError::MacroTileSize(size));
@@ -126,9 +123,7 @@ impl Runtime {
     /// or because a query listens.
     pub(crate) fn recorder(&self) -> Option<&Recorder> {
         let config = &self.config;
-        let wanted = config.recorder.is_some()
-            || config.simulated_timestamps
-            || self.recorder.has_listeners();
+        let wanted = config.recorder.is_some() || config.simulated_timestamps || self.recorder.has_listeners();
         wanted.then_some(&*self.recorder)
     }
 
@@ -144,9 +139,7 @@ impl Runtime {
 
     /// The number of workers.
     pub fn threads(&self) -> usize {
-        self.workers
-            .pool()
-            .map_or(1, ThreadPool::current_num_threads)
+        self.workers.pool().map_or(1, ThreadPool::current_num_threads)
     }
 
     /// Runs `work` on the workers.
@@ -213,17 +206,12 @@ struct Workers {
 impl Workers {
     /// Starts `count` threads; 0 starts one per processor.
     fn new(count: usize) -> Result<Self, ThreadPoolBuildError> {
-        let mut workers = Self {
-            pool: None,
-            threads: Vec::new(),
-        };
+        let mut workers = Self { pool: None, threads: Vec::new() };
         let pool = ThreadPoolBuilder::new()
             .num_threads(count)
             .spawn_handler(|worker| {
                 let name = format!("gaurast-{}", worker.index());
-                let spawned = std::thread::Builder::new()
-                    .name(name)
-                    .spawn(|| worker.run());
+                let spawned = std::thread::Builder::new().name(name).spawn(|| worker.run());
                 workers.threads.push(spawned?);
                 Ok(())
             })
@@ -256,11 +244,7 @@ mod tests {
     #[gaurast_runner::test]
     fn impossible_macro_tiles_are_refused() {
         for macro_tile_size in [0, 8, 40, 144, u32::MAX] {
-            let config = Config {
-                threads: 1,
-                macro_tile_size,
-                ..Config::default()
-            };
+            let config = Config { threads: 1, macro_tile_size, ..Config::default() };
             assert!(matches!(
                 Runtime::new(&config),
                 Err(DeviceError::MacroTileSize(size)) if size == macro_tile_size
@@ -278,20 +262,12 @@ mod tests {
         pool.broadcast(|_| KEPT.with(|kept| *kept.borrow_mut() = Some(witness.clone())));
         assert_eq!(Arc::strong_count(&witness), 4);
         drop(workers);
-        assert_eq!(
-            Arc::strong_count(&witness),
-            1,
-            "thread locals die with their threads"
-        );
+        assert_eq!(Arc::strong_count(&witness), 1, "thread locals die with their threads");
     }
 
     #[gaurast_runner::test]
     fn tasks_are_shared_until_one_stops() {
-        let runtime = Runtime::new(&Config {
-            threads: 3,
-            ..Config::default()
-        })
-        .unwrap();
+        let runtime = Runtime::new(&Config { threads: 3, ..Config::default() }).unwrap();
         let cancel = AtomicBool::new(false);
         let (workers, done) = runtime.share(5..100, 4, &cancel, Vec::new, |worker, task| {
             worker.push(task);
@@ -301,9 +277,7 @@ mod tests {
         tasks.sort_unstable();
         assert_eq!(tasks, (5..100).collect::<Vec<_>>());
         assert_eq!(done, Ok(()));
-        let timed_out = Stopped::TimedOut {
-            limit: Duration::ZERO,
-        };
+        let timed_out = Stopped::TimedOut { limit: Duration::ZERO };
         let stopping = |_: &mut (), task| match task {
             70 => Err(timed_out),
             _ if cancel.load(Relaxed) => Err(Stopped::Cancelled),

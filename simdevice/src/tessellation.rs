@@ -153,11 +153,7 @@ impl Tessellation {
                 let [b, c, d] = [a + 1, a + 1 + width, a + width];
                 // Diagonals point to the middle, so that the grid looks like rings.
                 let is_left = 2 * (a - start) + 2 < width;
-                if is_left == is_low {
-                    [a, b, c, a, c, d]
-                } else {
-                    [b, c, d, b, d, a]
-                }
+                if is_left == is_low { [a, b, c, a, c, d] } else { [b, c, d, b, d, a] }
             }));
         }
         let step = width as i32;
@@ -216,24 +212,16 @@ impl Spacing {
         };
         let level = match self {
             Self::Equal => segments,
-            Self::FractionalEven | Self::FractionalOdd => {
-                level.max(segments - 2.0 + LEAST_FRACTION)
-            }
+            Self::FractionalEven | Self::FractionalOdd => level.max(segments - 2.0 + LEAST_FRACTION),
         };
         let length = 1.0 / level;
         let short = (level + 2.0 - segments) / 2.0 * length;
         let segments = segments as usize;
         let short_at = short_segment(segments);
-        let mut edge = Edge {
-            at: [0; MAX_LEVEL as usize + 1],
-            segments,
-        };
+        let mut edge = Edge { at: [0; MAX_LEVEL as usize + 1], segments };
         for number in 0..segments.div_ceil(2) {
-            let position = if number <= short_at {
-                number as f64 * length
-            } else {
-                (number - 1) as f64 * length + short
-            };
+            let position =
+                if number <= short_at { number as f64 * length } else { (number - 1) as f64 * length + short };
             edge.at[number] = (position * f64::from(ONE)).round() as u32;
             edge.at[segments - number] = ONE - edge.at[number];
         }
@@ -303,12 +291,7 @@ struct Row<'a> {
 impl<'a> Row<'a> {
     /// The row of a grid's points that begins at `first`.
     fn of_grid(positions: &'a [u32], first: u32, step: i32) -> Self {
-        Self {
-            positions,
-            first,
-            step,
-            last: first.wrapping_add_signed(step * (positions.len() as i32 - 1)),
-        }
+        Self { positions, first, step, last: first.wrapping_add_signed(step * (positions.len() as i32 - 1)) }
     }
 
     fn segments(&self) -> usize {
@@ -316,11 +299,7 @@ impl<'a> Row<'a> {
     }
 
     fn point(&self, number: usize) -> u32 {
-        if number == self.segments() {
-            self.last
-        } else {
-            self.first.wrapping_add_signed(self.step * number as i32)
-        }
+        if number == self.segments() { self.last } else { self.first.wrapping_add_signed(self.step * number as i32) }
     }
 
     /// Twice the position of the middle of a segment.
@@ -343,17 +322,8 @@ fn ring<'a, const SIDES: usize>(
         let before_last = &positions[..positions.len() - 1];
         out.points(before_last.iter().map(|&it| point(side, it)));
         side += 1;
-        let last = if side == SIDES {
-            ring
-        } else {
-            out.points.len() as u32
-        };
-        Row {
-            positions,
-            first,
-            step: 1,
-            last,
-        }
+        let last = if side == SIDES { ring } else { out.points.len() as u32 };
+        Row { positions, first, step: 1, last }
     })
 }
 
@@ -370,11 +340,7 @@ fn square_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 4]) -> [Row<'a
 /// Adds the points of one of the concentric triangles. They are where perpendiculars to the domain's edges, at given
 /// positions, meet the triangle. `corner` is the position on both edges at a corner whose perpendiculars meet in the
 /// triangle's corner.
-fn triangle_ring<'a>(
-    out: &mut TessellatedPatch,
-    sides: [&'a [u32]; 3],
-    corner: u32,
-) -> [Row<'a>; 3] {
+fn triangle_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 3], corner: u32) -> [Row<'a>; 3] {
     if corner == HALF {
         let third = ONE / 3;
         out.points([[third, third, ONE - 2 * third]].into_iter());

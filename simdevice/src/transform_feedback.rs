@@ -33,10 +33,7 @@ pub(crate) struct StreamPrimitives<'a> {
 impl TransformFeedback {
     /// Transform feedback to buffers that are empty so far.
     pub fn new(buffers: [Option<BufferRange>; MAX_TRANSFORM_FEEDBACK_BUFFERS]) -> Self {
-        Self {
-            buffers,
-            written: Default::default(),
-        }
+        Self { buffers, written: Default::default() }
     }
 
     /// Reads how many bytes of each buffer are written already.
@@ -65,14 +62,9 @@ impl TransformFeedback {
     }
 
     /// Appends primitives to the buffers of their stream, as many as all of these have room for. Returns their number.
-    pub(crate) fn append(
-        &self,
-        outputs: &CapturedOutputs,
-        primitives: StreamPrimitives<'_>,
-    ) -> u64 {
-        let of_stream = |(_, vertex): &(usize, &CapturedVertex)| {
-            vertex.stride > 0 && vertex.stream == primitives.stream
-        };
+    pub(crate) fn append(&self, outputs: &CapturedOutputs, primitives: StreamPrimitives<'_>) -> u64 {
+        let of_stream =
+            |(_, vertex): &(usize, &CapturedVertex)| vertex.stride > 0 && vertex.stream == primitives.stream;
         let vertices = outputs.buffers.iter().enumerate().filter(of_stream);
         let targets = vertices.filter_map(|(number, vertex)| {
             let buffer = self.buffers[number].as_ref()?;
@@ -98,12 +90,7 @@ impl TransformFeedback {
 }
 
 /// Writes the values of consecutive vertices from byte `start` of a buffer on. `None` if the memory ends before.
-fn write_vertices(
-    vertex: &CapturedVertex,
-    buffer: &BufferRange,
-    start: u64,
-    values: &[u32],
-) -> Option<()> {
+fn write_vertices(vertex: &CapturedVertex, buffer: &BufferRange, start: u64, values: &[u32]) -> Option<()> {
     let start = buffer.offset.checked_add(start)?;
     if vertex.values.len() * 4 == vertex.stride as usize {
         return buffer.memory.write(start, values).ok();

@@ -18,40 +18,25 @@ struct Addressed {
 
 impl Addressed {
     fn of(gpu: &Gpu, words: &[u32]) -> Self {
-        let usage =
-            vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS | vk::BufferUsageFlags::STORAGE_BUFFER;
-        let info = vk::BufferCreateInfo::default()
-            .size(size_of_val(words) as u64)
-            .usage(usage);
+        let usage = vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS | vk::BufferUsageFlags::STORAGE_BUFFER;
+        let info = vk::BufferCreateInfo::default().size(size_of_val(words) as u64).usage(usage);
         let device = gpu.device();
         // SAFETY: the create infos are valid, and the memory is as long as the words.
         unsafe {
             let raw = device.create_buffer(&info, None).expect("a buffer");
             let needed = device.get_buffer_memory_requirements(raw);
-            let mut flags = vk::MemoryAllocateFlagsInfo::default()
-                .flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+            let mut flags = vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
             let info = vk::MemoryAllocateInfo::default()
                 .allocation_size(needed.size)
                 .memory_type_index(1)
                 .push_next(&mut flags);
             let memory = device.allocate_memory(&info, None).expect("memory");
-            device
-                .bind_buffer_memory(raw, memory, 0)
-                .expect("it is bound");
-            let to = device
-                .map_memory(memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
-                .expect("it is mapped");
-            to.cast::<u32>()
-                .copy_from_nonoverlapping(words.as_ptr(), words.len());
+            device.bind_buffer_memory(raw, memory, 0).expect("it is bound");
+            let to = device.map_memory(memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).expect("it is mapped");
+            to.cast::<u32>().copy_from_nonoverlapping(words.as_ptr(), words.len());
             device.unmap_memory(memory);
             let info = vk::BufferDeviceAddressInfo::default().buffer(raw);
-            Self {
-                raw,
-                memory,
-                address: device.get_buffer_device_address(&info),
-                words: words.len(),
-                gpu: gpu.clone(),
-            }
+            Self { raw, memory, address: device.get_buffer_device_address(&info), words: words.len(), gpu: gpu.clone() }
         }
     }
 
@@ -60,11 +45,9 @@ impl Addressed {
         let mut words = vec![0u32; self.words];
         // SAFETY: the memory has this length, and the device is idle.
         unsafe {
-            let from = device
-                .map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
-                .expect("it is mapped");
-            from.cast::<u32>()
-                .copy_to_nonoverlapping(words.as_mut_ptr(), words.len());
+            let from =
+                device.map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).expect("it is mapped");
+            from.cast::<u32>().copy_to_nonoverlapping(words.as_mut_ptr(), words.len());
             device.unmap_memory(self.memory);
         }
         words

@@ -10,9 +10,8 @@ use ash::vk;
 fn clocks_never_go_back() {
     const LANES: usize = 64;
     const READS: usize = 6;
-    let mut features = vk::PhysicalDeviceShaderClockFeaturesKHR::default()
-        .shader_subgroup_clock(true)
-        .shader_device_clock(true);
+    let mut features =
+        vk::PhysicalDeviceShaderClockFeaturesKHR::default().shader_subgroup_clock(true).shader_device_clock(true);
     let gpu = Gpu::extended(&[ash::khr::shader_clock::NAME], &mut features).expect("a device");
     let times = Buffer::new(&gpu, (8 * LANES * READS) as u64);
     let bindings = Bindings::new(&gpu, &[Resource::Storage(times.raw)]);
@@ -43,8 +42,5 @@ fn clocks_never_go_back() {
             assert!(times[0] < times[READS - 1], "time passes");
         }
     }
-    assert!(
-        earlier.iter().max() < later.iter().min(),
-        "a clock of the device"
-    );
+    assert!(earlier.iter().max() < later.iter().min(), "a clock of the device");
 }

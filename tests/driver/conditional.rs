@@ -2,8 +2,7 @@
 
 use ash::vk;
 use gaurast_testkit::{
-    Bindings, Buffer, Commands, Gpu, Kernel, Pass, Pipeline, PipelineOptions, Resource, Target,
-    TargetOptions, Vertex,
+    Bindings, Buffer, Commands, Gpu, Kernel, Pass, Pipeline, PipelineOptions, Resource, Target, TargetOptions, Vertex,
 };
 
 use crate::GLSLANG;
@@ -26,8 +25,7 @@ impl Device {
         let mut features = vk::PhysicalDeviceConditionalRenderingFeaturesEXT::default()
             .conditional_rendering(true)
             .inherited_conditional_rendering(true);
-        let gpu = Gpu::extended(&[ash::ext::conditional_rendering::NAME], &mut features)
-            .expect("a device");
+        let gpu = Gpu::extended(&[ash::ext::conditional_rendering::NAME], &mut features).expect("a device");
         let commands = ash::ext::conditional_rendering::Device::new(gpu.instance(), gpu.device());
         Self { gpu, commands }
     }
@@ -40,10 +38,7 @@ impl Device {
         flags: vk::ConditionalRenderingFlagsEXT,
         record: impl FnOnce(),
     ) {
-        let info = vk::ConditionalRenderingBeginInfoEXT::default()
-            .buffer(words.raw)
-            .offset(4)
-            .flags(flags);
+        let info = vk::ConditionalRenderingBeginInfoEXT::default().buffer(words.raw).offset(4).flags(flags);
         // SAFETY: the command buffer records, its device has the extension, and the buffer is alive.
         unsafe {
             let functions = self.commands.fp();
@@ -95,29 +90,16 @@ fn dispatches_are_executed_or_not() {
 fn draws_and_clears_go_by_what_the_device_wrote() {
     let device = Device::new();
     let gpu = &device.gpu;
-    let vertex = |x: f32, y: f32| Vertex {
-        position: [x, y, 0.5, 1.0],
-        color: [1.0, 0.0, 0.0, 1.0],
-    };
+    let vertex = |x: f32, y: f32| Vertex { position: [x, y, 0.5, 1.0], color: [1.0, 0.0, 0.0, 1.0] };
     let corners = [vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)];
     let vertices = Buffer::of(gpu, &corners);
     for (word, flags, executed) in CASES {
         for clears in [false, true] {
-            let target = Target::new(
-                gpu,
-                &TargetOptions {
-                    size: [4, 4],
-                    ..TargetOptions::of(vk::Format::R8G8B8A8_UNORM)
-                },
-            );
+            let target =
+                Target::new(gpu, &TargetOptions { size: [4, 4], ..TargetOptions::of(vk::Format::R8G8B8A8_UNORM) });
             let pipeline = Pipeline::new(gpu, &target, &PipelineOptions::default());
             let words = Buffer::of(gpu, &[!word, !word]);
-            let pass = Pass {
-                color: vk::ClearColorValue {
-                    float32: [0.0, 1.0, 0.0, 1.0],
-                },
-                ..Pass::default()
-            };
+            let pass = Pass { color: vk::ClearColorValue { float32: [0.0, 1.0, 0.0, 1.0] }, ..Pass::default() };
             gpu.run(|commands| {
                 // SAFETY: the command buffer records, and the buffer is alive.
                 unsafe {
@@ -128,18 +110,12 @@ fn draws_and_clears_go_by_what_the_device_wrote() {
                 commands.pass(&target, &pass, || {
                     device.when(commands.raw, &words, flags, || {
                         if clears {
-                            let clear = vk::ClearAttachment::default()
-                                .aspect_mask(vk::ImageAspectFlags::COLOR)
-                                .clear_value(vk::ClearValue {
-                                    color: vk::ClearColorValue {
-                                        float32: [1.0, 0.0, 0.0, 1.0],
-                                    },
-                                });
+                            let clear =
+                                vk::ClearAttachment::default().aspect_mask(vk::ImageAspectFlags::COLOR).clear_value(
+                                    vk::ClearValue { color: vk::ClearColorValue { float32: [1.0, 0.0, 0.0, 1.0] } },
+                                );
                             let rect = vk::ClearRect::default()
-                                .rect(vk::Rect2D::default().extent(vk::Extent2D {
-                                    width: 4,
-                                    height: 4,
-                                }))
+                                .rect(vk::Rect2D::default().extent(vk::Extent2D { width: 4, height: 4 }))
                                 .layer_count(1);
                             // SAFETY: the command buffer records within a pass.
                             unsafe {
@@ -154,11 +130,7 @@ fn draws_and_clears_go_by_what_the_device_wrote() {
                     });
                 });
             });
-            let expected = if executed {
-                [255, 0, 0, 255]
-            } else {
-                [0, 255, 0, 255]
-            };
+            let expected = if executed { [255, 0, 0, 255] } else { [0, 255, 0, 255] };
             let pixels = target.colors[0].colors::<[u8; 4]>();
             assert_eq!(pixels, [expected; 16], "{word} {flags:?} {clears}");
         }

@@ -2,43 +2,18 @@
 //! write.
 
 use ash::vk;
-use gaurast_testkit::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-};
+use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex};
 
 use crate::GLSLANG;
 
 /// The red of a target that a triangle covers, at depth `z` with a w of `w` and in a viewport with these depths; `None` if it is
 /// clipped.
-fn red_of_triangle(
-    gpu: &Gpu,
-    options: &PipelineOptions<'_>,
-    z: f32,
-    w: f32,
-    viewport_depths: [f32; 2],
-) -> Option<f32> {
-    let target = Target::new(
-        gpu,
-        &TargetOptions {
-            size: [4, 4],
-            ..TargetOptions::of(vk::Format::R32_SFLOAT)
-        },
-    );
+fn red_of_triangle(gpu: &Gpu, options: &PipelineOptions<'_>, z: f32, w: f32, viewport_depths: [f32; 2]) -> Option<f32> {
+    let target = Target::new(gpu, &TargetOptions { size: [4, 4], ..TargetOptions::of(vk::Format::R32_SFLOAT) });
     let pipeline = Pipeline::new(gpu, &target, options);
-    let vertex = |x: f32, y: f32| Vertex {
-        position: [w * x, w * y, w * z, w],
-        color: [0.0; 4],
-    };
-    let vertices = Buffer::of(
-        gpu,
-        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
-    );
-    let pass = Pass {
-        color: vk::ClearColorValue {
-            float32: [100.0; 4],
-        },
-        ..Pass::default()
-    };
+    let vertex = |x: f32, y: f32| Vertex { position: [w * x, w * y, w * z, w], color: [0.0; 4] };
+    let vertices = Buffer::of(gpu, &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)]);
+    let pass = Pass { color: vk::ClearColorValue { float32: [100.0; 4] }, ..Pass::default() };
     gpu.run(|commands| {
         commands.pass(&target, &pass, || {
             commands.bind(&pipeline);
@@ -47,19 +22,16 @@ fn red_of_triangle(
             commands.draw(0..3);
         });
     });
-    let found: Vec<f32> =
-        bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
+    let found: Vec<f32> = bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
     assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
     (found[0] != 100.0).then_some(found[0])
 }
 
 /// The depth that a fragment shader gets for a triangle that covers the target at depth `z`; `None` if it is clipped.
 fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32> {
-    let mut state = vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default()
-        .depth_clip_enable(clip.unwrap_or(false));
-    let mut raster = vk::PipelineRasterizationStateCreateInfo::default()
-        .line_width(1.0)
-        .depth_clamp_enable(clamp);
+    let mut state =
+        vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default().depth_clip_enable(clip.unwrap_or(false));
+    let mut raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0).depth_clamp_enable(clamp);
     if clip.is_some() {
         raster.p_next = std::ptr::from_mut(&mut state).cast();
     }
@@ -80,8 +52,7 @@ fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32>
 
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn planes_clip_as_the_pipeline_says() {
-    let mut features =
-        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
+    let mut features = vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
     let gpu = Gpu::extended(&[ash::ext::depth_clip_enable::NAME], &mut features).expect("a device");
     for z in [-0.5, 1.5] {
         for (clamp, clip, drawn) in [
@@ -117,10 +88,8 @@ fn depth_in_viewport(gpu: &Gpu, negative_one_to_one: bool, z: f32) -> Option<f32
 
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn clip_space_begins_at_minus_w_where_the_pipeline_says_so() {
-    let mut features =
-        vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
-    let gpu =
-        Gpu::extended(&[ash::ext::depth_clip_control::NAME], &mut features).expect("a device");
+    let mut features = vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
+    let gpu = Gpu::extended(&[ash::ext::depth_clip_control::NAME], &mut features).expect("a device");
     for (z, from_zero, from_minus_one) in [
         (-1.25, None, None),
         (-1.0, None, Some(0.25)),
@@ -159,13 +128,7 @@ const STORED: WrittenDepth = WrittenDepth {
 
 /// The depth that is stored after fragments whose shader writes a depth.
 fn stored_depth(gpu: &Gpu, test: WrittenDepth, written: f32) -> f32 {
-    let target = Target::new(
-        gpu,
-        &TargetOptions {
-            size: [4, 4],
-            ..TargetOptions::with_depth(test.format)
-        },
-    );
+    let target = Target::new(gpu, &TargetOptions { size: [4, 4], ..TargetOptions::with_depth(test.format) });
     let fragment = format!(
         "{}
         layout(location = 0) flat in float depth;
@@ -179,9 +142,7 @@ fn stored_depth(gpu: &Gpu, test: WrittenDepth, written: f32) -> f32 {
                  layout(location = 0) flat out float depth;
                  void main() { gl_Position = position; depth = color.x; }",
         fragment: Some(&fragment),
-        raster: vk::PipelineRasterizationStateCreateInfo::default()
-            .line_width(1.0)
-            .depth_clamp_enable(test.clamp),
+        raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0).depth_clamp_enable(test.clamp),
         depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(true)
             .depth_write_enable(true)
@@ -189,21 +150,9 @@ fn stored_depth(gpu: &Gpu, test: WrittenDepth, written: f32) -> f32 {
         ..PipelineOptions::default()
     };
     let pipeline = Pipeline::new(gpu, &target, &options);
-    let vertex = |x: f32, y: f32| Vertex {
-        position: [x, y, 0.5, 1.0],
-        color: [written, 0.0, 0.0, 0.0],
-    };
-    let vertices = Buffer::of(
-        gpu,
-        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
-    );
-    let pass = Pass {
-        depth: vk::ClearDepthStencilValue {
-            depth: test.cleared,
-            stencil: 0,
-        },
-        ..Pass::default()
-    };
+    let vertex = |x: f32, y: f32| Vertex { position: [x, y, 0.5, 1.0], color: [written, 0.0, 0.0, 0.0] };
+    let vertices = Buffer::of(gpu, &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)]);
+    let pass = Pass { depth: vk::ClearDepthStencilValue { depth: test.cleared, stencil: 0 }, ..Pass::default() };
     gpu.run(|commands| {
         commands.pass(&target, &pass, || {
             commands.bind(&pipeline);
@@ -227,71 +176,40 @@ fn stored_depth(gpu: &Gpu, test: WrittenDepth, written: f32) -> f32 {
 
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn depths_are_clamped_to_zero_and_one() {
-    let mut features =
-        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::default().depth_clamp_zero_one(true);
-    let gpu =
-        Gpu::extended(&[ash::ext::depth_clamp_zero_one::NAME], &mut features).expect("a device");
-    for (written, unclamped, clamped) in [
-        (-0.5, 0.0, 0.25),
-        (0.125, 0.125, 0.25),
-        (0.5, 0.5, 0.5),
-        (0.875, 0.875, 0.75),
-        (1.5, 1.0, 0.75),
-    ] {
+    let mut features = vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::default().depth_clamp_zero_one(true);
+    let gpu = Gpu::extended(&[ash::ext::depth_clamp_zero_one::NAME], &mut features).expect("a device");
+    for (written, unclamped, clamped) in
+        [(-0.5, 0.0, 0.25), (0.125, 0.125, 0.25), (0.5, 0.5, 0.5), (0.875, 0.875, 0.75), (1.5, 1.0, 0.75)]
+    {
         assert_eq!(stored_depth(&gpu, STORED, written), unclamped);
-        let within = WrittenDepth {
-            clamp: true,
-            viewport_depths: [0.75, 0.25],
-            ..STORED
-        };
+        let within = WrittenDepth { clamp: true, viewport_depths: [0.75, 0.25], ..STORED };
         assert_eq!(stored_depth(&gpu, within, written), clamped);
     }
 }
 
 /// A device whose floating-point depths are unrestricted, and whose others are clamped to 0 and 1.
 fn unrestricted() -> Gpu {
-    let mut features =
-        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::default().depth_clamp_zero_one(true);
-    let extensions = [
-        ash::ext::depth_clamp_zero_one::NAME,
-        ash::ext::depth_range_unrestricted::NAME,
-    ];
+    let mut features = vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::default().depth_clamp_zero_one(true);
+    let extensions = [ash::ext::depth_clamp_zero_one::NAME, ash::ext::depth_range_unrestricted::NAME];
     Gpu::extended(&extensions, &mut features).expect("a device")
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn depths_of_floats_are_unrestricted() {
     let gpu = unrestricted();
-    let within = WrittenDepth {
-        clamp: true,
-        viewport_depths: [3.0, -2.0],
-        ..STORED
-    };
-    let integers = WrittenDepth {
-        format: vk::Format::D16_UNORM,
-        ..STORED
-    };
-    for (written, clamped, of_integers) in [
-        (-7.5, -2.0, 0.0),
-        (-0.5, -0.5, 0.0),
-        (1.0, 1.0, 1.0),
-        (1.5, 1.5, 1.0),
-        (1e9, 3.0, 1.0),
-    ] {
+    let within = WrittenDepth { clamp: true, viewport_depths: [3.0, -2.0], ..STORED };
+    let integers = WrittenDepth { format: vk::Format::D16_UNORM, ..STORED };
+    for (written, clamped, of_integers) in
+        [(-7.5, -2.0, 0.0), (-0.5, -0.5, 0.0), (1.0, 1.0, 1.0), (1.5, 1.5, 1.0), (1e9, 3.0, 1.0)]
+    {
         assert_eq!(stored_depth(&gpu, STORED, written), written);
         assert_eq!(stored_depth(&gpu, within, written), clamped);
         assert_eq!(stored_depth(&gpu, integers, written), of_integers);
     }
     for (written, cleared) in [(-2.0, -1.0), (-1.0, -2.0), (-1.0, 0.5), (0.5, -1.0)] {
-        for (compare, passes) in [
-            (vk::CompareOp::LESS, written < cleared),
-            (vk::CompareOp::GREATER, written > cleared),
-        ] {
-            let test = WrittenDepth {
-                compare,
-                cleared,
-                ..STORED
-            };
+        for (compare, passes) in [(vk::CompareOp::LESS, written < cleared), (vk::CompareOp::GREATER, written > cleared)]
+        {
+            let test = WrittenDepth { compare, cleared, ..STORED };
             let expected = if passes { written } else { cleared };
             assert_eq!(stored_depth(&gpu, test, written), expected, "{cleared}");
         }
@@ -311,15 +229,9 @@ fn viewports_reach_beyond_zero_and_one() {
         ..PipelineOptions::default()
     };
     for (z, depth) in [(0.0, -4.0), (0.25, -2.0), (0.75, 2.0), (1.0, 4.0)] {
-        assert_eq!(
-            red_of_triangle(&gpu, &options, z, 1.0, [-4.0, 4.0]),
-            Some(depth)
-        );
+        assert_eq!(red_of_triangle(&gpu, &options, z, 1.0, [-4.0, 4.0]), Some(depth));
     }
-    assert_eq!(
-        red_of_triangle(&gpu, &options, 1.25, 1.0, [-4.0, 4.0]),
-        None
-    );
+    assert_eq!(red_of_triangle(&gpu, &options, 1.25, 1.0, [-4.0, 4.0]), None);
 }
 
 /// Shaders with both early and late tests write depths on one side of the primitive's, which is 0.5. The late tests
@@ -334,11 +246,7 @@ fn late_tests_decide_after_early_ones() {
         layout(depth_greater) out float gl_FragDepth;";
     let mut features = vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD::default()
         .shader_early_and_late_fragment_tests(true);
-    let gpu = Gpu::extended(
-        &[ash::amd::shader_early_and_late_fragment_tests::NAME],
-        &mut features,
-    )
-    .expect("a device");
+    let gpu = Gpu::extended(&[ash::amd::shader_early_and_late_fragment_tests::NAME], &mut features).expect("a device");
     for (declarations, written) in [(LESS, 0.25), (GREATER, 0.75)] {
         // On both sides of the written depth, and beyond the primitive's.
         for cleared in [0.125, 0.375, 0.625, 0.875] {
@@ -348,12 +256,7 @@ fn late_tests_decide_after_early_ones() {
                 (vk::CompareOp::NOT_EQUAL, true),
                 (vk::CompareOp::EQUAL, false),
             ] {
-                let test = WrittenDepth {
-                    declarations,
-                    compare,
-                    cleared,
-                    ..STORED
-                };
+                let test = WrittenDepth { declarations, compare, cleared, ..STORED };
                 let expected = if passes { written } else { cleared };
                 let found = stored_depth(&gpu, test, written);
                 assert_eq!(found, expected, "{written} {compare:?} {cleared}");

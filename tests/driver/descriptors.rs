@@ -23,49 +23,32 @@ type Row = (vk::DescriptorType, u32, vk::DescriptorBindingFlags);
 impl Set {
     fn new(gpu: &Gpu, rows: &[Row], variable_count: Option<u32>) -> Self {
         let layout = layout(gpu, rows).expect("a layout");
-        let sizes: Vec<_> = rows
-            .iter()
-            .map(|&(ty, descriptor_count, _)| vk::DescriptorPoolSize {
-                ty,
-                descriptor_count,
-            })
-            .collect();
-        let mut blocks = vk::DescriptorPoolInlineUniformBlockCreateInfo::default()
-            .max_inline_uniform_block_bindings(4);
+        let sizes: Vec<_> =
+            rows.iter().map(|&(ty, descriptor_count, _)| vk::DescriptorPoolSize { ty, descriptor_count }).collect();
+        let mut blocks = vk::DescriptorPoolInlineUniformBlockCreateInfo::default().max_inline_uniform_block_bindings(4);
         let info = vk::DescriptorPoolCreateInfo::default()
             .flags(vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND)
             .max_sets(1)
             .pool_sizes(&sizes)
             .push_next(&mut blocks);
         let counts = [variable_count.unwrap_or(0)];
-        let mut variable = vk::DescriptorSetVariableDescriptorCountAllocateInfo::default()
-            .descriptor_counts(&counts);
+        let mut variable = vk::DescriptorSetVariableDescriptorCountAllocateInfo::default().descriptor_counts(&counts);
         let layouts = [layout];
         // SAFETY: the create infos are valid.
         unsafe {
-            let pool = gpu
-                .device()
-                .create_descriptor_pool(&info, None)
-                .expect("a pool");
+            let pool = gpu.device().create_descriptor_pool(&info, None).expect("a pool");
             let info = vk::DescriptorSetAllocateInfo::default()
                 .descriptor_pool(pool)
                 .set_layouts(&layouts)
                 .push_next(&mut variable);
             let sets = gpu.device().allocate_descriptor_sets(&info);
-            Self {
-                raw: sets.expect("a set")[0],
-                layout,
-                pool,
-                gpu: gpu.clone(),
-            }
+            Self { raw: sets.expect("a set")[0], layout, pool, gpu: gpu.clone() }
         }
     }
 
     /// Writes a whole buffer to an element of a binding.
     fn write(&self, binding: u32, element: u32, buffer: &Buffer) {
-        let info = [vk::DescriptorBufferInfo::default()
-            .buffer(buffer.raw)
-            .range(vk::WHOLE_SIZE)];
+        let info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)];
         let write = vk::WriteDescriptorSet::default()
             .dst_set(self.raw)
             .dst_binding(binding)
@@ -137,10 +120,7 @@ fn sets_are_updated_after_they_were_bound() {
         | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
     let count = 500_000;
     let last = flags | vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
-    let rows = [
-        (STORAGE, 1, vk::DescriptorBindingFlags::UPDATE_AFTER_BIND),
-        (STORAGE, count, last),
-    ];
+    let rows = [(STORAGE, 1, vk::DescriptorBindingFlags::UPDATE_AFTER_BIND), (STORAGE, count, last)];
     let set = Set::new(gpu, &rows, Some(count));
     let kernel = Kernel::over(
         gpu,
@@ -158,9 +138,7 @@ fn sets_are_updated_after_they_were_bound() {
         &[set.layout],
     );
     let result = Buffer::new(gpu, 64);
-    let inputs: Vec<_> = (0..16u32)
-        .map(|it| Buffer::of(gpu, &[100 + it; 4]))
-        .collect();
+    let inputs: Vec<_> = (0..16u32).map(|it| Buffer::of(gpu, &[100 + it; 4])).collect();
     let device = gpu.device();
     let recorded = gpu.record(|commands| {
         let point = vk::PipelineBindPoint::COMPUTE;
@@ -198,26 +176,17 @@ fn sets_are_updated_after_they_were_bound() {
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn sets_choose_the_length_of_their_last_binding() {
     let gpu = own();
-    let variable = vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT
-        | vk::DescriptorBindingFlags::PARTIALLY_BOUND;
-    let rows = [
-        (STORAGE, 1, vk::DescriptorBindingFlags::empty()),
-        (STORAGE, 64, variable),
-    ];
+    let variable = vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT | vk::DescriptorBindingFlags::PARTIALLY_BOUND;
+    let rows = [(STORAGE, 1, vk::DescriptorBindingFlags::empty()), (STORAGE, 64, variable)];
     let mut support = vk::DescriptorSetVariableDescriptorCountLayoutSupport::default();
-    let bindings = [vk::DescriptorSetLayoutBinding::default()
-        .descriptor_type(STORAGE)
-        .descriptor_count(64)];
+    let bindings = [vk::DescriptorSetLayoutBinding::default().descriptor_type(STORAGE).descriptor_count(64)];
     let flags = [variable];
     let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
-    let info = vk::DescriptorSetLayoutCreateInfo::default()
-        .bindings(&bindings)
-        .push_next(&mut flags);
+    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings).push_next(&mut flags);
     let mut answer = vk::DescriptorSetLayoutSupport::default().push_next(&mut support);
     // SAFETY: the create info is valid.
     unsafe {
-        gpu.device()
-            .get_descriptor_set_layout_support(&info, &mut answer);
+        gpu.device().get_descriptor_set_layout_support(&info, &mut answer);
     }
     assert_eq!(answer.supported, vk::TRUE);
     assert!(support.max_variable_descriptor_count >= 64);
@@ -259,19 +228,15 @@ fn inline_uniform_blocks_hold_bytes() {
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
         // SAFETY: the physical device is the instance's.
         unsafe {
-            gpu.instance()
-                .get_physical_device_properties2(gpu.physical_device(), &mut properties);
+            gpu.instance().get_physical_device_properties2(gpu.physical_device(), &mut properties);
         }
         limits
     };
     let most = limits.max_inline_uniform_block_size;
     assert!(most >= 256);
     let after_bind = vk::DescriptorBindingFlags::UPDATE_AFTER_BIND;
-    let rows = [
-        (STORAGE, 1, vk::DescriptorBindingFlags::empty()),
-        (INLINE, 32, after_bind),
-        (INLINE, most, after_bind),
-    ];
+    let rows =
+        [(STORAGE, 1, vk::DescriptorBindingFlags::empty()), (INLINE, 32, after_bind), (INLINE, most, after_bind)];
     let (set, other) = (Set::new(gpu, &rows, None), Set::new(gpu, &rows, None));
     let result = Buffer::new(gpu, 40);
     set.write(0, 0, &result);
@@ -338,9 +303,7 @@ fn inline_uniform_blocks_hold_bytes() {
     let data = [0u32, 1, 2, 1234];
     // SAFETY: the template describes the data.
     unsafe {
-        let template = device
-            .create_descriptor_update_template(&info, None)
-            .expect("a template");
+        let template = device.create_descriptor_update_template(&info, None).expect("a template");
         device.update_descriptor_set_with_template(set.raw, template, data.as_ptr().cast());
         device.destroy_descriptor_update_template(template, None);
     }

@@ -2,9 +2,7 @@
 //! draws that are recorded one by one.
 
 use ash::vk;
-use gaurast_testkit::{
-    Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-};
+use gaurast_testkit::{Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex};
 use vk::DynamicState as S;
 
 use crate::GLSLANG;
@@ -25,23 +23,18 @@ struct Device {
 impl Device {
     fn new() -> Self {
         let mut multi = vk::PhysicalDeviceMultiDrawFeaturesEXT::default().multi_draw(true);
-        let mut input = vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT::default()
-            .vertex_input_dynamic_state(true);
-        let mut writes =
-            vk::PhysicalDeviceColorWriteEnableFeaturesEXT::default().color_write_enable(true);
-        let mut clip =
-            vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
-        let mut control =
-            vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
+        let mut input =
+            vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT::default().vertex_input_dynamic_state(true);
+        let mut writes = vk::PhysicalDeviceColorWriteEnableFeaturesEXT::default().color_write_enable(true);
+        let mut clip = vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
+        let mut control = vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
         let mut logic = vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::default()
             .extended_dynamic_state2(true)
             .extended_dynamic_state2_logic_op(true);
-        let mut provoking =
-            vk::PhysicalDeviceProvokingVertexFeaturesEXT::default().provoking_vertex_last(true);
-        let mut restart = vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::default()
-            .primitive_topology_list_restart(true);
-        let mut lines =
-            vk::PhysicalDeviceLineRasterizationFeaturesKHR::default().rectangular_lines(true);
+        let mut provoking = vk::PhysicalDeviceProvokingVertexFeaturesEXT::default().provoking_vertex_last(true);
+        let mut restart =
+            vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::default().primitive_topology_list_restart(true);
+        let mut lines = vk::PhysicalDeviceLineRasterizationFeaturesKHR::default().rectangular_lines(true);
         let mut states = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
             .extended_dynamic_state3_alpha_to_coverage_enable(true)
             .extended_dynamic_state3_alpha_to_one_enable(true)
@@ -97,10 +90,7 @@ impl Device {
         vertices: &[Vertex],
         record: impl FnOnce(&Commands),
     ) -> Vec<u8> {
-        let target = TargetOptions {
-            size: SIZE,
-            ..TargetOptions::of(FORMAT)
-        };
+        let target = TargetOptions { size: SIZE, ..TargetOptions::of(FORMAT) };
         let target = match samples {
             1 => target,
             _ => target.multisampled(),
@@ -108,12 +98,7 @@ impl Device {
         let target = Target::new(&self.gpu, &target);
         let pipeline = Pipeline::new(&self.gpu, &target, options);
         let vertices = Buffer::of(&self.gpu, vertices);
-        let pass = Pass {
-            color: vk::ClearColorValue {
-                float32: [0.25, 0.5, 0.75, 0.5],
-            },
-            ..Pass::default()
-        };
+        let pass = Pass { color: vk::ClearColorValue { float32: [0.25, 0.5, 0.75, 0.5] }, ..Pass::default() };
         self.gpu.run(|commands| {
             commands.pass(&target, &pass, || {
                 commands.bind(&pipeline);
@@ -121,21 +106,14 @@ impl Device {
                 record(commands);
             });
         });
-        let images = if samples == 1 {
-            &target.colors
-        } else {
-            &target.resolved
-        };
+        let images = if samples == 1 { &target.colors } else { &target.resolved };
         images[0].read(vk::ImageAspectFlags::COLOR, 4)
     }
 }
 
 /// Two triangles that cover most of the target, the right corner deeper than the far plane.
 fn triangles() -> Vec<Vertex> {
-    let vertex = |x: f32, y: f32, z: f32, color: [f32; 4]| Vertex {
-        position: [x, y, z, 1.0],
-        color,
-    };
+    let vertex = |x: f32, y: f32, z: f32, color: [f32; 4]| Vertex { position: [x, y, z, 1.0], color };
     let (red, green) = ([1.0, 0.3, 0.0, 0.5], [0.0, 0.8, 0.4, 0.5]);
     vec![
         vertex(-0.9, -0.9, 0.5, red),
@@ -157,44 +135,24 @@ struct Case {
 }
 
 fn blend(on: bool) -> vk::PipelineColorBlendAttachmentState {
-    let to = if on {
-        vk::BlendFactor::ONE
-    } else {
-        vk::BlendFactor::ZERO
-    };
+    let to = if on { vk::BlendFactor::ONE } else { vk::BlendFactor::ZERO };
     gaurast_testkit::blend(vk::BlendFactor::SRC_ALPHA, to, vk::BlendOp::ADD)
 }
 
 fn mask(on: bool) -> vk::ColorComponentFlags {
-    if on {
-        vk::ColorComponentFlags::G | vk::ColorComponentFlags::A
-    } else {
-        vk::ColorComponentFlags::RGBA
-    }
+    if on { vk::ColorComponentFlags::G | vk::ColorComponentFlags::A } else { vk::ColorComponentFlags::RGBA }
 }
 
 fn polygon(on: bool) -> vk::PolygonMode {
-    if on {
-        vk::PolygonMode::LINE
-    } else {
-        vk::PolygonMode::FILL
-    }
+    if on { vk::PolygonMode::LINE } else { vk::PolygonMode::FILL }
 }
 
 fn logic(on: bool) -> vk::LogicOp {
-    if on {
-        vk::LogicOp::XOR
-    } else {
-        vk::LogicOp::COPY
-    }
+    if on { vk::LogicOp::XOR } else { vk::LogicOp::COPY }
 }
 
 fn provoking(on: bool) -> vk::ProvokingVertexModeEXT {
-    if on {
-        vk::ProvokingVertexModeEXT::LAST_VERTEX
-    } else {
-        vk::ProvokingVertexModeEXT::FIRST_VERTEX
-    }
+    if on { vk::ProvokingVertexModeEXT::LAST_VERTEX } else { vk::ProvokingVertexModeEXT::FIRST_VERTEX }
 }
 
 /// Chains a structure to a pipeline's rasterization state. It is never freed.
@@ -205,13 +163,7 @@ fn chained<T: 'static>(options: &mut PipelineOptions<'_>, structure: T) {
 
 // SAFETY of all commands: the command buffer records, and its device has the extensions and features.
 fn cases() -> Vec<Case> {
-    let case = |state, samples, fixed, set| Case {
-        state,
-        samples,
-        base: |_| {},
-        fixed,
-        set,
-    };
+    let case = |state, samples, fixed, set| Case { state, samples, base: |_| {}, fixed, set };
     vec![
         case(
             S::POLYGON_MODE_EXT,
@@ -274,15 +226,12 @@ fn cases() -> Vec<Case> {
                 S::PROVOKING_VERTEX_MODE_EXT,
                 1,
                 |options, on| {
-                    let state =
-                        vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT::default();
+                    let state = vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT::default();
                     chained(options, state.provoking_vertex_mode(provoking(on)));
                 },
                 // SAFETY: see above.
                 |device, c, on| unsafe {
-                    device
-                        .states
-                        .cmd_set_provoking_vertex_mode(c, provoking(on));
+                    device.states.cmd_set_provoking_vertex_mode(c, provoking(on));
                 },
             )
         },
@@ -355,9 +304,7 @@ fn cases() -> Vec<Case> {
                 };
                 // SAFETY: see above.
                 unsafe {
-                    device
-                        .states
-                        .cmd_set_color_blend_equation(c, 0, &[equation]);
+                    device.states.cmd_set_color_blend_equation(c, 0, &[equation]);
                 }
             },
         ),
@@ -376,11 +323,7 @@ fn cases() -> Vec<Case> {
             // A disabled attachment is equal to a write mask of no component.
             |options, on| {
                 let all = vk::ColorComponentFlags::RGBA;
-                let mask = if on {
-                    all
-                } else {
-                    vk::ColorComponentFlags::empty()
-                };
+                let mask = if on { all } else { vk::ColorComponentFlags::empty() };
                 options.blend = vec![blend(true).color_write_mask(mask)];
             },
             // SAFETY: see above.
@@ -448,17 +391,12 @@ fn vertex_input_is_set() {
             .input_rate(vk::VertexInputRate::VERTEX)
             .divisor(1)];
         let attribute = |location, offset| {
-            vk::VertexInputAttributeDescription2EXT::default()
-                .location(location)
-                .format(vec4)
-                .offset(offset)
+            vk::VertexInputAttributeDescription2EXT::default().location(location).format(vec4).offset(offset)
         };
         // SAFETY: the command buffer records, and its device has the extension.
         unsafe {
             let attributes = [attribute(0, 0), attribute(1, color)];
-            device
-                .input
-                .cmd_set_vertex_input(commands.raw, &bindings, &attributes);
+            device.input.cmd_set_vertex_input(commands.raw, &bindings, &attributes);
         }
     };
     let dynamic = device.draw(1, &options, &vertices, |commands| {
@@ -503,12 +441,8 @@ fn several_draws_are_one_command() {
     let mut vertices = triangles();
     vertices.iter_mut().for_each(|it| it.position[2] = 0.5);
     let draws = [
-        vk::MultiDrawInfoEXT::default()
-            .first_vertex(3)
-            .vertex_count(3),
-        vk::MultiDrawInfoEXT::default()
-            .first_vertex(0)
-            .vertex_count(3),
+        vk::MultiDrawInfoEXT::default().first_vertex(3).vertex_count(3),
+        vk::MultiDrawInfoEXT::default().first_vertex(0).vertex_count(3),
     ];
     let blue = |pixels: &[u8], x: usize, y: usize| pixels[4 * (y * SIZE[0] as usize + x) + 2];
     let drawn = device.draw(1, &options, &vertices, |commands| {
@@ -524,13 +458,8 @@ fn several_draws_are_one_command() {
     let indices: Vec<u32> = vec![0, 1, 2, 0, 1, 2];
     let indices = Buffer::of(&device.gpu, &indices);
     let draws = [
-        vk::MultiDrawIndexedInfoEXT::default()
-            .first_index(0)
-            .index_count(3)
-            .vertex_offset(3),
-        vk::MultiDrawIndexedInfoEXT::default()
-            .first_index(3)
-            .index_count(3),
+        vk::MultiDrawIndexedInfoEXT::default().first_index(0).index_count(3).vertex_offset(3),
+        vk::MultiDrawIndexedInfoEXT::default().first_index(3).index_count(3),
     ];
     let draw = |offset: Option<i32>| {
         device.draw(1, &options, &vertices, |commands| {
@@ -555,10 +484,7 @@ fn several_draws_are_one_command() {
 fn lists_restart() {
     let device = Device::new();
     let vertices = triangles();
-    let options = PipelineOptions {
-        restart: true,
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { restart: true, ..PipelineOptions::default() };
     let indices: Vec<u32> = vec![0, 1, u32::MAX, 3, 4, 5];
     let indices = Buffer::of(&device.gpu, &indices);
     let restarted = device.draw(1, &options, &vertices, |commands| {
@@ -577,19 +503,13 @@ fn lines_are_rectangles() {
     let device = Device::new();
     let vertices = triangles();
     let lines = |mode| {
-        let mut options = PipelineOptions {
-            topology: vk::PrimitiveTopology::LINE_LIST,
-            ..PipelineOptions::default()
-        };
+        let mut options = PipelineOptions { topology: vk::PrimitiveTopology::LINE_LIST, ..PipelineOptions::default() };
         let state = vk::PipelineRasterizationLineStateCreateInfoKHR::default();
         chained(&mut options, state.line_rasterization_mode(mode));
         options
     };
-    let [default, rectangular] = [
-        vk::LineRasterizationModeKHR::DEFAULT,
-        vk::LineRasterizationModeKHR::RECTANGULAR,
-    ]
-    .map(|mode| device.draw(1, &lines(mode), &vertices, |commands| commands.draw(2..4)));
+    let [default, rectangular] = [vk::LineRasterizationModeKHR::DEFAULT, vk::LineRasterizationModeKHR::RECTANGULAR]
+        .map(|mode| device.draw(1, &lines(mode), &vertices, |commands| commands.draw(2..4)));
     assert!(default == rectangular);
     let nothing = device.draw(1, &PipelineOptions::default(), &vertices, |_| {});
     assert!(default != nothing);
@@ -598,10 +518,7 @@ fn lines_are_rectangles() {
     // SAFETY: the physical device is the instance's.
     unsafe {
         let physical = device.gpu.physical_device();
-        device
-            .gpu
-            .instance()
-            .get_physical_device_features2(physical, &mut all);
+        device.gpu.instance().get_physical_device_features2(physical, &mut all);
     }
     let others = [
         features.bresenham_lines,
@@ -610,8 +527,5 @@ fn lines_are_rectangles() {
         features.stippled_bresenham_lines,
         features.stippled_smooth_lines,
     ];
-    assert_eq!(
-        (features.rectangular_lines, others),
-        (vk::TRUE, [vk::FALSE; 5])
-    );
+    assert_eq!((features.rectangular_lines, others), (vk::TRUE, [vk::FALSE; 5]));
 }

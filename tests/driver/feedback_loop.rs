@@ -3,8 +3,8 @@
 use ash::vk;
 use gaurast_runner::Case;
 use gaurast_testkit::{
-    Attachments, Bindings, Driver, Formats, Gpu, Image, ImageOptions, Opening, Pass, Pipeline,
-    PipelineOptions, Resource, Sampler,
+    Attachments, Bindings, Driver, Formats, Gpu, Image, ImageOptions, Opening, Pass, Pipeline, PipelineOptions,
+    Resource, Sampler,
 };
 
 use super::programs::{drivers, options};
@@ -29,10 +29,7 @@ impl Attachments for Loop {
             .load_op(pass.load)
             .store_op(pass.store)
             .clear_value(vk::ClearValue { color: pass.color })];
-        let extent = vk::Extent2D {
-            width: SIDE,
-            height: SIDE,
-        };
+        let extent = vk::Extent2D { width: SIDE, height: SIDE };
         let info = vk::RenderingInfo::default()
             .render_area(vk::Rect2D::default().extent(extent))
             .layer_count(1)
@@ -53,8 +50,8 @@ fn device(case: &Case) -> Gpu {
             _ => Driver::Embedded,
         })
     };
-    let mut features = vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::default()
-        .attachment_feedback_loop_layout(true);
+    let mut features =
+        vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::default().attachment_feedback_loop_layout(true);
     Gpu::open_with(&opening, &mut features).expect("a device")
 }
 
@@ -107,8 +104,7 @@ fn a_draw_reads_what_it_replaces(case: &Case) {
                     device.cmd_pipeline_barrier(
                         raw,
                         vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
-                        vk::PipelineStageFlags::FRAGMENT_SHADER
-                            | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+                        vk::PipelineStageFlags::FRAGMENT_SHADER | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
                         vk::DependencyFlags::BY_REGION | vk::DependencyFlags::FEEDBACK_LOOP_EXT,
                         &[barrier],
                         &[],

@@ -5,23 +5,15 @@ use ash::vk;
 use ash::vk::PrimitiveTopology as Topology;
 use gaurast_runner::Case;
 use gaurast_testkit::shader::Stage;
-use gaurast_testkit::{
-    Buffer, Gpu, Image, ImageOptions, PipelineOptions, Resource, Sampler, blend,
-};
+use gaurast_testkit::{Buffer, Gpu, Image, ImageOptions, PipelineOptions, Resource, Sampler, blend};
 
-use super::programs::{
-    COVER, ONES, Program, SIDE, WORDS, drivers, multiview, need, options, with_geometry,
-};
+use super::programs::{COVER, ONES, Program, SIDE, WORDS, drivers, multiview, need, options, with_geometry};
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 
 /// A pipeline with a geometry shader.
 fn of(topology: Topology, geometry: &str) -> PipelineOptions<'_> {
-    PipelineOptions {
-        topology,
-        between: vec![(Stage::Geometry, geometry)],
-        ..options()
-    }
+    PipelineOptions { topology, between: vec![(Stage::Geometry, geometry)], ..options() }
 }
 
 /// A shader that turns points into triangle strips of rectangles; `main` is its body.
@@ -45,14 +37,8 @@ const TOPOLOGIES: [(Topology, &str); 10] = [
     (Topology::TRIANGLE_FAN, "triangles"),
     (Topology::LINE_LIST_WITH_ADJACENCY, "lines_adjacency"),
     (Topology::LINE_STRIP_WITH_ADJACENCY, "lines_adjacency"),
-    (
-        Topology::TRIANGLE_LIST_WITH_ADJACENCY,
-        "triangles_adjacency",
-    ),
-    (
-        Topology::TRIANGLE_STRIP_WITH_ADJACENCY,
-        "triangles_adjacency",
-    ),
+    (Topology::TRIANGLE_LIST_WITH_ADJACENCY, "triangles_adjacency"),
+    (Topology::TRIANGLE_STRIP_WITH_ADJACENCY, "triangles_adjacency"),
 ];
 
 /// The places of the vertices of primitive `i` of `n`, as the specification's chapter on topologies lists them, in the
@@ -113,10 +99,7 @@ const RECORD: usize = 8;
 
 /// A pipeline whose geometry shader emits nothing.
 fn silent(topology: Topology, geometry: &str) -> PipelineOptions<'_> {
-    PipelineOptions {
-        fragment: Some(ONES),
-        ..of(topology, geometry)
-    }
+    PipelineOptions { fragment: Some(ONES), ..of(topology, geometry) }
 }
 
 /// A shader that writes a record for each primitive: the number of invocations, and its vertices. Records begin at a
@@ -144,10 +127,7 @@ fn assert_records(words: &[u32], expected: &[Vec<u32>], what: &str) {
         assert_eq!(&record[1..], vertices, "primitive {number} of {what}");
     }
     let rest = &words[RECORD * expected.len()..];
-    assert!(
-        rest.iter().all(|word| *word == 0),
-        "{what} has more primitives"
-    );
+    assert!(rest.iter().all(|word| *word == 0), "{what} has more primitives");
 }
 
 /// The vertices of each primitive of each topology, for runs of few and of many vertices and for several instances.
@@ -158,14 +138,8 @@ fn primitives_have_their_vertices(case: &Case) {
     let counts: Vec<usize> = (0..=14).chain([701]).collect();
     for (topology, input) in TOPOLOGIES {
         let shader = recording(input);
-        let sizes: Vec<usize> = counts
-            .iter()
-            .map(|&count| RECORD * INSTANCES * primitives(topology, count))
-            .collect();
-        let program = Program::new(
-            silent(topology, &shader),
-            sizes.iter().sum::<usize>() as u32,
-        );
+        let sizes: Vec<usize> = counts.iter().map(|&count| RECORD * INSTANCES * primitives(topology, count)).collect();
+        let program = Program::new(silent(topology, &shader), sizes.iter().sum::<usize>() as u32);
         let drawn = program.draw(gpu, |commands| {
             let mut first = 0;
             for (&count, size) in counts.iter().zip(&sizes) {
@@ -181,11 +155,7 @@ fn primitives_have_their_vertices(case: &Case) {
             let once = assembled(topology, &vertices);
             let expected = [&once[..]; INSTANCES].concat();
             let (these, rest) = words.split_at(size);
-            assert_records(
-                these,
-                &expected,
-                &format!("{count} vertices of {topology:?}"),
-            );
+            assert_records(these, &expected, &format!("{count} vertices of {topology:?}"));
             words = rest;
         }
     }
@@ -208,14 +178,8 @@ fn restart_begins_another_run(case: &Case) {
             continue;
         }
         let shader = recording(input);
-        let options = PipelineOptions {
-            restart: true,
-            ..silent(topology, &shader)
-        };
-        let expected: Vec<_> = runs
-            .iter()
-            .flat_map(|run| assembled(topology, run))
-            .collect();
+        let options = PipelineOptions { restart: true, ..silent(topology, &shader) };
+        let expected: Vec<_> = runs.iter().flat_map(|run| assembled(topology, run)).collect();
         let size = RECORD * (expected.len() + 4);
         let program = Program::new(options, 2 * size as u32);
         let drawn = program.draw(gpu, |commands| {
@@ -435,11 +399,7 @@ fn one_vertex_is_a_point(case: &Case) {
     let drawn = program.draw(gpu, |commands| commands.draw(0..3000));
     drawn.assert_all(|x, y| {
         let n = SIDE * y + x;
-        if n < 3000 && !n.is_multiple_of(3) {
-            n as f32
-        } else {
-            0.0
-        }
+        if n < 3000 && !n.is_multiple_of(3) { n as f32 } else { 0.0 }
     });
 }
 
@@ -496,11 +456,7 @@ fn fragments_have_the_number_that_was_given(case: &Case) {
     });
     for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
         let n = 64 * (y / 2) + x / 2;
-        let expected = if x % 2 == 0 && n < 700 {
-            [(5 * n) as f32 - 3.0, 1.0]
-        } else {
-            [0.0; 2]
-        };
+        let expected = if x % 2 == 0 && n < 700 { [(5 * n) as f32 - 3.0, 1.0] } else { [0.0; 2] };
         let [number, is_drawn, ..] = drawn.texel(x, y);
         assert_eq!([number, is_drawn], expected, "texel {x}, {y}");
     }
@@ -530,19 +486,12 @@ fn layers_are_chosen(case: &Case) {
         ),
         ..of(Topology::POINT_LIST, &shader)
     };
-    let program = Program {
-        layers: 7,
-        ..Program::new(options, 1)
-    };
+    let program = Program { layers: 7, ..Program::new(options, 1) };
     let drawn = program.draw(gpu, |commands| commands.draw(0..5));
     for layer in 0..7 {
         drawn.assert_layer(layer, |x, y| {
             let is_inside = (8 * layer..8 * layer + 16).contains(&x) && y < 80;
-            if layer % 2 == 1 && is_inside {
-                (100 * layer + y / 16 + 1) as f32
-            } else {
-                0.0
-            }
+            if layer % 2 == 1 && is_inside { (100 * layer + y / 16 + 1) as f32 } else { 0.0 }
         });
     }
 }
@@ -582,14 +531,8 @@ fn viewports_are_chosen(case: &Case) {
             max_depth: 1.0,
         });
         let scissors = [0, 1, 2, 3].map(|index: i32| vk::Rect2D {
-            offset: vk::Offset2D {
-                x: 32 * index,
-                y: 0,
-            },
-            extent: vk::Extent2D {
-                width: 16 + 4 * index as u32,
-                height: 40,
-            },
+            offset: vk::Offset2D { x: 32 * index, y: 0 },
+            extent: vk::Extent2D { width: 16 + 4 * index as u32, height: 40 },
         });
         // SAFETY: see the crate.
         unsafe {
@@ -601,11 +544,7 @@ fn viewports_are_chosen(case: &Case) {
     drawn.assert_all(|x, y| {
         let viewport = x / 32;
         let width = (16 + 4 * viewport).min(24);
-        if x % 32 < width && (8..40).contains(&y) {
-            (10 * (4 - viewport) + viewport) as f32
-        } else {
-            0.0
-        }
+        if x % 32 < width && (8..40).contains(&y) { (10 * (4 - viewport) + viewport) as f32 } else { 0.0 }
     });
 }
 
@@ -670,11 +609,7 @@ fn distances_clip_and_cull(case: &Case) {
         let n = y / 10;
         // Primitive 4 is culled only if all vertices have a negative distance.
         let is_whole = n == 1 || n == 4;
-        if is_whole && (10 * n..80).contains(&x) {
-            (n + 1) as f32
-        } else {
-            0.0
-        }
+        if is_whole && (10 * n..80).contains(&x) { (n + 1) as f32 } else { 0.0 }
     });
 }
 
@@ -736,11 +671,7 @@ fn values_reach_fragments(case: &Case) {
              atomicAdd(words[1], 1u);
          }}"
     );
-    let options = PipelineOptions {
-        vertex,
-        fragment: Some(&fragment),
-        ..of(Topology::LINE_LIST, geometry)
-    };
+    let options = PipelineOptions { vertex, fragment: Some(&fragment), ..of(Topology::LINE_LIST, geometry) };
     let drawn = Program::new(options, 2).draw(gpu, |commands| commands.draw(0..2));
     assert_eq!(drawn.words, [0, SIDE * SIDE], "wrong fragments, fragments");
     for x in 0..SIDE {
@@ -772,10 +703,8 @@ fn many_primitives_keep_their_order(case: &Case) {
          cover(4.0 * vec2(n * 7 % 16, n * 11 % 256 / 16), vec2(4));",
     );
     let (from, to) = (vk::BlendFactor::ONE, vk::BlendFactor::SRC_ALPHA);
-    let options = PipelineOptions {
-        blend: vec![blend(from, to, vk::BlendOp::ADD)],
-        ..of(Topology::POINT_LIST, &shader)
-    };
+    let options =
+        PipelineOptions { blend: vec![blend(from, to, vk::BlendOp::ADD)], ..of(Topology::POINT_LIST, &shader) };
     let drawn = Program::new(options, 1).draw(gpu, |commands| commands.draw(0..POINTS));
     let mut cells = [[0.0f32; 16]; 16];
     for n in 0..POINTS {
@@ -815,10 +744,7 @@ fn the_stage_uses_resources(case: &Case) {
          void main",
     );
     let program = Program {
-        resources: vec![
-            Resource::Uniform(uniform.raw),
-            Resource::Texture(image.view, sampler.raw),
-        ],
+        resources: vec![Resource::Uniform(uniform.raw), Resource::Texture(image.view, sampler.raw)],
         ..Program::new(of(Topology::POINT_LIST, &shader), 2 + 64)
     };
     let drawn = program.draw(gpu, |commands| {
@@ -859,14 +785,8 @@ fn views_have_their_own_primitives(case: &Case) {
          cover(vec2(16 * gl_ViewIndex, gl_PrimitiveIDIn), vec2(16, 1));",
     );
     let shader = format!("#extension GL_EXT_multiview : require\n{shader}");
-    let options = PipelineOptions {
-        view_mask: MASK,
-        ..of(Topology::POINT_LIST, &shader)
-    };
-    let program = Program {
-        layers: 6,
-        ..Program::new(options, 6)
-    };
+    let options = PipelineOptions { view_mask: MASK, ..of(Topology::POINT_LIST, &shader) };
+    let program = Program { layers: 6, ..Program::new(options, 6) };
     let drawn = program.draw(gpu, |commands| commands.draw(0..3));
     for view in 0..6 {
         let is_drawn = MASK & (1 << view) != 0;
@@ -876,11 +796,7 @@ fn views_have_their_own_primitives(case: &Case) {
         if is_drawn {
             drawn.assert_layer(view, |x, y| {
                 let is_covered = x / 16 == view && y < 3;
-                if is_covered {
-                    (10 * view + y + 1) as f32
-                } else {
-                    0.0
-                }
+                if is_covered { (10 * view + y + 1) as f32 } else { 0.0 }
             });
         }
     }

@@ -3,8 +3,8 @@
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
 use gaurast_testkit::{
-    Bindings, Buffer, Image, ImageOptions, Kernel, Pass, Pipeline, PipelineOptions, Resource,
-    Sampler, Target, TargetOptions,
+    Bindings, Buffer, Image, ImageOptions, Kernel, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
+    TargetOptions,
 };
 use gaurast_tests::triangles::shapes;
 
@@ -21,19 +21,9 @@ fn words(buffer: &Buffer) -> Vec<u32> {
 fn varyings_of_128_components_arrive() {
     let gpu = own();
     let limits = gpu.limits();
-    assert_eq!(
-        (
-            limits.max_vertex_output_components,
-            limits.max_fragment_input_components
-        ),
-        (128, 128)
-    );
+    assert_eq!((limits.max_vertex_output_components, limits.max_fragment_input_components), (128, 128));
     let declare = |direction: &str| -> String {
-        (0..32)
-            .map(|location| {
-                format!("layout(location = {location}) {direction} vec4 v{location};\n")
-            })
-            .collect()
+        (0..32).map(|location| format!("layout(location = {location}) {direction} vec4 v{location};\n")).collect()
     };
     let write: String = (0..32)
         .map(|location| {
@@ -62,11 +52,7 @@ fn varyings_of_128_components_arrive() {
         declare("in")
     );
     let target = Target::new(gpu, &TargetOptions::of(vk::Format::R32_SFLOAT));
-    let options = PipelineOptions {
-        vertex: &vertex,
-        fragment: Some(&fragment),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { vertex: &vertex, fragment: Some(&fragment), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let vertices = Buffer::of(gpu, &shapes::whole(0.5, [1.0; 4]));
     gpu.run(|commands| {
@@ -76,8 +62,7 @@ fn varyings_of_128_components_arrive() {
             commands.draw(0..6);
         });
     });
-    let found: Vec<f32> =
-        bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
+    let found: Vec<f32> = bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
     assert!(found.iter().all(|right| *right == 32.0), "{:?}", found[0]);
 }
 
@@ -114,10 +99,7 @@ fn texel_buffers_have_two_to_the_27_texels() {
     let texels = Buffer::new(gpu, u64::from(count) + 16);
     let device = gpu.device();
     let view = |range: u64| {
-        let info = vk::BufferViewCreateInfo::default()
-            .buffer(texels.raw)
-            .format(vk::Format::R8_UINT)
-            .range(range);
+        let info = vk::BufferViewCreateInfo::default().buffer(texels.raw).format(vk::Format::R8_UINT).range(range);
         // SAFETY: the buffer is alive, and the device refuses a wrong create info.
         unsafe { device.create_buffer_view(&info, None) }
     };
@@ -155,17 +137,8 @@ fn texel_buffers_have_two_to_the_27_texels() {
 fn texel_offsets_reach_from_minus_32_to_31() {
     let gpu = own();
     let limits = gpu.limits();
-    assert_eq!(
-        (limits.min_texel_offset, limits.max_texel_offset),
-        (-32, 31)
-    );
-    assert_eq!(
-        (
-            limits.min_texel_gather_offset,
-            limits.max_texel_gather_offset
-        ),
-        (-32, 31)
-    );
+    assert_eq!((limits.min_texel_offset, limits.max_texel_offset), (-32, 31));
+    assert_eq!((limits.min_texel_gather_offset, limits.max_texel_gather_offset), (-32, 31));
     let side = 128u32;
     let texels: Vec<f32> = (0..side * side).map(|texel| texel as f32).collect();
     let usage = vk::ImageUsageFlags::SAMPLED;
@@ -173,10 +146,7 @@ fn texel_offsets_reach_from_minus_32_to_31() {
     let image = Image::textured(gpu, &options, &[texels]);
     let sampler = Sampler::new(gpu, &vk::SamplerCreateInfo::default());
     let result = Buffer::new(gpu, 24);
-    let resources = [
-        Resource::Storage(result.raw),
-        Resource::Texture(image.view, sampler.raw),
-    ];
+    let resources = [Resource::Storage(result.raw), Resource::Texture(image.view, sampler.raw)];
     let bindings = Bindings::new(gpu, &resources);
     // The compiler accepts only constant offsets in Vulkan's minimum range, so the words are patched.
     let words: Vec<u32> = compile(
@@ -206,17 +176,7 @@ fn texel_offsets_reach_from_minus_32_to_31() {
     kernel.run(&[bindings.set], &[], [1, 1, 1]);
     let found: Vec<f32> = bytemuck::pod_collect_to_vec(&result.read());
     let at = |x: u32, y: u32| (y * side + x) as f32;
-    assert_eq!(
-        found,
-        [
-            at(32, 95),
-            at(95, 32),
-            at(32, 95),
-            at(95, 32),
-            at(31, 94),
-            at(95, 32)
-        ]
-    );
+    assert_eq!(found, [at(32, 95), at(95, 32), at(32, 95), at(95, 32), at(31, 94), at(95, 32)]);
 }
 
 /// An image with the greatest length in each of its three dimensions is sampled at its far end.
@@ -236,10 +196,7 @@ fn volumes_are_4096_texels_long() {
         };
         let image = Image::textured(gpu, &options, &[(0..side).collect()]);
         let result = Buffer::new(gpu, 8);
-        let resources = [
-            Resource::Storage(result.raw),
-            Resource::Texture(image.view, sampler.raw),
-        ];
+        let resources = [Resource::Storage(result.raw), Resource::Texture(image.view, sampler.raw)];
         let bindings = Bindings::new(gpu, &resources);
         let kernel = Kernel::new(
             gpu,
@@ -278,17 +235,10 @@ fn input_attachments_are_of_formats_that_are_rendered_to() {
             )
         }
     };
-    let (sampled, input) = (
-        vk::ImageUsageFlags::SAMPLED,
-        vk::ImageUsageFlags::INPUT_ATTACHMENT,
-    );
+    let (sampled, input) = (vk::ImageUsageFlags::SAMPLED, vk::ImageUsageFlags::INPUT_ATTACHMENT);
     for format in [vk::Format::R8G8B8_UNORM, vk::Format::R32G32B32_SFLOAT] {
         assert!(answer(format, sampled).is_ok(), "{format:?}");
-        assert_eq!(
-            answer(format, sampled | input).err(),
-            Some(vk::Result::ERROR_FORMAT_NOT_SUPPORTED),
-            "{format:?}"
-        );
+        assert_eq!(answer(format, sampled | input).err(), Some(vk::Result::ERROR_FORMAT_NOT_SUPPORTED), "{format:?}");
     }
     assert!(answer(vk::Format::R8G8B8A8_UNORM, sampled | input).is_ok());
     assert!(answer(vk::Format::D32_SFLOAT, sampled | input).is_ok());
@@ -300,41 +250,27 @@ fn input_attachments_are_of_formats_that_are_rendered_to() {
 fn commands_of_listed_extensions_are_found() {
     let entry = vulkan_gaurast::entry();
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-    let (push, template) = (
-        ash::khr::push_descriptor::NAME,
-        ash::khr::descriptor_update_template::NAME,
-    );
+    let (push, template) = (ash::khr::push_descriptor::NAME, ash::khr::descriptor_update_template::NAME);
     // SAFETY: the create infos are valid, and nothing outlives the instance.
     unsafe {
-        let instance = entry
-            .create_instance(&vk::InstanceCreateInfo::default(), None)
-            .expect("an instance");
+        let instance = entry.create_instance(&vk::InstanceCreateInfo::default(), None).expect("an instance");
         let physical_device = instance.enumerate_physical_devices().expect("a device")[0];
-        let listed = instance
-            .enumerate_device_extension_properties(physical_device)
-            .expect("extensions");
+        let listed = instance.enumerate_device_extension_properties(physical_device).expect("extensions");
         for name in [push, template] {
             let is_it = |it: &&vk::ExtensionProperties| it.extension_name_as_c_str() == Ok(name);
             assert_eq!(listed.iter().filter(is_it).count(), 1, "{name:?}");
         }
         let finds = |names: &[&std::ffi::CStr], commands: &[&std::ffi::CStr]| {
             let names: Vec<_> = names.iter().map(|name| name.as_ptr()).collect();
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&names);
-            let device = instance
-                .create_device(physical_device, &info, None)
-                .expect("a device");
+            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names);
+            let device = instance.create_device(physical_device, &info, None).expect("a device");
             for command in commands {
                 let found = instance.get_device_proc_addr(device.handle(), command.as_ptr());
                 assert!(found.is_some(), "{command:?}");
             }
             device.destroy_device(None);
         };
-        let pushes = [
-            c"vkCmdPushDescriptorSetKHR",
-            c"vkCmdPushDescriptorSetWithTemplateKHR",
-        ];
+        let pushes = [c"vkCmdPushDescriptorSetKHR", c"vkCmdPushDescriptorSetWithTemplateKHR"];
         finds(&[push], &pushes);
         let all = [
             pushes[0],

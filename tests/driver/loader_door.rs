@@ -9,8 +9,8 @@ use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Case, Need};
 use gaurast_testkit::loader::through_the_loader;
 use gaurast_testkit::{
-    Buffer, Driver, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Message, Opening, Pass,
-    PassObject, Settings, Target, over,
+    Buffer, Driver, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Message, Opening, Pass, PassObject,
+    Settings, Target, over,
 };
 use gaurast_tests::scenes;
 
@@ -24,11 +24,7 @@ const EXPECTED: &[[&str; 3]] = &[
         "VK_GAURAST_gaussian_primitive_topology is not supported by this layer",
         "the extension is not registered",
     ],
-    [
-        "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter",
-        "topology",
-        "the topology is the extension's",
-    ],
+    ["VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter", "topology", "the topology is the extension's"],
     [
         "VUID-VkGraphicsPipelineCreateInfo-pStages-06896",
         "does not contain any pre-raster shaders",
@@ -68,28 +64,17 @@ fn picture(gpu: &Gpu) -> Vec<[f32; 4]> {
     let on_device = GaussianScene::new(gpu, &scene);
     let indices: Vec<u32> = (0..on_device.count).rev().step_by(3).collect();
     let index_buffer = Buffer::of(gpu, &indices);
-    let options = GaussianOptions {
-        blend: vec![over()],
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { blend: vec![over()], ..GaussianOptions::new(scene.degree) };
     let target = Target::floats(gpu, SIZE);
     let object = PassObject::new(&target);
     let pipeline = GaussianPipeline::new(gpu, &options);
-    let pipeline_of_object = GaussianPipeline::new(
-        gpu,
-        &GaussianOptions {
-            render_pass: Some(object.render_pass),
-            ..options
-        },
-    );
+    let pipeline_of_object =
+        GaussianPipeline::new(gpu, &GaussianOptions { render_pass: Some(object.render_pass), ..options });
     gpu.run(|commands| {
         let background = [0.1, 0.2, 0.3, 1.0];
         commands.pass(&target, &Pass::clear(background), || ());
         let pass = Pass {
-            area: Some(vk::Rect2D::default().extent(vk::Extent2D {
-                width: SIZE[0],
-                height: SIZE[1],
-            })),
+            area: Some(vk::Rect2D::default().extent(vk::Extent2D { width: SIZE[0], height: SIZE[1] })),
             ..Pass::clear(background)
         };
         commands.pass(&object, &pass, || {
@@ -123,18 +108,13 @@ fn the_picture_is_that_of_the_embedded_door(case: &Case) {
 #[gaurast_runner::test(needs = [Need::ValidationLayer])]
 fn the_validation_layer_says_what_is_expected(case: &Case) {
     through_the_loader(case, || {
-        let gpu = Gpu::open(&Opening {
-            layers: &[VALIDATION],
-            ..Opening::of(Driver::Loaded)
-        });
+        let gpu = Gpu::open(&Opening { layers: &[VALIDATION], ..Opening::of(Driver::Loaded) });
         let gpu = gpu.expect("this driver's device");
         let validated = picture(&gpu);
         let messages = gpu.messages();
         // Layers of some versions give fewer messages.
-        let unexpected: Vec<_> = messages
-            .iter()
-            .filter(|message| !EXPECTED.iter().any(|expected| is(message, expected)))
-            .collect();
+        let unexpected: Vec<_> =
+            messages.iter().filter(|message| !EXPECTED.iter().any(|expected| is(message, expected))).collect();
         assert!(unexpected.is_empty(), "{unexpected:#?}");
         assert!(validated == embedded_picture());
     });

@@ -2,9 +2,7 @@
 
 use ash::vk;
 use gaurast_testkit::{Bindings, Vertex};
-use gaurast_testkit::{
-    Buffer, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Target, TargetOptions,
-};
+use gaurast_testkit::{Buffer, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Target, TargetOptions};
 use gaurast_tests::triangles::shapes;
 
 use crate::GLSLANG;
@@ -39,9 +37,7 @@ fn layered(gpu: &Gpu, usage: vk::ImageUsageFlags) -> Image {
     };
     let image = Image::new(gpu, &options);
     gpu.run(|commands| {
-        let value = vk::ClearColorValue {
-            float32: [BEFORE; 4],
-        };
+        let value = vk::ClearColorValue { float32: [BEFORE; 4] };
         let range = gaurast_testkit::range(vk::ImageAspectFlags::COLOR);
         // SAFETY: the image is alive and in that layout.
         unsafe {
@@ -66,9 +62,7 @@ fn pixels(image: &Image) -> Vec<[[f32; 2]; 2]> {
         let [red, green, ..] = texels[((layer * SIDE + SIDE / 2) * SIDE + x) as usize];
         [red, green]
     };
-    (0..LAYERS)
-        .map(|layer| [at(layer, 1), at(layer, SIDE - 2)])
-        .collect()
+    (0..LAYERS).map(|layer| [at(layer, 1), at(layer, SIDE - 2)]).collect()
 }
 
 /// The expected pixels: those of a layer that is not a view, and those of a layer that was drawn to.
@@ -94,17 +88,9 @@ fn render_pass(gpu: &Gpu, masks: &[u32], second: bool) -> vk::RenderPass {
         .store_op(vk::AttachmentStoreOp::STORE)
         .initial_layout(vk::ImageLayout::GENERAL)
         .final_layout(vk::ImageLayout::GENERAL)];
-    let attachments: Vec<_> = attachment
-        .iter()
-        .cycle()
-        .take(1 + usize::from(second))
-        .copied()
-        .collect();
+    let attachments: Vec<_> = attachment.iter().cycle().take(1 + usize::from(second)).copied().collect();
     let general = vk::ImageLayout::GENERAL;
-    let reference = |attachment| vk::AttachmentReference {
-        attachment,
-        layout: general,
-    };
+    let reference = |attachment| vk::AttachmentReference { attachment, layout: general };
     let (first, other) = ([reference(0)], [reference(1)]);
     let subpasses: Vec<_> = (0..masks.len())
         .map(|index| {
@@ -138,29 +124,14 @@ fn render_pass(gpu: &Gpu, masks: &[u32], second: bool) -> vk::RenderPass {
 }
 
 /// Runs a render pass over attachments; `draw` records each subpass.
-fn run(
-    gpu: &Gpu,
-    pass: vk::RenderPass,
-    views: &[vk::ImageView],
-    draw: &[&dyn Fn(&gaurast_testkit::Commands)],
-) {
-    let info = vk::FramebufferCreateInfo::default()
-        .render_pass(pass)
-        .attachments(views)
-        .width(SIDE)
-        .height(SIDE)
-        .layers(1);
-    let clear = vk::ClearValue {
-        color: vk::ClearColorValue {
-            float32: [CLEARED; 4],
-        },
-    };
+fn run(gpu: &Gpu, pass: vk::RenderPass, views: &[vk::ImageView], draw: &[&dyn Fn(&gaurast_testkit::Commands)]) {
+    let info =
+        vk::FramebufferCreateInfo::default().render_pass(pass).attachments(views).width(SIDE).height(SIDE).layers(1);
+    let clear = vk::ClearValue { color: vk::ClearColorValue { float32: [CLEARED; 4] } };
     let device = gpu.device();
     // SAFETY: all handles are alive until the device is idle.
     unsafe {
-        let framebuffer = device
-            .create_framebuffer(&info, None)
-            .expect("a framebuffer");
+        let framebuffer = device.create_framebuffer(&info, None).expect("a framebuffer");
         gpu.run(|commands| {
             let clears = vec![clear; views.len()];
             let begin = vk::RenderPassBeginInfo::default()
@@ -168,10 +139,7 @@ fn run(
                 .framebuffer(framebuffer)
                 .render_area(vk::Rect2D {
                     offset: vk::Offset2D::default(),
-                    extent: vk::Extent2D {
-                        width: SIDE,
-                        height: SIDE,
-                    },
+                    extent: vk::Extent2D { width: SIDE, height: SIDE },
                 })
                 .clear_values(&clears);
             device.cmd_begin_render_pass(commands.raw, &begin, vk::SubpassContents::INLINE);
@@ -192,10 +160,7 @@ fn run(
 
 /// A target that gives pipelines its size and formats. Its contents are not used.
 fn target(gpu: &Gpu) -> Target {
-    let options = TargetOptions {
-        size: [SIDE; 2],
-        ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT)
-    };
+    let options = TargetOptions { size: [SIDE; 2], ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT) };
     Target::new(gpu, &options)
 }
 
@@ -237,10 +202,7 @@ fn render_passes_draw_every_view_to_its_layer() {
 fn views_are_loaded_by_the_first_subpass_that_has_them() {
     let gpu = own();
     let (target, vertices) = (target(gpu), Buffer::of(gpu, &left_half()));
-    let right = Buffer::of(
-        gpu,
-        &shapes::rectangle([0.0, -1.0, 1.0, 1.0], 0.5, [1.0; 4]),
-    );
+    let right = Buffer::of(gpu, &shapes::rectangle([0.0, -1.0, 1.0, 1.0], 0.5, [1.0; 4]));
     let pass = render_pass(gpu, &[0b11, 0b110], false);
     let pipelines = [0, 1].map(|subpass| Pipeline::new(gpu, &target, &views(pass, subpass)));
     let image = layered(gpu, vk::ImageUsageFlags::COLOR_ATTACHMENT);
@@ -252,12 +214,7 @@ fn views_are_loaded_by_the_first_subpass_that_has_them() {
             commands.draw(0..6);
         }
     };
-    run(
-        gpu,
-        pass,
-        &[image.view],
-        &[&draw(0, &vertices), &draw(1, &right)],
-    );
+    run(gpu, pass, &[image.view], &[&draw(0, &vertices), &draw(1, &right)]);
     let found = pixels(&image);
     assert_eq!(found[0], [[0.0; 2], [CLEARED; 2]], "first subpass only");
     assert_eq!(found[1], [[1.0; 2], [1.0; 2]], "both");
@@ -329,16 +286,10 @@ fn dynamic_rendering_has_views() {
     let pipeline = Pipeline::new(
         gpu,
         &target,
-        &PipelineOptions {
-            view_mask: mask,
-            subpass: None,
-            ..views(vk::RenderPass::null(), 0)
-        },
+        &PipelineOptions { view_mask: mask, subpass: None, ..views(vk::RenderPass::null(), 0) },
     );
     let views = mask.count_ones();
-    let info = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::OCCLUSION)
-        .query_count(views);
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(views);
     // SAFETY: all handles are alive until the device is idle.
     unsafe {
         let pool = device.create_query_pool(&info, None).expect("a query pool");
@@ -348,28 +299,16 @@ fn dynamic_rendering_has_views() {
                 .image_layout(vk::ImageLayout::GENERAL)
                 .load_op(vk::AttachmentLoadOp::LOAD)
                 .store_op(vk::AttachmentStoreOp::STORE)];
-            let area = vk::Rect2D {
-                offset: vk::Offset2D::default(),
-                extent: vk::Extent2D {
-                    width: SIDE,
-                    height: SIDE,
-                },
-            };
-            let info = vk::RenderingInfo::default()
-                .render_area(area)
-                .view_mask(mask)
-                .color_attachments(&attachment);
+            let area =
+                vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: SIDE, height: SIDE } };
+            let info = vk::RenderingInfo::default().render_area(area).view_mask(mask).color_attachments(&attachment);
             device.cmd_reset_query_pool(commands.raw, pool, 0, views);
             device.cmd_begin_rendering(commands.raw, &info);
             commands.viewport([0.0, 0.0, SIDE as f32, SIDE as f32], [0.0, 1.0]);
             commands.scissor([0, 0], [SIDE; 2]);
             let clear = vk::ClearAttachment::default()
                 .aspect_mask(vk::ImageAspectFlags::COLOR)
-                .clear_value(vk::ClearValue {
-                    color: vk::ClearColorValue {
-                        float32: [CLEARED; 4],
-                    },
-                });
+                .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: [CLEARED; 4] } });
             let rect = vk::ClearRect::default().rect(area).layer_count(1);
             device.cmd_clear_attachments(commands.raw, &[clear], &[rect]);
             let precise = vk::QueryControlFlags::PRECISE;

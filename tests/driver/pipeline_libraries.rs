@@ -10,9 +10,8 @@ use gaurast::vk::{
 use gaurast_oracle::scenes;
 use gaurast_testkit::shader::{Stage, compile};
 use gaurast_testkit::{
-    Attachments, Bindings, Buffer, Commands, FRAGMENT, GaussianOptions, GaussianScene, Gpu,
-    Graphics, Output, Pass, Pipeline, Resource, Shader, Target, TargetOptions, VERTEX, Vertex,
-    attribute, binding, blend, depth_test, over,
+    Attachments, Bindings, Buffer, Commands, FRAGMENT, GaussianOptions, GaussianScene, Gpu, Graphics, Output, Pass,
+    Pipeline, Resource, Shader, Target, TargetOptions, VERTEX, Vertex, attribute, binding, blend, depth_test, over,
 };
 use vk::GraphicsPipelineLibraryFlagsEXT as Parts;
 use vk::PipelineCreateFlags as Flags;
@@ -32,12 +31,9 @@ const SIZE: [u32; 2] = [48, 32];
 /// A device with the extension.
 fn device() -> &'static Gpu {
     static DEVICE: LazyLock<Gpu> = LazyLock::new(|| {
-        let mut features = vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::default()
-            .graphics_pipeline_library(true);
-        let names = [
-            ash::khr::pipeline_library::NAME,
-            ash::ext::graphics_pipeline_library::NAME,
-        ];
+        let mut features =
+            vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::default().graphics_pipeline_library(true);
+        let names = [ash::khr::pipeline_library::NAME, ash::ext::graphics_pipeline_library::NAME];
         Gpu::extended(&names, &mut features).expect("a device")
     });
     &DEVICE
@@ -45,11 +41,7 @@ fn device() -> &'static Gpu {
 
 /// A library of parts.
 fn library<'a>(graphics: &Graphics<'a>, parts: Parts) -> Graphics<'a> {
-    Graphics {
-        flags: graphics.flags | Flags::LIBRARY_KHR,
-        parts: Some(parts),
-        ..graphics.clone()
-    }
+    Graphics { flags: graphics.flags | Flags::LIBRARY_KHR, parts: Some(parts), ..graphics.clone() }
 }
 
 /// A pipeline that links libraries, and has no parts of its own.
@@ -71,9 +63,7 @@ fn create(gpu: &Gpu, graphics: &Graphics<'_>) -> Pipeline {
 /// A pipeline that is linked of a library for each element of `split`. The libraries are destroyed.
 fn linked(gpu: &Gpu, graphics: &Graphics<'_>, split: &[Parts]) -> Pipeline {
     let parts = split.iter();
-    let libraries: Vec<_> = parts
-        .map(|&parts| create(gpu, &library(graphics, parts)))
-        .collect();
+    let libraries: Vec<_> = parts.map(|&parts| create(gpu, &library(graphics, parts))).collect();
     create(gpu, &link(graphics, &libraries))
 }
 
@@ -91,10 +81,8 @@ fn splits() -> Vec<Vec<Parts>> {
 }
 
 fn target(gpu: &Gpu) -> Target {
-    let options = TargetOptions {
-        size: SIZE,
-        ..TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT).multisampled()
-    };
+    let options =
+        TargetOptions { size: SIZE, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT).multisampled() };
     Target::new(gpu, &options)
 }
 
@@ -108,15 +96,8 @@ fn fragment(source: &str) -> Shader {
 
 /// Two crossing triangles, of which one is a mirror image, and a third vertex for a strip.
 fn triangles() -> Vec<Vertex> {
-    let vertex = |x: f32, y: f32, z: f32, color: [f32; 4]| Vertex {
-        position: [x, y, z, 1.0],
-        color,
-    };
-    let (red, green, blue) = (
-        [1.0, 0.3, 0.0, 0.5],
-        [0.0, 0.8, 0.4, 0.75],
-        [0.1, 0.2, 0.9, 0.6],
-    );
+    let vertex = |x: f32, y: f32, z: f32, color: [f32; 4]| Vertex { position: [x, y, z, 1.0], color };
+    let (red, green, blue) = ([1.0, 0.3, 0.0, 0.5], [0.0, 0.8, 0.4, 0.75], [0.1, 0.2, 0.9, 0.6]);
     vec![
         vertex(-0.9, -0.8, 0.3, red),
         vertex(0.9, -0.7, 0.6, green),
@@ -170,30 +151,14 @@ fn other(target: &Target) -> Graphics<'static> {
     let plain = plain(target);
     Graphics {
         shaders: vec![
-            Shader {
-                constants: constants(0.2),
-                ..vertex(moved)
-            },
-            Shader {
-                constants: constants(0.5),
-                ..fragment(striped)
-            },
+            Shader { constants: constants(0.2), ..vertex(moved) },
+            Shader { constants: constants(0.5), ..fragment(striped) },
         ],
         topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-        raster: plain
-            .raster
-            .cull_mode(vk::CullModeFlags::BACK)
-            .front_face(vk::FrontFace::CLOCKWISE),
-        depth_stencil: depth_test(vk::CompareOp::GREATER)
-            .stencil_test_enable(true)
-            .front(face)
-            .back(face),
+        raster: plain.raster.cull_mode(vk::CullModeFlags::BACK).front_face(vk::FrontFace::CLOCKWISE),
+        depth_stencil: depth_test(vk::CompareOp::GREATER).stencil_test_enable(true).front(face).back(face),
         sample_mask: Some(0b0111),
-        blend: vec![blend(
-            vk::BlendFactor::CONSTANT_COLOR,
-            vk::BlendFactor::ONE,
-            vk::BlendOp::ADD,
-        )],
+        blend: vec![blend(vk::BlendFactor::CONSTANT_COLOR, vk::BlendFactor::ONE, vk::BlendOp::ADD)],
         blend_constants: [0.9, 0.7, 0.5, 0.3],
         ..plain
     }
@@ -201,16 +166,12 @@ fn other(target: &Target) -> Graphics<'static> {
 
 /// The first pipeline with parts of the second.
 fn mixed<'a>(one: &Graphics<'a>, second: &Graphics<'a>, parts: Parts) -> Graphics<'a> {
-    let [input, vertex, fragment, output] =
-        ALL.map(|part| if parts.contains(part) { second } else { one });
+    let [input, vertex, fragment, output] = ALL.map(|part| if parts.contains(part) { second } else { one });
     let shader = |of: &Graphics<'_>, stage| {
         let mut shaders = of.shaders.iter();
         shaders.find(|shader| shader.stage == stage).cloned()
     };
-    let shaders = [
-        shader(vertex, vk::ShaderStageFlags::VERTEX),
-        shader(fragment, vk::ShaderStageFlags::FRAGMENT),
-    ];
+    let shaders = [shader(vertex, vk::ShaderStageFlags::VERTEX), shader(fragment, vk::ShaderStageFlags::FRAGMENT)];
     Graphics {
         shaders: shaders.into_iter().flatten().collect(),
         topology: input.topology,
@@ -228,20 +189,9 @@ fn draw(gpu: &Gpu, pipeline: &Pipeline, record: impl FnOnce(&Commands)) -> Outpu
     draw_to(gpu, &target(gpu), pipeline, record)
 }
 
-fn draw_to(
-    gpu: &Gpu,
-    target: &Target,
-    pipeline: &Pipeline,
-    record: impl FnOnce(&Commands),
-) -> Output {
+fn draw_to(gpu: &Gpu, target: &Target, pipeline: &Pipeline, record: impl FnOnce(&Commands)) -> Output {
     let vertices = Buffer::of(gpu, &triangles());
-    let pass = Pass {
-        depth: vk::ClearDepthStencilValue {
-            depth: 0.48,
-            stencil: 3,
-        },
-        ..Pass::default()
-    };
+    let pass = Pass { depth: vk::ClearDepthStencilValue { depth: 0.48, stencil: 3 }, ..Pass::default() };
     target.draw(gpu, &pass, |commands| {
         commands.bind(pipeline);
         commands.vertices(&vertices);
@@ -267,18 +217,12 @@ fn each_part_is_that_of_its_library() {
         let parts = Parts::from_raw(bits);
         let expected = picture(gpu, &create(gpu, &mixed(&plain, &other, parts)));
         assert!(expected.shows_something());
-        assert!(
-            !pictures.contains(&expected),
-            "{parts:?} makes no difference"
-        );
+        assert!(!pictures.contains(&expected), "{parts:?} makes no difference");
         let chosen = ALL.iter().enumerate().map(|(index, part)| {
             let library = usize::from(parts.contains(*part));
             of[library][index].raw
         });
-        let linked = Graphics {
-            libraries: chosen.collect(),
-            ..link(&plain, &[])
-        };
+        let linked = Graphics { libraries: chosen.collect(), ..link(&plain, &[]) };
         assert!(picture(gpu, &create(gpu, &linked)) == expected, "{parts:?}");
         pictures.push(expected);
     }
@@ -292,23 +236,11 @@ fn every_split_draws_the_same() {
     let other = other(&target);
     let expected = picture(gpu, &create(gpu, &other));
     for split in splits() {
-        assert!(
-            picture(gpu, &linked(gpu, &other, &split)) == expected,
-            "{split:?}"
-        );
-        let inline = Graphics {
-            inline_modules: true,
-            flags: Flags::RETAIN_LINK_TIME_OPTIMIZATION_INFO_EXT,
-            ..other.clone()
-        };
-        let libraries: Vec<_> = split
-            .iter()
-            .map(|&parts| create(gpu, &library(&inline, parts)))
-            .collect();
-        let optimized = Graphics {
-            flags: Flags::LINK_TIME_OPTIMIZATION_EXT,
-            ..link(&inline, &libraries)
-        };
+        assert!(picture(gpu, &linked(gpu, &other, &split)) == expected, "{split:?}");
+        let inline =
+            Graphics { inline_modules: true, flags: Flags::RETAIN_LINK_TIME_OPTIMIZATION_INFO_EXT, ..other.clone() };
+        let libraries: Vec<_> = split.iter().map(|&parts| create(gpu, &library(&inline, parts))).collect();
+        let optimized = Graphics { flags: Flags::LINK_TIME_OPTIMIZATION_EXT, ..link(&inline, &libraries) };
         let pipeline = create(gpu, &optimized);
         drop(libraries);
         assert!(picture(gpu, &pipeline) == expected, "{split:?}, inline");
@@ -324,43 +256,24 @@ fn libraries_are_made_of_libraries() {
     let expected = picture(gpu, &create(gpu, &other));
     let [input, vertex, fragment, output] = ALL.map(|part| library(&other, part));
     let with = |graphics: &Graphics<'_>, libraries: &[&Pipeline]| {
-        let linking = Graphics {
-            libraries: libraries.iter().map(|library| library.raw).collect(),
-            ..graphics.clone()
-        };
+        let linking = Graphics { libraries: libraries.iter().map(|library| library.raw).collect(), ..graphics.clone() };
         create(gpu, &linking)
     };
     // A chain in which each library adds a part, and then the pipeline does.
     let first = with(&output, &[]);
     let second = with(&vertex, &[&first]);
     let third = with(&input, &[&second]);
-    let last = Graphics {
-        flags: Flags::empty(),
-        ..fragment.clone()
-    };
+    let last = Graphics { flags: Flags::empty(), ..fragment.clone() };
     let pipeline = with(&last, &[&third]);
     drop((first, second, third));
     assert!(picture(gpu, &pipeline) == expected, "a chain");
     // A tree, the inner libraries of which have no parts of their own. A structure without parts may be left out.
-    let [input, vertex, fragment, output] =
-        [input, vertex, fragment, output].map(|part| with(&part, &[]));
-    let inner = Graphics {
-        flags: Flags::LIBRARY_KHR,
-        ..link(&other, &[])
-    };
-    let (before, after) = (
-        with(&inner, &[&input, &vertex]),
-        with(&inner, &[&fragment, &output]),
-    );
-    let root = Graphics {
-        parts: None,
-        ..link(&other, &[])
-    };
+    let [input, vertex, fragment, output] = [input, vertex, fragment, output].map(|part| with(&part, &[]));
+    let inner = Graphics { flags: Flags::LIBRARY_KHR, ..link(&other, &[]) };
+    let (before, after) = (with(&inner, &[&input, &vertex]), with(&inner, &[&fragment, &output]));
+    let root = Graphics { parts: None, ..link(&other, &[]) };
     // The testkit gives all state of a pipeline without the structure; it must not be read.
-    assert!(
-        picture(gpu, &with(&root, &[&before, &after])) == expected,
-        "a tree"
-    );
+    assert!(picture(gpu, &with(&root, &[&before, &after])) == expected, "a tree");
 }
 
 /// Dynamic states of a part are those that its library names; what it names beside them has no effect.
@@ -434,18 +347,12 @@ fn independent_sets_are_united() {
         layout(location = 0) out vec4 color;
         void main() { color = tint * v_color; }";
     let buffer = |values: [f32; 4]| Buffer::of(gpu, &values);
-    let (shift, unused, tint) = (
-        buffer([0.1, -0.2, 0.0, 0.0]),
-        buffer([0.0; 4]),
-        buffer([0.2, 1.0, 0.6, 1.0]),
-    );
+    let (shift, unused, tint) = (buffer([0.1, -0.2, 0.0, 0.0]), buffer([0.0; 4]), buffer([0.2, 1.0, 0.6, 1.0]));
     let set = |buffer: &Buffer| Bindings::new(gpu, &[Resource::Uniform(buffer.raw)]);
     let sets = [set(&shift), set(&unused), set(&tint)];
     let layouts: Vec<_> = sets.iter().map(|set| set.layout).collect();
     let null = vk::DescriptorSetLayout::null();
-    let push = vk::PushConstantRange::default()
-        .stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS)
-        .size(16);
+    let push = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS).size(16);
     let whole = Graphics {
         shaders: vec![vertex(moved), fragment(tinted)],
         set_layouts: layouts.clone(),
@@ -467,16 +374,10 @@ fn independent_sets_are_united() {
         })
     };
     let expected = drawn(&create(gpu, &whole));
-    let independent = Graphics {
-        layout_flags: vk::PipelineLayoutCreateFlags::INDEPENDENT_SETS_EXT,
-        ..whole.clone()
-    };
+    let independent = Graphics { layout_flags: vk::PipelineLayoutCreateFlags::INDEPENDENT_SETS_EXT, ..whole.clone() };
     let of = |part, set_layouts: &[vk::DescriptorSetLayout]| {
         let library = library(&independent, part);
-        let graphics = Graphics {
-            set_layouts: set_layouts.to_vec(),
-            ..library
-        };
+        let graphics = Graphics { set_layouts: set_layouts.to_vec(), ..library };
         create(gpu, &graphics)
     };
     let [input, vertex, fragment, output] = ALL;
@@ -500,10 +401,7 @@ fn independent_sets_are_united() {
     });
     assert!(drawn_at_once == expected);
     // The fragment stage of a library with the vertex stage's layout lacks its set.
-    let lacking = Graphics {
-        set_layouts: vec![layouts[0]],
-        ..library(&independent, fragment)
-    };
+    let lacking = Graphics { set_layouts: vec![layouts[0]], ..library(&independent, fragment) };
     let result = vk::Result::ERROR_VALIDATION_FAILED_EXT;
     let rule = "VUID-VkGraphicsPipelineCreateInfo-layout-07988";
     refused(gpu, &lacking, result, rule);
@@ -519,11 +417,8 @@ fn a_library_is_linked_for_any_number_of_samples() {
         layout(location = 0) out vec4 color;
         void main() { color = interpolateAtSample(v_color, 1); }";
     let target = |samples| {
-        let options = TargetOptions {
-            size: SIZE,
-            samples,
-            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT)
-        };
+        let options =
+            TargetOptions { size: SIZE, samples, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT) };
         Target::new(gpu, &options)
     };
     let (one, four) = (target(1), target(4));
@@ -550,10 +445,7 @@ fn parts_that_are_needed() {
     let gpu = device();
     let target = target(gpu);
     let plain = plain(&target);
-    let discarding = Graphics {
-        raster: plain.raster.rasterizer_discard_enable(true),
-        ..plain.clone()
-    };
+    let discarding = Graphics { raster: plain.raster.rasterizer_discard_enable(true), ..plain.clone() };
     let before = &ALL[..2];
     let pipeline = linked(gpu, &discarding, before);
     let nothing = picture(gpu, &pipeline);
@@ -562,9 +454,7 @@ fn parts_that_are_needed() {
     let incomplete = "GAURAST-pipeline-incomplete";
     for missing in ALL {
         let parts = ALL.iter().filter(|&&part| part != missing);
-        let libraries: Vec<_> = parts
-            .map(|&part| create(gpu, &library(&plain, part)))
-            .collect();
+        let libraries: Vec<_> = parts.map(|&part| create(gpu, &library(&plain, part))).collect();
         let result = vk::Result::ERROR_VALIDATION_FAILED_EXT;
         refused(gpu, &link(&plain, &libraries), result, incomplete);
     }
@@ -598,15 +488,9 @@ fn pipelines_of_gaussians_are_linked() {
     };
     let state = PipelineGaussianStateCreateInfoGAURAST::default()
         .low_pass_variance(1.5)
-        .resolve_input_locations(
-            GaussianResolveInputLocationsGAURAST::default().accumulated_color(0),
-        );
-    let options = GaussianOptions {
-        state,
-        formats: target.attachment_formats(),
-        blend: vec![over()],
-        ..GaussianOptions::new(1)
-    };
+        .resolve_input_locations(GaussianResolveInputLocationsGAURAST::default().accumulated_color(0));
+    let options =
+        GaussianOptions { state, formats: target.attachment_formats(), blend: vec![over()], ..GaussianOptions::new(1) };
     let mut pictures: Vec<Output> = Vec::new();
     for is_dynamic in [false, true] {
         for resolve in [None, Some(fragment(negative))] {
@@ -633,10 +517,7 @@ fn stages_have_code_in_place_of_modules() {
     let gpu = device();
     let target = target(gpu);
     let plain = plain(&target);
-    let inline = Graphics {
-        inline_modules: true,
-        ..plain.clone()
-    };
+    let inline = Graphics { inline_modules: true, ..plain.clone() };
     let expected = picture(gpu, &create(gpu, &plain));
     assert!(picture(gpu, &create(gpu, &inline)) == expected);
     refused(
@@ -645,32 +526,20 @@ fn stages_have_code_in_place_of_modules() {
         vk::Result::ERROR_VALIDATION_FAILED_EXT,
         "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
     );
-    let words = compile(
-        Stage::Compute,
-        "layout(local_size_x = 1) in; void main() {}",
-    );
+    let words = compile(Stage::Compute, "layout(local_size_x = 1) in; void main() {}");
     let mut code = vk::ShaderModuleCreateInfo::default().code(&words);
-    let stage = vk::PipelineShaderStageCreateInfo::default()
-        .stage(vk::ShaderStageFlags::COMPUTE)
-        .name(c"main");
+    let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).name(c"main");
     let device = gpu.device();
     // SAFETY: the create infos are valid, except the second's.
     unsafe {
-        let layout = device
-            .create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default(), None)
-            .expect("a layout");
+        let layout = device.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default(), None).expect("a layout");
         let create = |stage| {
-            let info = vk::ComputePipelineCreateInfo::default()
-                .stage(stage)
-                .layout(layout);
+            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
             device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None)
         };
         let pipelines = create(stage.push_next(&mut code)).expect("a pipeline");
         device.destroy_pipeline(pipelines[0], None);
-        let refused = create(vk::PipelineShaderStageCreateInfo {
-            p_next: std::ptr::null(),
-            ..stage
-        });
+        let refused = create(vk::PipelineShaderStageCreateInfo { p_next: std::ptr::null(), ..stage });
         let (_, result) = refused.expect_err("a stage without code");
         assert_eq!(result, vk::Result::ERROR_VALIDATION_FAILED_EXT);
         let rule = "VUID-VkPipelineShaderStageCreateInfo-stage-06845";
@@ -682,15 +551,10 @@ fn stages_have_code_in_place_of_modules() {
 /// Checks that a pipeline is refused with a message.
 fn refused(gpu: &Gpu, graphics: &Graphics<'_>, result: vk::Result, id: &str) {
     gpu.messages();
-    let refused = graphics
-        .create(gpu)
-        .expect_err("a pipeline that is refused");
+    let refused = graphics.create(gpu).expect_err("a pipeline that is refused");
     let messages = gpu.messages();
     assert_eq!(refused, result, "{messages:?}");
-    assert!(
-        messages.iter().any(|message| message.id == id),
-        "{id}: {messages:?}"
-    );
+    assert!(messages.iter().any(|message| message.id == id), "{id}: {messages:?}");
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]
@@ -713,14 +577,9 @@ fn invalid_use_is_refused() {
         "VUID-VkPipelineLibraryCreateInfoKHR-pLibraries-03381",
     );
     let twice = "VUID-VkGraphicsPipelineCreateInfo-pLibraries-06611";
-    let libraries = [ALL[0] | ALL[1], ALL[1] | ALL[2] | ALL[3]]
-        .map(|parts| create(gpu, &library(&plain, parts)));
+    let libraries = [ALL[0] | ALL[1], ALL[1] | ALL[2] | ALL[3]].map(|parts| create(gpu, &library(&plain, parts)));
     refused(gpu, &link(&plain, &libraries), invalid, twice);
-    let beside = Graphics {
-        parts: Some(ALL[1]),
-        libraries: vec![libraries[1].raw],
-        ..plain.clone()
-    };
+    let beside = Graphics { parts: Some(ALL[1]), libraries: vec![libraries[1].raw], ..plain.clone() };
     refused(gpu, &beside, invalid, twice);
     // A library can't be bound.
     gpu.messages();
@@ -738,8 +597,7 @@ fn linking_is_not_fast_and_decorations_are_independent() {
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut found);
     // SAFETY: the physical device is the instance's.
     unsafe {
-        gpu.instance()
-            .get_physical_device_properties2(gpu.physical_device(), &mut all);
+        gpu.instance().get_physical_device_properties2(gpu.physical_device(), &mut all);
     }
     assert_eq!(found.graphics_pipeline_library_fast_linking, vk::FALSE);
     let independent = found.graphics_pipeline_library_independent_interpolation_decoration;

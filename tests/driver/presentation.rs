@@ -6,16 +6,11 @@ use ash::vk;
 use super::window::{Presenter, SIZE, SwapchainOptions};
 
 fn headless() -> Presenter {
-    Presenter::new(
-        vulkan_gaurast::entry(),
-        ash::ext::headless_surface::NAME,
-        |entry, instance| {
-            let functions = ash::ext::headless_surface::Instance::new(entry, instance);
-            // SAFETY: the create info is valid.
-            unsafe { functions.create_headless_surface(&Default::default(), None) }
-                .expect("a surface")
-        },
-    )
+    Presenter::new(vulkan_gaurast::entry(), ash::ext::headless_surface::NAME, |entry, instance| {
+        let functions = ash::ext::headless_surface::Instance::new(entry, instance);
+        // SAFETY: the create info is valid.
+        unsafe { functions.create_headless_surface(&Default::default(), None) }.expect("a surface")
+    })
 }
 
 #[gaurast_runner::test]
@@ -31,17 +26,10 @@ fn a_surface_tells_what_it_can() {
         | vk::ImageUsageFlags::SAMPLED
         | vk::ImageUsageFlags::INPUT_ATTACHMENT;
     assert!(can.supported_usage_flags.contains(wanted));
-    assert_eq!(
-        presenter.formats(),
-        [vk::Format::B8G8R8A8_UNORM, vk::Format::B8G8R8A8_SRGB]
-    );
+    assert_eq!(presenter.formats(), [vk::Format::B8G8R8A8_UNORM, vk::Format::B8G8R8A8_SRGB]);
     assert_eq!(
         presenter.modes(),
-        [
-            vk::PresentModeKHR::FIFO,
-            vk::PresentModeKHR::MAILBOX,
-            vk::PresentModeKHR::IMMEDIATE
-        ]
+        [vk::PresentModeKHR::FIFO, vk::PresentModeKHR::MAILBOX, vk::PresentModeKHR::IMMEDIATE]
     );
 }
 
@@ -49,11 +37,7 @@ fn a_surface_tells_what_it_can() {
 fn many_frames_are_presented_in_every_mode() {
     let presenter = headless();
     for mode in presenter.modes() {
-        let options = SwapchainOptions {
-            mode,
-            count: 3,
-            ..SwapchainOptions::default()
-        };
+        let options = SwapchainOptions { mode, count: 3, ..SwapchainOptions::default() };
         let swapchain = presenter.swapchain(&options).expect("a swapchain");
         assert_eq!(swapchain.images.len(), 3);
         let mut seen = [0; 3];
@@ -72,9 +56,7 @@ fn many_frames_are_presented_in_every_mode() {
 #[gaurast_runner::test]
 fn images_hold_what_is_drawn_and_share_their_memory() {
     let presenter = headless();
-    let swapchain = presenter
-        .swapchain(&SwapchainOptions::default())
-        .expect("a swapchain");
+    let swapchain = presenter.swapchain(&SwapchainOptions::default()).expect("a swapchain");
     let (index, presented) = swapchain.frame([0.2, 0.4, 0.6, 1.0]);
     assert_eq!(presented, Ok(false));
     let expected = [153, 102, 51, 255];
@@ -90,10 +72,7 @@ fn images_hold_what_is_drawn_and_share_their_memory() {
 #[gaurast_runner::test]
 fn an_acquisition_waits_as_long_as_it_is_told() {
     let presenter = headless();
-    let options = SwapchainOptions {
-        count: 2,
-        ..SwapchainOptions::default()
-    };
+    let options = SwapchainOptions { count: 2, ..SwapchainOptions::default() };
     let swapchain = presenter.swapchain(&options).expect("a swapchain");
     let first = swapchain.acquire(u64::MAX).expect("an image");
     let second = swapchain.acquire(u64::MAX).expect("another");
@@ -111,21 +90,11 @@ fn a_swapchain_takes_the_place_of_another() {
     let old = presenter.swapchain(&options).expect("a swapchain");
     assert_eq!(old.frame([1.0; 4]).1, Ok(false));
     let (acquired, _) = old.acquire(u64::MAX).expect("an image");
-    assert_eq!(
-        presenter.swapchain(&options).err(),
-        Some(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR)
-    );
-    let options = SwapchainOptions {
-        old: old.raw,
-        size: [7, 5],
-        ..options
-    };
+    assert_eq!(presenter.swapchain(&options).err(), Some(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR));
+    let options = SwapchainOptions { old: old.raw, size: [7, 5], ..options };
     let new = presenter.swapchain(&options).expect("a swapchain");
     assert_eq!(old.acquire(0), Err(vk::Result::ERROR_OUT_OF_DATE_KHR));
-    assert_eq!(
-        old.present(acquired),
-        Err(vk::Result::ERROR_OUT_OF_DATE_KHR)
-    );
+    assert_eq!(old.present(acquired), Err(vk::Result::ERROR_OUT_OF_DATE_KHR));
     drop(old);
     assert_eq!(new.frame([0.0; 4]).1, Ok(false));
 }
@@ -133,22 +102,11 @@ fn a_swapchain_takes_the_place_of_another() {
 #[gaurast_runner::test]
 fn what_is_no_swapchain_is_refused() {
     let presenter = headless();
-    let empty = SwapchainOptions {
-        size: [0, 4],
-        ..SwapchainOptions::default()
-    };
-    assert_eq!(
-        presenter.swapchain(&empty).err(),
-        Some(vk::Result::ERROR_VALIDATION_FAILED_EXT)
-    );
-    let swapchain = presenter
-        .swapchain(&SwapchainOptions::default())
-        .expect("one after the one that failed");
+    let empty = SwapchainOptions { size: [0, 4], ..SwapchainOptions::default() };
+    assert_eq!(presenter.swapchain(&empty).err(), Some(vk::Result::ERROR_VALIDATION_FAILED_EXT));
+    let swapchain = presenter.swapchain(&SwapchainOptions::default()).expect("one after the one that failed");
     // An image that was not acquired.
-    assert_eq!(
-        swapchain.present(0),
-        Err(vk::Result::ERROR_VALIDATION_FAILED_EXT)
-    );
+    assert_eq!(swapchain.present(0), Err(vk::Result::ERROR_VALIDATION_FAILED_EXT));
 }
 
 /// Without a window system, the driver lists no window surface extension.
@@ -158,21 +116,13 @@ fn windows_are_there_with_their_systems_only() {
         // SAFETY: no layer is named.
         let listed = unsafe { entry.enumerate_instance_extension_properties(None) };
         let listed = listed.expect("extensions");
-        let names = listed
-            .iter()
-            .filter_map(|it| it.extension_name_as_c_str().ok());
-        names
-            .map(|name| name.to_string_lossy().into_owned())
-            .collect()
+        let names = listed.iter().filter_map(|it| it.extension_name_as_c_str().ok());
+        names.map(|name| name.to_string_lossy().into_owned()).collect()
     };
     let has = |names: &[String], name: &str| names.iter().any(|listed| listed == name);
     let bare = names(&vulkan_gaurast::entry());
     assert!(has(&bare, "VK_KHR_surface") && has(&bare, "VK_EXT_headless_surface"));
-    let of_systems = [
-        "VK_KHR_xcb_surface",
-        "VK_KHR_xlib_surface",
-        "VK_KHR_wayland_surface",
-    ];
+    let of_systems = ["VK_KHR_xcb_surface", "VK_KHR_xlib_surface", "VK_KHR_wayland_surface"];
     assert!(of_systems.iter().all(|name| !has(&bare, name)));
     let with_windows = names(&vulkan_gaurast_window::entry());
     assert!(of_systems.iter().all(|name| has(&with_windows, name)));

@@ -4,8 +4,8 @@ use ash::vk;
 use gaurast_testkit::Pass;
 use gaurast_testkit::shader::{Stage, compile};
 use gaurast_testkit::{
-    Buffer, FRAGMENT, Gpu, Graphics, Pipeline, PipelineOptions, Settings, Shader, Target,
-    TargetOptions, VERTEX, Vertex, attribute, binding,
+    Buffer, FRAGMENT, Gpu, Graphics, Pipeline, PipelineOptions, Settings, Shader, Target, TargetOptions, VERTEX,
+    Vertex, attribute, binding,
 };
 
 use crate::GLSLANG;
@@ -32,15 +32,8 @@ fn evaluation(domain: &str) -> Shader {
 }
 
 /// A pipeline with these stages between a vertex and a fragment stage.
-fn with(
-    between: &[Shader],
-    topology: vk::PrimitiveTopology,
-    patch_vertices: u32,
-) -> Graphics<'static> {
-    let (vertex, fragment) = (
-        compile(Stage::Vertex, VERTEX),
-        compile(Stage::Fragment, FRAGMENT),
-    );
+fn with(between: &[Shader], topology: vk::PrimitiveTopology, patch_vertices: u32) -> Graphics<'static> {
+    let (vertex, fragment) = (compile(Stage::Vertex, VERTEX), compile(Stage::Fragment, FRAGMENT));
     let mut shaders = vec![Shader::vertex(vertex)];
     shaders.extend_from_slice(between);
     shaders.push(Shader::fragment(fragment));
@@ -60,10 +53,7 @@ fn with(
 fn stages_that_do_not_fit_are_refused() {
     // A device of its own, whose messages no other test causes.
     let gpu = Gpu::embedded(&Settings::default()).expect("a device");
-    let (triangles, patches) = (
-        vk::PrimitiveTopology::TRIANGLE_LIST,
-        vk::PrimitiveTopology::PATCH_LIST,
-    );
+    let (triangles, patches) = (vk::PrimitiveTopology::TRIANGLE_LIST, vk::PrimitiveTopology::PATCH_LIST);
     let strips = vk::PrimitiveTopology::LINE_STRIP;
     let both = [control(), evaluation("triangles")];
     let lines = [control(), evaluation("isolines"), geometry()];
@@ -83,11 +73,9 @@ fn stages_that_do_not_fit_are_refused() {
         assert!(message.contains(rule), "{rule}: {message}");
     }
     let quads = [control(), evaluation("quads")];
-    for (shaders, topology, count) in [
-        (&both[..], patches, 32),
-        (&quads[..], patches, 1),
-        (&[geometry()][..], triangles, 0),
-    ] {
+    for (shaders, topology, count) in
+        [(&both[..], patches, 32), (&quads[..], patches, 1), (&[geometry()][..], triangles, 0)]
+    {
         let created = with(shaders, topology, count).create(&gpu).map(drop);
         assert_eq!(created, Ok(()), "{:?}", gpu.message_texts());
     }
@@ -183,17 +171,7 @@ fn statistics_count_patches_and_primitives() {
     let shaded = results[0][2];
     assert!((24..=26).contains(&shaded), "{shaded} vertices are shaded");
     let geometry = patches * triangles;
-    let expected = [
-        26,
-        8,
-        shaded,
-        geometry,
-        geometry,
-        geometry,
-        geometry / 2,
-        8,
-        patches * points,
-    ];
+    let expected = [26, 8, shaded, geometry, geometry, geometry, geometry / 2, 8, patches * points];
     assert_eq!(results[0], expected);
 }
 
@@ -229,15 +207,9 @@ fn primitives_after_tessellation_are_numbered() {
         ..options()
     };
     let one = vk::BlendFactor::ONE;
-    let options = PipelineOptions {
-        blend: vec![gaurast_testkit::blend(one, one, vk::BlendOp::ADD)],
-        ..options
-    };
+    let options = PipelineOptions { blend: vec![gaurast_testkit::blend(one, one, vk::BlendOp::ADD)], ..options };
     let gpu = own();
-    let options_of_target = TargetOptions {
-        size: [128, 128],
-        ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT)
-    };
+    let options_of_target = TargetOptions { size: [128, 128], ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT) };
     let target = Target::new(gpu, &options_of_target);
     let pipeline = Pipeline::new(gpu, &target, &options);
     let vertices = Buffer::of(gpu, &[[0.0f32; 8]; 1000]);

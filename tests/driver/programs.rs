@@ -6,8 +6,8 @@
 use ash::vk;
 use gaurast_runner::{Case, Missing, Need, Variant, ignore};
 use gaurast_testkit::{
-    Attachments, Bindings, Buffer, Commands, Formats, Gpu, Image, ImageOptions, Pass, Pipeline,
-    PipelineOptions, Resource,
+    Attachments, Bindings, Buffer, Commands, Formats, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions,
+    Resource,
 };
 
 use crate::triangles::devices::{lavapipe, own};
@@ -17,10 +17,7 @@ pub const SIDE: u32 = 128;
 
 /// A variant for each driver.
 pub fn drivers() -> Vec<Variant> {
-    let lavapipe = Variant {
-        name: "lavapipe".to_owned(),
-        needs: vec![Need::VulkanLoader, Need::Lavapipe],
-    };
+    let lavapipe = Variant { name: "lavapipe".to_owned(), needs: vec![Need::VulkanLoader, Need::Lavapipe] };
     vec![Variant::new("this driver"), lavapipe]
 }
 
@@ -66,8 +63,7 @@ pub fn multiview(gpu: &Gpu) -> vk::PhysicalDeviceMultiviewFeatures<'static> {
     let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut found);
     // SAFETY: the physical device is the instance's.
     unsafe {
-        gpu.instance()
-            .get_physical_device_features2(gpu.physical_device(), &mut all);
+        gpu.instance().get_physical_device_features2(gpu.physical_device(), &mut all);
     }
     found
 }
@@ -177,21 +173,14 @@ impl Drawn {
         let (count, records) = (self.words[0] as usize, &self.words[1..]);
         assert!(count * N <= records.len(), "{count} records");
         let records = records[..count * N].chunks_exact(N);
-        records
-            .map(|record| record.try_into().expect("N words"))
-            .collect()
+        records.map(|record| record.try_into().expect("N words")).collect()
     }
 }
 
 impl<'a> Program<'a> {
     /// A program that draws to one layer, with no more resources than the storage buffer.
     pub fn new(options: PipelineOptions<'a>, words: u32) -> Self {
-        Self {
-            options,
-            words,
-            resources: Vec::new(),
-            layers: 1,
-        }
+        Self { options, words, resources: Vec::new(), layers: 1 }
     }
 
     /// Draws on zeros.
@@ -234,10 +223,7 @@ impl<'a> Program<'a> {
         let mut resources = vec![Resource::Storage(buffer.raw)];
         resources.extend(&self.resources);
         let bindings = Bindings::new(gpu, &resources);
-        let options = PipelineOptions {
-            bindings: Some(&bindings),
-            ..self.options.clone()
-        };
+        let options = PipelineOptions { bindings: Some(&bindings), ..self.options.clone() };
         let pipeline = Pipeline::new(gpu, &canvas, &options);
         gpu.run(|commands| {
             let (device, raw) = commands.raw();
@@ -254,10 +240,7 @@ impl<'a> Program<'a> {
             // SAFETY: see the crate.
             query.inspect(|&pool| unsafe { device.cmd_end_query(raw, pool, 0) });
         });
-        Drawn {
-            texels: canvas.image.colors(),
-            words: buffer.values(),
-        }
+        Drawn { texels: canvas.image.colors(), words: buffer.values() }
     }
 }
 
@@ -276,10 +259,7 @@ impl Canvas {
             view: vk::ImageViewType::TYPE_2D_ARRAY,
             ..ImageOptions::new(format, [SIDE; 2], usage)
         };
-        Self {
-            image: Image::new(gpu, &options),
-            view_mask,
-        }
+        Self { image: Image::new(gpu, &options), view_mask }
     }
 }
 

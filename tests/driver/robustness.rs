@@ -19,11 +19,7 @@ fn set(
     gpu: &Gpu,
     kinds: &[vk::DescriptorType],
     first: vk::DescriptorBufferInfo,
-) -> (
-    vk::DescriptorSet,
-    vk::DescriptorSetLayout,
-    vk::DescriptorPool,
-) {
+) -> (vk::DescriptorSet, vk::DescriptorSetLayout, vk::DescriptorPool) {
     let bindings: Vec<_> = (0..)
         .zip(kinds)
         .map(|(binding, &kind)| {
@@ -34,28 +30,16 @@ fn set(
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
         })
         .collect();
-    let sizes: Vec<_> = kinds
-        .iter()
-        .map(|&ty| vk::DescriptorPoolSize {
-            ty,
-            descriptor_count: 1,
-        })
-        .collect();
+    let sizes: Vec<_> = kinds.iter().map(|&ty| vk::DescriptorPoolSize { ty, descriptor_count: 1 }).collect();
     let device = gpu.device();
     // SAFETY: the create infos are valid, and null descriptors are enabled.
     unsafe {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        let layout = device
-            .create_descriptor_set_layout(&info, None)
-            .expect("a layout");
-        let info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(1)
-            .pool_sizes(&sizes);
+        let layout = device.create_descriptor_set_layout(&info, None).expect("a layout");
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         let pool = device.create_descriptor_pool(&info, None).expect("a pool");
         let layouts = [layout];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(pool)
-            .set_layouts(&layouts);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         let set = device.allocate_descriptor_sets(&info).expect("a set")[0];
         for (binding, &kind) in (0..).zip(kinds) {
             let buffer = [match binding {
@@ -65,14 +49,9 @@ fn set(
             let sampler = vk::Sampler::null();
             let image = [vk::DescriptorImageInfo::default().sampler(sampler)];
             let texels = [vk::BufferView::null()];
-            let write = vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(binding)
-                .descriptor_type(kind);
+            let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(binding).descriptor_type(kind);
             let write = match kind {
-                vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::STORAGE_BUFFER => {
-                    write.buffer_info(&buffer)
-                }
+                vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(&buffer),
                 vk::DescriptorType::UNIFORM_TEXEL_BUFFER => write.texel_buffer_view(&texels),
                 _ => write.image_info(&image),
             };
@@ -82,14 +61,7 @@ fn set(
     }
 }
 
-fn free(
-    gpu: &Gpu,
-    (_, layout, pool): (
-        vk::DescriptorSet,
-        vk::DescriptorSetLayout,
-        vk::DescriptorPool,
-    ),
-) {
+fn free(gpu: &Gpu, (_, layout, pool): (vk::DescriptorSet, vk::DescriptorSetLayout, vk::DescriptorPool)) {
     // SAFETY: the device is idle.
     unsafe {
         gpu.device().destroy_descriptor_pool(pool, None);
@@ -115,9 +87,7 @@ fn null_descriptors_read_zero() {
         Kind::STORAGE_IMAGE,
         Kind::UNIFORM_TEXEL_BUFFER,
     ];
-    let first = vk::DescriptorBufferInfo::default()
-        .buffer(result.raw)
-        .range(vk::WHOLE_SIZE);
+    let first = vk::DescriptorBufferInfo::default().buffer(result.raw).range(vk::WHOLE_SIZE);
     let set = set(&gpu, &kinds, first);
     let words_of = compile(
         Stage::Compute,
@@ -157,17 +127,14 @@ fn ranges_end_where_they_say() {
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut robustness);
     // SAFETY: the physical device is the instance's.
     unsafe {
-        gpu.instance()
-            .get_physical_device_properties2(gpu.physical_device(), &mut properties);
+        gpu.instance().get_physical_device_properties2(gpu.physical_device(), &mut properties);
     }
     let storage = robustness.robust_storage_buffer_access_size_alignment;
     assert!(storage == 1 || storage == 4, "{storage}");
     let uniform = robustness.robust_uniform_buffer_access_size_alignment;
     assert!(uniform.is_power_of_two() && uniform <= 256, "{uniform}");
     let buffer = Buffer::of(&gpu, &(1..=64u32).collect::<Vec<_>>());
-    let info = vk::DescriptorBufferInfo::default()
-        .buffer(buffer.raw)
-        .range(4 * 40);
+    let info = vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(4 * 40);
     let set = set(&gpu, &[vk::DescriptorType::STORAGE_BUFFER], info);
     let words_of = compile(
         Stage::Compute,

@@ -10,10 +10,7 @@ use crate::triangles::devices::own;
 fn sampled(gpu: &Gpu, image: &Image, sampler: &vk::SamplerCreateInfo<'_>, code: &str) -> [f32; 4] {
     let sampler = Sampler::new(gpu, sampler);
     let result = Buffer::new(gpu, 16);
-    let resources = [
-        Resource::Storage(result.raw),
-        Resource::Texture(image.view, sampler.raw),
-    ];
+    let resources = [Resource::Storage(result.raw), Resource::Texture(image.view, sampler.raw)];
     let bindings = Bindings::new(gpu, &resources);
     let kernel = Kernel::new(
         gpu,
@@ -87,10 +84,7 @@ fn long_footprints_are_sampled_along_their_length() {
     // A footprint that is as wide as long is sampled once, with or without anisotropy.
     let round = "found = textureGrad(image, vec2(13.25, 30.0) / 64.0, vec2(2.0, 0.0) / 64.0, vec2(0.0, 2.0) / 64.0);";
     let info = linear().anisotropy_enable(true).max_anisotropy(16.0);
-    assert_eq!(
-        sampled(gpu, &image, &info, round),
-        sampled(gpu, &image, &linear(), round)
-    );
+    assert_eq!(sampled(gpu, &image, &info, round), sampled(gpu, &image, &linear(), round));
 }
 
 /// The minimum and the maximum of the texels with a nonzero weight, of one level and of two.
@@ -134,19 +128,14 @@ fn borders_have_any_colour() {
         .border_color_swizzle(true)
         .border_color_swizzle_from_image(true);
     custom.p_next = std::ptr::from_mut(&mut swizzle).cast();
-    let names = [
-        ash::ext::custom_border_color::NAME,
-        ash::ext::border_color_swizzle::NAME,
-    ];
+    let names = [ash::ext::custom_border_color::NAME, ash::ext::border_color_swizzle::NAME];
     let gpu = Gpu::extended(&names, &mut custom).expect("a device");
     let usage = vk::ImageUsageFlags::SAMPLED;
     let options = ImageOptions::new(vk::Format::R32G32B32A32_SFLOAT, [1, 1], usage);
     let image = Image::textured(&gpu, &options, &[vec![[0f32; 4]]]);
     for format in [vk::Format::UNDEFINED, vk::Format::R32G32B32A32_SFLOAT] {
         let mut color = vk::SamplerCustomBorderColorCreateInfoEXT::default()
-            .custom_border_color(vk::ClearColorValue {
-                float32: [0.125, -2.5, 1e6, 0.75],
-            })
+            .custom_border_color(vk::ClearColorValue { float32: [0.125, -2.5, 1e6, 0.75] })
             .format(format);
         let info = vk::SamplerCreateInfo::default()
             .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_BORDER)
@@ -184,19 +173,15 @@ fn components_of_four_bits_have_their_places() {
 /// Across a cube's edge lies the next face, or, with seams, what the address mode says of the face alone.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn cubes_may_have_seams() {
-    let mut features =
-        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::default().non_seamless_cube_map(true);
-    let gpu =
-        &Gpu::extended(&[ash::ext::non_seamless_cube_map::NAME], &mut features).expect("a device");
+    let mut features = vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::default().non_seamless_cube_map(true);
+    let gpu = &Gpu::extended(&[ash::ext::non_seamless_cube_map::NAME], &mut features).expect("a device");
     let options = ImageOptions {
         layers: 6,
         view: vk::ImageViewType::CUBE,
         ..ImageOptions::new(vk::Format::R32_SFLOAT, [2; 2], vk::ImageUsageFlags::SAMPLED)
     };
     // Columns of each face differ: 10 times its number, and one more.
-    let texels: Vec<f32> = (0..24)
-        .map(|texel| (10 * (texel / 4) + texel % 2) as f32)
-        .collect();
+    let texels: Vec<f32> = (0..24).map(|texel| (10 * (texel / 4) + texel % 2) as f32).collect();
     let image = Image::textured(gpu, &options, &[texels]);
     let found = |flags, mode, code: &str| {
         let info = linear()
@@ -206,10 +191,7 @@ fn cubes_may_have_seams() {
             .border_color(vk::BorderColor::FLOAT_OPAQUE_WHITE);
         let sampler = Sampler::new(gpu, &info);
         let result = Buffer::new(gpu, 16);
-        let resources = [
-            Resource::Storage(result.raw),
-            Resource::Texture(image.view, sampler.raw),
-        ];
+        let resources = [Resource::Storage(result.raw), Resource::Texture(image.view, sampler.raw)];
         let bindings = Bindings::new(gpu, &resources);
         let kernel = Kernel::new(
             gpu,
@@ -226,10 +208,7 @@ fn cubes_may_have_seams() {
         x
     };
     use vk::SamplerAddressMode as Mode;
-    let (seamless, seams) = (
-        vk::SamplerCreateFlags::empty(),
-        vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT,
-    );
+    let (seamless, seams) = (vk::SamplerCreateFlags::empty(), vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT);
     // At the left edge of +X, whose neighbour is +Z, in the middle of the edge.
     let edge = "textureLod(image, vec3(1.0, 0.0, 1.0 - 1e-6), 0.0)";
     let across = found(seamless, Mode::CLAMP_TO_EDGE, edge);

@@ -1,9 +1,7 @@
 //! Storage images of several samples and as cubes, and atomics on floats.
 
 use ash::vk;
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler, device_format,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler, device_format};
 use simdevice::Format;
 use simdevice::format::Numeric;
 use vk::ImageUsageFlags as Usage;
@@ -17,30 +15,16 @@ fn samples_are_stored_and_read_one_by_one() {
     const SIDE: u32 = 8;
     let gpu = own();
     let image = |format, size: u32, layers, view| {
-        let options = ImageOptions {
-            layers,
-            samples: 4,
-            view,
-            ..ImageOptions::new(format, [size; 2], Usage::STORAGE)
-        };
+        let options = ImageOptions { layers, samples: 4, view, ..ImageOptions::new(format, [size; 2], Usage::STORAGE) };
         Image::new(gpu, &options)
     };
-    let flat = image(
-        vk::Format::R8G8B8A8_UNORM,
-        SIDE,
-        1,
-        vk::ImageViewType::TYPE_2D,
-    );
+    let flat = image(vk::Format::R8G8B8A8_UNORM, SIDE, 1, vk::ImageViewType::TYPE_2D);
     let array = vk::ImageViewType::TYPE_2D_ARRAY;
     let counts = image(vk::Format::R32_UINT, SIDE / 2, 2, array);
     let results = Buffer::new(gpu, 4 * 2 * 4 * u64::from(SIDE * SIDE));
     let bindings = Bindings::new(
         gpu,
-        &[
-            Resource::StorageImage(flat.view),
-            Resource::StorageImage(counts.view),
-            Resource::Storage(results.raw),
-        ],
+        &[Resource::StorageImage(flat.view), Resource::StorageImage(counts.view), Resource::Storage(results.raw)],
     );
     let declarations = "
         layout(local_size_x = 8, local_size_y = 8) in;
@@ -92,17 +76,10 @@ fn samples_are_stored_and_read_one_by_one() {
         assert_eq!(found[place as usize], texel, "{x}, {y}, sample {sample}");
         // Four pixels add to each texel of the second layer.
         let counted = 1000 * (10 + 4 * (1 + sample));
-        assert_eq!(
-            found[256 + place as usize],
-            counted,
-            "{x}, {y}, sample {sample}"
-        );
+        assert_eq!(found[256 + place as usize], counted, "{x}, {y}, sample {sample}");
     }
 
-    let whole = Image::new(
-        gpu,
-        &ImageOptions::new(vk::Format::R8G8B8A8_UNORM, [SIDE; 2], Usage::SAMPLED),
-    );
+    let whole = Image::new(gpu, &ImageOptions::new(vk::Format::R8G8B8A8_UNORM, [SIDE; 2], Usage::SAMPLED));
     gpu.run(|commands| {
         let layers = vk::ImageSubresourceLayers {
             aspect_mask: vk::ImageAspectFlags::COLOR,
@@ -110,25 +87,15 @@ fn samples_are_stored_and_read_one_by_one() {
             base_array_layer: 0,
             layer_count: 1,
         };
-        let region = vk::ImageResolve::default()
-            .src_subresource(layers)
-            .dst_subresource(layers)
-            .extent(vk::Extent3D {
-                width: SIDE,
-                height: SIDE,
-                depth: 1,
-            });
+        let region = vk::ImageResolve::default().src_subresource(layers).dst_subresource(layers).extent(vk::Extent3D {
+            width: SIDE,
+            height: SIDE,
+            depth: 1,
+        });
         let layout = vk::ImageLayout::GENERAL;
         // SAFETY: both images are alive, and in that layout.
         unsafe {
-            commands.device().cmd_resolve_image(
-                commands.raw,
-                flat.raw,
-                layout,
-                whole.raw,
-                layout,
-                &[region],
-            );
+            commands.device().cmd_resolve_image(commands.raw, flat.raw, layout, whole.raw, layout, &[region]);
         }
         commands.barrier();
     });
@@ -215,20 +182,14 @@ fn every_kind_of_image_is_stored_to_without_a_format() {
 /// A slice of a 3D image is stored to and sampled as an image of two dimensions.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn slices_are_images_of_two_dimensions() {
-    let mut features = vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::default()
-        .image2_d_view_of3_d(true)
-        .sampler2_d_view_of3_d(true);
-    let gpu =
-        &Gpu::extended(&[ash::ext::image_2d_view_of_3d::NAME], &mut features).expect("a device");
+    let mut features =
+        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::default().image2_d_view_of3_d(true).sampler2_d_view_of3_d(true);
+    let gpu = &Gpu::extended(&[ash::ext::image_2d_view_of_3d::NAME], &mut features).expect("a device");
     let options = ImageOptions {
         size: [8, 4, 5],
         view: vk::ImageViewType::TYPE_3D,
         flags: vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT,
-        ..ImageOptions::new(
-            vk::Format::R32_SFLOAT,
-            [8, 4],
-            Usage::STORAGE | Usage::SAMPLED,
-        )
+        ..ImageOptions::new(vk::Format::R32_SFLOAT, [8, 4], Usage::STORAGE | Usage::SAMPLED)
     };
     let image = Image::new(gpu, &options);
     let before: Vec<f32> = (0..160).map(|texel| texel as f32).collect();
@@ -249,18 +210,12 @@ fn slices_are_images_of_two_dimensions() {
     let (written, sampled) = (view(2), view(3));
     let sampler = Sampler::new(
         gpu,
-        &vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR),
+        &vk::SamplerCreateInfo::default().mag_filter(vk::Filter::LINEAR).min_filter(vk::Filter::LINEAR),
     );
     let results = Buffer::new(gpu, 4 * 32);
     let bindings = Bindings::new(
         gpu,
-        &[
-            Resource::StorageImage(written),
-            Resource::Texture(sampled, sampler.raw),
-            Resource::Storage(results.raw),
-        ],
+        &[Resource::StorageImage(written), Resource::Texture(sampled, sampler.raw), Resource::Storage(results.raw)],
     );
     let kernel = Kernel::new(
         gpu,
@@ -345,26 +300,18 @@ fn floats_are_changed_atomically() {
         .shader_image_float32_atomics(true)
         .shader_image_float32_atomic_add(true);
     sums.p_next = (&raw mut minima).cast();
-    let names = [
-        ash::ext::shader_atomic_float::NAME,
-        ash::ext::shader_atomic_float2::NAME,
-    ];
+    let names = [ash::ext::shader_atomic_float::NAME, ash::ext::shader_atomic_float2::NAME];
     let gpu = &Gpu::extended(&names, &mut sums).expect("a device");
     let format = vk::Format::R32_SFLOAT;
     let properties = gpu.format_properties(format);
-    let (image_atomic, buffer_atomic) = (
-        vk::FormatFeatureFlags::STORAGE_IMAGE_ATOMIC,
-        vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC,
-    );
+    let (image_atomic, buffer_atomic) =
+        (vk::FormatFeatureFlags::STORAGE_IMAGE_ATOMIC, vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC);
     assert!(properties.optimal_tiling_features.contains(image_atomic));
     assert!(properties.buffer_features.contains(buffer_atomic));
     // Sum, minimum, maximum, and what is exchanged.
     let before = [0.5f32, 1e9, -1e9, -1.0];
     let words = Buffer::of(gpu, &before);
-    let info = vk::BufferViewCreateInfo::default()
-        .buffer(words.raw)
-        .format(format)
-        .range(vk::WHOLE_SIZE);
+    let info = vk::BufferViewCreateInfo::default().buffer(words.raw).format(format).range(vk::WHOLE_SIZE);
     // SAFETY: the buffer is alive.
     let view = unsafe { gpu.device().create_buffer_view(&info, None) }.expect("a view");
     let image = Image::new(gpu, &ImageOptions::new(format, [4, 1], Usage::STORAGE));

@@ -7,13 +7,9 @@ use ash::vk;
 use ash::vk::PrimitiveTopology as Topology;
 use gaurast_runner::Case;
 use gaurast_testkit::shader::Stage;
-use gaurast_testkit::{
-    Buffer, Driver, Gpu, Image, ImageOptions, Opening, PipelineOptions, Resource, Sampler,
-};
+use gaurast_testkit::{Buffer, Driver, Gpu, Image, ImageOptions, Opening, PipelineOptions, Resource, Sampler};
 
-use super::programs::{
-    Drawn, ONES, Program, WORDS, drivers, multiview, need, options, with_tessellation,
-};
+use super::programs::{Drawn, ONES, Program, WORDS, drivers, multiview, need, options, with_tessellation};
 use crate::GLSLANG;
 
 /// A pipeline with the two stages.
@@ -21,10 +17,7 @@ fn of<'a>(patch_vertices: u32, control: &'a str, evaluation: &'a str) -> Pipelin
     PipelineOptions {
         topology: Topology::PATCH_LIST,
         patch_vertices,
-        between: vec![
-            (Stage::TessellationControl, control),
-            (Stage::TessellationEvaluation, evaluation),
-        ],
+        between: vec![(Stage::TessellationControl, control), (Stage::TessellationEvaluation, evaluation)],
         ..options()
     }
 }
@@ -38,10 +31,7 @@ struct Levels {
 }
 
 const fn levels(outer: [f32; 4], inner: [f32; 2]) -> Levels {
-    Levels {
-        outer,
-        inner: [inner[0], inner[1], 0.0, 0.0],
-    }
+    Levels { outer, inner: [inner[0], inner[1], 0.0, 0.0] }
 }
 
 /// A control shader that takes the levels of each patch from binding 1.
@@ -86,10 +76,7 @@ fn evaluation(layout: &str) -> String {
 /// Draws a patch for each element of `all`.
 fn drawn(gpu: &Gpu, options: PipelineOptions<'_>, words: u32, all: &[Levels]) -> Drawn {
     let buffer = Buffer::of(gpu, all);
-    let program = Program {
-        resources: vec![Resource::Storage(buffer.raw)],
-        ..Program::new(options, words)
-    };
+    let program = Program { resources: vec![Resource::Storage(buffer.raw)], ..Program::new(options, words) };
     let vertices = program.options.patch_vertices * all.len() as u32;
     program.draw(gpu, |commands| commands.draw(0..vertices))
 }
@@ -117,18 +104,13 @@ const TOLERANCE: f32 = 1e-4;
 
 /// Checks that two sets of coordinates are the same.
 fn assert_same(found: &BTreeSet<Place>, expected: &[[f32; 3]], what: &str) {
-    let is_near = |a: [f32; 3], b: [f32; 3]| {
-        a.into_iter()
-            .zip(b)
-            .all(|(a, b)| (a - b).abs() <= TOLERANCE)
-    };
+    let is_near = |a: [f32; 3], b: [f32; 3]| a.into_iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE);
     for &place in expected {
         // Bits of numbers that are not negative have the numbers' order.
         let first = (place[0] - TOLERANCE).max(0.0).to_bits();
         let last = (place[0] + TOLERANCE).to_bits();
-        let near = found
-            .range([first, 0, 0]..=[last, u32::MAX, u32::MAX])
-            .filter(|found| is_near(values(**found), place));
+        let near =
+            found.range([first, 0, 0]..=[last, u32::MAX, u32::MAX]).filter(|found| is_near(values(**found), place));
         assert_eq!(near.count(), 1, "{what}: {place:?}");
     }
     assert_eq!(found.len(), expected.len(), "{what}");
@@ -203,11 +185,7 @@ fn lines(Levels { outer, .. }: Levels) -> Vec<[f32; 3]> {
 type Vertices = fn(Levels) -> Vec<[f32; 3]>;
 
 /// The domains, with their vertices.
-const DOMAINS: [(&str, Vertices); 3] = [
-    ("triangles", triangle),
-    ("quads", quad),
-    ("isolines", lines),
-];
+const DOMAINS: [(&str, Vertices); 3] = [("triangles", triangle), ("quads", quad), ("isolines", lines)];
 
 /// Levels of all kinds: equal and different ones, ones that are rounded, and ones beyond the limits.
 const KINDS: [Levels; 12] = [
@@ -242,9 +220,7 @@ fn vertices_have_equal_spacing(case: &Case) {
 fn edges_are_exact(case: &Case) {
     let gpu = with_tessellation(case);
     for spacing in ["equal", "fractional_even", "fractional_odd"] {
-        let all: Vec<_> = (0..20)
-            .map(|n| levels([n as f32 * 0.7 + 1.1; 4], [n as f32 * 0.9 + 1.2; 2]))
-            .collect();
+        let all: Vec<_> = (0..20).map(|n| levels([n as f32 * 0.7 + 1.1; 4], [n as f32 * 0.9 + 1.2; 2])).collect();
         let places = coordinates(gpu, &format!("triangles, {spacing}_spacing"), &all);
         for place in places.iter().flatten().map(|place| values(*place)) {
             let sum: f32 = place.iter().sum();
@@ -283,10 +259,7 @@ fn count_of_segments(spacing: &str, level: f32) -> usize {
 fn fractional_segments_shrink(case: &Case) {
     let gpu = with_tessellation(case);
     let sweep: Vec<f32> = (0..160).map(|step| 0.9 + 0.061 * step as f32).collect();
-    let all: Vec<_> = sweep
-        .iter()
-        .map(|&level| levels([1.0, level, 0.0, 0.0], [0.0; 2]))
-        .collect();
+    let all: Vec<_> = sweep.iter().map(|&level| levels([1.0, level, 0.0, 0.0], [0.0; 2])).collect();
     for spacing in ["equal", "fractional_even", "fractional_odd"] {
         let lines = coordinates(gpu, &format!("isolines, {spacing}_spacing"), &all);
         // The number of segments of the line before, and its ratio.
@@ -325,12 +298,7 @@ fn fractional_segments_shrink(case: &Case) {
 }
 
 /// The triangles of each patch, as the geometry stage takes them.
-fn triangles_of(
-    gpu: &Gpu,
-    layout: &str,
-    origin: vk::TessellationDomainOrigin,
-    all: &[Levels],
-) -> Vec<Vec<[Place; 3]>> {
+fn triangles_of(gpu: &Gpu, layout: &str, origin: vk::TessellationDomainOrigin, all: &[Levels]) -> Vec<Vec<[Place; 3]>> {
     let evaluation = format!(
         "layout({layout}) in;
          layout(location = 0) out vec3 place;
@@ -351,11 +319,7 @@ fn triangles_of(
          }}",
         recorder(10)
     );
-    let mut options = PipelineOptions {
-        domain_origin: origin,
-        fragment: Some(ONES),
-        ..of(1, CONTROL, &evaluation)
-    };
+    let mut options = PipelineOptions { domain_origin: origin, fragment: Some(ONES), ..of(1, CONTROL, &evaluation) };
     options.between.push((Stage::Geometry, &geometry));
     let drawn = drawn(gpu, options, 1 << 19, all);
     let mut patches = vec![Vec::new(); all.len()];
@@ -458,11 +422,7 @@ fn statistics_count_patches(case: &Case) {
     use vk::QueryPipelineStatisticFlags as Flags;
     let gpu = with_tessellation(case);
     // A square of four vertices and two triangles, one of nine and eight, and one that is discarded.
-    let all = [
-        levels([1.0; 4], [1.0; 2]),
-        levels([2.0; 4], [2.0; 2]),
-        levels([2.0, 2.0, 0.0, 2.0], [2.0; 2]),
-    ];
+    let all = [levels([1.0; 4], [1.0; 2]), levels([2.0; 4], [2.0; 2]), levels([2.0, 2.0, 0.0, 2.0], [2.0; 2])];
     let evaluation = evaluation("quads, equal_spacing");
     let buffer = Buffer::of(gpu, &all);
     let program = Program {
@@ -474,10 +434,9 @@ fn statistics_count_patches(case: &Case) {
         | Flags::CLIPPING_INVOCATIONS
         | Flags::TESSELLATION_CONTROL_SHADER_PATCHES
         | Flags::TESSELLATION_EVALUATION_SHADER_INVOCATIONS;
-    let [vertices, primitives, clipped, patches, evaluations] =
-        program.statistics(gpu, counted, |commands| {
-            commands.draw_instances(0..15, 0..2);
-        });
+    let [vertices, primitives, clipped, patches, evaluations] = program.statistics(gpu, counted, |commands| {
+        commands.draw_instances(0..15, 0..2);
+    });
     assert_eq!([vertices, primitives, clipped], [30, 6, 20]);
     assert_eq!(patches, 6);
     // A shader may run more than once for a vertex.
@@ -563,9 +522,7 @@ fn patches_have_their_vertices(case: &Case) {
             assert_eq!(record[..3], [taken, given, 0], "{what}");
             for invocation in 0..given {
                 let vertex = |i: u32| patch * taken + (i * 7 + invocation + patch) % taken;
-                let sum: u32 = (0..=invocation)
-                    .map(|i| vertex(i) * (i + 1) + instance)
-                    .sum();
+                let sum: u32 = (0..=invocation).map(|i| vertex(i) * (i + 1) + instance).sum();
                 let found = record[3 + invocation as usize];
                 assert_eq!(found, sum, "{what}: vertex {invocation}");
             }
@@ -647,10 +604,7 @@ fn invocations_exchange_values(case: &Case) {
         assert_eq!(record[9..13], block, "patch {patch}");
         for (index, &bits) in record[13..17].iter().enumerate() {
             let (found, expected) = (f32::from_bits(bits), list[index] as f32 * 0.001 + 1.0);
-            assert!(
-                (found - expected).abs() < 1e-5,
-                "patch {patch}, outer {index}"
-            );
+            assert!((found - expected).abs() < 1e-5, "patch {patch}, outer {index}");
         }
         let inner = [0.0, 1.0].map(|more| (sum(&second) as f32 + more).to_bits());
         assert_eq!(record[17..19], inner, "patch {patch}");
@@ -696,10 +650,7 @@ fn the_stages_use_resources(case: &Case) {
          }}"
     );
     let program = Program {
-        resources: vec![
-            Resource::Uniform(uniform.raw),
-            Resource::Texture(image.view, sampler.raw),
-        ],
+        resources: vec![Resource::Uniform(uniform.raw), Resource::Texture(image.view, sampler.raw)],
         ..Program::new(of(1, &control, &evaluation), 1 + 40)
     };
     let drawn = program.draw(gpu, |commands| {
@@ -739,10 +690,8 @@ fn sizes_of_patches_are_dynamic(case: &Case) {
              value = vec4(0.0);
          }}"
     );
-    let options = PipelineOptions {
-        dynamic: vec![vk::DynamicState::PATCH_CONTROL_POINTS_EXT],
-        ..of(7, control, &evaluation)
-    };
+    let options =
+        PipelineOptions { dynamic: vec![vk::DynamicState::PATCH_CONTROL_POINTS_EXT], ..of(7, control, &evaluation) };
     let functions = ash::ext::extended_dynamic_state2::Device::new(gpu.instance(), gpu.device());
     let sizes = [1, 2, 5, 12, 3];
     let drawn = Program::new(options, 2 * 12 * 5).draw(&gpu, |commands| {
@@ -754,11 +703,7 @@ fn sizes_of_patches_are_dynamic(case: &Case) {
     });
     for (size, records) in sizes.into_iter().zip(drawn.words.chunks_exact(24)) {
         for (patch, record) in (0..).zip(records.chunks_exact(2)) {
-            let expected = if patch < 12 / size {
-                [size, size * (patch + 1) - 1]
-            } else {
-                [0; 2]
-            };
+            let expected = if patch < 12 / size { [size, size * (patch + 1) - 1] } else { [0; 2] };
             assert_eq!(record, expected, "patch {patch} of {size} vertices");
         }
     }
@@ -771,8 +716,7 @@ fn with_dynamic_patches(case: &Case) -> Gpu {
     let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut found);
     // SAFETY: the physical device is the instance's.
     unsafe {
-        gpu.instance()
-            .get_physical_device_features2(gpu.physical_device(), &mut all);
+        gpu.instance().get_physical_device_features2(gpu.physical_device(), &mut all);
     }
     let has = found.extended_dynamic_state2_patch_control_points;
     need("extendedDynamicState2PatchControlPoints", has);
@@ -780,10 +724,7 @@ fn with_dynamic_patches(case: &Case) -> Gpu {
         "lavapipe" => Driver::Lavapipe,
         _ => Driver::Embedded,
     };
-    let opening = Opening {
-        extensions: &[ash::ext::extended_dynamic_state2::NAME],
-        ..Opening::of(driver)
-    };
+    let opening = Opening { extensions: &[ash::ext::extended_dynamic_state2::NAME], ..Opening::of(driver) };
     let mut features = vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::default()
         .extended_dynamic_state2(true)
         .extended_dynamic_state2_patch_control_points(true);
@@ -817,23 +758,11 @@ fn views_have_their_own_patches(case: &Case) {
             gl_Position = vec4(place / 64.0 - 1.0, 0.0, 1.0);
             value = vec4(10 * view + gl_PrimitiveID + 1);
         }";
-    let options = PipelineOptions {
-        view_mask: MASK,
-        ..of(1, control, evaluation)
-    };
-    let program = Program {
-        layers: 6,
-        ..Program::new(options, 1)
-    };
+    let options = PipelineOptions { view_mask: MASK, ..of(1, control, evaluation) };
+    let program = Program { layers: 6, ..Program::new(options, 1) };
     let drawn = program.draw(gpu, |commands| commands.draw(0..3));
     for view in (0..6).filter(|view| MASK & (1 << view) != 0) {
-        drawn.assert_layer(view, |x, y| {
-            if x / 16 == view && y < 24 {
-                (10 * view + y / 8 + 1) as f32
-            } else {
-                0.0
-            }
-        });
+        drawn.assert_layer(view, |x, y| if x / 16 == view && y < 24 { (10 * view + y / 8 + 1) as f32 } else { 0.0 });
     }
 }
 
@@ -868,11 +797,7 @@ fn patches_cover_their_pixels(case: &Case) {
         let drawn = Program::new(options, 1).draw(gpu, |commands| commands.draw(0..4 * 200));
         drawn.assert_all(|x, y| {
             let number = 16 * (y / 8) + x / 8;
-            if number < 200 {
-                (number + 1) as f32
-            } else {
-                0.0
-            }
+            if number < 200 { (number + 1) as f32 } else { 0.0 }
         });
     }
 }

@@ -6,8 +6,7 @@ use ash::vk::PrimitiveTopology as Topology;
 use gaurast_runner::Case;
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{
-    Buffer, Commands, Driver, Gpu, Opening, Pass, Pipeline, PipelineOptions, Target,
-    TransformFeedback,
+    Buffer, Commands, Driver, Gpu, Opening, Pass, Pipeline, PipelineOptions, Target, TransformFeedback,
 };
 
 use super::programs::{drivers, need};
@@ -47,9 +46,8 @@ impl Device {
             .primitives_generated_query(true)
             .primitives_generated_query_with_rasterizer_discard(true)
             .primitives_generated_query_with_non_zero_streams(true);
-        let mut features = vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default()
-            .transform_feedback(true)
-            .geometry_streams(true);
+        let mut features =
+            vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default().transform_feedback(true).geometry_streams(true);
         provoking.p_next = std::ptr::from_mut(&mut generated).cast();
         features.p_next = std::ptr::from_mut(&mut provoking).cast();
         let gpu = Gpu::open_with(&opening, &mut features).expect("a device");
@@ -93,12 +91,7 @@ impl Device {
     }
 
     /// The words of a buffer after draws that are captured in it.
-    fn captured(
-        &self,
-        options: &PipelineOptions<'_>,
-        words: usize,
-        draws: impl FnOnce(&Commands),
-    ) -> Vec<u32> {
+    fn captured(&self, options: &PipelineOptions<'_>, words: usize, draws: impl FnOnce(&Commands)) -> Vec<u32> {
         let buffer = self.buffer(words);
         self.draw(options, |commands| {
             self.bind(commands, &[&buffer]);
@@ -114,9 +107,7 @@ impl Device {
         streams: u32,
         draws: impl FnOnce(&dyn Fn(&Commands, bool)),
     ) -> Vec<[u64; N]> {
-        let info = vk::QueryPoolCreateInfo::default()
-            .query_type(kind)
-            .query_count(streams);
+        let info = vk::QueryPoolCreateInfo::default().query_type(kind).query_count(streams);
         let device = self.gpu.device();
         // SAFETY: see the crate.
         let pool = unsafe { device.create_query_pool(&info, None).expect("a pool") };
@@ -161,9 +152,7 @@ fn discarding(vertex: &str) -> PipelineOptions<'_> {
         vertex_bindings: Vec::new(),
         vertex_attributes: Vec::new(),
         topology: Topology::POINT_LIST,
-        raster: vk::PipelineRasterizationStateCreateInfo::default()
-            .line_width(1.0)
-            .rasterizer_discard_enable(true),
+        raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0).rasterizer_discard_enable(true),
         ..PipelineOptions::default()
     }
 }
@@ -171,8 +160,7 @@ fn discarding(vertex: &str) -> PipelineOptions<'_> {
 /// The primitives of a run of `count` vertices, as the specification's chapter on topologies lists them; adjacent vertices
 /// are left out. The provoking vertex is the first, or the last.
 fn primitives(topology: Topology, count: u32, last: bool) -> Vec<Vec<u32>> {
-    let each =
-        |number: u32, primitive: &dyn Fn(u32) -> Vec<u32>| (0..number).map(primitive).collect();
+    let each = |number: u32, primitive: &dyn Fn(u32) -> Vec<u32>| (0..number).map(primitive).collect();
     match topology {
         Topology::POINT_LIST => each(count, &|i| vec![i]),
         Topology::LINE_LIST => each(count / 2, &|i| vec![2 * i, 2 * i + 1]),
@@ -189,16 +177,12 @@ fn primitives(topology: Topology, count: u32, last: bool) -> Vec<Vec<u32>> {
         }),
         Topology::LINE_LIST_WITH_ADJACENCY => each(count / 4, &|i| vec![4 * i + 1, 4 * i + 2]),
         Topology::LINE_STRIP_WITH_ADJACENCY => each(count - 3, &|i| vec![i + 1, i + 2]),
-        Topology::TRIANGLE_LIST_WITH_ADJACENCY => {
-            each(count / 6, &|i| vec![6 * i, 6 * i + 2, 6 * i + 4])
-        }
-        Topology::TRIANGLE_STRIP_WITH_ADJACENCY => {
-            each((count - 4) / 2, &|i| match (i % 2, last) {
-                (0, _) => vec![2 * i, 2 * i + 2, 2 * i + 4],
-                (_, false) => vec![2 * i, 2 * i + 4, 2 * i + 2],
-                (_, true) => vec![2 * i + 2, 2 * i, 2 * i + 4],
-            })
-        }
+        Topology::TRIANGLE_LIST_WITH_ADJACENCY => each(count / 6, &|i| vec![6 * i, 6 * i + 2, 6 * i + 4]),
+        Topology::TRIANGLE_STRIP_WITH_ADJACENCY => each((count - 4) / 2, &|i| match (i % 2, last) {
+            (0, _) => vec![2 * i, 2 * i + 2, 2 * i + 4],
+            (_, false) => vec![2 * i, 2 * i + 4, 2 * i + 2],
+            (_, true) => vec![2 * i + 2, 2 * i, 2 * i + 4],
+        }),
         other => unreachable!("{other:?}"),
     }
 }
@@ -210,12 +194,11 @@ fn strips_and_fans_are_captured_as_lists(case: &Case) {
     const COUNT: u32 = 13;
     for topology in (0..10).map(Topology::from_raw) {
         for last in [false, true] {
-            let mut provoking =
-                vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT::default()
-                    .provoking_vertex_mode(match last {
-                        true => vk::ProvokingVertexModeEXT::LAST_VERTEX,
-                        false => vk::ProvokingVertexModeEXT::FIRST_VERTEX,
-                    });
+            let mut provoking = vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT::default()
+                .provoking_vertex_mode(match last {
+                    true => vk::ProvokingVertexModeEXT::LAST_VERTEX,
+                    false => vk::ProvokingVertexModeEXT::FIRST_VERTEX,
+                });
             let mut options = discarding(NUMBERS);
             options.topology = topology;
             options.raster.p_next = std::ptr::from_mut(&mut provoking).cast();
@@ -273,18 +256,7 @@ fn outputs_lie_at_their_offsets(case: &Case) {
     let none = UNWRITTEN;
     let first = (0..2).flat_map(|number| {
         let at = |value| float(number, value);
-        [
-            none,
-            at(1),
-            at(2),
-            at(3),
-            at(4),
-            none,
-            at(6),
-            at(7),
-            none,
-            at(5),
-        ]
+        [none, at(1), at(2), at(3), at(4), none, at(6), at(7), none, at(5)]
     });
     assert_eq!(buffers[0].values::<u32>(), first.collect::<Vec<_>>());
     assert_eq!(buffers[1].values::<u32>(), [none]);
@@ -301,10 +273,7 @@ fn outputs_lie_at_their_offsets(case: &Case) {
 fn a_full_buffer_takes_whole_primitives_only(case: &Case) {
     let device = Device::of(case);
     let (buffer, counter, drawn) = (device.buffer(23), device.buffer(1), device.buffer(40));
-    let options = PipelineOptions {
-        topology: Topology::LINE_LIST,
-        ..discarding(NUMBERS)
-    };
+    let options = PipelineOptions { topology: Topology::LINE_LIST, ..discarding(NUMBERS) };
     let kind = vk::QueryType::TRANSFORM_FEEDBACK_STREAM_EXT;
     let mut counts = Vec::new();
     // Of five lines of four words each, the first four fit into two captures.
@@ -349,15 +318,12 @@ fn a_full_buffer_takes_whole_primitives_only(case: &Case) {
     device.draw(&options, |commands| {
         device.bind(commands, &[&drawn]);
         device.capture(commands, None, || {
-            device
-                .feedback
-                .draw(commands, 2, (&counter, 0), 8 * skipped, 8);
+            device.feedback.draw(commands, 2, (&counter, 0), 8 * skipped, 8);
         });
     });
     let vertices = 0..10 - skipped;
-    let instances = (0..2)
-        .flat_map(|instance| (vertices.clone()).flat_map(move |number| [number, instance]))
-        .collect::<Vec<_>>();
+    let instances =
+        (0..2).flat_map(|instance| (vertices.clone()).flat_map(move |number| [number, instance])).collect::<Vec<_>>();
     assert_eq!(drawn.values::<u32>()[..instances.len()], instances);
 }
 
@@ -405,25 +371,17 @@ fn tessellated_vertices_are_captured(case: &Case) {
             gl_Position = vec4(0.0);
         }";
     let options = PipelineOptions {
-        between: vec![
-            (Stage::TessellationControl, control),
-            (Stage::TessellationEvaluation, evaluation),
-        ],
+        between: vec![(Stage::TessellationControl, control), (Stage::TessellationEvaluation, evaluation)],
         topology: Topology::PATCH_LIST,
         patch_vertices: 1,
         ..discarding("void main() { gl_Position = vec4(0.0); }")
     };
     let words = device.captured(&options, 60, |commands| commands.draw(0..2));
     // Of each patch two lines at y 0 and 1/2, of three pieces each.
-    let mut lines: Vec<[f32; 4]> = words[..48]
-        .chunks_exact(4)
-        .map(|line| [0, 1, 2, 3].map(|word| f32::from_bits(line[word])))
-        .collect();
+    let mut lines: Vec<[f32; 4]> =
+        words[..48].chunks_exact(4).map(|line| [0, 1, 2, 3].map(|word| f32::from_bits(line[word]))).collect();
     assert!(words[48..].iter().all(|&word| word == UNWRITTEN));
-    assert!(
-        lines[..6].iter().all(|line| line[1] < 1.0),
-        "the first patch"
-    );
+    assert!(lines[..6].iter().all(|line| line[1] < 1.0), "the first patch");
     lines.sort_by(|a, b| (a[1], a[0]).partial_cmp(&(b[1], b[0])).expect("numbers"));
     let expected = [0.0, 0.5, 1.0, 1.5].into_iter().flat_map(|y: f32| {
         let third = |number: f32| number / 3.0;
@@ -431,10 +389,7 @@ fn tessellated_vertices_are_captured(case: &Case) {
     });
     for (found, expected) in lines.iter().zip(expected) {
         let near = |(a, b): (&f32, f32)| (a - b).abs() < 1e-4;
-        assert!(
-            found.iter().zip(expected).all(near),
-            "{found:?}, {expected:?}"
-        );
+        assert!(found.iter().zip(expected).all(near), "{found:?}, {expected:?}");
     }
 }
 
@@ -523,8 +478,7 @@ fn streams_of_triangles_take_turns() {
                 EmitStreamVertex(2);
             }
         }";
-    let mut stream =
-        vk::PipelineRasterizationStateStreamCreateInfoEXT::default().rasterization_stream(2);
+    let mut stream = vk::PipelineRasterizationStateStreamCreateInfoEXT::default().rasterization_stream(2);
     let mut options = PipelineOptions {
         between: vec![(Stage::Geometry, geometry)],
         fragment: Some(
@@ -542,10 +496,7 @@ fn streams_of_triangles_take_turns() {
         device.capture(commands, None, || commands.draw(0..1));
     });
     assert_eq!(buffers[0].values::<u32>(), [0, 1, 2, 1, 3, 2, UNWRITTEN]);
-    assert_eq!(
-        buffers[1].values::<u32>(),
-        [10, 11, 12, 11, 13, 12, UNWRITTEN]
-    );
+    assert_eq!(buffers[1].values::<u32>(), [10, 11, 12, 11, 13, 12, UNWRITTEN]);
     let pixels: Vec<[f32; 4]> = target.read();
     assert_eq!(pixels[0], [10.0; 4], "the first triangle covers the target");
 }
@@ -555,34 +506,22 @@ fn streams_of_triangles_take_turns() {
 fn wrong_use_is_refused() {
     type Use = (&'static str, fn(&Device, &Commands, &Buffer));
     const CASES: [Use; 6] = [
-        (
-            "VUID-vkCmdEndTransformFeedbackEXT-None-02375",
-            |device, commands, _| device.feedback.end(commands, &[]),
-        ),
-        (
-            "VUID-vkCmdBeginTransformFeedbackEXT-None-02367",
-            |device, commands, _| {
-                device.capture(commands, None, || device.capture(commands, None, || ()));
-            },
-        ),
-        (
-            "VUID-vkCmdBindTransformFeedbackBuffersEXT-None-02365",
-            |device, commands, buffer| {
-                device.capture(commands, None, || device.bind(commands, &[buffer]));
-            },
-        ),
-        (
-            "VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357",
-            |device, commands, buffer| device.bind(commands, &[buffer; 5]),
-        ),
-        (
-            "VUID-vkCmdBindTransformFeedbackBuffersEXT-pOffsets-02359",
-            |device, commands, buffer| device.feedback.bind(commands, 0, &[(buffer, 2)]),
-        ),
-        (
-            "VUID-vkCmdDrawIndirectByteCountEXT-vertexStride-02289",
-            |device, commands, buffer| device.feedback.draw(commands, 1, (buffer, 0), 0, 0),
-        ),
+        ("VUID-vkCmdEndTransformFeedbackEXT-None-02375", |device, commands, _| device.feedback.end(commands, &[])),
+        ("VUID-vkCmdBeginTransformFeedbackEXT-None-02367", |device, commands, _| {
+            device.capture(commands, None, || device.capture(commands, None, || ()));
+        }),
+        ("VUID-vkCmdBindTransformFeedbackBuffersEXT-None-02365", |device, commands, buffer| {
+            device.capture(commands, None, || device.bind(commands, &[buffer]));
+        }),
+        ("VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357", |device, commands, buffer| {
+            device.bind(commands, &[buffer; 5])
+        }),
+        ("VUID-vkCmdBindTransformFeedbackBuffersEXT-pOffsets-02359", |device, commands, buffer| {
+            device.feedback.bind(commands, 0, &[(buffer, 2)])
+        }),
+        ("VUID-vkCmdDrawIndirectByteCountEXT-vertexStride-02289", |device, commands, buffer| {
+            device.feedback.draw(commands, 1, (buffer, 0), 0, 0)
+        }),
     ];
     let device = Device::open(Driver::Embedded);
     let buffer = device.buffer(4);

@@ -134,10 +134,7 @@ fn values_of_64_bits_pass_between_stages(case: &Case) {
     need("tessellationShader", gpu.features().tessellation_shader);
     let (vertex, fragment) = (vertex(), fragment());
     let (geometry, control, evaluation) = (geometry(), control(), evaluation());
-    let tessellation = [
-        (Stage::TessellationControl, &*control),
-        (Stage::TessellationEvaluation, &*evaluation),
-    ];
+    let tessellation = [(Stage::TessellationControl, &*control), (Stage::TessellationEvaluation, &*evaluation)];
     let geometry = [(Stage::Geometry, &*geometry)];
     for (between, patch_vertices) in [
         (vec![], 0),
@@ -160,11 +157,7 @@ fn values_of_64_bits_pass_between_stages(case: &Case) {
         let drawn = Program::new(pipeline, 1).draw(gpu, |commands| commands.draw(0..3));
         // The triangle covers what is left of and above its diagonal.
         for (x, y) in [(0, 0), (100, 5), (5, 100), (63, 63)] {
-            assert_eq!(
-                drawn.texel(x, y),
-                [1.0; 4],
-                "{stages} further stages, {x}, {y}"
-            );
+            assert_eq!(drawn.texel(x, y), [1.0; 4], "{stages} further stages, {x}, {y}");
         }
     }
 }

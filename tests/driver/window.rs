@@ -19,12 +19,7 @@ pub struct SwapchainOptions {
 
 impl Default for SwapchainOptions {
     fn default() -> Self {
-        Self {
-            size: SIZE,
-            mode: vk::PresentModeKHR::FIFO,
-            count: 2,
-            old: vk::SwapchainKHR::null(),
-        }
+        Self { size: SIZE, mode: vk::PresentModeKHR::FIFO, count: 2, old: vk::SwapchainKHR::null() }
     }
 }
 
@@ -52,21 +47,15 @@ impl Presenter {
     ) -> Self {
         let names = [ash::khr::surface::NAME.as_ptr(), extension.as_ptr()];
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        let info = vk::InstanceCreateInfo::default()
-            .application_info(&app)
-            .enabled_extension_names(&names);
+        let info = vk::InstanceCreateInfo::default().application_info(&app).enabled_extension_names(&names);
         // SAFETY: see above.
         unsafe {
             let instance = entry.create_instance(&info, None).expect("an instance");
             let physical = instance.enumerate_physical_devices().expect("devices")[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
             let names = [ash::khr::swapchain::NAME.as_ptr()];
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&names);
-            let device = instance
-                .create_device(physical, &info, None)
-                .expect("a device");
+            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names);
+            let device = instance.create_device(physical, &info, None).expect("a device");
             let surface = create(&entry, &instance);
             let surfaces = ash::khr::surface::Instance::new(&entry, &instance);
             let supported = surfaces.get_physical_device_surface_support(physical, 0, surface);
@@ -88,28 +77,19 @@ impl Presenter {
 
     pub fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR, vk::Result> {
         // SAFETY: see above.
-        unsafe {
-            self.surfaces
-                .get_physical_device_surface_capabilities(self.physical, self.surface)
-        }
+        unsafe { self.surfaces.get_physical_device_surface_capabilities(self.physical, self.surface) }
     }
 
     pub fn formats(&self) -> Vec<vk::Format> {
         // SAFETY: see above.
-        let formats = unsafe {
-            self.surfaces
-                .get_physical_device_surface_formats(self.physical, self.surface)
-        };
+        let formats = unsafe { self.surfaces.get_physical_device_surface_formats(self.physical, self.surface) };
         let formats = formats.expect("formats").into_iter();
         formats.map(|it| it.format).collect()
     }
 
     pub fn modes(&self) -> Vec<vk::PresentModeKHR> {
         // SAFETY: see above.
-        let modes = unsafe {
-            self.surfaces
-                .get_physical_device_surface_present_modes(self.physical, self.surface)
-        };
+        let modes = unsafe { self.surfaces.get_physical_device_surface_present_modes(self.physical, self.surface) };
         modes.expect("modes")
     }
 
@@ -131,33 +111,18 @@ impl Presenter {
         unsafe {
             let raw = self.swapchains.create_swapchain(&info, None)?;
             let images = self.swapchains.get_swapchain_images(raw).expect("images");
-            Ok(Swapchain {
-                presenter: self,
-                raw,
-                images,
-                size: options.size,
-                semaphores: Cell::default(),
-            })
+            Ok(Swapchain { presenter: self, raw, images, size: options.size, semaphores: Cell::default() })
         }
     }
 
     /// Records commands, submits them and waits for them.
-    fn run(
-        &self,
-        waits: &[vk::Semaphore],
-        signals: &[vk::Semaphore],
-        record: impl FnOnce(vk::CommandBuffer),
-    ) {
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(self.pool)
-            .command_buffer_count(1);
+    fn run(&self, waits: &[vk::Semaphore], signals: &[vk::Semaphore], record: impl FnOnce(vk::CommandBuffer)) {
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         let device = &self.device;
         // SAFETY: see above.
         unsafe {
             let commands = device.allocate_command_buffers(&info).expect("commands");
-            device
-                .begin_command_buffer(commands[0], &Default::default())
-                .expect("it begins");
+            device.begin_command_buffer(commands[0], &Default::default()).expect("it begins");
             record(commands[0]);
             device.end_command_buffer(commands[0]).expect("it ends");
             let stages = vec![vk::PipelineStageFlags::ALL_COMMANDS; waits.len()];
@@ -166,9 +131,7 @@ impl Presenter {
                 .wait_dst_stage_mask(&stages)
                 .command_buffers(&commands)
                 .signal_semaphores(signals)];
-            device
-                .queue_submit(self.queue, &submits, vk::Fence::null())
-                .expect("it is submitted");
+            device.queue_submit(self.queue, &submits, vk::Fence::null()).expect("it is submitted");
             device.queue_wait_idle(self.queue).expect("it is done");
             device.free_command_buffers(self.pool, &commands);
         }
@@ -177,39 +140,26 @@ impl Presenter {
     /// The pixels of an image of [`SIZE`].
     pub fn read(&self, image: vk::Image) -> Vec<[u8; 4]> {
         let size = u64::from(4 * SIZE[0] * SIZE[1]);
-        let info = vk::BufferCreateInfo::default()
-            .size(size)
-            .usage(vk::BufferUsageFlags::TRANSFER_DST);
+        let info = vk::BufferCreateInfo::default().size(size).usage(vk::BufferUsageFlags::TRANSFER_DST);
         let device = &self.device;
         // SAFETY: see above.
         unsafe {
             let buffer = device.create_buffer(&info, None).expect("a buffer");
-            let info = vk::MemoryAllocateInfo::default()
-                .allocation_size(size)
-                .memory_type_index(1);
+            let info = vk::MemoryAllocateInfo::default().allocation_size(size).memory_type_index(1);
             let memory = device.allocate_memory(&info, None).expect("memory");
-            device
-                .bind_buffer_memory(buffer, memory, 0)
-                .expect("it is bound");
-            let layers = vk::ImageSubresourceLayers::default()
-                .aspect_mask(vk::ImageAspectFlags::COLOR)
-                .layer_count(1);
-            let region = vk::BufferImageCopy::default()
-                .image_subresource(layers)
-                .image_extent(vk::Extent3D {
-                    width: SIZE[0],
-                    height: SIZE[1],
-                    depth: 1,
-                });
+            device.bind_buffer_memory(buffer, memory, 0).expect("it is bound");
+            let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+            let region = vk::BufferImageCopy::default().image_subresource(layers).image_extent(vk::Extent3D {
+                width: SIZE[0],
+                height: SIZE[1],
+                depth: 1,
+            });
             self.run(&[], &[], |commands| {
                 let layout = vk::ImageLayout::GENERAL;
                 device.cmd_copy_image_to_buffer(commands, image, layout, buffer, &[region]);
             });
-            let mapped = device
-                .map_memory(memory, 0, size, Default::default())
-                .expect("it is mapped");
-            let pixels =
-                std::slice::from_raw_parts(mapped.cast::<[u8; 4]>(), (SIZE[0] * SIZE[1]) as usize);
+            let mapped = device.map_memory(memory, 0, size, Default::default()).expect("it is mapped");
+            let pixels = std::slice::from_raw_parts(mapped.cast::<[u8; 4]>(), (SIZE[0] * SIZE[1]) as usize);
             let pixels = pixels.to_vec();
             device.destroy_buffer(buffer, None);
             device.free_memory(memory, None);
@@ -251,18 +201,11 @@ impl Swapchain<'_> {
         let device = &self.presenter.device;
         // SAFETY: see above.
         unsafe {
-            let fence = device
-                .create_fence(&Default::default(), None)
-                .expect("a fence");
+            let fence = device.create_fence(&Default::default(), None).expect("a fence");
             let semaphore = vk::Semaphore::null();
-            let acquired = self
-                .presenter
-                .swapchains
-                .acquire_next_image(self.raw, timeout, semaphore, fence);
+            let acquired = self.presenter.swapchains.acquire_next_image(self.raw, timeout, semaphore, fence);
             if acquired.is_ok() {
-                device
-                    .wait_for_fences(&[fence], true, u64::MAX)
-                    .expect("it is signaled");
+                device.wait_for_fences(&[fence], true, u64::MAX).expect("it is signaled");
             }
             device.destroy_fence(fence, None);
             acquired
@@ -282,9 +225,7 @@ impl Swapchain<'_> {
             .swapchains(&raws)
             .image_indices(&indices)
             .results(&mut results);
-        let Presenter {
-            swapchains, queue, ..
-        } = self.presenter;
+        let Presenter { swapchains, queue, .. } = self.presenter;
         // SAFETY: see above.
         let presented = unsafe { swapchains.queue_present(*queue, &info) };
         let whole = match presented {
@@ -301,22 +242,17 @@ impl Swapchain<'_> {
         let device = &self.presenter.device;
         // SAFETY: see above.
         unsafe {
-            let semaphore = || {
-                device
-                    .create_semaphore(&Default::default(), None)
-                    .expect("a semaphore")
-            };
+            let semaphore = || device.create_semaphore(&Default::default(), None).expect("a semaphore");
             let (acquired, drawn) = (semaphore(), semaphore());
             let mut semaphores = self.semaphores.take();
             semaphores.extend([acquired, drawn]);
             self.semaphores.set(semaphores);
             let fence = vk::Fence::null();
             let swapchains = &self.presenter.swapchains;
-            let (index, _) =
-                match swapchains.acquire_next_image(self.raw, u64::MAX, acquired, fence) {
-                    Ok(acquired) => acquired,
-                    Err(error) => return (u32::MAX, Err(error)),
-                };
+            let (index, _) = match swapchains.acquire_next_image(self.raw, u64::MAX, acquired, fence) {
+                Ok(acquired) => acquired,
+                Err(error) => return (u32::MAX, Err(error)),
+            };
             let range = vk::ImageSubresourceRange::default()
                 .aspect_mask(vk::ImageAspectFlags::COLOR)
                 .level_count(1)
@@ -338,11 +274,7 @@ impl Swapchain<'_> {
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(vk::Format::B8G8R8A8_UNORM)
-            .extent(vk::Extent3D {
-                width,
-                height,
-                depth: 1,
-            })
+            .extent(vk::Extent3D { width, height, depth: 1 })
             .mip_levels(1)
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
@@ -352,12 +284,9 @@ impl Swapchain<'_> {
         // SAFETY: see above.
         unsafe {
             let image = device.create_image(&info, None).expect("an image");
-            let mut of_swapchain = vk::BindImageMemorySwapchainInfoKHR::default()
-                .swapchain(self.raw)
-                .image_index(index);
-            let bind = vk::BindImageMemoryInfo::default()
-                .image(image)
-                .push_next(&mut of_swapchain);
+            let mut of_swapchain =
+                vk::BindImageMemorySwapchainInfoKHR::default().swapchain(self.raw).image_index(index);
+            let bind = vk::BindImageMemoryInfo::default().image(image).push_next(&mut of_swapchain);
             device.bind_image_memory2(&[bind]).expect("it is bound");
             image
         }

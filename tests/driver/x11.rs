@@ -9,9 +9,7 @@ use ash::vk;
 use gaurast_runner::{Need, is_long};
 use gaurast_tests::long_run::memory;
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{
-    ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass,
-};
+use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass};
 use x11rb::rust_connection::RustConnection;
 use x11rb::xcb_ffi::XCBConnection;
 
@@ -42,10 +40,7 @@ impl Server {
             number.push(byte[0] as char);
         }
         assert!(!number.is_empty(), "Xvfb did not start");
-        Self {
-            process,
-            display: format!(":{number}"),
-        }
+        Self { process, display: format!(":{number}") }
     }
 
     fn stop(&mut self) {
@@ -90,44 +85,28 @@ impl Window {
             .expect("a window")
             .check()
             .expect("a window");
-        connection
-            .map_window(id)
-            .expect("it is shown")
-            .check()
-            .expect("it is shown");
+        connection.map_window(id).expect("it is shown").check().expect("it is shown");
         Self { id, connection }
     }
 
     fn presenter(&self) -> Presenter {
-        Presenter::new(
-            vulkan_gaurast_window::entry(),
-            ash::khr::xcb_surface::NAME,
-            |entry, instance| {
-                let functions = ash::khr::xcb_surface::Instance::new(entry, instance);
-                let info = vk::XcbSurfaceCreateInfoKHR::default()
-                    .connection(self.connection.get_raw_xcb_connection())
-                    .window(self.id);
-                // SAFETY: the connection and the window outlive the surface.
-                unsafe { functions.create_xcb_surface(&info, None) }.expect("a surface")
-            },
-        )
+        Presenter::new(vulkan_gaurast_window::entry(), ash::khr::xcb_surface::NAME, |entry, instance| {
+            let functions = ash::khr::xcb_surface::Instance::new(entry, instance);
+            let info = vk::XcbSurfaceCreateInfoKHR::default()
+                .connection(self.connection.get_raw_xcb_connection())
+                .window(self.id);
+            // SAFETY: the connection and the window outlive the surface.
+            unsafe { functions.create_xcb_surface(&info, None) }.expect("a surface")
+        })
     }
 
     fn resize(&self, [width, height]: [u32; 2]) {
         let size = ConfigureWindowAux::new().width(width).height(height);
-        self.connection
-            .configure_window(self.id, &size)
-            .expect("it is resized")
-            .check()
-            .expect("it is resized");
+        self.connection.configure_window(self.id, &size).expect("it is resized").check().expect("it is resized");
     }
 
     fn destroy(&self) {
-        self.connection
-            .destroy_window(self.id)
-            .expect("it is destroyed")
-            .check()
-            .expect("it is destroyed");
+        self.connection.destroy_window(self.id).expect("it is destroyed").check().expect("it is destroyed");
     }
 }
 
@@ -165,29 +144,16 @@ fn what_is_presented_is_shown(options: &[&str]) {
     let [width, height] = SIZE;
     assert_eq!(can.current_extent, vk::Extent2D { width, height });
     for mode in presenter.modes() {
-        let options = SwapchainOptions {
-            mode,
-            count: 3,
-            ..SwapchainOptions::default()
-        };
+        let options = SwapchainOptions { mode, count: 3, ..SwapchainOptions::default() };
         let swapchain = presenter.swapchain(&options).expect("a swapchain");
-        for (color, bytes) in [
-            ([1.0, 0.2, 0.4, 1.0], [102, 51, 255]),
-            ([0.2, 1.0, 0.0, 1.0], [0, 255, 51]),
-        ] {
+        for (color, bytes) in [([1.0, 0.2, 0.4, 1.0], [102, 51, 255]), ([0.2, 1.0, 0.0, 1.0], [0, 255, 51])] {
             for _ in 0..5 {
                 assert_eq!(swapchain.frame(color).1, Ok(false), "{mode:?}");
             }
             assert_shown(&server, window.id, bytes);
         }
     }
-    assert!(
-        window
-            .connection
-            .poll_for_event()
-            .expect("no error")
-            .is_none()
-    );
+    assert!(window.connection.poll_for_event().expect("no error").is_none());
 }
 
 #[gaurast_runner::test(needs = [XVFB])]
@@ -206,9 +172,7 @@ fn frames_in_order_are_paced_by_the_display() {
     let server = Server::start(&[]);
     let window = Window::open(&server);
     let presenter = window.presenter();
-    let swapchain = presenter
-        .swapchain(&SwapchainOptions::default())
-        .expect("a swapchain");
+    let swapchain = presenter.swapchain(&SwapchainOptions::default()).expect("a swapchain");
     let begin = Instant::now();
     for _ in 0..33 {
         assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
@@ -228,20 +192,10 @@ fn a_window_changes_its_size() {
     assert_eq!(old.frame([0.0, 0.0, 1.0, 1.0]).1, Ok(false));
     window.resize([64, 40]);
     let can = presenter.capabilities().expect("capabilities");
-    assert_eq!(
-        (can.current_extent.width, can.current_extent.height),
-        (64, 40)
-    );
-    assert_eq!(
-        old.acquire(u64::MAX).map(|(_, suboptimal)| suboptimal),
-        Ok(true)
-    );
+    assert_eq!((can.current_extent.width, can.current_extent.height), (64, 40));
+    assert_eq!(old.acquire(u64::MAX).map(|(_, suboptimal)| suboptimal), Ok(true));
     assert_eq!(old.frame([0.0, 1.0, 0.0, 1.0]).1, Ok(true));
-    let options = SwapchainOptions {
-        size: [64, 40],
-        old: old.raw,
-        ..options
-    };
+    let options = SwapchainOptions { size: [64, 40], old: old.raw, ..options };
     let new = presenter.swapchain(&options).expect("a swapchain");
     drop(old);
     assert_eq!(new.frame([1.0, 0.0, 0.0, 1.0]).1, Ok(false));
@@ -258,10 +212,7 @@ fn resizing_does_not_grow() {
     let server = Server::start(&[]);
     let window = Window::open(&server);
     let presenter = window.presenter();
-    let options = SwapchainOptions {
-        mode: vk::PresentModeKHR::MAILBOX,
-        ..SwapchainOptions::default()
-    };
+    let options = SwapchainOptions { mode: vk::PresentModeKHR::MAILBOX, ..SwapchainOptions::default() };
     let mut swapchain = presenter.swapchain(&options).expect("a swapchain");
     let (begin, mut resized, mut early) = (Instant::now(), 0, None);
     let goes_on = |resized: u32| match is_long() {
@@ -273,11 +224,7 @@ fn resizing_does_not_grow() {
         window.resize(size);
         // The old swapchain no longer suits the window.
         assert_eq!(swapchain.frame([1.0; 4]).1, Ok(true), "{resized}");
-        let options = SwapchainOptions {
-            size,
-            old: swapchain.raw,
-            ..options
-        };
+        let options = SwapchainOptions { size, old: swapchain.raw, ..options };
         let new = presenter.swapchain(&options).expect("a swapchain");
         drop(std::mem::replace(&mut swapchain, new));
         assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false), "{resized}");
@@ -290,10 +237,7 @@ fn resizing_does_not_grow() {
         return;
     };
     println!("{resized} sizes: {early} bytes of memory, then {late}");
-    assert!(
-        late <= early + SLACK,
-        "memory grew from {early} to {late} bytes"
-    );
+    assert!(late <= early + SLACK, "memory grew from {early} to {late} bytes");
 }
 
 /// Presents until the surface is lost, which it must be soon.
@@ -325,16 +269,10 @@ fn a_server_that_dies_is_a_lost_surface() {
     let mut server = Server::start(&[]);
     let window = Window::open(&server);
     let presenter = window.presenter();
-    let options = SwapchainOptions {
-        mode: vk::PresentModeKHR::MAILBOX,
-        ..SwapchainOptions::default()
-    };
+    let options = SwapchainOptions { mode: vk::PresentModeKHR::MAILBOX, ..SwapchainOptions::default() };
     let swapchain = presenter.swapchain(&options).expect("a swapchain");
     assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
     server.stop();
     assert_lost(&swapchain);
-    assert_eq!(
-        presenter.capabilities().map(|_| ()),
-        Err(vk::Result::ERROR_SURFACE_LOST_KHR)
-    );
+    assert_eq!(presenter.capabilities().map(|_| ()), Err(vk::Result::ERROR_SURFACE_LOST_KHR));
 }

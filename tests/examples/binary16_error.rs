@@ -5,9 +5,7 @@
 
 use gaurast::vk::{GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_scene::camera::DEFAULT_FOV;
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use std::error::Error;
@@ -26,9 +24,8 @@ struct Figures {
 }
 
 fn figures(picture: &[[f32; 4]], exact: &[[f64; 4]]) -> Figures {
-    let difference = |(a, b): (&[f32; 4], &[f64; 4])| {
-        [0, 1, 2, 3].map(|channel| (f64::from(a[channel]) - b[channel]).abs())
-    };
+    let difference =
+        |(a, b): (&[f32; 4], &[f64; 4])| [0, 1, 2, 3].map(|channel| (f64::from(a[channel]) - b[channel]).abs());
     let differences: Vec<[f64; 4]> = picture.iter().zip(exact).map(difference).collect();
     let all = differences.as_flattened();
     let (count, pixels) = (all.len() as f64, differences.len() as f64);
@@ -43,10 +40,7 @@ fn figures(picture: &[[f32; 4]], exact: &[[f64; 4]]) -> Figures {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut subjects = Vec::new();
-    for (name, count, enlarged) in [
-        ("a cloud of 20,000", 20_000, 1.0),
-        ("4,000 large ones", 4_000, 6.0),
-    ] {
+    for (name, count, enlarged) in [("a cloud of 20,000", 20_000, 1.0), ("4,000 large ones", 4_000, 6.0)] {
         let mut scene = scenes::cloud(70, count, 1);
         for scale in scene.scales.as_flattened_mut() {
             *scale *= enlarged;
@@ -56,19 +50,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let garden = gaurast_scene::garden::scene(1, 100_000);
     let camera = gaurast_scene::garden::camera(None, SIZE)?.to_vulkan();
-    subjects.push((
-        "a garden of 100,000".to_owned(),
-        SceneBuffers::from(&garden),
-        camera,
-    ));
+    subjects.push(("a garden of 100,000".to_owned(), SceneBuffers::from(&garden), camera));
     for file in std::env::args().skip(1) {
         let path = Path::new(&file);
         let scene = gaurast_scene::open(path)?;
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
         subjects.push((name, SceneBuffers::from(&scene), camera));
     }
@@ -79,19 +65,16 @@ fn main() -> Result<(), Box<dyn Error>> {
          `cargo run --release -p gaurast-tests --example binary16_error` prints this page.\n",
         SIZE[0], SIZE[1]
     );
-    println!(
-        "| scene | precision | greatest error | mean error | PSNR, dB | pixels off by 1/255 or more |"
-    );
+    println!("| scene | precision | greatest error | mean error | PSNR, dB | pixels off by 1/255 or more |");
     println!("|---|---|---:|---:|---:|---:|");
     let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     for (name, scene, camera) in &subjects {
         let on_device = GaussianScene::new(&gpu, scene);
         let view = OracleCamera::new(camera, SIZE).ok_or("a camera that the oracle lacks")?;
         let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
-        for (precision_name, precision) in [
-            ("binary16", GaussianPrecisionGAURAST::FLOAT16),
-            ("binary32", GaussianPrecisionGAURAST::FLOAT32),
-        ] {
+        for (precision_name, precision) in
+            [("binary16", GaussianPrecisionGAURAST::FLOAT16), ("binary32", GaussianPrecisionGAURAST::FLOAT32)]
+        {
             let options = GaussianOptions {
                 state: PipelineGaussianStateCreateInfoGAURAST::default().precision(precision),
                 ..GaussianOptions::new(scene.degree)
@@ -104,15 +87,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                     commands.draw(0..on_device.count);
                 });
             });
-            let Figures {
-                greatest,
-                mean,
-                psnr,
-                visible,
-            } = figures(&target.read(), &reference.nominal);
-            println!(
-                "| {name} | {precision_name} | {greatest:.2e} | {mean:.2e} | {psnr:.1} | {visible:.3} % |"
-            );
+            let Figures { greatest, mean, psnr, visible } = figures(&target.read(), &reference.nominal);
+            println!("| {name} | {precision_name} | {greatest:.2e} | {mean:.2e} | {psnr:.1} | {visible:.3} % |");
         }
     }
     Ok(())

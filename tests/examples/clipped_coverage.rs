@@ -24,9 +24,7 @@ struct Counts {
 
 impl Counts {
     fn add(&mut self, devices: [&Gpu; 2], triangles: &[[Position; 3]], size: u32) {
-        let clip: Vec<_> = (triangles.iter())
-            .map(|corners| corners.map(to_clip))
-            .collect();
+        let clip: Vec<_> = (triangles.iter()).map(|corners| corners.map(to_clip)).collect();
         let count = triangles.len() as u32;
         let [own, their] = devices.map(|gpu| {
             let sums = Checksums::new(gpu, &clip, [size; 2], 1).draw(0..count);
@@ -67,10 +65,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => 1,
     };
     let (own, lavapipe) = (Gpu::embedded(&Settings::default())?, Gpu::lavapipe()?);
-    println!(
-        "{:<16}{:>10}{:>10}{:>12}{:>12}{:>8}",
-        "cut by", "samples", "differ", "own wrong", "lp wrong", "far"
-    );
+    println!("{:<16}{:>10}{:>10}{:>12}{:>12}{:>8}", "cut by", "samples", "differ", "own wrong", "lp wrong", "far");
     for (name, seed, plane) in KINDS {
         let mut counts = Counts::default();
         for time in 0..times {

@@ -10,9 +10,7 @@ use std::path::{Path, PathBuf};
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_testkit::for_levels::levels;
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
@@ -52,11 +50,7 @@ fn cloud(rng: &mut ChaCha8Rng, count: usize) -> Vec<Gaussian> {
     let mut one = || {
         let z = rng.random_range(2.0..9.0f32);
         Gaussian {
-            position: [
-                z * rng.random_range(-0.6..0.6),
-                z * rng.random_range(-0.5..0.5),
-                z,
-            ],
+            position: [z * rng.random_range(-0.6..0.6), z * rng.random_range(-0.5..0.5), z],
             scale: [0; 3].map(|_| rng.random_range(0.01..0.3)),
             rotation: [0; 4].map(|_| rng.random_range(-1.0..1.0)),
             opacity: rng.random_range(0.05..1.0),
@@ -67,11 +61,7 @@ fn cloud(rng: &mut ChaCha8Rng, count: usize) -> Vec<Gaussian> {
 }
 
 fn plain(gaussians: Vec<Gaussian>) -> View {
-    View {
-        gaussians,
-        camera: camera(105.0),
-        state: State::default(),
-    }
+    View { gaussians, camera: camera(105.0), state: State::default() }
 }
 
 fn layers(rng: &mut ChaCha8Rng, count: f64) -> View {
@@ -86,10 +76,7 @@ fn layers(rng: &mut ChaCha8Rng, count: f64) -> View {
     };
     let gaussians = (0..count).map(one).collect();
     let view = plain(gaussians);
-    View {
-        state: view.state.transmittance_floor(0.0),
-        ..view
-    }
+    View { state: view.state.transmittance_floor(0.0), ..view }
 }
 
 fn far_away(rng: &mut ChaCha8Rng, distance: f64) -> View {
@@ -120,10 +107,7 @@ fn filterless(rng: &mut ChaCha8Rng, thinness: f64) -> View {
         gaussian.scale = [rng.random_range(0.3..3.0), across, across];
     }
     let view = plain(gaussians);
-    View {
-        state: view.state.low_pass_variance(0.0),
-        ..view
-    }
+    View { state: view.state.low_pass_variance(0.0), ..view }
 }
 
 fn field_of_view(rng: &mut ChaCha8Rng, degrees: f64) -> View {
@@ -142,40 +126,19 @@ fn opacities(rng: &mut ChaCha8Rng, opacity: f64) -> View {
 }
 
 fn sweeps() -> Vec<Sweep> {
-    let powers = |base: f64, exponents: std::ops::RangeInclusive<i32>| {
-        exponents.map(|exponent| base.powi(exponent)).collect()
-    };
+    let powers =
+        |base: f64, exponents: std::ops::RangeInclusive<i32>| exponents.map(|exponent| base.powi(exponent)).collect();
     vec![
-        Sweep {
-            name: "layers",
-            values: powers(4.0, 0..=7),
-            view: layers,
-        },
-        Sweep {
-            name: "distance from the origin",
-            values: powers(10.0, 0..=7),
-            view: far_away,
-        },
-        Sweep {
-            name: "ratio of axes",
-            values: powers(10.0, 0..=7),
-            view: needles,
-        },
-        Sweep {
-            name: "1 / deviation in pixels, no filter",
-            values: powers(10.0, 0..=6),
-            view: filterless,
-        },
+        Sweep { name: "layers", values: powers(4.0, 0..=7), view: layers },
+        Sweep { name: "distance from the origin", values: powers(10.0, 0..=7), view: far_away },
+        Sweep { name: "ratio of axes", values: powers(10.0, 0..=7), view: needles },
+        Sweep { name: "1 / deviation in pixels, no filter", values: powers(10.0, 0..=6), view: filterless },
         Sweep {
             name: "field of view in degrees",
             values: vec![1.0, 5.0, 20.0, 45.0, 90.0, 130.0, 160.0, 170.0],
             view: field_of_view,
         },
-        Sweep {
-            name: "opacity",
-            values: powers(1e3, 0..=10),
-            view: opacities,
-        },
+        Sweep { name: "opacity", values: powers(1e3, 0..=10), view: opacities },
     ]
 }
 
@@ -186,10 +149,7 @@ fn errors(gpus: &[Gpu], view: &View) -> Vec<f64> {
     let state = OracleState::from(&view.state);
     let reference = render_bounded(&scene.as_oracle(), &camera, &state);
     let of = |gpu: &Gpu| {
-        let options = GaussianOptions {
-            state: view.state,
-            ..GaussianOptions::new(0)
-        };
+        let options = GaussianOptions { state: view.state, ..GaussianOptions::new(0) };
         let pipeline = GaussianPipeline::new(gpu, &options);
         let on_device = GaussianScene::new(gpu, &scene);
         let target = Target::floats(gpu, SIZE);
@@ -199,12 +159,7 @@ fn errors(gpus: &[Gpu], view: &View) -> Vec<f64> {
                 commands.draw(0..on_device.count);
             });
         });
-        verdict(
-            &target.read::<[f32; 4]>(),
-            &reference,
-            Limits::ENVELOPE_ONLY,
-        )
-        .max_distance
+        verdict(&target.read::<[f32; 4]>(), &reference, Limits::ENVELOPE_ONLY).max_distance
     };
     gpus.iter().map(of).collect()
 }
@@ -235,9 +190,7 @@ fn plot(path: &Path, results: &[(Sweep, Points)], levels: &[&str]) -> Result<(),
             .draw()?;
         chart.draw_series(LineSeries::new([(first, 5e-6), (last, 5e-6)], &RED))?;
         for (level, color) in [BLUE, GREEN].iter().enumerate().take(levels.len()) {
-            let line = points
-                .iter()
-                .map(|(value, errors)| (*value, errors[level].max(1e-9)));
+            let line = points.iter().map(|(value, errors)| (*value, errors[level].max(1e-9)));
             chart.draw_series(LineSeries::new(line, color))?;
         }
     }
@@ -246,18 +199,11 @@ fn plot(path: &Path, results: &[(Sweep, Points)], levels: &[&str]) -> Result<(),
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args()
-        .nth(1)
-        .map_or_else(PathBuf::new, PathBuf::from);
+    let folder = std::env::args().nth(1).map_or_else(PathBuf::new, PathBuf::from);
     let all = levels();
     let levels = [all[0], all[all.len() - 1]];
     let gpus = levels.map(|simd| {
-        Gpu::embedded(&Settings {
-            simd: Some(simd),
-            threads: None,
-            ..Settings::default()
-        })
-        .expect("a device")
+        Gpu::embedded(&Settings { simd: Some(simd), threads: None, ..Settings::default() }).expect("a device")
     });
     let mut csv = format!("sweep,value,{}\n", levels.join(","));
     let mut results = Vec::new();
@@ -269,10 +215,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for seed in 0..SEEDS {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
                 let found = errors(&gpus, &(sweep.view)(&mut rng, value));
-                worst
-                    .iter_mut()
-                    .zip(found)
-                    .for_each(|(worst, found)| *worst = worst.max(found));
+                worst.iter_mut().zip(found).for_each(|(worst, found)| *worst = worst.max(found));
             }
             let cells: Vec<_> = worst.iter().map(|error| format!("{error:.2e}")).collect();
             println!("  {value:9.3e}  {}", cells.join("  "));

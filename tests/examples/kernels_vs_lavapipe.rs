@@ -27,14 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("The Vulkan loader does not know lavapipe: there is nothing to compare with.");
         return Ok(());
     };
-    println!(
-        "{} beside {}, median of {RUNS} runs",
-        own.name, lavapipe.name
-    );
-    println!(
-        "{:<16}{:>12}{:>12}{:>10}",
-        "kernel", "own ms", "lavapipe ms", "own / lp"
-    );
+    println!("{} beside {}, median of {RUNS} runs", own.name, lavapipe.name);
+    println!("{:<16}{:>12}{:>12}{:>10}", "kernel", "own ms", "lavapipe ms", "own / lp");
     let mut logarithms = Vec::new();
     for kernel in all(Size::Large) {
         let (ours, theirs) = (own.prepare(&kernel)?, lavapipe.prepare(&kernel)?);
@@ -47,11 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             their_times.push(time(&theirs)?);
         }
         let (ours, theirs) = (median(our_times), median(their_times));
-        println!(
-            "{:<16}{ours:>12.3}{theirs:>12.3}{:>10.2}",
-            kernel.name,
-            ours / theirs
-        );
+        println!("{:<16}{ours:>12.3}{theirs:>12.3}{:>10.2}", kernel.name, ours / theirs);
         logarithms.push((ours / theirs).ln());
     }
     let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();

@@ -2,9 +2,7 @@
 //! and writes PNG files to the working directory: a program for `gaurast compare-drivers`.
 
 use ash::vk;
-use gaurast_testkit::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding,
-};
+use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding};
 use gaurast_tests::triangles::clipped::{FRAME, FRAMES, floor};
 use gaurast_tests::triangles::edges::to_clip;
 use gaurast_tests::triangles::models::{Model, Ready};
@@ -31,10 +29,7 @@ const FRAGMENT: &str = "
     }";
 
 fn target(gpu: &Gpu, size: [u32; 2]) -> Target {
-    let options = TargetOptions {
-        size,
-        ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
-    };
+    let options = TargetOptions { size, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) };
     Target::new(gpu, &options)
 }
 
@@ -67,14 +62,7 @@ fn draw_floor(gpu: &Gpu, frame: u32) -> Outcome<()> {
         ..PipelineOptions::default()
     };
     let pipeline = Pipeline::new(gpu, &target, &options);
-    let places = [
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 1.0],
-        [0.0, 0.0],
-        [1.0, 1.0],
-        [0.0, 1.0],
-    ];
+    let places = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let vertices: Vec<[f32; 6]> = (floor(frame).as_flattened().iter().zip(places))
         .map(|(&corner, [u, v])| {
             let [x, y, z, w] = to_clip(corner);

@@ -25,10 +25,7 @@ fn main() -> std::io::Result<()> {
         .iter()
         .map(|scene| {
             let name = Path::new(scene).file_stem().unwrap_or_default();
-            (
-                name.to_string_lossy().into_owned(),
-                tiles::View::open(Path::new(scene), [640, 360]),
-            )
+            (name.to_string_lossy().into_owned(), tiles::View::open(Path::new(scene), [640, 360]))
         })
         .collect();
     let mut masked = Vec::new();
@@ -41,16 +38,11 @@ fn main() -> std::io::Result<()> {
             )];
             let groups = setting.masked.then_some(setting.groups);
             for (scene, view) in &views {
-                sources.push((
-                    scene.clone(),
-                    view.lists(format, groups, count, setting.seed),
-                ));
+                sources.push((scene.clone(), view.lists(format, groups, count, setting.seed)));
             }
             for (source, lists) in sources {
                 let cycles = Cycles::of(&bench, setting, format, &lists)?;
-                let pairs = cycles
-                    .by_cause()
-                    .map(|[ours, model]| format!("{ours:.0} / {model:.0}"));
+                let pairs = cycles.by_cause().map(|[ours, model]| format!("{ours:.0} / {model:.0}"));
                 println!(
                     "| {source} | {name} | {} | {} | {} | {} |",
                     setting.name,

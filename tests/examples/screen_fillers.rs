@@ -3,9 +3,7 @@
 //! process.
 
 use gaurast::vk::GaussianCameraGAURAST;
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use std::error::Error;
 use std::time::Instant;
@@ -27,9 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pipeline = GaussianPipeline::new(&gpu, &options);
     let on_device = GaussianScene::new(&gpu, &scene);
     let target = Target::floats(&gpu, [side; 2]);
-    let camera = GaussianCameraGAURAST::default()
-        .focal_length([side as f32; 2])
-        .principal_point([0.5 * side as f32; 2]);
+    let camera =
+        GaussianCameraGAURAST::default().focal_length([side as f32; 2]).principal_point([0.5 * side as f32; 2]);
     let started = Instant::now();
     gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
@@ -37,10 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             commands.draw(0..on_device.count);
         });
     });
-    println!(
-        "{count} Gaussians at {side}x{side}: {:.1} s",
-        started.elapsed().as_secs_f64()
-    );
+    println!("{count} Gaussians at {side}x{side}: {:.1} s", started.elapsed().as_secs_f64());
     // Only Linux has this file.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find(|line| line.starts_with("VmHWM"));

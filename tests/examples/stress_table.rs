@@ -10,9 +10,7 @@ use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
 use gaurast_scene::{GaussianShape, Scene};
 use gaurast_testkit::for_levels::levels;
 use gaurast_testkit::{Gpu, Settings};
-use gaurast_tests::oracle::{
-    OracleCamera, OracleState, Reference, render_binary16, render_bounded,
-};
+use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_binary16, render_bounded};
 
 #[allow(dead_code, unused_imports, reason = "the tests use all of it")]
 #[path = "../stress/scenes.rs"]
@@ -105,21 +103,14 @@ impl Distances {
             let outside = |c: usize| {
                 let value = f64::from(rgba[c]);
                 let outside = (least[c] - value).max(value - greatest[c]).max(0.0);
-                if value.is_finite() {
-                    outside
-                } else {
-                    f64::INFINITY
-                }
+                if value.is_finite() { outside } else { f64::INFINITY }
             };
             (0..4).map(outside).fold(0.0, f64::max)
         };
         let mut all: Vec<f64> = image.iter().enumerate().map(distance).collect();
         all.sort_by(f64::total_cmp);
         let at = |share: f64| all[((all.len() - 1) as f64 * share).round() as usize];
-        Self {
-            greatest: at(1.0),
-            most: at(0.999),
-        }
+        Self { greatest: at(1.0), most: at(0.999) }
     }
 
     fn cell(&self) -> String {
@@ -131,25 +122,15 @@ impl Distances {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args().nth(1).map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("stress/TABLE.md"),
-        PathBuf::from,
-    );
+    let path = std::env::args()
+        .nth(1)
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("stress/TABLE.md"), PathBuf::from);
     let levels = levels();
-    let gpu = |simd: &&'static str| {
-        Gpu::embedded(&Settings {
-            simd: Some(simd),
-            ..Settings::default()
-        })
-        .expect("a device")
-    };
+    let gpu =
+        |simd: &&'static str| Gpu::embedded(&Settings { simd: Some(simd), ..Settings::default() }).expect("a device");
     let gpus: Vec<_> = levels.iter().map(gpu).collect();
     let mut peer = QuadRenderer::through_the_loader(PEER, 0)?;
-    let missing = if levels.contains(&"avx512") {
-        ""
-    } else {
-        " (it has no AVX-512)"
-    };
+    let missing = if levels.contains(&"avx512") { "" } else { " (it has no AVX-512)" };
     let mut text = HEAD
         .replace("{missing}", missing)
         .replace("{levels}", &levels.join(" | "))
@@ -158,38 +139,26 @@ fn main() -> Result<(), Box<dyn Error>> {
         let camera = OracleCamera::new(&stress.camera, stress.size).ok_or("the oracle's camera")?;
         let state = OracleState::from(&stress.state);
         let reference = render_bounded(&stress.scene.as_oracle(), &camera, &state);
-        let device: Vec<_> = gpus
-            .iter()
-            .map(|gpu| Distances::new(&draw(gpu, &stress), &reference))
-            .collect();
-        let half = draw(
-            gpus.last().ok_or("no SIMD level")?,
-            &stress.clone().in_binary16(),
-        );
+        let device: Vec<_> = gpus.iter().map(|gpu| Distances::new(&draw(gpu, &stress), &reference)).collect();
+        let half = draw(gpus.last().ok_or("no SIMD level")?, &stress.clone().in_binary16());
         let defined = render_binary16(&stress.scene.as_oracle(), &camera, &state);
         let beyond = Distances::new(&half, &defined);
         let half = Distances::new(&half, &reference).cell();
         let quads = match for_quads(&stress) {
             None => "-".to_owned(),
-            Some((scene, camera)) => {
-                match peer.render(&scene, &camera, 3, stress.state.alpha_floor) {
-                    Ok(frame) => Distances::new(&frame.picture.pixels, &reference).cell(),
-                    Err(error) => {
-                        eprintln!("{}: {error}", stress.name);
-                        "fails".to_owned()
-                    }
+            Some((scene, camera)) => match peer.render(&scene, &camera, 3, stress.state.alpha_floor) {
+                Ok(frame) => Distances::new(&frame.picture.pixels, &reference).cell(),
+                Err(error) => {
+                    eprintln!("{}: {error}", stress.name);
+                    "fails".to_owned()
                 }
-            }
+            },
         };
         let Stress { name, limit, .. } = &stress;
         let verdict = |holds| if holds { "holds" } else { "**fails**" };
         let single = verdict(device.iter().all(|distances| distances.greatest <= *limit));
         let half_verdict = verdict(beyond.greatest == 0.0);
-        let device = device
-            .iter()
-            .map(Distances::cell)
-            .collect::<Vec<_>>()
-            .join(" | ");
+        let device = device.iter().map(Distances::cell).collect::<Vec<_>>().join(" | ");
         writeln!(
             text,
             "| {name} | {limit:.0e} | {device} | {single} | {half} | {:.0e} | {half_verdict} | {quads} |",

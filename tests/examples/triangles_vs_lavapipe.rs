@@ -56,10 +56,7 @@ fn peak_memory() -> Option<f64> {
 
 /// The peak memory of a process that runs a workload twice on one device.
 fn memory_of(device: &str, name: &str) -> Option<f64> {
-    let output = Command::new(std::env::current_exe().ok()?)
-        .args([MEMORY, device, name])
-        .output()
-        .ok()?;
+    let output = Command::new(std::env::current_exe().ok()?).args([MEMORY, device, name]).output().ok()?;
     String::from_utf8_lossy(&output.stdout).trim().parse().ok()
 }
 
@@ -97,11 +94,7 @@ fn compare(own: &Gpu, lavapipe: &Gpu, name: &str, with_memory: bool) -> Result<f
         None => "-".to_owned(),
     };
     let ratio = ours / theirs;
-    println!(
-        "{name:<22}{ours:>10.2}{theirs:>13.2}{ratio:>10.2}{:>10}{:>13}",
-        memory("own"),
-        memory("lavapipe")
-    );
+    println!("{name:<22}{ours:>10.2}{theirs:>13.2}{ratio:>10.2}{:>10}{:>13}", memory("own"), memory("lavapipe"));
     Ok(ratio)
 }
 
@@ -135,11 +128,7 @@ fn main() -> Result<(), Failure> {
             return Ok(());
         }
     };
-    println!(
-        "{} beside {}, median of {RUNS} runs, 1920x1080",
-        own.name(),
-        lavapipe.name()
-    );
+    println!("{} beside {}, median of {RUNS} runs, 1920x1080", own.name(), lavapipe.name());
     println!(
         "{:<22}{:>10}{:>13}{:>10}{:>10}{:>13}",
         "workload", "own ms", "lavapipe ms", "own / lp", "own MiB", "lavapipe MiB"

@@ -8,9 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 use ash::vk;
 use gaurast_runner::{Case, Variant};
 use gaurast_testkit::Settings;
-use gaurast_testkit::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
-};
+use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test};
 
 use super::scenarios;
 
@@ -81,20 +79,12 @@ fn draw_triangles(gpu: &Gpu, count: usize) {
             resolve: true,
         },
     );
-    let options = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let vertex = |index: usize| {
         let at = |factor: usize, period: usize| (index * factor % period) as f32 / period as f32;
         Vertex {
-            position: [
-                3.0 * at(7, 101) - 1.5,
-                3.0 * at(13, 97) - 1.5,
-                at(29, 89),
-                1.0,
-            ],
+            position: [3.0 * at(7, 101) - 1.5, 3.0 * at(13, 97) - 1.5, at(29, 89), 1.0],
             color: [at(3, 7), at(5, 11), at(2, 5), 1.0],
         }
     };
@@ -114,10 +104,7 @@ fn draw_triangles(gpu: &Gpu, count: usize) {
 /// Fails the `n`th allocation while large draws of a scenario are executed. The parent process checks the result.
 fn fail_one(scenario: &str, n: i64) {
     LEFT.store(n, Relaxed);
-    let settings = Settings {
-        threads: Some(2),
-        ..Settings::default()
-    };
+    let settings = Settings { threads: Some(2), ..Settings::default() };
     std::panic::set_hook(Box::new(|info| {
         arm(false);
         eprintln!("{info}");
@@ -138,13 +125,7 @@ fn fail_one(scenario: &str, n: i64) {
 }
 
 fn drawn() -> Vec<Variant> {
-    vec![
-        Variant::new("gaussians"),
-        Variant {
-            needs: vec![scenarios::GLSLANG],
-            ..Variant::new("triangles")
-        },
-    ]
+    vec![Variant::new("gaussians"), Variant { needs: vec![scenarios::GLSLANG], ..Variant::new("triangles") }]
 }
 
 #[gaurast_runner::test(each = drawn())]
@@ -155,11 +136,7 @@ fn no_large_allocation_aborts(case: &Case) {
     }
     let (mut n, mut lost) = (0, 0);
     loop {
-        let output = case
-            .command()
-            .env(VARIABLE, n.to_string())
-            .output()
-            .expect("it starts");
+        let output = case.command().env(VARIABLE, n.to_string()).output().expect("it starts");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
         if stdout.contains(NONE) {

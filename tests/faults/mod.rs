@@ -103,11 +103,7 @@ fn every_allocation_may_fail(case: &Case) {
     let ended = fail_each(&scenario);
     let _ = std::panic::take_hook();
     for &result in scenario.results {
-        assert!(
-            ended.failed[result] > 0,
-            "no {}: {ended:?}",
-            RESULTS[result]
-        );
+        assert!(ended.failed[result] > 0, "no {}: {ended:?}", RESULTS[result]);
     }
 }
 
@@ -115,15 +111,8 @@ fn every_allocation_may_fail(case: &Case) {
 #[gaurast_runner::test]
 fn every_result_is_asked_for() {
     let scenarios = scenarios::all();
-    assert!(
-        scenarios
-            .iter()
-            .all(|scenario| !scenario.results.is_empty())
-    );
-    let asked: BTreeSet<_> = scenarios
-        .iter()
-        .flat_map(|scenario| scenario.results)
-        .collect();
+    assert!(scenarios.iter().all(|scenario| !scenario.results.is_empty()));
+    let asked: BTreeSet<_> = scenarios.iter().flat_map(|scenario| scenario.results).collect();
     assert_eq!(asked.len(), RESULTS.len());
 }
 
@@ -131,16 +120,12 @@ fn every_result_is_asked_for() {
 #[gaurast_runner::test]
 fn every_place_is_listed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let table =
-        std::fs::read_to_string(root.join("simdevice/devmem/ALLOCATIONS.md")).expect("the table");
+    let table = std::fs::read_to_string(root.join("simdevice/devmem/ALLOCATIONS.md")).expect("the table");
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
-    let listed: BTreeSet<String> = rows
-        .filter_map(|row| Some(row.split_once("` |")?.0.to_owned()))
-        .collect();
+    let listed: BTreeSet<String> = rows.filter_map(|row| Some(row.split_once("` |")?.0.to_owned())).collect();
     let mut found = BTreeSet::from(["simdevice/devmem/src/memory.rs".to_owned()]);
-    let mut folders: Vec<_> = ["simdevice/src", "simdevice/isa/src", "driver/src"]
-        .map(|folder| root.join(folder))
-        .into();
+    let mut folders: Vec<_> =
+        ["simdevice/src", "simdevice/isa/src", "driver/src"].map(|folder| root.join(folder)).into();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).expect("a folder") {
             let path = entry.expect("an entry").path();
@@ -159,23 +144,8 @@ fn every_place_is_listed() {
 
 /// Returns true if a source file allocates through `devmem::host`, outside its tests.
 fn allocates(text: &str) -> bool {
-    const FUNCTIONS: [&str; 10] = [
-        "reserve",
-        "extend",
-        "push",
-        "resize",
-        "with_capacity",
-        "filled",
-        "copied",
-        "boxed",
-        "collect",
-        "zeroed",
-    ];
-    let text = text
-        .split("#[cfg(test)]\nmod tests {")
-        .next()
-        .unwrap_or_default();
-    FUNCTIONS
-        .iter()
-        .any(|function| text.contains(&format!("host::{function}")))
+    const FUNCTIONS: [&str; 10] =
+        ["reserve", "extend", "push", "resize", "with_capacity", "filled", "copied", "boxed", "collect", "zeroed"];
+    let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    FUNCTIONS.iter().any(|function| text.contains(&format!("host::{function}")))
 }

@@ -1,13 +1,11 @@
 //! The scenarios that run while allocations fail.
 
 use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Need, Variant};
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::kernels;
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use gaurast_tests::triangles::scenes;
@@ -38,11 +36,7 @@ pub struct Scenario {
     pub open: Box<dyn Fn() -> Use>,
 }
 
-const SETTINGS: Settings = Settings {
-    simd: None,
-    threads: Some(2),
-    trace: None,
-};
+const SETTINGS: Settings = Settings { simd: None, threads: Some(2), trace: None };
 
 /// Scenes of triangles whose commands, descriptors and transfers differ.
 const TRIANGLES: [&str; 14] = [
@@ -65,17 +59,9 @@ const TRIANGLES: [&str; 14] = [
 /// All scenarios.
 pub fn all() -> Vec<Scenario> {
     let opening = scenario("opening a device", || {
-        Box::new(|| {
-            gaussians_on(
-                &Gpu::embedded(&SETTINGS).expect("a device"),
-                Gaussians::default(),
-            )
-        })
+        Box::new(|| gaussians_on(&Gpu::embedded(&SETTINGS).expect("a device"), Gaussians::default()))
     });
-    let mut all = vec![Scenario {
-        device: Opened::Within,
-        ..opening
-    }];
+    let mut all = vec![Scenario { device: Opened::Within, ..opening }];
     for gaussians in Gaussians::all() {
         all.push(scenario(gaussians.name, move || {
             let context = Gpu::embedded(&SETTINGS).expect("a device");
@@ -98,11 +84,7 @@ pub fn all() -> Vec<Scenario> {
 /// A variant for each scenario.
 pub fn variants() -> Vec<Variant> {
     let variant = |scenario: Scenario| Variant {
-        needs: if TRIANGLES.contains(&&*scenario.name) {
-            vec![GLSLANG]
-        } else {
-            Vec::new()
-        },
+        needs: if TRIANGLES.contains(&&*scenario.name) { vec![GLSLANG] } else { Vec::new() },
         name: scenario.name,
     };
     all().into_iter().map(variant).collect()
@@ -147,21 +129,9 @@ impl Gaussians {
                 state: state.order(GaussianOrderGAURAST::PER_PIXEL),
                 ..plain
             },
-            Self {
-                name: "discs",
-                state: state.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D),
-                ..plain
-            },
-            Self {
-                name: "Gaussians in binary16",
-                state: state.precision(GaussianPrecisionGAURAST::FLOAT16),
-                ..plain
-            },
-            Self {
-                name: "a panorama",
-                model: GaussianCameraModelGAURAST::EQUIRECTANGULAR,
-                ..plain
-            },
+            Self { name: "discs", state: state.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D), ..plain },
+            Self { name: "Gaussians in binary16", state: state.precision(GaussianPrecisionGAURAST::FLOAT16), ..plain },
+            Self { name: "a panorama", model: GaussianCameraModelGAURAST::EQUIRECTANGULAR, ..plain },
         ]
     }
 }
@@ -171,11 +141,7 @@ pub fn scene(count: usize) -> SceneBuffers {
     let one = |index: usize| {
         let at = |factor: usize, period: usize| (index * factor % period) as f32 / period as f32;
         Gaussian {
-            position: [
-                4.0 * at(7, 101) - 2.0,
-                3.0 * at(13, 97) - 1.5,
-                2.0 + 4.0 * at(29, 89),
-            ],
+            position: [4.0 * at(7, 101) - 2.0, 3.0 * at(13, 97) - 1.5, 2.0 + 4.0 * at(29, 89)],
             scale: [0.02 + 0.1 * at(3, 31), 0.05, 0.03],
             rotation: [1.0, at(5, 17), at(11, 19), 0.3],
             opacity: 0.2 + 0.7 * at(17, 23),
@@ -186,26 +152,12 @@ pub fn scene(count: usize) -> SceneBuffers {
 }
 
 /// Draws a scene three times, so that the driver builds chunks. `drawing` is called when this begins and when it ends.
-pub fn draw(
-    context: &Gpu,
-    buffers: &SceneBuffers,
-    size: [u32; 2],
-    drawing: impl Fn(bool),
-) -> Vec<u8> {
+pub fn draw(context: &Gpu, buffers: &SceneBuffers, size: [u32; 2], drawing: impl Fn(bool)) -> Vec<u8> {
     draw_as(context, buffers, size, Gaussians::default(), drawing)
 }
 
-fn draw_as(
-    context: &Gpu,
-    buffers: &SceneBuffers,
-    size: [u32; 2],
-    how: Gaussians,
-    drawing: impl Fn(bool),
-) -> Vec<u8> {
-    let options = GaussianOptions {
-        state: how.state,
-        ..GaussianOptions::new(0)
-    };
+fn draw_as(context: &Gpu, buffers: &SceneBuffers, size: [u32; 2], how: Gaussians, drawing: impl Fn(bool)) -> Vec<u8> {
+    let options = GaussianOptions { state: how.state, ..GaussianOptions::new(0) };
     let pipeline = GaussianPipeline::new(context, &options);
     let scene = GaussianScene::new(context, buffers);
     let target = Target::floats(context, size);

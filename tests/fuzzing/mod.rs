@@ -21,28 +21,15 @@ use watch::{are_many, panics, runs, watch_panics};
 
 /// The seed files of a fuzz target.
 fn corpus(name: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fuzz/corpus")
-        .join(name);
-    let mut paths: Vec<_> = std::fs::read_dir(folder)
-        .expect("a corpus")
-        .map(|entry| entry.expect("an entry").path())
-        .collect();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(name);
+    let mut paths: Vec<_> =
+        std::fs::read_dir(folder).expect("a corpus").map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
-    paths
-        .iter()
-        .map(|path| std::fs::read(path).expect("readable"))
-        .collect()
+    paths.iter().map(|path| std::fs::read(path).expect("readable")).collect()
 }
 
 /// Runs a target on a shard's seeds, then on changed seeds and on random bytes of at most `longest`.
-fn fuzz(
-    case: &Case,
-    runs: Range<u64>,
-    seeds: &[Vec<u8>],
-    longest: usize,
-    mut target: impl FnMut(&[u8]),
-) {
+fn fuzz(case: &Case, runs: Range<u64>, seeds: &[Vec<u8>], longest: usize, mut target: impl FnMut(&[u8])) {
     watch_panics();
     for (number, seed) in seeds.iter().enumerate() {
         if case.shard().has(number) {
@@ -73,20 +60,11 @@ fn scene_files_are_read_or_refused(case: &Case) {
     let runs = runs(case, 20_000);
     let (mut read, mut refused) = (0, 0);
     let seeds = [loaders::seeds(), corpus("scene_files")].concat();
-    fuzz(
-        case,
-        runs.clone(),
-        &seeds,
-        300,
-        |data| match loaders::load(data) {
-            Some(_) => read += 1,
-            None => refused += 1,
-        },
-    );
-    assert!(
-        !are_many(&runs) || read > refused / 50 && refused > 0,
-        "{read} read, {refused} refused"
-    );
+    fuzz(case, runs.clone(), &seeds, 300, |data| match loaders::load(data) {
+        Some(_) => read += 1,
+        None => refused += 1,
+    });
+    assert!(!are_many(&runs) || read > refused / 50 && refused > 0, "{read} read, {refused} refused");
 }
 
 #[gaurast_runner::test(each = shards(4), alone)]
@@ -99,10 +77,7 @@ fn packets_are_executed_or_refused(case: &Case) {
         executed += fared.executed;
         refused += fared.refused;
     });
-    assert!(
-        !are_many(&runs) || executed > refused / 4 && refused > 0,
-        "{executed} executed, {refused} refused"
-    );
+    assert!(!are_many(&runs) || executed > refused / 4 && refused > 0, "{executed} executed, {refused} refused");
 }
 
 #[gaurast_runner::test(each = shards(4), alone)]

@@ -24,38 +24,24 @@ fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
     names.sort();
     let kept = names.into_iter().map(|path| {
         let words = bytemuck::pod_collect_to_vec(&std::fs::read(&path).unwrap());
-        (
-            path.file_name().unwrap().to_string_lossy().into_owned(),
-            words,
-        )
+        (path.file_name().unwrap().to_string_lossy().into_owned(), words)
     });
     let made = (0..8).map(|seed| {
         let program = structured::generate(seed, &[[seed as u32, 3]]);
-        (
-            format!("structured {seed}"),
-            structured::assemble(&[program]),
-        )
+        (format!("structured {seed}"), structured::assemble(&[program]))
     });
-    kept.chain(made)
-        .filter_map(|(name, words)| Layout::of(&words).map(|layout| (name, words, layout)))
-        .collect()
+    kept.chain(made).filter_map(|(name, words)| Layout::of(&words).map(|layout| (name, words, layout))).collect()
 }
 
 /// Modules that fuzzing has found. Descriptors that the test cannot provide are not bound.
 fn found() -> Vec<(String, Vec<u32>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/shader_modules");
-    let mut paths: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     let read = |path: &std::path::PathBuf| {
         let mut bytes = std::fs::read(path).unwrap();
         bytes.truncate(bytes.len() / 4 * 4);
-        (
-            path.display().to_string(),
-            bytemuck::pod_collect_to_vec(&bytes),
-        )
+        (path.display().to_string(), bytemuck::pod_collect_to_vec(&bytes))
     };
     paths.iter().map(read).collect()
 }

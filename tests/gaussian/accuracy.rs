@@ -4,16 +4,14 @@
 use std::sync::Arc;
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, Need, data, simd_levels};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::{Camera, DEFAULT_FOV};
 use gaurast_testkit::for_levels::ForLevels;
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
@@ -35,12 +33,8 @@ pub(crate) struct Devices<'a> {
 impl<'a> Devices<'a> {
     pub(crate) fn new(level: &'a str) -> Self {
         let gpus = [1, 2].map(|threads| {
-            Gpu::embedded(&Settings {
-                simd: Some(level),
-                threads: Some(threads),
-                ..Settings::default()
-            })
-            .expect("a device")
+            Gpu::embedded(&Settings { simd: Some(level), threads: Some(threads), ..Settings::default() })
+                .expect("a device")
         });
         Self { level, gpus }
     }
@@ -48,10 +42,7 @@ impl<'a> Devices<'a> {
     /// Draws `scene` in `state` from each of `views` on both devices and judges the pictures. All levels share the
     /// oracle's pictures, which are identified by `name` and the view's name.
     pub(crate) fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
-        let [images, same] = self
-            .gpus
-            .each_ref()
-            .map(|gpu| draw(gpu, scene, state, views));
+        let [images, same] = self.gpus.each_ref().map(|gpu| draw(gpu, scene, state, views));
         for ((view, image), same) in views.iter().zip(images).zip(same) {
             let reference = reference(name, scene, state, view);
             let name = format!("{name}, {}, {}", view.name, self.level);
@@ -70,10 +61,7 @@ fn reference(name: &str, scene: &SceneBuffers, state: State, view: &View) -> Arc
         let nominal = reference.nominal.iter();
         let covered = nominal.filter(|rgba| rgba[3] > 0.1).count();
         let is_made_up = view.limits == Limits::ENVELOPE_ONLY;
-        assert!(
-            is_made_up || covered > reference.nominal.len() / 20,
-            "{name}: hardly anything is seen"
-        );
+        assert!(is_made_up || covered > reference.nominal.len() / 20, "{name}: hardly anything is seen");
         reference
     })
 }
@@ -87,12 +75,7 @@ pub(crate) struct View {
 }
 
 /// Pictures of `scene`.
-pub(crate) fn draw(
-    gpu: &Gpu,
-    scene: &SceneBuffers,
-    state: State,
-    views: &[View],
-) -> Vec<Vec<[f32; 4]>> {
+pub(crate) fn draw(gpu: &Gpu, scene: &SceneBuffers, state: State, views: &[View]) -> Vec<Vec<[f32; 4]>> {
     let options = GaussianOptions {
         state,
         // The device draws at most degree 3 here, so the oracle gets no more.
@@ -120,21 +103,11 @@ pub(crate) fn states() -> [(&'static str, State); 4] {
     let default = State::default();
     [
         ("default", default),
-        (
-            "opacity-compensated",
-            default.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED),
-        ),
-        (
-            "lax floors",
-            default.alpha_floor(1e-4).transmittance_floor(0.0),
-        ),
+        ("opacity-compensated", default.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)),
+        ("lax floors", default.alpha_floor(1e-4).transmittance_floor(0.0)),
         (
             "strict floors",
-            default
-                .low_pass_variance(0.05)
-                .alpha_floor(0.05)
-                .alpha_ceiling(0.9)
-                .transmittance_floor(0.02),
+            default.low_pass_variance(0.05).alpha_floor(0.05).alpha_ceiling(0.9).transmittance_floor(0.02),
         ),
     ]
 }
@@ -145,12 +118,7 @@ pub(crate) const SIZE: [u32; 2] = [211, 157];
 /// The view of a generated scene.
 pub(crate) fn generated_view(limits: Limits) -> View {
     let size = SIZE;
-    View {
-        name: "in front".to_owned(),
-        camera: scenes::camera(size[0], size[1]).to_vulkan(),
-        size,
-        limits,
-    }
+    View { name: "in front".to_owned(), camera: scenes::camera(size[0], size[1]).to_vulkan(), size, limits }
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -160,12 +128,7 @@ fn generated_scenes_keep_the_contract_in_every_state(case: &Case) {
         let scene = scenes::cloud(seed, 3000, degree);
         for (name, state) in states() {
             let name = format!("cloud {seed} {name}");
-            devices.judge(
-                &name,
-                &scene,
-                state,
-                &[generated_view(Limits::ENVELOPE_ONLY)],
-            );
+            devices.judge(&name, &scene, state, &[generated_view(Limits::ENVELOPE_ONLY)]);
         }
     }
 }
@@ -173,12 +136,7 @@ fn generated_scenes_keep_the_contract_in_every_state(case: &Case) {
 /// Views of a generated scene by cameras of the other models, one of them with Gaussians behind it.
 fn other_cameras() -> Vec<View> {
     let size = [211, 157];
-    let view = |name: &str, camera| View {
-        name: name.to_owned(),
-        camera,
-        size,
-        limits: Limits::ENVELOPE_ONLY,
-    };
+    let view = |name: &str, camera| View { name: name.to_owned(), camera, size, limits: Limits::ENVELOPE_ONLY };
     let pinhole = scenes::camera(size[0], size[1]).to_vulkan();
     let parallel = pinhole
         .model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
@@ -190,15 +148,9 @@ fn other_cameras() -> Vec<View> {
     let panorama = GaussianCameraGAURAST::panorama(&axes, eye, [211.0, 157.0]).expect("a camera");
     vec![
         view("parallel", parallel),
-        view(
-            "parallel, from its middle",
-            parallel.eye([0.2, -0.1, 5.0]).near_plane(-4.0),
-        ),
+        view("parallel, from its middle", parallel.eye([0.2, -0.1, 5.0]).near_plane(-4.0)),
         view("fisheye", fisheye.focal_length([120.0, 110.0])),
-        view(
-            "fisheye, from its middle",
-            fisheye.eye([0.2, -0.1, 5.0]).focal_length([32.0; 2]),
-        ),
+        view("fisheye, from its middle", fisheye.eye([0.2, -0.1, 5.0]).focal_length([32.0; 2])),
         view("panorama, from its middle", panorama),
         view(
             "panorama, a part, turned to a pole",
@@ -208,10 +160,7 @@ fn other_cameras() -> Vec<View> {
                 .principal_point([180.0, 70.0]),
         ),
         // The picture is more than three periods wide.
-        view(
-            "panorama, many times around",
-            panorama.focal_length([9.0, 40.0]),
-        ),
+        view("panorama, many times around", panorama.focal_length([9.0, 40.0])),
     ]
 }
 
@@ -228,12 +177,7 @@ fn every_camera_and_every_order_keep_the_contract(case: &Case) {
     for (name, order) in orders {
         let mut views = other_cameras();
         views.push(generated_view(Limits::ENVELOPE_ONLY));
-        devices.judge(
-            &format!("cloud 11 {name}"),
-            &scene,
-            State::default().order(order),
-            &views,
-        );
+        devices.judge(&format!("cloud 11 {name}"), &scene, State::default().order(order), &views);
     }
 }
 
@@ -264,12 +208,7 @@ fn orders_give_different_pictures() {
     let scene = scenes::cloud(12, 3000, 0);
     let view = generated_view(Limits::ENVELOPE_ONLY);
     let picture = |order| {
-        let mut drawn = draw(
-            &gpu,
-            &scene,
-            State::default().order(order),
-            std::slice::from_ref(&view),
-        );
+        let mut drawn = draw(&gpu, &scene, State::default().order(order), std::slice::from_ref(&view));
         drawn.remove(0)
     };
     let by_depth = picture(GaussianOrderGAURAST::VIEW_DEPTH);
@@ -287,12 +226,7 @@ fn awkward_scenes_stay_within_the_envelope_in_every_state(case: &Case) {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32);
         for (name, state) in states() {
             let name = format!("awkward {seed} {name}");
-            devices.judge(
-                &name,
-                &scene,
-                state,
-                &[generated_view(Limits::ENVELOPE_ONLY)],
-            );
+            devices.judge(&name, &scene, state, &[generated_view(Limits::ENVELOPE_ONLY)]);
         }
     }
 }
@@ -310,10 +244,7 @@ pub(crate) fn views(scene: &Scene) -> Vec<View> {
             let cameras = [
                 ("whole", gaurast_scene::frame(scene, DEFAULT_FOV, size)),
                 ("side", look([1.4, -0.5, 0.9], [0.0, 0.1, 0.1], 60.0, size)),
-                (
-                    "inside",
-                    look([0.1, 0.0, 0.1], [-1.0, 0.2, 0.6], 75.0, size),
-                ),
+                ("inside", look([0.1, 0.0, 0.1], [-1.0, 0.2, 0.6], 75.0, size)),
             ];
             cameras.map(|(name, camera)| View {
                 name: format!("{name}, {}x{}", size[0], size[1]),
@@ -338,13 +269,9 @@ fn bulk(scene: &Scene) -> (DVec3, f64) {
         let middle = values.len() / 2;
         *values.select_nth_unstable_by(middle, f64::total_cmp).1
     };
-    let centre: [f64; 3] =
-        std::array::from_fn(|axis| median(opaque.iter().map(|p| p[axis]).collect()));
+    let centre: [f64; 3] = std::array::from_fn(|axis| median(opaque.iter().map(|p| p[axis]).collect()));
     let centre = DVec3::from(centre);
-    (
-        centre,
-        median(opaque.iter().map(|p| p.distance(centre)).collect()),
-    )
+    (centre, median(opaque.iter().map(|p| p.distance(centre)).collect()))
 }
 
 /// Judges the pictures of a scene file.

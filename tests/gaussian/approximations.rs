@@ -6,9 +6,7 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST as State,
 };
 use gaurast_runner::{Case, simd_levels};
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::oracle::spherical_harmonics::{coefficient_count, color};
 use gaurast_tests::oracle::{OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, Gaussian, SceneBuffers};
@@ -55,17 +53,12 @@ fn all_scenes() -> [(&'static str, SceneBuffers); 4] {
 /// Draws a picture, with the approximation's structure if `allowed` is given.
 fn draw(gpu: &Gpu, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32; 4]> {
     let [error, budget] = allowed.unwrap_or_default();
-    let approximation = Approximation::default()
-        .exponential_error(error)
-        .contribution_budget(budget);
+    let approximation = Approximation::default().exponential_error(error).contribution_budget(budget);
     let mut state = State::default();
     if allowed.is_some() {
         state.p_next = (&raw const approximation).cast();
     }
-    let options = GaussianOptions {
-        state,
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { state, ..GaussianOptions::new(scene.degree) };
     let pipeline = GaussianPipeline::new(gpu, &options);
     let on_device = GaussianScene::new(gpu, scene);
     let target = Target::floats(gpu, SIZE);
@@ -82,19 +75,11 @@ fn draw(gpu: &Gpu, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32;
 
 fn reference(scene: &SceneBuffers) -> Reference {
     let camera = scenes::camera(SIZE[0], SIZE[1]);
-    render_bounded(
-        &scene.as_oracle(),
-        &camera,
-        &OracleState::from(&State::default()),
-    )
+    render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&State::default()))
 }
 
 fn gpu(threads: usize) -> Gpu {
-    Gpu::embedded(&Settings {
-        threads: Some(threads),
-        ..Settings::default()
-    })
-    .expect("a device")
+    Gpu::embedded(&Settings { threads: Some(threads), ..Settings::default() }).expect("a device")
 }
 
 /// The distance of each pixel outside the oracle's envelope: of colours as a share of `range`, the range of colours,
@@ -138,13 +123,9 @@ fn pictures_are_no_further_off_than_is_allowed() {
     for (scene_name, scene) in all_scenes() {
         let (reference, range) = (reference(&scene), range(&scene));
         let exact = draw(&gpu, &scene, None);
-        for allowed @ [error, budget] in [
-            [1e-4, 0.0],
-            [2e-3, 0.0],
-            [0.0, 1.0 / 255.0],
-            [0.0, 16.0 / 255.0],
-            [2e-3, 4.0 / 255.0],
-        ] {
+        for allowed @ [error, budget] in
+            [[1e-4, 0.0], [2e-3, 0.0], [0.0, 1.0 / 255.0], [0.0, 16.0 / 255.0], [2e-3, 4.0 / 255.0]]
+        {
             let image = draw(&gpu, &scene, Some(allowed));
             let name = format!("{scene_name}, {allowed:?}");
             // A sparse scene in a small picture has few saturated blocks. The awkward scene may hide everything behind
@@ -154,25 +135,15 @@ fn pictures_are_no_further_off_than_is_allowed() {
                 "awkward" => false,
                 _ => error > 0.0,
             };
-            assert!(
-                image != exact || !must_differ,
-                "{name}: nothing is approximated"
-            );
+            assert!(image != exact || !must_differ, "{name}: nothing is approximated");
             let bound = f64::from(error) + f64::from(budget);
             let distances = distances(&image, &reference, range);
             let worst = distances.iter().copied().fold(0.0, f64::max);
             let flipped = distances.iter().filter(|distance| **distance > bound);
             // Only an error of the exponential changes the Gaussian at which a pixel ends, and it does so at few
             // pixels.
-            let (flips, most) = if error > 0.0 {
-                (image.len() / 100, bound + finished)
-            } else {
-                (0, bound)
-            };
-            assert!(
-                flipped.count() <= flips,
-                "{name}: {worst:e} exceeds {bound:e}"
-            );
+            let (flips, most) = if error > 0.0 { (image.len() / 100, bound + finished) } else { (0, bound) };
+            assert!(flipped.count() <= flips, "{name}: {worst:e} exceeds {bound:e}");
             assert!(worst <= most, "{name}: {worst:e} exceeds {most:e}");
         }
     }
@@ -194,12 +165,9 @@ fn threads_change_nothing(case: &Case) {
     let allowed = Some([2e-3, 4.0 / 255.0]);
     let scene = scenes::cloud(21, 3000, 1);
     let picture = |threads| {
-        let gpu = Gpu::embedded(&Settings {
-            simd: Some(case.variant()),
-            threads: Some(threads),
-            ..Settings::default()
-        })
-        .expect("a device");
+        let gpu =
+            Gpu::embedded(&Settings { simd: Some(case.variant()), threads: Some(threads), ..Settings::default() })
+                .expect("a device");
         draw(&gpu, &scene, allowed)
     };
     assert!(picture(1) == picture(3));

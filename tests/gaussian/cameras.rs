@@ -2,9 +2,7 @@
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_runner::{Case, simd_levels};
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
@@ -21,10 +19,7 @@ fn draw(
     camera: &GaussianCameraGAURAST,
     size: [u32; 2],
 ) -> Vec<[f32; 4]> {
-    let options = GaussianOptions {
-        state,
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { state, ..GaussianOptions::new(scene.degree) };
     let pipeline = GaussianPipeline::new(gpu, &options);
     let on_device = GaussianScene::new(gpu, scene);
     let target = Target::floats(gpu, size);
@@ -109,11 +104,7 @@ fn what_straddles_the_seam_is_seen_on_both_sides() {
 
 #[gaurast_runner::test(each = simd_levels())]
 fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere(case: &Case) {
-    let gpu = Gpu::embedded(&Settings {
-        simd: Some(case.variant()),
-        ..Settings::default()
-    })
-    .expect("a device");
+    let gpu = Gpu::embedded(&Settings { simd: Some(case.variant()), ..Settings::default() }).expect("a device");
     let above = [[0.2, -2.1, 5.0], [0.25, 1.4, 4.98], [1.2, 0.4, 5.1]];
     let scene = SceneBuffers {
         positions: above.to_vec(),

@@ -6,18 +6,13 @@
 use ash::ext::{depth_clip_control, extended_dynamic_state3};
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
+use gaurast_testkit::{Attachments, GaussianOptions, GaussianPipeline, GaussianScene, Settings, over};
 use gaurast_testkit::{
-    Attachments, GaussianOptions, GaussianPipeline, GaussianScene, Settings, over,
-};
-use gaurast_testkit::{
-    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-    depth_test,
+    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, depth_format, held};
-use gaurast_tests::oracle::{
-    OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested,
-};
+use gaurast_tests::oracle::{OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested};
 use gaurast_tests::scenes::{self, SceneBuffers};
 
 use crate::GLSLANG;
@@ -58,9 +53,7 @@ fn coefficients(reverse: bool) -> [f32; 2] {
 }
 
 fn camera(reverse: bool) -> GaussianCameraGAURAST<'static> {
-    scenes::camera(SIZE[0], SIZE[1])
-        .to_vulkan()
-        .depth_coefficients(coefficients(reverse))
+    scenes::camera(SIZE[0], SIZE[1]).to_vulkan().depth_coefficients(coefficients(reverse))
 }
 
 /// A cloud in which many Gaussians are at the same depths.
@@ -68,11 +61,7 @@ fn layered_cloud(seed: u64, count: usize) -> SceneBuffers {
     let mut scene = scenes::cloud(seed, count, 1);
     for position in &mut scene.positions {
         let z = (2.0 * position[2]).round() / 2.0;
-        *position = [
-            position[0] * z / position[2],
-            position[1] * z / position[2],
-            z,
-        ];
+        *position = [position[0] * z / position[2], position[1] * z / position[2], z];
     }
     for scale in &mut scene.scales {
         *scale = scale.map(|s| 4.0 * s);
@@ -99,17 +88,12 @@ fn triangles(reverse: bool) -> Vec<Vertex> {
         position: [x, y, depth(z), 1.0],
         color: [shade, 0.5 * shade, 1.0 - shade, 1.0],
     };
-    let flat =
-        |points: [[f32; 2]; 3], z: f64, shade: f32| points.map(|point| corner(point, z, shade));
+    let flat = |points: [[f32; 2]; 3], z: f64, shade: f32| points.map(|point| corner(point, z, shade));
     let mut all = Vec::new();
     all.extend(flat([[-1.1, -0.9], [0.1, -0.8], [-0.7, 0.7]], 4.0, 0.2));
     all.extend(flat([[-0.2, -0.95], [0.9, -0.9], [0.3, 0.2]], 6.5, 0.5));
     all.extend(flat([[-0.9, 0.95], [0.2, 0.9], [-0.3, 0.1]], 2.5, 0.8));
-    all.extend([
-        corner([0.0, 0.9], 2.2, 0.9),
-        corner([0.95, 0.8], 7.0, 0.1),
-        corner([0.7, -0.2], 11.0, 0.4),
-    ]);
+    all.extend([corner([0.0, 0.9], 2.2, 0.9), corner([0.95, 0.8], 7.0, 0.1), corner([0.7, -0.2], 11.0, 0.4)]);
     all
 }
 
@@ -133,10 +117,7 @@ impl Case {
             reverse: false,
             sets_depths: false,
             range: [0.0, 1.0],
-            options: GaussianOptions {
-                blend: vec![over()],
-                ..GaussianOptions::new(0)
-            },
+            options: GaussianOptions { blend: vec![over()], ..GaussianOptions::new(0) },
         }
     }
 
@@ -144,11 +125,7 @@ impl Case {
     fn camera(&self) -> GaussianCameraGAURAST<'static> {
         let [c0, c1] = coefficients(self.reverse);
         let camera = camera(self.reverse);
-        if self.options.negative_one_to_one {
-            camera.depth_coefficients([2.0 * c0 - 1.0, 2.0 * c1])
-        } else {
-            camera
-        }
+        if self.options.negative_one_to_one { camera.depth_coefficients([2.0 * c0 - 1.0, 2.0 * c1]) } else { camera }
     }
 
     fn tests(&self) -> OracleTests {
@@ -158,14 +135,11 @@ impl Case {
             negative_one_to_one: self.options.negative_one_to_one,
             depth_range: self.range,
             format: depth_format(&self.target),
-            depth: (state.depth_test_enable != vk::FALSE).then_some((
-                state.depth_compare_op,
-                state.depth_write_enable != vk::FALSE,
-            )),
+            depth: (state.depth_test_enable != vk::FALSE)
+                .then_some((state.depth_compare_op, state.depth_write_enable != vk::FALSE)),
             bounds: (state.depth_bounds_test_enable != vk::FALSE)
                 .then_some([state.min_depth_bounds, state.max_depth_bounds]),
-            stencil: (state.stencil_test_enable != vk::FALSE)
-                .then_some(OracleStencil { state: state.front }),
+            stencil: (state.stencil_test_enable != vk::FALSE).then_some(OracleStencil { state: state.front }),
         }
     }
 
@@ -186,10 +160,7 @@ impl Case {
             gpu,
             &target,
             &PipelineOptions {
-                depth_stencil: depth_test(vk::CompareOp::ALWAYS)
-                    .stencil_test_enable(true)
-                    .front(stencil)
-                    .back(stencil),
+                depth_stencil: depth_test(vk::CompareOp::ALWAYS).stencil_test_enable(true).front(stencil).back(stencil),
                 dynamic: vec![vk::DynamicState::STENCIL_REFERENCE],
                 ..PipelineOptions::default()
             },
@@ -206,10 +177,7 @@ impl Case {
             (pipeline, GaussianScene::new(gpu, scene))
         });
         let pass = Pass {
-            depth: vk::ClearDepthStencilValue {
-                depth: if self.reverse { 0.0 } else { 1.0 },
-                stencil: 7,
-            },
+            depth: vk::ClearDepthStencilValue { depth: if self.reverse { 0.0 } else { 1.0 }, stencil: 7 },
             ..Pass::default()
         };
         target.draw(gpu, &pass, |commands: &Commands| {
@@ -243,16 +211,12 @@ impl Case {
         for (sample, (before, after)) in before.iter().zip(&after).enumerate() {
             let name = format!("{}, sample {sample}", self.name);
             if self.options.sample_mask >> sample & 1 == 0 {
-                assert!(
-                    before.color == after.color,
-                    "{name}: a masked sample changed"
-                );
+                assert!(before.color == after.color, "{name}: a masked sample changed");
                 assert_eq!(before.stored, after.stored, "{name}");
                 continue;
             }
             let tests = self.tests();
-            let reference =
-                render_tested(&scene.as_oracle(), &oracle, &state, &tests, &before.stored);
+            let reference = render_tested(&scene.as_oracle(), &oracle, &state, &tests, &before.stored);
             judge_sample(&name, &reference, before, after);
             fragments += reference.fragments[0];
         }
@@ -268,23 +232,16 @@ fn judge_sample(name: &str, reference: &TestedReference, before: &Held, after: &
     let mut unknown = 0;
     for (at, &depth) in after.stored.depth.iter().enumerate() {
         match &reference.depth[at] {
-            Some(allowed) => assert!(
-                allowed.contains(&depth),
-                "{name}: pixel {at} stores depth {depth:#x}, not one of {allowed:x?}"
-            ),
+            Some(allowed) => {
+                assert!(allowed.contains(&depth), "{name}: pixel {at} stores depth {depth:#x}, not one of {allowed:x?}")
+            }
             None => unknown += 1,
         }
     }
-    assert!(
-        unknown * 1000 < reference.depth.len(),
-        "{name}: {unknown} depths unknown"
-    );
+    assert!(unknown * 1000 < reference.depth.len(), "{name}: {unknown} depths unknown");
     for (at, stencil) in after.stored.stencil.iter().enumerate() {
         let allowed = &reference.stencil[at];
-        assert!(
-            allowed.contains(stencil),
-            "{name}: pixel {at} stores {stencil}, not {allowed:?}"
-        );
+        assert!(allowed.contains(stencil), "{name}: pixel {at} stores {stencil}, not {allowed:?}");
     }
 }
 
@@ -297,10 +254,7 @@ fn every_comparison_works_in_every_format_both_ways() {
     let (gpu, scene) = (gpu(), layered_cloud(1, 1500));
     let mut drawn = 0;
     for format in FORMATS {
-        for (op, reverse) in COMPARES
-            .into_iter()
-            .flat_map(|op| [(op, false), (op, true)])
-        {
+        for (op, reverse) in COMPARES.into_iter().flat_map(|op| [(op, false), (op, true)]) {
             let mut case = Case::new(format!("{op:?} {format:?} reverse {reverse}"), format, 1);
             case.reverse = reverse;
             case.options.depth_stencil = depth_test(op);
@@ -318,25 +272,10 @@ fn samples_are_tested_one_by_one() {
     for (format, op, write, mask) in [
         (vk::Format::D32_SFLOAT, vk::CompareOp::LESS, true, u32::MAX),
         (vk::Format::D32_SFLOAT, vk::CompareOp::LESS, false, 0b1010),
-        (
-            vk::Format::D16_UNORM,
-            vk::CompareOp::GREATER,
-            true,
-            u32::MAX,
-        ),
+        (vk::Format::D16_UNORM, vk::CompareOp::GREATER, true, u32::MAX),
         (vk::Format::D16_UNORM, vk::CompareOp::EQUAL, true, u32::MAX),
-        (
-            vk::Format::D24_UNORM_S8_UINT,
-            vk::CompareOp::NOT_EQUAL,
-            true,
-            0b0111,
-        ),
-        (
-            vk::Format::X8_D24_UNORM_PACK32,
-            vk::CompareOp::LESS_OR_EQUAL,
-            true,
-            u32::MAX,
-        ),
+        (vk::Format::D24_UNORM_S8_UINT, vk::CompareOp::NOT_EQUAL, true, 0b0111),
+        (vk::Format::X8_D24_UNORM_PACK32, vk::CompareOp::LESS_OR_EQUAL, true, u32::MAX),
     ] {
         let name = format!("4 samples {op:?} {format:?} mask {mask:x}");
         let mut case = Case::new(name, format, 4);
@@ -361,20 +300,15 @@ fn depth_ranges_bounds_and_orders_apply() {
     case.range = [1.0, 0.5];
     case.judge(&gpu, &scene);
     let mut case = Case::new("bounds".to_owned(), vk::Format::D32_SFLOAT, 1);
-    let bounds = less
-        .depth_bounds_test_enable(true)
-        .min_depth_bounds(0.2)
-        .max_depth_bounds(0.81);
+    let bounds = less.depth_bounds_test_enable(true).min_depth_bounds(0.2).max_depth_bounds(0.81);
     case.options.depth_stencil = bounds;
     case.judge(&gpu, &scene);
     case.name = "bounds alone".to_owned();
     case.options.depth_stencil = bounds.depth_test_enable(false);
     case.judge(&gpu, &scene);
-    for order in [
-        GaussianOrderGAURAST::RADIAL_DISTANCE,
-        GaussianOrderGAURAST::PRIMITIVE,
-        GaussianOrderGAURAST::PER_PIXEL,
-    ] {
+    for order in
+        [GaussianOrderGAURAST::RADIAL_DISTANCE, GaussianOrderGAURAST::PRIMITIVE, GaussianOrderGAURAST::PER_PIXEL]
+    {
         let mut case = Case::new(format!("{order:?}"), vk::Format::D32_SFLOAT, 1);
         case.options.depth_stencil = less;
         case.options.state = case.options.state.order(order);
@@ -387,8 +321,7 @@ fn depth_ranges_bounds_and_orders_apply() {
 fn depths_may_begin_at_minus_one() {
     let mut states = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
         .extended_dynamic_state3_depth_clip_negative_one_to_one(true);
-    let mut control =
-        vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
+    let mut control = vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
     control.p_next = (&raw mut states).cast();
     let extensions = [depth_clip_control::NAME, extended_dynamic_state3::NAME];
     let gpu = Gpu::extended(&extensions, &mut control).expect("a device");
@@ -439,14 +372,9 @@ fn stencil_is_tested_first_and_written_last() {
             write_mask: [255, 0x0E][index % 2],
             reference: 1,
         };
-        let format = [
-            vk::Format::D24_UNORM_S8_UINT,
-            vk::Format::D32_SFLOAT_S8_UINT,
-        ][index % 2];
+        let format = [vk::Format::D24_UNORM_S8_UINT, vk::Format::D32_SFLOAT_S8_UINT][index % 2];
         let mut case = Case::new(format!("stencil {compare:?}"), format, 1);
-        case.options.depth_stencil = depth_test(vk::CompareOp::LESS)
-            .stencil_test_enable(true)
-            .front(face);
+        case.options.depth_stencil = depth_test(vk::CompareOp::LESS).stencil_test_enable(true).front(face);
         case.judge(&gpu, &scene);
         case.name = format!("stencil {compare:?} without depth");
         case.options.depth_stencil = case.options.depth_stencil.depth_test_enable(false);

@@ -5,8 +5,8 @@ use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::{
-    Buffer, Commands, Formats, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass,
-    PassObject, Settings, Target, TargetOptions, over,
+    Buffer, Commands, Formats, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, PassObject, Settings,
+    Target, TargetOptions, over,
 };
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
@@ -21,10 +21,7 @@ fn camera() -> OracleCamera {
 }
 
 fn rect(x: i32, y: i32, width: u32, height: u32) -> vk::Rect2D {
-    vk::Rect2D {
-        offset: vk::Offset2D { x, y },
-        extent: vk::Extent2D { width, height },
-    }
+    vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } }
 }
 
 /// The Gaussians of a scene in `range`.
@@ -61,11 +58,7 @@ struct Bench {
 
 impl Bench {
     fn new(scene: &SceneBuffers) -> Self {
-        Self::with(
-            scene,
-            &Settings::default(),
-            &GaussianOptions::new(scene.degree),
-        )
+        Self::with(scene, &Settings::default(), &GaussianOptions::new(scene.degree))
     }
 
     fn with(scene: &SceneBuffers, settings: &Settings, options: &GaussianOptions) -> Self {
@@ -126,11 +119,7 @@ fn assert_same(a: &[[f32; 4]], b: &[[f32; 4]]) {
 #[track_caller]
 fn assert_close(a: &[[f32; 4]], b: &[[f64; 4]], tolerance: f64) {
     assert_eq!(a.len(), b.len());
-    let worst = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| distance(*a, *b))
-        .fold(0.0, f64::max);
+    let worst = a.iter().zip(b).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
     assert!(worst <= tolerance, "{worst:e} exceeds {tolerance:e}");
 }
 
@@ -144,11 +133,7 @@ fn distance(a: [f32; 4], b: [f64; 4]) -> f64 {
 fn threads_change_nothing(case: &Case) {
     let scene = scene();
     let draw = |threads| {
-        let settings = Settings {
-            simd: Some(case.variant()),
-            threads: Some(threads),
-            ..Settings::default()
-        };
+        let settings = Settings { simd: Some(case.variant()), threads: Some(threads), ..Settings::default() };
         Bench::with(&scene, &settings, &GaussianOptions::new(scene.degree)).whole()
     };
     let one = draw(1);
@@ -268,10 +253,7 @@ fn attributes_advance_by_instance() {
     let mut mixed = shapes.clone();
     mixed.opacities.clone_from(&looks.opacities);
     mixed.sh.clone_from(&looks.sh);
-    let options = GaussianOptions {
-        looks_by_instance: true,
-        ..GaussianOptions::new(0)
-    };
+    let options = GaussianOptions { looks_by_instance: true, ..GaussianOptions::new(0) };
     // The first instance has index 1.
     let mut expected = SceneBuffers::default();
     for instance in 1..4 {
@@ -307,10 +289,7 @@ fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
     let reference = render_bounded(&scene.as_oracle(), &camera(), &OracleState::default());
     let (mut kept, mut replaced) = (0, 0);
     for (pixel, color) in drawn.iter().enumerate() {
-        if reference
-            .outcomes(pixel)
-            .all(|outcome| *outcome == [0.0; 4])
-        {
+        if reference.outcomes(pixel).all(|outcome| *outcome == [0.0; 4]) {
             assert_eq!(*color, background, "pixel {pixel} is not covered");
             kept += 1;
         } else {
@@ -338,23 +317,13 @@ fn the_viewport_says_where_the_camera_s_picture_is() {
             })
         };
         let drawn = draw([corner[0], corner[1], whole_size[0], whole_size[1]]);
-        let rows = drawn
-            .chunks(size[0] as usize)
-            .skip(y as usize)
-            .take(height as usize);
-        let within: Vec<[f32; 4]> = rows
-            .flat_map(|row| row[x as usize..][..width as usize].to_vec())
-            .collect();
+        let rows = drawn.chunks(size[0] as usize).skip(y as usize).take(height as usize);
+        let within: Vec<[f32; 4]> = rows.flat_map(|row| row[x as usize..][..width as usize].to_vec()).collect();
         let name = format!("viewport at {x}, {y}");
         assert_contract(&name, &within, &reference, Limits::ENVELOPE_ONLY);
 
         // A viewport with negative height covers the same pixels, and the camera's picture is not flipped.
-        let flipped = draw([
-            corner[0],
-            corner[1] + whole_size[1],
-            whole_size[0],
-            -whole_size[1],
-        ]);
+        let flipped = draw([corner[0], corner[1] + whole_size[1], whole_size[0], -whole_size[1]]);
         assert!(drawn == flipped, "{name}");
     }
 }
@@ -372,12 +341,11 @@ fn the_scissor_cuts_and_changes_nothing_else() {
         rect(50, 50, 0, 10),
     ] {
         let background = [0.25, 0.5, 0.75, 1.0];
-        let cut: Vec<[f32; 4]> =
-            bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
-                let (offset, extent) = (scissor.offset, scissor.extent);
-                commands.scissor([offset.x, offset.y], [extent.width, extent.height]);
-                commands.draw(0..bench.scene.count);
-            });
+        let cut: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
+            let (offset, extent) = (scissor.offset, scissor.extent);
+            commands.scissor([offset.x, offset.y], [extent.width, extent.height]);
+            commands.draw(0..bench.scene.count);
+        });
         assert_same(&inside(&whole, scissor, background), &cut);
     }
 }
@@ -386,19 +354,12 @@ fn the_scissor_cuts_and_changes_nothing_else() {
 fn the_render_area_cuts_and_changes_nothing_else() {
     let bench = Bench::new(&scene());
     let whole = bench.whole();
-    for area in [
-        rect(16, 16, 64, 32),
-        rect(3, 61, 150, 70),
-        rect(202, 138, 1, 1),
-    ] {
+    for area in [rect(16, 16, 64, 32), rect(3, 61, 150, 70), rect(202, 138, 1, 1)] {
         let target = bench.target();
         let background = [0.25, 0.5, 0.75, 1.0];
         let none = bench.draw_to(&target, &Pass::clear(background), |_| ());
         assert_same(&vec![background; whole.len()], &none);
-        let pass = Pass {
-            area: Some(area),
-            ..Pass::clear([0.0; 4])
-        };
+        let pass = Pass { area: Some(area), ..Pass::clear([0.0; 4]) };
         let cut: Vec<[f32; 4]> = bench.draw_to(&target, &pass, |commands| {
             commands.draw(0..bench.scene.count);
         });
@@ -414,8 +375,7 @@ fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 
     };
     let pixel = |(index, rgba): (usize, &[f32; 4])| {
         let (x, y) = (index % SIZE[0] as usize, index / SIZE[0] as usize);
-        let is_in = within(x, rect.offset.x, rect.extent.width)
-            && within(y, rect.offset.y, rect.extent.height);
+        let is_in = within(x, rect.offset.x, rect.extent.width) && within(y, rect.offset.y, rect.extent.height);
         if is_in { *rgba } else { outside }
     };
     image.iter().enumerate().map(pixel).collect()
@@ -425,19 +385,14 @@ fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 
 fn blending_composites_over_the_background() {
     let scene = scene();
     let alone = Bench::new(&scene).whole();
-    let options = GaussianOptions {
-        blend: vec![over()],
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { blend: vec![over()], ..GaussianOptions::new(scene.degree) };
     let bench = Bench::with(&scene, &Settings::default(), &options);
     for background in [[0.2, 0.4, 0.6, 1.0], [0.0; 4], [3.0, 0.1, 0.05, 0.3]] {
         let blended = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
             commands.draw(0..bench.scene.count);
         });
-        let expected: Vec<[f64; 4]> = alone
-            .iter()
-            .map(|rgba| composite(rgba.map(f64::from), background.map(f64::from)))
-            .collect();
+        let expected: Vec<[f64; 4]> =
+            alone.iter().map(|rgba| composite(rgba.map(f64::from), background.map(f64::from))).collect();
         // The error of one product and one sum of numbers up to 3.
         assert_close(&blended, &expected, 4e-7);
     }
@@ -452,10 +407,7 @@ fn composite(front: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
 fn draws_of_a_pass_are_composited_in_their_order() {
     // Each draw is sorted by itself: a later one is over an earlier one at any depth.
     let scene = scenes::cloud(26, 3000, 1);
-    let options = GaussianOptions {
-        blend: vec![over()],
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { blend: vec![over()], ..GaussianOptions::new(scene.degree) };
     let bench = Bench::with(&scene, &Settings::default(), &options);
     let background = [0.1, 0.2, 0.3, 0.4];
     let parts = [0..1000_usize, 1000..1003, 1003..2500, 2500..3000];
@@ -466,9 +418,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
         let front = render_bounded(&part.as_oracle(), &camera(), &OracleState::default());
         let over = |(pixel, behind): (usize, Vec<[f64; 4]>)| {
             let fronts = front.outcomes(pixel);
-            fronts
-                .flat_map(|front| behind.iter().map(|behind| composite(*front, *behind)))
-                .collect()
+            fronts.flat_map(|front| behind.iter().map(|behind| composite(*front, *behind))).collect()
         };
         behind.into_iter().enumerate().map(over).collect()
     });
@@ -485,10 +435,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
     }
 
     // The same draws by one indirect command.
-    let numbers: Vec<[u32; 4]> = parts
-        .iter()
-        .map(|range| [range.len() as u32, 1, range.start as u32, 0])
-        .collect();
+    let numbers: Vec<[u32; 4]> = parts.iter().map(|range| [range.len() as u32, 1, range.start as u32, 0]).collect();
     let numbers = Buffer::of(&bench.gpu, &numbers);
     let indirect = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
         commands.draw_indirect(&numbers, parts.len() as u32);
@@ -517,18 +464,10 @@ fn a_render_pass_object_is_dynamic_rendering() {
         commands.draw(0..dynamic.scene.count);
     });
 
-    let Bench {
-        gpu,
-        scene: on_device,
-        camera,
-        ..
-    } = dynamic;
+    let Bench { gpu, scene: on_device, camera, .. } = dynamic;
     let target = Target::floats(&gpu, SIZE);
     let object = PassObject::new(&target);
-    let options = GaussianOptions {
-        render_pass: Some(object.render_pass),
-        ..GaussianOptions::new(scene.degree)
-    };
+    let options = GaussianOptions { render_pass: Some(object.render_pass), ..GaussianOptions::new(scene.degree) };
     let pipeline = GaussianPipeline::new(&gpu, &options);
     gpu.run(|commands| {
         commands.pass(&object, &pass, || {
@@ -545,18 +484,9 @@ fn formats_differ_by_their_quantisation_alone() {
     let scene = scene();
     let exact = Bench::new(&scene).whole();
     let draw = |format| {
-        let options = GaussianOptions {
-            formats: Formats::of(format),
-            ..GaussianOptions::new(scene.degree)
-        };
+        let options = GaussianOptions { formats: Formats::of(format), ..GaussianOptions::new(scene.degree) };
         let bench = Bench::with(&scene, &Settings::default(), &options);
-        let target = Target::new(
-            &bench.gpu,
-            &TargetOptions {
-                size: SIZE,
-                ..TargetOptions::of(format)
-            },
-        );
+        let target = Target::new(&bench.gpu, &TargetOptions { size: SIZE, ..TargetOptions::of(format) });
         let pass = Pass::clear([0.0; 4]);
         bench.draw_to::<u8>(&target, &pass, |commands| {
             commands.draw(0..bench.scene.count);

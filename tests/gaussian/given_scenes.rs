@@ -13,10 +13,7 @@ const TRAINED: [&str; 3] = [SKULL, PLAYBOT, "splats/yashica-t4-top8192.ply"];
 
 /// A variant for each of [`TRAINED`].
 fn trained() -> Vec<Variant> {
-    let variant = |file| Variant {
-        needs: vec![Need::Data(file)],
-        ..Variant::new(file)
-    };
+    let variant = |file| Variant { needs: vec![Need::Data(file)], ..Variant::new(file) };
     TRAINED.map(variant).into()
 }
 
@@ -47,11 +44,8 @@ fn assert_psnr(given: &Given, least: f64) {
         &OracleCamera::new(&given.camera().to_vulkan(), given.size).unwrap(),
         &OracleState::default(),
     );
-    let drawn: Vec<[f32; 4]> = drawn
-        .to_f32()
-        .iter()
-        .map(|[r, g, b, _]| [r.min(1.0), g.min(1.0), b.min(1.0), 1.0])
-        .collect();
+    let drawn: Vec<[f32; 4]> =
+        drawn.to_f32().iter().map(|[r, g, b, _]| [r.min(1.0), g.min(1.0), b.min(1.0), 1.0]).collect();
     let statistics = Statistics::new(&drawn, &given.pixels(), given.size[0]);
     assert!(statistics.psnr > least, "{statistics}");
 }

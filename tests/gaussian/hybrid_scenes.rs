@@ -54,16 +54,11 @@ fn head(model: &Model, place: impl Fn(DVec3) -> DVec3, to_clip: &ToClip) -> Vec<
         for &index in &part.indices {
             let corner = &part.corners[index as usize];
             let at = |coordinate: f32, size: u32| ((coordinate * size as f32) as u32).min(size - 1);
-            let texel = part
-                .diffuse
-                .get_pixel(at(corner.uv[0], width), at(corner.uv[1], height));
+            let texel = part.diffuse.get_pixel(at(corner.uv[0], width), at(corner.uv[1], height));
             let lit = 0.3 + 0.7 * Vec3::from(corner.normal).dot(light).max(0.0);
             let [r, g, b, _] = texel.0.map(|c| lit * f32::from(c) / 255.0);
             let point = Vec3::from(corner.position).as_dvec3();
-            vertices.push(Vertex {
-                position: to_clip.position(place(point)),
-                color: [r, g, b, 1.0],
-            });
+            vertices.push(Vertex { position: to_clip.position(place(point)), color: [r, g, b, 1.0] });
         }
     }
     vertices
@@ -71,10 +66,7 @@ fn head(model: &Model, place: impl Fn(DVec3) -> DVec3, to_clip: &ToClip) -> Vec<
 
 /// Two triangles of one colour.
 fn pane(corners: [DVec3; 4], to_clip: &ToClip) -> Vec<Vertex> {
-    let corner = |index: usize| Vertex {
-        position: to_clip.position(corners[index]),
-        color: [0.9, 0.75, 0.1, 1.0],
-    };
+    let corner = |index: usize| Vertex { position: to_clip.position(corners[index]), color: [0.9, 0.75, 0.1, 1.0] };
     [0, 1, 2, 0, 2, 3].map(corner).to_vec()
 }
 
@@ -89,26 +81,17 @@ impl Hybrid {
 
     pub(super) fn draw(&self, gpu: &Gpu, what: What) -> Output {
         let target = Target::new(gpu, &self.target);
-        let options = PipelineOptions {
-            depth_stencil: self.state(),
-            ..PipelineOptions::default()
-        };
+        let options = PipelineOptions { depth_stencil: self.state(), ..PipelineOptions::default() };
         let triangles = Pipeline::new(gpu, &target, &options);
         let gaussians = GaussianPipeline::new(
             gpu,
-            &GaussianOptions {
-                depth_stencil: self.state(),
-                ..GaussianOptions::over(self.scene.degree, &target)
-            },
+            &GaussianOptions { depth_stencil: self.state(), ..GaussianOptions::over(self.scene.degree, &target) },
         );
         let scene = GaussianScene::new(gpu, &self.scene);
         let (head, pane) = (Buffer::of(gpu, &self.head), Buffer::of(gpu, &self.pane));
         let pass = Pass {
             color: vk::ClearColorValue { float32: [0.0; 4] },
-            depth: vk::ClearDepthStencilValue {
-                depth: if self.is_reverse() { 0.0 } else { 1.0 },
-                stencil: 0,
-            },
+            depth: vk::ClearDepthStencilValue { depth: if self.is_reverse() { 0.0 } else { 1.0 }, stencil: 0 },
             ..Pass::default()
         };
         target.draw(gpu, &pass, |commands| {
@@ -138,8 +121,7 @@ impl Hybrid {
         let picture = &everything.pictures[0];
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/pictures");
         let saved = std::fs::create_dir_all(&folder).map_err(image::ImageError::from);
-        let saved = saved
-            .and_then(|()| for_people(picture).save(folder.join(format!("{}.png", self.name))));
+        let saved = saved.and_then(|()| for_people(picture).save(folder.join(format!("{}.png", self.name))));
         assert!(saved.is_ok(), "{saved:?}");
         for (sample, after) in held_of(&everything).iter().enumerate() {
             let name = format!("{} sample {sample}", self.name);
@@ -193,14 +175,8 @@ impl Hybrid {
         let is_head = |at: &usize| head.color[*at][3] == 1.0;
         let changed = |at: &usize| drawn.color.nominal[*at][3] > 0.0;
         let pixels = 0..head.color.len();
-        let (all, through) = (
-            pixels.clone().filter(is_head).count(),
-            pixels.filter(is_head).filter(changed).count(),
-        );
-        assert!(
-            all > 1000 && through > 100 && through < all,
-            "{through} of {all}"
-        );
+        let (all, through) = (pixels.clone().filter(is_head).count(), pixels.filter(is_head).filter(changed).count());
+        assert!(all > 1000 && through > 100 && through < all, "{through} of {all}");
     }
 }
 
@@ -216,9 +192,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hyb
     let model = Model::african_head().expect("its files");
     let camera = gaurast_scene::garden::camera(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 60.0f32);
-    let camera = camera
-        .to_vulkan()
-        .depth_coefficients([far / (far - near), -near * far / (far - near)]);
+    let camera = camera.to_vulkan().depth_coefficients([far / (far - near), -near * far / (far - near)]);
     let to_clip = ToClip { camera, size: SIZE };
     // The head is in the meadow and faces the camera.
     let place = |point: DVec3| {
@@ -266,11 +240,7 @@ fn a_head_stands_in_the_garden_with_four_samples() {
 }
 
 /// The needs of a head inside a trained scene.
-pub(super) const WITH_PLAYBOT: [Need; 3] = [
-    GLSLANG,
-    Need::Data(Model::AFRICAN_HEAD),
-    Need::Data(PLAYBOT),
-];
+pub(super) const WITH_PLAYBOT: [Need; 3] = [GLSLANG, Need::Data(Model::AFRICAN_HEAD), Need::Data(PLAYBOT)];
 
 /// A head inside a trained scene, with reversed depth.
 pub(super) fn playbot() -> Hybrid {
@@ -310,24 +280,14 @@ fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
 
 /// The centre of the Gaussians along the camera's axis, and the distance within which half of them are.
 fn middle(scene: &Scene, camera: &GaussianCameraGAURAST) -> (DVec3, f64) {
-    let points: Vec<DVec3> = (scene.positions().iter())
-        .map(|&position| Vec3::from(position).as_dvec3())
-        .collect();
+    let points: Vec<DVec3> = (scene.positions().iter()).map(|&position| Vec3::from(position).as_dvec3()).collect();
     let median = |mut values: Vec<f64>| {
         let half = values.len() / 2;
         *values.select_nth_unstable_by(half, f64::total_cmp).1
     };
-    let forward = DVec3::from_slice(
-        &camera.rotation[6..]
-            .iter()
-            .map(|&r| r.into())
-            .collect::<Vec<f64>>(),
-    );
+    let forward = DVec3::from_slice(&camera.rotation[6..].iter().map(|&r| r.into()).collect::<Vec<f64>>());
     let eye = DVec3::from(camera.eye);
     let along = median(points.iter().map(|p| (*p - eye).dot(forward)).collect());
     let middle = eye + along * forward;
-    (
-        middle,
-        median(points.iter().map(|p| p.distance(middle)).collect()),
-    )
+    (middle, median(points.iter().map(|p| p.distance(middle)).collect()))
 }

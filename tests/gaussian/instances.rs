@@ -2,19 +2,16 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::for_levels::ForLevels;
 use gaurast_testkit::{
-    Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Instance, Pass, Settings,
-    Target, bind_instances,
+    Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Instance, Pass, Settings, Target, bind_instances,
 };
 use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::oracle::{
-    OracleCamera, OracleInstance, OracleScene, OracleState, Reference, render_bounded,
-};
+use gaurast_tests::oracle::{OracleCamera, OracleInstance, OracleScene, OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, Gaussian, SceneBuffers};
 use half::f16;
 use rand::{Rng, SeedableRng};
@@ -25,11 +22,7 @@ type Camera = GaussianCameraGAURAST<'static>;
 
 const SIZE: [u32; 2] = [131, 97];
 
-const IDENTITY: [[f32; 4]; 3] = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-];
+const IDENTITY: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// The way in which a scene is drawn.
 #[derive(Clone, Copy)]
@@ -43,12 +36,7 @@ struct Way<'a> {
 
 impl Way<'_> {
     fn new(camera: Camera) -> Self {
-        Self {
-            state: State::default(),
-            camera,
-            instances: None,
-            half: false,
-        }
+        Self { state: State::default(), camera, instances: None, half: false }
     }
 }
 
@@ -60,11 +48,7 @@ fn draw(gpu: &Gpu, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
         ..GaussianOptions::new(scene.degree)
     };
     let pipeline = GaussianPipeline::new(gpu, &options);
-    let on_device = if way.half {
-        GaussianScene::half(gpu, scene)
-    } else {
-        GaussianScene::new(gpu, scene)
-    };
+    let on_device = if way.half { GaussianScene::half(gpu, scene) } else { GaussianScene::new(gpu, scene) };
     let placed = way.instances.map(|(instances, rate)| {
         let flat = |instance: &OracleInstance| -> Instance {
             let elements = instance.matrix.as_flattened();
@@ -94,18 +78,11 @@ fn draw(gpu: &Gpu, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
 }
 
 /// The oracle's picture of a scene that is drawn once for each of `instances`.
-fn reference(
-    scene: &SceneBuffers,
-    instances: &[OracleInstance],
-    state: &State,
-    camera: &Camera,
-) -> Reference {
+fn reference(scene: &SceneBuffers, instances: &[OracleInstance], state: &State, camera: &Camera) -> Reference {
     let one = scene.as_oracle();
     let (copies, count) = (instances.len(), scene.positions.len());
-    let expanded: Vec<OracleInstance> = instances
-        .iter()
-        .flat_map(|&instance| std::iter::repeat_n(instance, count))
-        .collect();
+    let expanded: Vec<OracleInstance> =
+        instances.iter().flat_map(|&instance| std::iter::repeat_n(instance, count)).collect();
     let whole = OracleScene {
         positions: &one.positions.repeat(copies),
         scales: &one.scales.repeat(copies),
@@ -121,12 +98,7 @@ fn reference(
 
 /// A device of the case's SIMD level.
 fn device(case: &Case) -> Gpu {
-    Gpu::embedded(&Settings {
-        simd: Some(case.variant()),
-        threads: Some(2),
-        ..Settings::default()
-    })
-    .expect("a device")
+    Gpu::embedded(&Settings { simd: Some(case.variant()), threads: Some(2), ..Settings::default() }).expect("a device")
 }
 
 /// Matrices that rotate, stretch, shear, mirror and translate, a singular one, one that is not finite, and opacity
@@ -160,18 +132,9 @@ fn cameras() -> [(&'static str, Camera); 4] {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let middle = [0.1, -0.2, 3.5];
     let panorama = Camera::panorama(&axes, middle, SIZE.map(|side| side as f32));
-    let parallel = pinhole()
-        .model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
-        .focal_length([21.0, 19.0]);
-    let fisheye = pinhole()
-        .model(GaussianCameraModelGAURAST::FISHEYE)
-        .focal_length([80.0, 70.0]);
-    [
-        ("pinhole", pinhole()),
-        ("parallel", parallel),
-        ("fisheye", fisheye),
-        ("panorama", panorama.expect("a camera")),
-    ]
+    let parallel = pinhole().model(GaussianCameraModelGAURAST::ORTHOGRAPHIC).focal_length([21.0, 19.0]);
+    let fisheye = pinhole().model(GaussianCameraModelGAURAST::FISHEYE).focal_length([80.0, 70.0]);
+    [("pinhole", pinhole()), ("parallel", parallel), ("fisheye", fisheye), ("panorama", panorama.expect("a camera"))]
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -192,11 +155,7 @@ fn instances_keep_the_contract_through_every_camera(case: &Case) {
             assert!(expected.nominal.iter().filter(|p| p[3] > 0.1).count() > 500);
             assert!(expected.skips.degenerate_covariance > 0 || name.starts_with("panorama"));
             assert!(expected.skips.non_finite == 500);
-            let way = Way {
-                state,
-                instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
-                ..Way::new(camera)
-            };
+            let way = Way { state, instances: Some((&instances, vk::VertexInputRate::INSTANCE)), ..Way::new(camera) };
             let picture = draw(&gpu, &scene, &way);
             let name = format!("{name}, {}", case.variant());
             assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);
@@ -215,11 +174,7 @@ fn exact(scene: &SceneBuffers) -> SceneBuffers {
 }
 
 /// Half a turn about y, with twice the size, and a translation.
-const SIMILARITY: [[f32; 4]; 3] = [
-    [-2.0, 0.0, 0.0, 0.25],
-    [0.0, 2.0, 0.0, -0.5],
-    [0.0, 0.0, -2.0, 16.0],
-];
+const SIMILARITY: [[f32; 4]; 3] = [[-2.0, 0.0, 0.0, 0.25], [0.0, 2.0, 0.0, -0.5], [0.0, 0.0, -2.0, 16.0]];
 
 /// The transformed Gaussians of a scene of degree 1.
 fn transformed(scene: &SceneBuffers) -> SceneBuffers {
@@ -255,25 +210,15 @@ fn an_instance_is_a_scene_that_was_transformed_before(case: &Case) {
     };
     let camera = pinhole();
     let oracle = OracleCamera::new(&camera, SIZE).expect("a pinhole");
-    let instances = [IDENTITY, SIMILARITY].map(|matrix| OracleInstance {
-        matrix,
-        opacity: 1.0,
-    });
+    let instances = [IDENTITY, SIMILARITY].map(|matrix| OracleInstance { matrix, opacity: 1.0 });
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
     let gpu = device(case);
     // Both in one sorted set: as one draw, or as one instance each.
-    for state in [
-        State::default(),
-        State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
-    ] {
+    for state in [State::default(), State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED)] {
         let expected = REFERENCES.get(&format!("{:?}", state.linearization), || {
             render_bounded(&both.as_oracle(), &oracle, &OracleState::from(&state))
         });
-        let way = Way {
-            state,
-            instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
-            ..Way::new(camera)
-        };
+        let way = Way { state, instances: Some((&instances, vk::VertexInputRate::INSTANCE)), ..Way::new(camera) };
         let picture = draw(&gpu, &scene, &way);
         assert_contract(case.variant(), &picture, &expected, Limits::ENVELOPE_ONLY);
     }
@@ -285,16 +230,10 @@ fn every_vertex_may_have_a_matrix_of_its_own() {
     let scene = scenes::cloud(33, 300, 0);
     let some = any_instances(33);
     let of_vertex: Vec<OracleInstance> = (0..300).map(|vertex| some[vertex % some.len()]).collect();
-    let way = Way {
-        instances: Some((&of_vertex, vk::VertexInputRate::VERTEX)),
-        ..Way::new(pinhole())
-    };
+    let way = Way { instances: Some((&of_vertex, vk::VertexInputRate::VERTEX)), ..Way::new(pinhole()) };
     let picture = draw(&gpu, &scene, &way);
     let camera = OracleCamera::new(&way.camera, SIZE).expect("a pinhole");
-    let whole = OracleScene {
-        instances: &of_vertex,
-        ..scene.as_oracle()
-    };
+    let whole = OracleScene { instances: &of_vertex, ..scene.as_oracle() };
     let expected = render_bounded(&whole, &camera, &OracleState::from(&way.state));
     assert_contract("by vertex", &picture, &expected, Limits::ENVELOPE_ONLY);
 }
@@ -342,28 +281,19 @@ fn a_scene_that_moves_far_away_with_its_camera_looks_the_same(case: &Case) {
     });
     let far = camera.eye(camera.eye.map(|at| at + f64::from(FAR)));
     let moved = SceneBuffers {
-        positions: (scene.positions.iter())
-            .map(|position| position.map(|at| at + FAR))
-            .collect(),
+        positions: (scene.positions.iter()).map(|position| position.map(|at| at + FAR)).collect(),
         ..scene.clone()
     };
     let mut matrix = IDENTITY;
     for row in &mut matrix {
         row[3] = FAR;
     }
-    let instances = [OracleInstance {
-        matrix,
-        opacity: 1.0,
-    }];
+    let instances = [OracleInstance { matrix, opacity: 1.0 }];
     let gpu = device(case);
-    let by_matrix = Way {
-        instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
-        ..Way::new(far)
-    };
-    for (name, picture) in [
-        ("by its positions", draw(&gpu, &moved, &Way::new(far))),
-        ("by a matrix", draw(&gpu, &scene, &by_matrix)),
-    ] {
+    let by_matrix = Way { instances: Some((&instances, vk::VertexInputRate::INSTANCE)), ..Way::new(far) };
+    for (name, picture) in
+        [("by its positions", draw(&gpu, &moved, &Way::new(far))), ("by a matrix", draw(&gpu, &scene, &by_matrix))]
+    {
         let name = format!("{name}, {}", case.variant());
         assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);
     }

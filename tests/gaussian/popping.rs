@@ -5,14 +5,10 @@
 //! the order of the view before.
 
 use ash::vk;
-use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
-};
+use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_runner::{Need, data};
 use gaurast_scene::camera::DEFAULT_FOV;
-use gaurast_testkit::{
-    Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::project::project;
 use gaurast_tests::oracle::rays::rounded;
@@ -44,11 +40,7 @@ fn turned(camera: &GaussianCameraGAURAST<'static>, steps: usize) -> GaussianCame
 }
 
 /// The device's sort keys as the specification defines them: in binary64, then rounded.
-fn keys(
-    scene: &SceneBuffers,
-    camera: &GaussianCameraGAURAST,
-    order: GaussianOrderGAURAST,
-) -> Vec<f32> {
+fn keys(scene: &SceneBuffers, camera: &GaussianCameraGAURAST, order: GaussianOrderGAURAST) -> Vec<f32> {
     let r = camera.rotation.map(f64::from);
     let key = |position: &[f32; 3]| {
         let d: [f64; 3] = std::array::from_fn(|i| f64::from(position[i]) - camera.eye[i]);
@@ -89,12 +81,7 @@ impl Bench {
         GaussianPipeline::new(gpu, &options)
     }
 
-    fn draw(
-        &self,
-        pipeline: &GaussianPipeline,
-        camera: &GaussianCameraGAURAST,
-        order: Option<&[u32]>,
-    ) -> Picture {
+    fn draw(&self, pipeline: &GaussianPipeline, camera: &GaussianCameraGAURAST, order: Option<&[u32]>) -> Picture {
         let target = Target::floats(&self.gpu, SIZE);
         let indices = order.map(|order| Buffer::of(&self.gpu, order));
         self.gpu.run(|commands| {
@@ -145,17 +132,10 @@ impl Bench {
 
 /// Checks that sorting by depth along the axis changes pixels as much as `by_depth` says, because that depth changes as
 /// the camera rotates, and that sorting by distance from the eye changes nothing.
-fn compare(
-    scene: SceneBuffers,
-    camera: GaussianCameraGAURAST<'static>,
-    by_depth: std::ops::Range<f32>,
-) {
+fn compare(scene: SceneBuffers, camera: GaussianCameraGAURAST<'static>, by_depth: std::ops::Range<f32>) {
     let bench = Bench::new(scene);
-    let orders = [
-        GaussianOrderGAURAST::VIEW_DEPTH,
-        GaussianOrderGAURAST::RADIAL_DISTANCE,
-        GaussianOrderGAURAST::PRIMITIVE,
-    ];
+    let orders =
+        [GaussianOrderGAURAST::VIEW_DEPTH, GaussianOrderGAURAST::RADIAL_DISTANCE, GaussianOrderGAURAST::PRIMITIVE];
     let [depth, distance, place] = orders.map(|order| bench.popping(&camera, order));
     assert!(by_depth.contains(&depth), "{depth}");
     assert_eq!([distance, place], [0.0; 2]);
@@ -179,10 +159,7 @@ struct Sampling {
     steps: usize,
 }
 
-const EVERY_FIFTH: Sampling = Sampling {
-    stride: 5,
-    steps: 3,
-};
+const EVERY_FIFTH: Sampling = Sampling { stride: 5, steps: 3 };
 
 /// The greatest change of a sampled pixel by a step's new order, if each pixel has its own order: that of the same ray
 /// in the view before. With `by_axis`, each pixel is sorted by the depth along the camera's axis instead.
@@ -193,20 +170,14 @@ fn popping_of_rays(
     by_axis: bool,
 ) -> f64 {
     let Sampling { stride, steps } = sampling;
-    let state = OracleState {
-        order: OracleOrder::PerPixel,
-        ..OracleState::default()
-    };
+    let state = OracleState { order: OracleOrder::PerPixel, ..OracleState::default() };
     let input = scene.as_oracle();
     let mut greatest = 0.0f64;
     for step in 1..=steps {
-        let views = [step - 1, step].map(|step| {
-            OracleCamera::new(&turned(camera, step), SIZE).expect("a camera of the oracle")
-        });
+        let views = [step - 1, step]
+            .map(|step| OracleCamera::new(&turned(camera, step), SIZE).expect("a camera of the oracle"));
         let splats = views.map(|view| -> Vec<_> {
-            (0..input.len())
-                .map(|index| project(&input, &view, &state, index).ok())
-                .collect()
+            (0..input.len()).map(|index| project(&input, &view, &state, index).ok()).collect()
         });
         // A point of the new picture, mapped to the old one. The rows, read as columns, are the matrix from camera to
         // world.
@@ -216,8 +187,7 @@ fn popping_of_rays(
         let [cx, cy] = views[1].principal.map(f64::from);
         let sampled = SIZE.map(|side| side as usize / stride);
         for at in 0..sampled[0] * sampled[1] {
-            let [x, y] =
-                [at % sampled[0], at / sampled[0]].map(|i| (stride * i + stride / 2) as u32);
+            let [x, y] = [at % sampled[0], at / sampled[0]].map(|i| (stride * i + stride / 2) as u32);
             let new = [f64::from(x) + 0.5, f64::from(y) + 0.5];
             let ray = to_old * DVec3::new((new[0] - cx) / fx, (new[1] - cy) / fy, 1.0);
             let old = [fx * ray.x / ray.z + cx, fy * ray.y / ray.z + cy];
@@ -233,10 +203,7 @@ fn popping_of_rays(
                 let keys = if by_axis {
                     [f64::from(before.z), f64::from(now.z)]
                 } else {
-                    let depths = [
-                        before.own_axes.depth(&views[0], old),
-                        now.own_axes.depth(&views[1], new),
-                    ];
+                    let depths = [before.own_axes.depth(&views[0], old), now.own_axes.depth(&views[1], new)];
                     depths.map(|depth| rounded(depth.value))
                 };
                 reached.push((keys, alpha, now.color));
@@ -284,10 +251,7 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
     let order = GaussianOrderGAURAST::PER_PIXEL;
     let pipeline = Bench::pipeline(&bench.gpu, &bench.scene, order);
     let picture = bench.draw(&pipeline, &camera, None);
-    let state = OracleState {
-        order: OracleOrder::PerPixel,
-        ..OracleState::default()
-    };
+    let state = OracleState { order: OracleOrder::PerPixel, ..OracleState::default() };
     let view = OracleCamera::new(&camera, SIZE).expect("a camera of the oracle");
     let reference = render_bounded(&bench.scene.as_oracle(), &view, &state);
     assert_contract("a cloud", &picture, &reference, Limits::ENVELOPE_ONLY);
@@ -299,10 +263,7 @@ fn skull_pops_by_view_depth_alone() {
     let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
     // Tens of thousands of Gaussians cover every sampled pixel.
-    let sampling = Sampling {
-        stride: 25,
-        steps: 2,
-    };
+    let sampling = Sampling { stride: 25, steps: 2 };
     rays_pop_not(&scene, &camera, sampling);
     // The change is up to 0.072, as `docs/gaussian-draws.md` says.
     compare(scene, camera, 0.071..0.073);

@@ -2,8 +2,8 @@
 //! with two.
 
 use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, simd_levels};
 use gaurast_tests::compare::Limits;
@@ -14,9 +14,7 @@ use super::accuracy::{Devices, SIZE, View, generated_view};
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 fn flat() -> State {
-    State::default()
-        .geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
-        .low_pass_variance(0.5)
+    State::default().geometry(GaussianGeometryGAURAST::GAUSSIAN_2D).low_pass_variance(0.5)
 }
 
 /// The named states of each mode.
@@ -29,20 +27,12 @@ fn states() -> Vec<(&'static str, State)> {
         ("flat", flat()),
         ("flat, lax floors", lax(flat())),
         ("flat, no filter", flat().low_pass_variance(0.0)),
-        (
-            "flat, per pixel",
-            flat().order(GaussianOrderGAURAST::PER_PIXEL),
-        ),
+        ("flat, per pixel", flat().order(GaussianOrderGAURAST::PER_PIXEL)),
     ]
 }
 
 fn view(name: &str, camera: GaussianCameraGAURAST<'static>) -> View {
-    View {
-        name: name.to_owned(),
-        camera,
-        size: SIZE,
-        limits: Limits::ENVELOPE_ONLY,
-    }
+    View { name: name.to_owned(), camera, size: SIZE, limits: Limits::ENVELOPE_ONLY }
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -91,9 +81,7 @@ fn ten_thousand_layers_on_a_pixel_are_sorted(case: &Case) {
     }
     scene.scales.fill([0.05, 0.04, 0.01]);
     scene.opacities.fill(0.02);
-    let state = State::default()
-        .order(GaussianOrderGAURAST::PER_PIXEL)
-        .transmittance_floor(0.0);
+    let state = State::default().order(GaussianOrderGAURAST::PER_PIXEL).transmittance_floor(0.0);
     let view = generated_view(Limits::ENVELOPE_ONLY);
     Devices::new(case.variant()).judge("10,000 layers", &scene, state, &[view]);
 }

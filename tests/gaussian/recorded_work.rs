@@ -12,15 +12,8 @@ use super::interleavings;
 
 /// A variant for each of these scenes, by name.
 fn hybrids() -> Vec<Variant> {
-    let variant = |name, needs: &[Need]| Variant {
-        needs: needs.to_vec(),
-        ..Variant::new(name)
-    };
-    vec![
-        variant("garden", &GARDEN),
-        variant("garden, four samples", &GARDEN),
-        variant("playbot", &WITH_PLAYBOT),
-    ]
+    let variant = |name, needs: &[Need]| Variant { needs: needs.to_vec(), ..Variant::new(name) };
+    vec![variant("garden", &GARDEN), variant("garden, four samples", &GARDEN), variant("playbot", &WITH_PLAYBOT)]
 }
 
 #[gaurast_runner::test(each = hybrids())]
@@ -32,10 +25,7 @@ fn models_of_the_rasterizer_agree_on_hybrids(case: &Case) {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("trace.json");
-    let gpu = Gpu::embedded(&Settings {
-        trace: Some(&path),
-        ..Settings::default()
-    });
+    let gpu = Gpu::embedded(&Settings { trace: Some(&path), ..Settings::default() });
     hybrid.draw(&gpu.expect("a device"), What::Everything);
     let trace = read(&path);
     let hides = (trace.frames.iter().flat_map(|frame| &frame.draws))

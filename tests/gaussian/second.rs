@@ -13,10 +13,7 @@ use super::{PLAYBOT, SKULL};
 
 /// The limits of the second implementation. It computes in binary64, so little more than the rounding of its picture to
 /// binary32 is allowed.
-const LIMITS: Limits = Limits {
-    distance: 2e-7,
-    ..Limits::ENVELOPE_ONLY
-};
+const LIMITS: Limits = Limits { distance: 2e-7, ..Limits::ENVELOPE_ONLY };
 
 /// Compares the pictures of both implementations with the oracle's.
 fn judge(gpu: &Gpu, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
@@ -25,16 +22,10 @@ fn judge(gpu: &Gpu, name: &str, scene: &SceneBuffers, state: State, views: &[Vie
         let name = format!("{name}, {}", view.name);
         let camera = OracleCamera::new(&view.camera, view.size).expect("a pinhole");
         let reference = render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
-        let as_data = Draw {
-            size: view.size,
-            ..Draw::new(scene.clone())
-        };
+        let as_data = Draw { size: view.size, ..Draw::new(scene.clone()) };
         let as_data = as_data.in_state(|_| state).seen_by(view.camera);
         assert_eq!(Second.missing(&as_data), None);
-        let ours = Second
-            .draw(&as_data, &Stored::default())
-            .expect("it draws")
-            .color;
+        let ours = Second.draw(&as_data, &Stored::default()).expect("it draws").color;
         let verdict = assert_contract(&format!("{name}, second"), &ours, &reference, LIMITS);
         let device = assert_contract(&name, &drawn, &reference, view.limits);
         println!(
@@ -52,12 +43,7 @@ fn gpu() -> Gpu {
 /// and off centre; and mirrored.
 fn generated_views() -> Vec<View> {
     let front = generated_view(Limits::ENVELOPE_ONLY).camera;
-    let view = |name: &str, camera| View {
-        name: name.to_owned(),
-        camera,
-        size: SIZE,
-        limits: Limits::ENVELOPE_ONLY,
-    };
+    let view = |name: &str, camera| View { name: name.to_owned(), camera, size: SIZE, limits: Limits::ENVELOPE_ONLY };
     vec![
         view("in front", front),
         view("inside", front.eye([0.2, -0.1, 5.0])),
@@ -71,10 +57,7 @@ fn generated_views() -> Vec<View> {
         ),
         view(
             "mirrored, between two planes",
-            front
-                .rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
-                .near_plane(3.0)
-                .far_plane(8.0),
+            front.rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).near_plane(3.0).far_plane(8.0),
         ),
     ]
 }
@@ -126,9 +109,7 @@ fn both_draw_far_from_the_origin() {
     }
     let mut views = generated_views();
     for view in &mut views {
-        view.camera = view
-            .camera
-            .eye(view.camera.eye.map(|c| c + f64::from(away) + 1.0 / 7.0));
+        view.camera = view.camera.eye(view.camera.eye.map(|c| c + f64::from(away) + 1.0 / 7.0));
     }
     judge(&gpu(), "far", &scene, State::default(), &views);
 }
@@ -163,10 +144,7 @@ fn chapters() -> Vec<Variant> {
         let mut cases = all().into_iter().filter(|case| case.chapter == *chapter);
         cases.any(|case| Second.missing(&case.draw()).is_none())
     };
-    cases::chapters()
-        .filter(supported)
-        .map(Variant::new)
-        .collect()
+    cases::chapters().filter(supported).map(Variant::new).collect()
 }
 
 #[gaurast_runner::test(each = chapters())]

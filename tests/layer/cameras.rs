@@ -25,63 +25,33 @@ pub fn mistakes() -> Vec<Mistake> {
     vec![
         set("no cameras", count, Vec::new),
         set("more cameras than views", count, || vec![camera(); 33]),
-        set(
-            "the structure's type was not set",
-            "VUID-VkGaussianCameraGAURAST-sType-sType",
-            || {
-                let mut camera = camera();
-                camera.s_type = vk::StructureType::APPLICATION_INFO;
-                vec![camera]
-            },
-        ),
-        set("a model that is none", model, || {
-            vec![camera().model(GaussianCameraModelGAURAST::from_raw(77))]
+        set("the structure's type was not set", "VUID-VkGaussianCameraGAURAST-sType-sType", || {
+            let mut camera = camera();
+            camera.s_type = vk::StructureType::APPLICATION_INFO;
+            vec![camera]
         }),
-        mistake(
-            "a fisheye without its feature",
-            "VUID-VkGaussianCameraGAURAST-model-90079",
-            |stage| {
-                recording(&stage.bare, |commands| {
-                    let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
-                    commands.camera(&fisheye);
-                })
-            },
-        ),
-        set(
-            "a rotation that is NaN",
-            "VUID-VkGaussianCameraGAURAST-rotation-90064",
-            || vec![camera().rotation([f32::NAN; 9])],
-        ),
-        set(
-            "an infinite eye",
-            "VUID-VkGaussianCameraGAURAST-eye-90065",
-            || vec![camera().eye([f64::INFINITY; 3])],
-        ),
-        set(
-            "a principal point that is NaN",
-            "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
-            || vec![camera().principal_point([f32::NAN, 0.0])],
-        ),
-        set(
-            "depth coefficients that are NaN",
-            "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
-            || vec![camera().depth_coefficients([0.0, f32::NAN])],
-        ),
-        set("no focal length", focal, || {
-            vec![camera().focal_length([0.0; 2])]
+        set("a model that is none", model, || vec![camera().model(GaussianCameraModelGAURAST::from_raw(77))]),
+        mistake("a fisheye without its feature", "VUID-VkGaussianCameraGAURAST-model-90079", |stage| {
+            recording(&stage.bare, |commands| {
+                let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
+                commands.camera(&fisheye);
+            })
         }),
-        set("a focal length that mirrors", focal, || {
-            vec![camera().focal_length([100.0, -100.0])]
+        set("a rotation that is NaN", "VUID-VkGaussianCameraGAURAST-rotation-90064", || {
+            vec![camera().rotation([f32::NAN; 9])]
         }),
-        set("a near plane at the eye", near, || {
-            vec![camera().near_plane(0.0)]
+        set("an infinite eye", "VUID-VkGaussianCameraGAURAST-eye-90065", || vec![camera().eye([f64::INFINITY; 3])]),
+        set("a principal point that is NaN", "VUID-VkGaussianCameraGAURAST-principalPoint-90066", || {
+            vec![camera().principal_point([f32::NAN, 0.0])]
         }),
-        set("a far plane before the near one", far, || {
-            vec![camera().far_plane(0.1)]
+        set("depth coefficients that are NaN", "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067", || {
+            vec![camera().depth_coefficients([0.0, f32::NAN])]
         }),
-        set("a far plane of 0 for none", far, || {
-            vec![camera().far_plane(0.0)]
-        }),
+        set("no focal length", focal, || vec![camera().focal_length([0.0; 2])]),
+        set("a focal length that mirrors", focal, || vec![camera().focal_length([100.0, -100.0])]),
+        set("a near plane at the eye", near, || vec![camera().near_plane(0.0)]),
+        set("a far plane before the near one", far, || vec![camera().far_plane(0.1)]),
+        set("a far plane of 0 for none", far, || vec![camera().far_plane(0.0)]),
         set("a rotation with a scale", "GAURAST-Camera-rotation", || {
             vec![camera().rotation([2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0])]
         }),

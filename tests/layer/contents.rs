@@ -8,8 +8,8 @@ use gaurast::vk::{
 use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Message, Pass, Resource, Target};
 
 use crate::stage::{
-    IDENTITY, Mistake, OPACITY, ROTATION, SCALE, SIZE, SPLAT, Splat, camera, drawing, drawn,
-    instanced, mistake, splat, splats, with,
+    IDENTITY, Mistake, OPACITY, ROTATION, SCALE, SIZE, SPLAT, Splat, camera, drawing, drawn, instanced, mistake, splat,
+    splats, with,
 };
 
 /// A draw of Gaussians that are wrong.
@@ -19,17 +19,11 @@ fn holds(
     request: fn() -> Graphics<'static>,
     gaussians: fn() -> Vec<Splat>,
 ) -> Mistake {
-    mistake(name, id, move |stage| {
-        drawn(&stage.full, &request(), &gaussians())
-    })
+    mistake(name, id, move |stage| drawn(&stage.full, &request(), &gaussians()))
 }
 
 /// A draw through another camera.
-fn seen(
-    name: &'static str,
-    id: &'static str,
-    through: fn() -> GaussianCameraGAURAST<'static>,
-) -> Mistake {
+fn seen(name: &'static str, id: &'static str, through: fn() -> GaussianCameraGAURAST<'static>) -> Mistake {
     mistake(name, id, move |stage| {
         drawing(&stage.full, &splats(), &[SPLAT], |commands| {
             commands.camera(&through());
@@ -67,10 +61,7 @@ fn through_a_buffer(gpu: &Gpu, cameras: &[u8], count: u32) -> Vec<Message> {
     let buffer = Buffer::of(gpu, cameras);
     let set = Bindings::new(gpu, &[Resource::Uniform(buffer.raw)]);
     let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-    let request = Graphics {
-        set_layouts: vec![set.layout],
-        ..with(|s| s.camera_source(source).camera_count(count))
-    };
+    let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source).camera_count(count)) };
     drawing(gpu, &request, &[SPLAT], |commands| {
         commands.bind_set(&set, &[]);
         commands.draw(0..1);
@@ -93,54 +84,24 @@ pub fn mistakes() -> Vec<Mistake> {
 fn gaussians() -> Vec<Mistake> {
     let finite = "GAURAST-Draw-not-finite";
     vec![
-        holds(
-            "logarithms for scales",
-            "GAURAST-Draw-negative-scale",
-            splats,
-            logarithms,
-        ),
-        holds(
-            "logits for opacities",
-            "GAURAST-Draw-opacity-outside",
-            splats,
-            || vec![splat(OPACITY, [4.2]), splat(OPACITY, [-1.5]), SPLAT],
-        ),
-        holds(
-            "opacities of 0",
-            "GAURAST-Draw-opacity-floor",
-            splats,
-            || vec![splat(OPACITY, [0.0]); 3],
-        ),
-        holds(
-            "rotations of zeros",
-            "GAURAST-Draw-zero-quaternion",
-            splats,
-            || vec![splat(ROTATION, [0.0; 4]); 3],
-        ),
-        holds(
-            "rotations as x, y, z, w",
-            "GAURAST-Draw-quaternion-order",
-            splats,
-            || vec![splat(ROTATION, [0.0, 0.0, 0.0, 1.0]); 3],
-        ),
-        holds(
-            "rotations as x, y, z, w, of many directions",
-            "GAURAST-Draw-quaternion-order",
-            splats,
-            || {
-                let turned = |index: u8| {
-                    let angle = f32::from(index) * 0.05;
-                    splat(ROTATION, [angle.sin() * 0.5, 0.1, -0.2, angle.cos()])
-                };
-                (0..20).map(turned).collect()
-            },
-        ),
-        holds("a position that is NaN", finite, splats, || {
-            vec![SPLAT, splat(0, [f32::NAN])]
+        holds("logarithms for scales", "GAURAST-Draw-negative-scale", splats, logarithms),
+        holds("logits for opacities", "GAURAST-Draw-opacity-outside", splats, || {
+            vec![splat(OPACITY, [4.2]), splat(OPACITY, [-1.5]), SPLAT]
         }),
-        holds("an infinite coefficient", finite, splats, || {
-            vec![SPLAT, splat(12, [f32::INFINITY])]
+        holds("opacities of 0", "GAURAST-Draw-opacity-floor", splats, || vec![splat(OPACITY, [0.0]); 3]),
+        holds("rotations of zeros", "GAURAST-Draw-zero-quaternion", splats, || vec![splat(ROTATION, [0.0; 4]); 3]),
+        holds("rotations as x, y, z, w", "GAURAST-Draw-quaternion-order", splats, || {
+            vec![splat(ROTATION, [0.0, 0.0, 0.0, 1.0]); 3]
         }),
+        holds("rotations as x, y, z, w, of many directions", "GAURAST-Draw-quaternion-order", splats, || {
+            let turned = |index: u8| {
+                let angle = f32::from(index) * 0.05;
+                splat(ROTATION, [angle.sin() * 0.5, 0.1, -0.2, angle.cos()])
+            };
+            (0..20).map(turned).collect()
+        }),
+        holds("a position that is NaN", finite, splats, || vec![SPLAT, splat(0, [f32::NAN])]),
+        holds("an infinite coefficient", finite, splats, || vec![SPLAT, splat(12, [f32::INFINITY])]),
         holds(
             "scales with LOG_SCALE",
             "GAURAST-Draw-scale-twice",
@@ -153,20 +114,16 @@ fn gaussians() -> Vec<Mistake> {
             || with(|s| s.flags(Flags::LOGIT_OPACITY)),
             || vec![SPLAT; 20],
         ),
-        mistake(
-            "instances whose opacity's factor is 0",
-            "GAURAST-Draw-model-opacity",
-            |stage| {
-                let mut model = IDENTITY;
-                model[12] = 0.0;
-                let models = Buffer::of(&stage.full, &[model; 2]);
-                drawing(&stage.full, &instanced(), &[SPLAT], |commands| {
-                    commands.camera(&camera());
-                    commands.vertex_buffer(1, &models, 0);
-                    commands.draw_instances(0..1, 0..2);
-                })
-            },
-        ),
+        mistake("instances whose opacity's factor is 0", "GAURAST-Draw-model-opacity", |stage| {
+            let mut model = IDENTITY;
+            model[12] = 0.0;
+            let models = Buffer::of(&stage.full, &[model; 2]);
+            drawing(&stage.full, &instanced(), &[SPLAT], |commands| {
+                commands.camera(&camera());
+                commands.vertex_buffer(1, &models, 0);
+                commands.draw_instances(0..1, 0..2);
+            })
+        }),
     ]
 }
 
@@ -176,70 +133,45 @@ fn places() -> Vec<Mistake> {
         seen("a camera that looks along -z", behind, || {
             camera().rotation([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0])
         }),
-        seen("a camera that stands behind", behind, || {
-            camera().eye([0.0, 0.0, 9.0])
+        seen("a camera that stands behind", behind, || camera().eye([0.0, 0.0, 9.0])),
+        seen("a far plane that is too near", "GAURAST-Draw-beyond-camera", || camera().far_plane(1.0)),
+        seen("a camera that looks aside", "GAURAST-Draw-outside-picture", || {
+            let (sin, cos) = 1.2f32.sin_cos();
+            camera().rotation([cos, 0.0, -sin, 0.0, 1.0, 0.0, sin, 0.0, cos])
         }),
-        seen(
-            "a far plane that is too near",
-            "GAURAST-Draw-beyond-camera",
-            || camera().far_plane(1.0),
-        ),
-        seen(
-            "a camera that looks aside",
-            "GAURAST-Draw-outside-picture",
-            || {
-                let (sin, cos) = 1.2f32.sin_cos();
-                camera().rotation([cos, 0.0, -sin, 0.0, 1.0, 0.0, sin, 0.0, cos])
-            },
-        ),
     ]
 }
 
 fn uploads() -> Vec<Mistake> {
     let id = "GAURAST-Draw-negative-scale";
     vec![
-        mistake(
-            "logarithms that were copied from a staging buffer",
-            id,
-            |stage| {
-                let staging = Buffer::of(&stage.full, logarithms().as_flattened());
-                from_the_device(&stage.full, |commands, buffer| {
-                    let region = vk::BufferCopy::default().size(staging.size);
-                    // SAFETY: see the crate.
-                    unsafe {
-                        (commands.device()).cmd_copy_buffer(
-                            commands.raw,
-                            staging.raw,
-                            buffer,
-                            &[region],
-                        );
-                    }
-                })
-            },
-        ),
+        mistake("logarithms that were copied from a staging buffer", id, |stage| {
+            let staging = Buffer::of(&stage.full, logarithms().as_flattened());
+            from_the_device(&stage.full, |commands, buffer| {
+                let region = vk::BufferCopy::default().size(staging.size);
+                // SAFETY: see the crate.
+                unsafe {
+                    (commands.device()).cmd_copy_buffer(commands.raw, staging.raw, buffer, &[region]);
+                }
+            })
+        }),
         mistake("logarithms that a command wrote", id, |stage| {
             from_the_device(&stage.full, |commands, buffer| {
                 let gaussians = logarithms();
                 let bytes = bytemuck::cast_slice(gaussians.as_flattened());
                 // SAFETY: see the crate.
                 unsafe {
-                    commands
-                        .device()
-                        .cmd_update_buffer(commands.raw, buffer, 0, bytes);
+                    commands.device().cmd_update_buffer(commands.raw, buffer, 0, bytes);
                 };
             })
         }),
-        mistake(
-            "a buffer that was only cleared",
-            "GAURAST-Draw-zero-quaternion",
-            |stage| {
-                from_the_device(&stage.full, |commands, buffer| {
-                    let (device, raw) = commands.raw();
-                    // SAFETY: see the crate.
-                    unsafe { device.cmd_fill_buffer(raw, buffer, 0, vk::WHOLE_SIZE, 0) };
-                })
-            },
-        ),
+        mistake("a buffer that was only cleared", "GAURAST-Draw-zero-quaternion", |stage| {
+            from_the_device(&stage.full, |commands, buffer| {
+                let (device, raw) = commands.raw();
+                // SAFETY: see the crate.
+                unsafe { device.cmd_fill_buffer(raw, buffer, 0, vk::WHOLE_SIZE, 0) };
+            })
+        }),
         mistake("logarithms of an indirect draw", id, |stage| {
             let draws = Buffer::of(&stage.full, &[3u32, 1, 0, 0]);
             drawing(&stage.full, &splats(), &logarithms(), |commands| {
@@ -275,45 +207,30 @@ fn uploads() -> Vec<Mistake> {
 fn cameras() -> Vec<Mistake> {
     let binding = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025";
     vec![
-        mistake(
-            "a uniform buffer that is too short for its cameras",
-            binding,
-            |stage| through_a_buffer(&stage.full, &bytes(&camera()), 2),
-        ),
-        mistake(
-            "no set with the camera's uniform buffer",
-            binding,
-            |stage| {
-                let buffer = Buffer::new(&stage.full, 128);
-                let set = Bindings::new(&stage.full, &[Resource::Uniform(buffer.raw)]);
-                let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-                let request = Graphics {
-                    set_layouts: vec![set.layout],
-                    ..with(|s| s.camera_source(source))
-                };
-                drawing(&stage.full, &request, &[SPLAT], |commands| {
-                    commands.draw(0..1);
-                })
-            },
-        ),
+        mistake("a uniform buffer that is too short for its cameras", binding, |stage| {
+            through_a_buffer(&stage.full, &bytes(&camera()), 2)
+        }),
+        mistake("no set with the camera's uniform buffer", binding, |stage| {
+            let buffer = Buffer::new(&stage.full, 128);
+            let set = Bindings::new(&stage.full, &[Resource::Uniform(buffer.raw)]);
+            let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
+            drawing(&stage.full, &request, &[SPLAT], |commands| {
+                commands.draw(0..1);
+            })
+        }),
         mistake(
             "a camera in a uniform buffer whose far plane is 0",
             "VUID-VkGaussianCameraGAURAST-farPlane-90070",
             |stage| through_a_buffer(&stage.full, &bytes(&camera().far_plane(0.0)), 1),
         ),
-        mistake(
-            "a camera in a uniform buffer whose rotation's rows are packed",
-            "GAURAST-Camera-rotation",
-            |stage| {
-                // Rows of three floats where four are.
-                let mut wrong = bytes(&camera());
-                let rows: Vec<u8> = (camera().rotation.iter())
-                    .flat_map(|value| value.to_le_bytes())
-                    .collect();
-                wrong[32..32 + rows.len()].copy_from_slice(&rows);
-                wrong[32 + rows.len()..80].fill(0);
-                through_a_buffer(&stage.full, &wrong, 1)
-            },
-        ),
+        mistake("a camera in a uniform buffer whose rotation's rows are packed", "GAURAST-Camera-rotation", |stage| {
+            // Rows of three floats where four are.
+            let mut wrong = bytes(&camera());
+            let rows: Vec<u8> = (camera().rotation.iter()).flat_map(|value| value.to_le_bytes()).collect();
+            wrong[32..32 + rows.len()].copy_from_slice(&rows);
+            wrong[32 + rows.len()..80].fill(0);
+            through_a_buffer(&stage.full, &wrong, 1)
+        }),
     ]
 }

@@ -2,24 +2,13 @@
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianPrecisionGAURAST};
-use gaurast_testkit::{
-    Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Message, Pass, Target, opaque,
-};
+use gaurast_testkit::{Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Message, Pass, Target, opaque};
 
-use crate::stage::{
-    IDENTITY, Mistake, SIZE, SPLAT, camera, drawing, instanced, mistake, recording, splats, with,
-};
+use crate::stage::{IDENTITY, Mistake, SIZE, SPLAT, camera, drawing, instanced, mistake, recording, splats, with};
 
 /// A draw of two Gaussians that `record` records.
-fn draw(
-    name: &'static str,
-    id: &'static str,
-    request: fn() -> Graphics<'static>,
-    record: fn(&Commands),
-) -> Mistake {
-    mistake(name, id, move |stage| {
-        drawing(&stage.full, &request(), &[SPLAT; 2], record)
-    })
+fn draw(name: &'static str, id: &'static str, request: fn() -> Graphics<'static>, record: fn(&Commands)) -> Mistake {
+    mistake(name, id, move |stage| drawing(&stage.full, &request(), &[SPLAT; 2], record))
 }
 
 /// The messages of a draw in a pass with views 0 and 2.
@@ -27,17 +16,10 @@ fn in_views(gpu: &Gpu) -> Vec<Message> {
     let options = ImageOptions {
         layers: 3,
         view: vk::ImageViewType::TYPE_2D_ARRAY,
-        ..ImageOptions::new(
-            vk::Format::R32G32B32A32_SFLOAT,
-            SIZE,
-            vk::ImageUsageFlags::COLOR_ATTACHMENT,
-        )
+        ..ImageOptions::new(vk::Format::R32G32B32A32_SFLOAT, SIZE, vk::ImageUsageFlags::COLOR_ATTACHMENT)
     };
     let image = Image::new(gpu, &options);
-    let request = Graphics {
-        view_mask: 0b101,
-        ..splats()
-    };
+    let request = Graphics { view_mask: 0b101, ..splats() };
     let pipeline = request.create(gpu).expect("a pipeline");
     let buffer = Buffer::of(gpu, &SPLAT);
     let attachments = [vk::RenderingAttachmentInfo::default()
@@ -77,14 +59,9 @@ pub fn mistakes() -> Vec<Mistake> {
 fn cameras() -> Vec<Mistake> {
     let model = "VUID-vkCmdDraw-geometry-90071";
     vec![
-        draw(
-            "a draw without a camera",
-            "GAURAST-Draw-no-camera",
-            splats,
-            |commands| {
-                commands.draw(0..2);
-            },
-        ),
+        draw("a draw without a camera", "GAURAST-Draw-no-camera", splats, |commands| {
+            commands.draw(0..2);
+        }),
         draw(
             "2D Gaussians through a fisheye",
             model,
@@ -103,33 +80,15 @@ fn cameras() -> Vec<Mistake> {
                 commands.draw(0..2);
             },
         ),
-        mistake(
-            "two cameras for views 0 and 2",
-            "VUID-vkCmdDraw-cameraCount-90063",
-            |stage| in_views(&stage.full),
-        ),
-        draw(
-            "a focal length in units of the picture",
-            "GAURAST-Draw-focal-length",
-            splats,
-            |commands| {
-                commands.camera(
-                    &camera()
-                        .focal_length([1.2, 1.6])
-                        .principal_point([0.5, 0.5]),
-                );
-                commands.draw(0..2);
-            },
-        ),
-        draw(
-            "a principal point of zeros",
-            "GAURAST-Draw-principal-point",
-            splats,
-            |commands| {
-                commands.camera(&camera().principal_point([0.0; 2]));
-                commands.draw(0..2);
-            },
-        ),
+        mistake("two cameras for views 0 and 2", "VUID-vkCmdDraw-cameraCount-90063", |stage| in_views(&stage.full)),
+        draw("a focal length in units of the picture", "GAURAST-Draw-focal-length", splats, |commands| {
+            commands.camera(&camera().focal_length([1.2, 1.6]).principal_point([0.5, 0.5]));
+            commands.draw(0..2);
+        }),
+        draw("a principal point of zeros", "GAURAST-Draw-principal-point", splats, |commands| {
+            commands.camera(&camera().principal_point([0.0; 2]));
+            commands.draw(0..2);
+        }),
     ]
 }
 
@@ -147,15 +106,10 @@ fn ranges() -> Vec<Mistake> {
     };
     let index = "GAURAST-Draw-index-past-vertices";
     vec![
-        draw(
-            "more Gaussians than the buffer holds",
-            vertices,
-            splats,
-            |commands| {
-                commands.camera(&camera());
-                commands.draw(0..3);
-            },
-        ),
+        draw("more Gaussians than the buffer holds", vertices, splats, |commands| {
+            commands.camera(&camera());
+            commands.draw(0..3);
+        }),
         draw("a first vertex in floats", vertices, splats, |commands| {
             commands.camera(&camera());
             commands.draw(14..15);
@@ -168,70 +122,43 @@ fn ranges() -> Vec<Mistake> {
                 commands.draw_instances(0..1, 0..2);
             })
         }),
-        draw(
-            "Gaussians as instances of one vertex",
-            "GAURAST-Draw-instances",
-            splats,
-            |commands| {
-                commands.camera(&camera());
-                commands.draw_instances(0..1, 0..2);
-            },
-        ),
-        mistake(
-            "more indices than the buffer holds",
-            "GAURAST-Draw-indices-past-buffer",
-            indexed(&[0, 1], 3, 0),
-        ),
+        draw("Gaussians as instances of one vertex", "GAURAST-Draw-instances", splats, |commands| {
+            commands.camera(&camera());
+            commands.draw_instances(0..1, 0..2);
+        }),
+        mistake("more indices than the buffer holds", "GAURAST-Draw-indices-past-buffer", indexed(&[0, 1], 3, 0)),
         mistake("an index of no Gaussian", index, indexed(&[0, 1, 2], 3, 0)),
-        mistake(
-            "a vertex offset past the Gaussians",
-            index,
-            indexed(&[0, 1], 2, 1),
-        ),
-        mistake(
-            "more Gaussians than a draw may have",
-            "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
-            |stage| {
-                let pipeline = splats().create(&stage.full).expect("a pipeline");
-                let buffer = Buffer::of(&stage.full, &SPLAT);
-                let target = Target::floats(&stage.full, SIZE);
-                recording(&stage.full, |commands| {
-                    commands.pass(&target, &Pass::zeros(), || {
-                        commands.bind(&pipeline);
-                        commands.vertices(&buffer);
-                        commands.camera(&camera());
-                        commands.draw_instances(0..u32::MAX, 0..u32::MAX);
-                    });
-                })
-            },
-        ),
+        mistake("a vertex offset past the Gaussians", index, indexed(&[0, 1], 2, 1)),
+        mistake("more Gaussians than a draw may have", "VUID-vkCmdDraw-maxGaussiansPerDraw-90083", |stage| {
+            let pipeline = splats().create(&stage.full).expect("a pipeline");
+            let buffer = Buffer::of(&stage.full, &SPLAT);
+            let target = Target::floats(&stage.full, SIZE);
+            recording(&stage.full, |commands| {
+                commands.pass(&target, &Pass::zeros(), || {
+                    commands.bind(&pipeline);
+                    commands.vertices(&buffer);
+                    commands.camera(&camera());
+                    commands.draw_instances(0..u32::MAX, 0..u32::MAX);
+                });
+            })
+        }),
     ]
 }
 
 fn blending() -> Vec<Mistake> {
     let off = "GAURAST-Draw-blending-off";
-    let replacing = || Graphics {
-        blend: vec![opaque()],
-        ..splats()
-    };
+    let replacing = || Graphics { blend: vec![opaque()], ..splats() };
     vec![
-        draw(
-            "a second draw that replaces the first",
-            off,
-            replacing,
-            |commands| {
-                commands.camera(&camera());
-                commands.draw(0..1);
-                commands.draw(1..2);
-            },
-        ),
+        draw("a second draw that replaces the first", off, replacing, |commands| {
+            commands.camera(&camera());
+            commands.draw(0..1);
+            commands.draw(1..2);
+        }),
         mistake("a draw that replaces what was loaded", off, move |stage| {
             let pipeline = replacing().create(&stage.full).expect("a pipeline");
             let buffer = Buffer::of(&stage.full, &SPLAT);
             let target = Target::floats(&stage.full, SIZE);
-            stage
-                .full
-                .run(|commands| commands.pass(&target, &Pass::zeros(), || ()));
+            stage.full.run(|commands| commands.pass(&target, &Pass::zeros(), || ()));
             recording(&stage.full, |commands| {
                 commands.pass(&target, &Pass::load(), || {
                     commands.bind(&pipeline);

@@ -3,17 +3,14 @@
 use ash::vk;
 use gaurast::gaussian_primitive_topology::Device;
 use gaurast::vk::{
-    DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST as CEILING,
-    DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST as ORDER,
-    DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST as DEGREE,
-    GaussianAntialiasingGAURAST, GaussianOrderGAURAST,
+    DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST as CEILING, DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST as ORDER,
+    DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST as DEGREE, GaussianAntialiasingGAURAST,
+    GaussianOrderGAURAST,
 };
 
 use gaurast_testkit::Buffer;
 
-use crate::stage::{
-    IDENTITY, Mistake, SPLAT, camera, drawing, gaussian, instanced, mistake, recording, splats,
-};
+use crate::stage::{IDENTITY, Mistake, SPLAT, camera, drawing, gaussian, instanced, mistake, recording, splats};
 
 type Set = fn(&Device, vk::CommandBuffer);
 
@@ -111,18 +108,10 @@ fn draws() -> Vec<Mistake> {
     // SAFETY: see the crate; in all of these functions.
     unsafe {
         vec![
-            draw(
-                "a dynamic order that was not set",
-                dynamic,
-                ORDER,
-                |_, _| (),
-            ),
-            draw(
-                "a dynamic alpha ceiling below the pipeline's floor",
-                dynamic,
-                CEILING,
-                |own, commands| own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3),
-            ),
+            draw("a dynamic order that was not set", dynamic, ORDER, |_, _| ()),
+            draw("a dynamic alpha ceiling below the pipeline's floor", dynamic, CEILING, |own, commands| {
+                own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3)
+            }),
             draw(
                 "a dynamic degree of more coefficients than the pipeline has",
                 "VUID-vkCmdDraw-sphericalHarmonicsDegree-90061",
@@ -131,21 +120,17 @@ fn draws() -> Vec<Mistake> {
                     own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1);
                 },
             ),
-            mistake(
-                "a dynamic order that model matrices do not go with",
-                dynamic,
-                |stage| {
-                    let request = instanced().with_dynamic(ORDER);
-                    let models = Buffer::of(&stage.full, &IDENTITY);
-                    drawing(&stage.full, &request, &[SPLAT], |commands| {
-                        let per_pixel = GaussianOrderGAURAST::PER_PIXEL;
-                        gaussian(&stage.full).cmd_set_gaussian_order(commands.raw, per_pixel);
-                        commands.vertex_buffer(1, &models, 0);
-                        commands.camera(&camera());
-                        commands.draw(0..1);
-                    })
-                },
-            ),
+            mistake("a dynamic order that model matrices do not go with", dynamic, |stage| {
+                let request = instanced().with_dynamic(ORDER);
+                let models = Buffer::of(&stage.full, &IDENTITY);
+                drawing(&stage.full, &request, &[SPLAT], |commands| {
+                    let per_pixel = GaussianOrderGAURAST::PER_PIXEL;
+                    gaussian(&stage.full).cmd_set_gaussian_order(commands.raw, per_pixel);
+                    commands.vertex_buffer(1, &models, 0);
+                    commands.camera(&camera());
+                    commands.draw(0..1);
+                })
+            }),
         ]
     }
 }

@@ -2,24 +2,19 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource};
 
 use crate::pipelines::{allowing, footprint};
 use crate::stage::{
-    Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, spirv,
-    splats, with,
+    Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, spirv, splats, with,
 };
 
 /// A pipeline on the device without optional modes.
-fn bare(
-    name: &'static str,
-    id: &'static str,
-    request: impl Fn() -> Graphics<'static> + 'static,
-) -> Mistake {
+fn bare(name: &'static str, id: &'static str, request: impl Fn() -> Graphics<'static> + 'static) -> Mistake {
     mistake(name, id, move |stage| creation(&stage.bare, &request()))
 }
 
@@ -147,10 +142,7 @@ fn of_shaders_and_sets() -> Vec<Mistake> {
                 let buffer = Buffer::new(&stage.bare, 1024);
                 let set = Bindings::new(&stage.bare, &[Resource::Uniform(buffer.raw)]);
                 let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-                let request = Graphics {
-                    set_layouts: vec![set.layout],
-                    ..with(|s| s.camera_source(source))
-                };
+                let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
                 creation(&stage.bare, &request)
             },
         ),
@@ -160,8 +152,7 @@ fn of_shaders_and_sets() -> Vec<Mistake> {
 fn of_fixed_functions() -> Vec<Mistake> {
     let samples = |samples| {
         move || Graphics {
-            multisample: vk::PipelineMultisampleStateCreateInfo::default()
-                .rasterization_samples(samples),
+            multisample: vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(samples),
             ..splats()
         }
     };
@@ -171,22 +162,13 @@ fn of_fixed_functions() -> Vec<Mistake> {
             "a depth test without its feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044",
             || Graphics {
-                depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
-                    .depth_test_enable(true),
+                depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default().depth_test_enable(true),
                 depth_format: vk::Format::D32_SFLOAT,
                 ..splats()
             },
         ),
-        bare(
-            "four samples without their feature",
-            multisample,
-            samples(vk::SampleCountFlags::TYPE_4),
-        ),
-        pipeline(
-            "samples that Gaussians do not have",
-            multisample,
-            samples(vk::SampleCountFlags::TYPE_64),
-        ),
+        bare("four samples without their feature", multisample, samples(vk::SampleCountFlags::TYPE_4)),
+        pipeline("samples that Gaussians do not have", multisample, samples(vk::SampleCountFlags::TYPE_64)),
         bare(
             "a dynamic state without its feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
@@ -195,10 +177,7 @@ fn of_fixed_functions() -> Vec<Mistake> {
         bare(
             "views without their feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049",
-            || Graphics {
-                view_mask: 1,
-                ..splats()
-            },
+            || Graphics { view_mask: 1, ..splats() },
         ),
     ]
 }

@@ -29,8 +29,7 @@ use gaurast_testkit::{Driver, Gpu, Opening};
 
 use crate::stage::{Mistake, Stage, said_by_the_driver, said_by_the_layer};
 
-const SPECIFICATION: &str =
-    include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
+const SPECIFICATION: &str = include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
 
 /// The least number of mistakes.
 const LEAST: usize = 75;
@@ -78,10 +77,7 @@ fn every_statement_has_a_mistake_or_a_reason() {
     let reasons: BTreeSet<_> = INVISIBLE.iter().map(|(id, _)| *id).collect();
     let stated = stated();
     assert!(stated.len() > 70, "{}", stated.len());
-    let forgotten: Vec<_> = stated
-        .iter()
-        .filter(|id| !made.contains(*id) && !reasons.contains(*id))
-        .collect();
+    let forgotten: Vec<_> = stated.iter().filter(|id| !made.contains(*id) && !reasons.contains(*id)).collect();
     assert!(forgotten.is_empty(), "no mistake breaks {forgotten:#?}");
     let both: Vec<_> = reasons.iter().filter(|id| made.contains(*id)).collect();
     assert!(both.is_empty(), "{both:?} can be seen");
@@ -113,10 +109,7 @@ fn each_mistake_has_its_message_and_no_other(case: &Case) {
 
 /// This layer alone, and with the Khronos layer below it.
 fn layers() -> Vec<Variant> {
-    let both = Variant {
-        name: "with VK_LAYER_KHRONOS_validation".to_owned(),
-        needs: vec![Need::ValidationLayer],
-    };
+    let both = Variant { name: "with VK_LAYER_KHRONOS_validation".to_owned(), needs: vec![Need::ValidationLayer] };
     vec![Variant::new("alone"), both]
 }
 
@@ -124,17 +117,8 @@ fn layers() -> Vec<Variant> {
 fn nothing_is_said_of_right_uses(case: &Case) {
     with_the_layer(case, Some(samples::settings()), || {
         let names = [LAYER, c"VK_LAYER_KHRONOS_validation"];
-        let layers = if case.variant() == "alone" {
-            &names[..1]
-        } else {
-            &names[..]
-        };
-        let opening = Opening {
-            layers,
-            all_extensions: true,
-            robust: true,
-            ..Opening::of(Driver::Loaded)
-        };
+        let layers = if case.variant() == "alone" { &names[..1] } else { &names[..] };
+        let opening = Opening { layers, all_extensions: true, robust: true, ..Opening::of(Driver::Loaded) };
         let gpu = Gpu::open(&opening).expect("a device");
         let at_first = gpu.messages();
         assert!(said_by_the_layer(&at_first).is_empty(), "{at_first:#?}");

@@ -27,19 +27,10 @@ fn page(rows: &[Row]) -> String {
     for (chapter, name, driver, layer) in rows {
         if *chapter != current {
             current = chapter;
-            page += &format!(
-                "\n## {chapter}\n\n| mistake | the driver says | the layer says |\n|---|---|---|\n"
-            );
+            page += &format!("\n## {chapter}\n\n| mistake | the driver says | the layer says |\n|---|---|---|\n");
         }
-        let driver = driver
-            .as_ref()
-            .map_or("nothing".to_owned(), |message| cell(&message.text));
-        page += &format!(
-            "| {} | {driver} | `{}`: {} |\n",
-            cell(name),
-            layer.id,
-            cell(&layer.text)
-        );
+        let driver = driver.as_ref().map_or("nothing".to_owned(), |message| cell(&message.text));
+        page += &format!("| {} | {driver} | `{}`: {} |\n", cell(name), layer.id, cell(&layer.text));
     }
     page + &before(rows)
 }
@@ -55,11 +46,7 @@ fn before(rows: &[Row]) -> String {
     for (name, said) in BEFORE {
         let row = rows.iter().find(|(_, mistake, ..)| mistake == name);
         let (.., driver, layer) = row.unwrap_or_else(|| panic!("{name} is no mistake"));
-        let now = if driver.is_some() {
-            "says it"
-        } else {
-            "nothing"
-        };
+        let now = if driver.is_some() { "says it" } else { "nothing" };
         section += &format!("| {} | {said} | {now} | `{}` |\n", cell(name), layer.id);
     }
     section
@@ -74,13 +61,7 @@ pub fn check(rows: &[Row]) {
         return;
     }
     let stored = std::fs::read_to_string(path).expect("docs/mistakes.md");
-    let mut lines = page
-        .lines()
-        .zip(stored.lines())
-        .filter(|(now, then)| now != then);
+    let mut lines = page.lines().zip(stored.lines()).filter(|(now, then)| now != then);
     let first = lines.next();
-    assert!(
-        page == stored,
-        "{WRITE}=1 writes docs/mistakes.md anew; first difference: {first:#?}"
-    );
+    assert!(page == stored, "{WRITE}=1 writes docs/mistakes.md anew; first difference: {first:#?}");
 }

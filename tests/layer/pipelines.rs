@@ -2,26 +2,20 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
 
-use crate::stage::{
-    Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, spirv, splats, with,
-};
+use crate::stage::{Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, spirv, splats, with};
 
 pub fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {
     let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
         .exponential_error(exponential_error)
         .contribution_budget(contribution_budget);
-    Graphics {
-        approximation: Some(approximation),
-        ..splats()
-    }
+    Graphics { approximation: Some(approximation), ..splats() }
 }
 
 /// A pipeline with a footprint state.
@@ -34,19 +28,13 @@ pub fn footprint(
         .cut_off(cut_off)
         .cut_off_deviations(cut_off_deviations)
         .compensation_floor(compensation_floor);
-    Graphics {
-        footprint: Some(footprint),
-        ..splats()
-    }
+    Graphics { footprint: Some(footprint), ..splats() }
 }
 
 fn raster(change: impl Fn(Raster) -> Raster + 'static) -> impl Fn() -> Graphics<'static> + 'static {
     move || {
         let request = splats();
-        Graphics {
-            raster: change(request.raster),
-            ..request
-        }
+        Graphics { raster: change(request.raster), ..request }
     }
 }
 type Raster = vk::PipelineRasterizationStateCreateInfo<'static>;
@@ -82,59 +70,36 @@ fn structures() -> Vec<Mistake> {
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032",
             |stage| creation(&stage.without, &splats()),
         ),
-        pipeline(
-            "the topology without a Gaussian state",
-            "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
-            || Graphics {
-                gaussian: None,
-                ..splats()
-            },
-        ),
-        pipeline(
-            "a Gaussian state beside a list of triangles",
-            "GAURAST-Pipeline-topology",
-            || Graphics {
-                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                ..splats()
-            },
-        ),
-        pipeline(
-            "primitive restart",
-            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
-            || Graphics {
-                restart: true,
-                ..splats()
-            },
-        ),
-        shaders(
-            "a vertex stage with fixed-function projection",
-            stages,
-            || splats().with_shader(Shader::vertex(spirv!("gaussian.vert"))),
-        ),
-        pipeline(
-            "vertex-shader projection without a vertex stage",
-            stages,
-            || with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
-        ),
+        pipeline("the topology without a Gaussian state", "VUID-VkGraphicsPipelineCreateInfo-topology-90007", || {
+            Graphics { gaussian: None, ..splats() }
+        }),
+        pipeline("a Gaussian state beside a list of triangles", "GAURAST-Pipeline-topology", || Graphics {
+            topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            ..splats()
+        }),
+        pipeline("primitive restart", "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009", || Graphics {
+            restart: true,
+            ..splats()
+        }),
+        shaders("a vertex stage with fixed-function projection", stages, || {
+            splats().with_shader(Shader::vertex(spirv!("gaussian.vert")))
+        }),
+        pipeline("vertex-shader projection without a vertex stage", stages, || {
+            with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER))
+        }),
         shaders("a geometry stage", stages, || {
             let stage = vk::ShaderStageFlags::GEOMETRY;
             splats().with_shader(Shader::new(stage, spirv!("gaussian.vert")))
         }),
-        pipeline(
-            "an order that is none",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
-            || with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
-        ),
-        pipeline(
-            "a geometry that is none",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
-            || with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(-1))),
-        ),
-        pipeline(
-            "a flag that is none",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
-            || with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::from_raw(0x100))),
-        ),
+        pipeline("an order that is none", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter", || {
+            with(|s| s.order(GaussianOrderGAURAST::from_raw(77)))
+        }),
+        pipeline("a geometry that is none", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter", || {
+            with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(-1)))
+        }),
+        pipeline("a flag that is none", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter", || {
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::from_raw(0x100)))
+        }),
     ]
 }
 
@@ -152,15 +117,11 @@ fn numbers() -> Vec<Mistake> {
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
             |s| s.low_pass_variance(-0.3),
         ),
-        state(
-            "an alpha floor of 1 in 255ths",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
-            |s| s.alpha_floor(255.0),
-        ),
-        state("an alpha ceiling of 0", ceiling, |s| s.alpha_ceiling(0.0)),
-        state("an alpha ceiling below the floor", ceiling, |s| {
-            s.alpha_floor(0.5).alpha_ceiling(0.25)
+        state("an alpha floor of 1 in 255ths", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012", |s| {
+            s.alpha_floor(255.0)
         }),
+        state("an alpha ceiling of 0", ceiling, |s| s.alpha_ceiling(0.0)),
+        state("an alpha ceiling below the floor", ceiling, |s| s.alpha_floor(0.5).alpha_ceiling(0.25)),
         state(
             "a transmittance floor of 1",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
@@ -199,19 +160,14 @@ fn numbers() -> Vec<Mistake> {
                 ..footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0)
             },
         ),
-        state(
-            "an alpha ceiling of 1 with a transmittance floor",
-            "GAURAST-Pipeline-alpha-ceiling",
-            |s| s.alpha_ceiling(1.0),
-        ),
+        state("an alpha ceiling of 1 with a transmittance floor", "GAURAST-Pipeline-alpha-ceiling", |s| {
+            s.alpha_ceiling(1.0)
+        }),
     ]
 }
 
 fn combinations() -> Vec<Mistake> {
-    let (flat, half) = (
-        GaussianGeometryGAURAST::GAUSSIAN_2D,
-        GaussianPrecisionGAURAST::FLOAT16,
-    );
+    let (flat, half) = (GaussianGeometryGAURAST::GAUSSIAN_2D, GaussianPrecisionGAURAST::FLOAT16);
     let precision = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030";
     let matrix = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028";
     let binding = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025";
@@ -219,10 +175,7 @@ fn combinations() -> Vec<Mistake> {
     let changed = |change: fn(State) -> State| {
         move || {
             let request = instanced();
-            Graphics {
-                gaussian: request.gaussian.map(change),
-                ..request
-            }
+            Graphics { gaussian: request.gaussian.map(change), ..request }
         }
     };
     vec![
@@ -252,38 +205,23 @@ fn combinations() -> Vec<Mistake> {
                 with(|s| s.geometry(flat).linearization(unscented))
             },
         ),
-        pipeline(
-            "binary16 in the order of each pixel",
-            precision,
-            move || with(|s| s.precision(half).order(GaussianOrderGAURAST::PER_PIXEL)),
-        ),
-        pipeline("binary16 of 2D Gaussians", precision, move || {
-            with(|s| s.precision(half).geometry(flat))
+        pipeline("binary16 in the order of each pixel", precision, move || {
+            with(|s| s.precision(half).order(GaussianOrderGAURAST::PER_PIXEL))
         }),
-        shaders("binary16 of what a shader projects", precision, move || {
-            shaded(|s| s.precision(half))
+        pipeline("binary16 of 2D Gaussians", precision, move || with(|s| s.precision(half).geometry(flat))),
+        shaders("binary16 of what a shader projects", precision, move || shaded(|s| s.precision(half))),
+        pipeline("a camera in a uniform buffer that the layout does not have", binding, || {
+            with(|s| s.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER))
         }),
-        pipeline(
-            "a camera in a uniform buffer that the layout does not have",
-            binding,
-            || with(|s| s.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)),
-        ),
         mistake("a camera in a storage buffer", binding, |stage| {
             let buffer = Buffer::new(&stage.full, 1024);
             let set = Bindings::new(&stage.full, &[Resource::Storage(buffer.raw)]);
             let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-            let request = Graphics {
-                set_layouts: vec![set.layout],
-                ..with(|s| s.camera_source(source))
-            };
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
             creation(&stage.full, &request)
         }),
         mistake("no cameras in a uniform buffer", count, counted(0)),
-        mistake(
-            "fewer cameras in a uniform buffer than views",
-            count,
-            counted(2),
-        ),
+        mistake("fewer cameras in a uniform buffer than views", count, counted(2)),
     ]
 }
 
@@ -304,71 +242,41 @@ fn fixed_functions() -> Vec<Mistake> {
             "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
             raster(|raster| raster.rasterizer_discard_enable(true)),
         ),
-        pipeline(
-            "dynamic rasterizer discard",
-            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
-            || splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE),
-        ),
-        pipeline(
-            "two viewports",
-            "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
-            || Graphics {
-                viewports: 2,
-                ..splats()
-            },
-        ),
-        pipeline(
-            "a vertex binding whose stride is 0",
-            "GAURAST-Pipeline-stride",
-            || {
-                let mut request = splats();
-                request.bindings[0].stride = 0;
-                request
-            },
-        ),
-        pipeline(
-            "a vertex binding whose stride is counted in floats",
-            "GAURAST-Pipeline-stride",
-            || {
-                let mut request = splats();
-                request.bindings[0].stride = 14;
-                request
-            },
-        ),
+        pipeline("dynamic rasterizer discard", "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082", || {
+            splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
+        }),
+        pipeline("two viewports", "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081", || Graphics {
+            viewports: 2,
+            ..splats()
+        }),
+        pipeline("a vertex binding whose stride is 0", "GAURAST-Pipeline-stride", || {
+            let mut request = splats();
+            request.bindings[0].stride = 0;
+            request
+        }),
+        pipeline("a vertex binding whose stride is counted in floats", "GAURAST-Pipeline-stride", || {
+            let mut request = splats();
+            request.bindings[0].stride = 14;
+            request
+        }),
     ]
 }
 
 fn output() -> Vec<Mistake> {
     use vk::BlendFactor as Factor;
     vec![
-        pipeline(
-            "blending that multiplies by alpha once more",
-            "GAURAST-Pipeline-blending",
-            || Graphics {
-                blend: vec![blend(
-                    Factor::SRC_ALPHA,
-                    Factor::ONE_MINUS_SRC_ALPHA,
-                    vk::BlendOp::ADD,
-                )],
-                ..splats()
-            },
-        ),
-        pipeline(
-            "a write mask of nothing",
-            "GAURAST-Pipeline-write-mask",
-            || Graphics {
-                blend: vec![vk::PipelineColorBlendAttachmentState::default()],
-                ..splats()
-            },
-        ),
-        pipeline(
-            "an integer colour attachment",
-            "GAURAST-Pipeline-integer-attachment",
-            || Graphics {
-                formats: vec![vk::Format::R32G32B32A32_UINT],
-                blend: vec![gaurast_testkit::opaque()],
-                ..splats()
-            },
-        ),
+        pipeline("blending that multiplies by alpha once more", "GAURAST-Pipeline-blending", || Graphics {
+            blend: vec![blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, vk::BlendOp::ADD)],
+            ..splats()
+        }),
+        pipeline("a write mask of nothing", "GAURAST-Pipeline-write-mask", || Graphics {
+            blend: vec![vk::PipelineColorBlendAttachmentState::default()],
+            ..splats()
+        }),
+        pipeline("an integer colour attachment", "GAURAST-Pipeline-integer-attachment", || Graphics {
+            formats: vec![vk::Format::R32G32B32A32_UINT],
+            blend: vec![gaurast_testkit::opaque()],
+            ..splats()
+        }),
     ]
 }

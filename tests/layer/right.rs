@@ -2,21 +2,18 @@
 
 use ash::vk;
 use gaurast::vk::{
-    DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST, DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST,
-    GaussianAntialiasingGAURAST, GaussianCameraModelGAURAST, GaussianCameraSourceGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST, DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST, GaussianAntialiasingGAURAST,
+    GaussianCameraModelGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Graphics, Message, Pass, PassObject, Resource, Target, opaque,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Graphics, Message, Pass, PassObject, Resource, Target, opaque};
 
 use crate::contents::bytes;
 use crate::harmonics::Addressed;
 use crate::pipelines::allowing;
 use crate::stage::{
-    IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced,
-    laid_out, resolved, shaded, spirv, splat, splats, with,
+    IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced, laid_out, resolved,
+    shaded, spirv, splat, splats, with,
 };
 
 /// A right use: what it is, and what is said of it.
@@ -43,33 +40,15 @@ pub fn uses() -> Vec<Use> {
 fn states() -> Vec<Use> {
     vec![
         state("the defaults", |s| s),
-        state("opacity compensation", |s| {
-            s.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)
-        }),
-        state("the order of distance", |s| {
-            s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)
-        }),
-        state("the order of each pixel", |s| {
-            s.order(GaussianOrderGAURAST::PER_PIXEL)
-        }),
-        state("the order of the draw", |s| {
-            s.order(GaussianOrderGAURAST::PRIMITIVE)
-        }),
-        state("binary16", |s| {
-            s.precision(GaussianPrecisionGAURAST::FLOAT16)
-        }),
-        state("2D Gaussians", |s| {
-            s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
-        }),
-        state("the unscented transform", |s| {
-            s.linearization(GaussianLinearizationGAURAST::UNSCENTED)
-        }),
-        state("no early end", |s| {
-            s.transmittance_floor(0.0).alpha_ceiling(1.0)
-        }),
-        right("approximations", |gpu| {
-            drawn(gpu, &allowing(1e-3, 1e-3), &[SPLAT])
-        }),
+        state("opacity compensation", |s| s.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)),
+        state("the order of distance", |s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
+        state("the order of each pixel", |s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+        state("the order of the draw", |s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
+        state("binary16", |s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
+        state("2D Gaussians", |s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+        state("the unscented transform", |s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
+        state("no early end", |s| s.transmittance_floor(0.0).alpha_ceiling(1.0)),
+        right("approximations", |gpu| drawn(gpu, &allowing(1e-3, 1e-3), &[SPLAT])),
         right("logarithms and logits", |gpu| {
             let mut trained = splat(SCALE, [-2.3, -2.0, -3.1]);
             trained[OPACITY] = 4.2;
@@ -134,10 +113,7 @@ fn draws() -> Vec<Use> {
             })
         }),
         right("a sorted set that replaces", |gpu| {
-            let request = Graphics {
-                blend: vec![opaque()],
-                ..splats()
-            };
+            let request = Graphics { blend: vec![opaque()], ..splats() };
             drawing(gpu, &request, &[SPLAT; 3], |commands| {
                 commands.camera(&camera());
                 commands.gaussian_set(|| {
@@ -188,12 +164,8 @@ fn shaders() -> Vec<Use> {
         gpu.messages()
     };
     vec![
-        right("a vertex shader that projects", move |gpu| {
-            created(gpu, shaded(|s| s))
-        }),
-        right("a resolve shader", move |gpu| {
-            created(gpu, resolved(spirv!("toned.frag"), [2, 5], |s| s))
-        }),
+        right("a vertex shader that projects", move |gpu| created(gpu, shaded(|s| s))),
+        right("a resolve shader", move |gpu| created(gpu, resolved(spirv!("toned.frag"), [2, 5], |s| s))),
         right("a resolve shader that reads less", move |gpu| {
             created(gpu, resolved(spirv!("woven.frag"), [0, 1], |s| s))
         }),
@@ -206,10 +178,7 @@ fn sources() -> Vec<Use> {
             let buffer = Buffer::of(gpu, &bytes(&camera()));
             let set = Bindings::new(gpu, &[Resource::Uniform(buffer.raw)]);
             let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-            let request = Graphics {
-                set_layouts: vec![set.layout],
-                ..with(|s| s.camera_source(source))
-            };
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
             drawing(gpu, &request, &[SPLAT], |commands| {
                 commands.bind_set(&set, &[]);
                 commands.draw(0..1);
@@ -221,10 +190,7 @@ fn sources() -> Vec<Use> {
             let buffer = Buffer::of(gpu, &cameras);
             let set = Bindings::new(gpu, &[Resource::DynamicUniform(buffer.raw, 128)]);
             let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-            let request = Graphics {
-                set_layouts: vec![set.layout],
-                ..with(|s| s.camera_source(source))
-            };
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
             drawing(gpu, &request, &[SPLAT], |commands| {
                 commands.bind_set(&set, &[256]);
                 commands.draw(0..1);
@@ -236,8 +202,7 @@ fn sources() -> Vec<Use> {
             drawing(gpu, &request, &[SPLAT], |commands| {
                 // SAFETY: see the crate.
                 unsafe {
-                    gaussian(gpu)
-                        .cmd_bind_gaussian_spherical_harmonics(commands.raw, &buffer.bound(256));
+                    gaussian(gpu).cmd_bind_gaussian_spherical_harmonics(commands.raw, &buffer.bound(256));
                 }
                 commands.camera(&camera());
                 commands.draw(0..1);
@@ -267,10 +232,7 @@ fn passes() -> Vec<Use> {
         right("a render pass object", |gpu| {
             let target = Target::floats(gpu, SIZE);
             let object = PassObject::new(&target);
-            let request = Graphics {
-                subpass: Some((object.render_pass, 0)),
-                ..splats()
-            };
+            let request = Graphics { subpass: Some((object.render_pass, 0)), ..splats() };
             let pipeline = request.create(gpu).expect("a pipeline");
             let buffer = Buffer::of(gpu, &SPLAT);
             gpu.messages();

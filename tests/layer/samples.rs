@@ -13,9 +13,7 @@ const OWN: &str = "VK_LAYER_GAURAST_validation";
 
 /// The file of settings that the page prints.
 pub fn settings() -> &'static str {
-    let (_, after) = PAGE
-        .split_once("```ini\n")
-        .expect("docs/layer.md prints the file");
+    let (_, after) = PAGE.split_once("```ini\n").expect("docs/layer.md prints the file");
     after.split_once("```").expect("the block ends").0
 }
 
@@ -40,11 +38,7 @@ fn compile(source: &str, folder: &Path) -> PathBuf {
         .arg(&program)
         .output()
         .expect("cc runs");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     program
 }
 
@@ -102,10 +96,7 @@ fn a_mistake_of_the_c_program_is_told_on_the_standard_error() {
     let away = HELLO.replace(right, "vkGaussianCameraLookAtGAURAST(ahead, eye, up");
     let program = compile(&away, folder.path());
     let text = said(&run(&program, &[], OWN, folder.path()));
-    assert!(
-        text.contains("none of 5 Gaussians is drawn: 5 are behind"),
-        "{text}"
-    );
+    assert!(text.contains("none of 5 Gaussians is drawn: 5 are behind"), "{text}");
     assert!(text.contains("[GAURAST-Draw-behind-camera]"), "{text}");
     assert_eq!(text.lines().count(), 1, "{text}");
 }
@@ -113,18 +104,10 @@ fn a_mistake_of_the_c_program_is_told_on_the_standard_error() {
 /// The samples in Rust, with their arguments, and what each leaves or says.
 const SAMPLES: [(&str, &[&str], Left); 7] = [
     ("hello_gaussians", &[], Left::File("hello_gaussians.png")),
-    (
-        "hello_tessellation",
-        &[],
-        Left::File("hello_tessellation.png"),
-    ),
+    ("hello_tessellation", &[], Left::File("hello_tessellation.png")),
     ("hello_triangle", &[], Left::File("hello_triangle.png")),
     ("picking", &[], Left::Text(": Gaussian ")),
-    (
-        "wobbling_gaussians",
-        &[],
-        Left::File("wobbling_gaussians.png"),
-    ),
+    ("wobbling_gaussians", &[], Left::File("wobbling_gaussians.png")),
     ("tilted_plane", &["."], Left::File("surfels.png")),
     ("gallery", &["."], Left::File("GALLERY.md")),
 ];
@@ -149,16 +132,9 @@ fn nothing_is_said_of_the_samples(case: &Case) {
         let folder = tempfile::tempdir().expect("a folder");
         let output = run(&program, &arguments, &layers, folder.path());
         // The gallery shows a transmittance floor that ends pixels at once. The layer's warning of it is right.
-        let shown = if *name == "gallery" {
-            "[GAURAST-Pipeline-alpha-ceiling]"
-        } else {
-            "[]"
-        };
+        let shown = if *name == "gallery" { "[GAURAST-Pipeline-alpha-ceiling]" } else { "[]" };
         let text = said(&output);
-        let text: String = text
-            .split_inclusive('\n')
-            .filter(|line| !line.contains(shown))
-            .collect();
+        let text: String = text.split_inclusive('\n').filter(|line| !line.contains(shown)).collect();
         let is_silent = output.stderr.is_empty();
         assert!(is_silent || *name == "gallery", "{layers}: {text}");
         for layer in [OWN, KHRONOS, "VUID", "UNASSIGNED"] {

@@ -25,11 +25,7 @@ fn within(gpu: &Gpu, record: impl FnOnce(&Commands)) -> Vec<Message> {
 }
 
 /// The messages of a set of two draws with a change between them.
-fn changed(
-    gpu: &Gpu,
-    dynamic: Option<vk::DynamicState>,
-    change: impl FnOnce(&Commands),
-) -> Vec<Message> {
+fn changed(gpu: &Gpu, dynamic: Option<vk::DynamicState>, change: impl FnOnce(&Commands)) -> Vec<Message> {
     let mut request = splats();
     request.dynamic.extend(dynamic);
     drawing(gpu, &request, &[SPLAT; 2], |commands| {
@@ -50,68 +46,46 @@ pub fn mistakes() -> Vec<Mistake> {
     let not_ended = "VUID-vkCmdBeginGaussianSetGAURAST-None-90003";
     let other = "VUID-vkCmdDraw-None-90006";
     vec![
-        mistake(
-            "a set without its feature",
-            "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
-            |stage| within(&stage.bare, begin),
-        ),
-        mistake(
-            "a set outside of a render pass",
-            "VUID-vkCmdBeginGaussianSetGAURAST-renderpass",
-            |stage| recording(&stage.full, begin),
-        ),
-        mistake(
-            "a set within a set",
-            "VUID-vkCmdBeginGaussianSetGAURAST-None-90002",
-            |stage| {
-                within(&stage.full, |commands| {
-                    begin(commands);
-                    begin(commands);
-                    end(commands);
-                })
-            },
-        ),
-        mistake("a set that the pass ends before", not_ended, |stage| {
-            within(&stage.full, begin)
+        mistake("a set without its feature", "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001", |stage| {
+            within(&stage.bare, begin)
         }),
-        mistake(
-            "secondary command buffers within a set",
-            not_ended,
-            |stage| {
-                let target = Target::floats(&stage.full, SIZE);
-                let inheritance = vk::CommandBufferInheritanceInfo::default();
-                let secondary = stage.full.record_as(
-                    vk::CommandBufferLevel::SECONDARY,
-                    &vk::CommandBufferBeginInfo::default().inheritance_info(&inheritance),
-                    |_| (),
-                );
-                let secondary = secondary.expect("a secondary command buffer");
-                recording(&stage.full, |commands| {
-                    commands.pass(&target, &Pass::zeros(), || {
-                        begin(commands);
-                        // SAFETY: see the crate.
-                        unsafe {
-                            commands
-                                .device()
-                                .cmd_execute_commands(commands.raw, &[secondary.raw]);
-                        };
-                    });
-                })
-            },
-        ),
-        mistake(
-            "the end of a set that has not begun",
-            "VUID-vkCmdEndGaussianSetGAURAST-None-90004",
-            |stage| within(&stage.full, end),
-        ),
-        mistake(
-            "another pipeline within a set",
-            "VUID-vkCmdDraw-None-90005",
-            |stage| {
-                let pipeline = splats().create(&stage.full).expect("a pipeline");
-                changed(&stage.full, None, |commands| commands.bind(&pipeline))
-            },
-        ),
+        mistake("a set outside of a render pass", "VUID-vkCmdBeginGaussianSetGAURAST-renderpass", |stage| {
+            recording(&stage.full, begin)
+        }),
+        mistake("a set within a set", "VUID-vkCmdBeginGaussianSetGAURAST-None-90002", |stage| {
+            within(&stage.full, |commands| {
+                begin(commands);
+                begin(commands);
+                end(commands);
+            })
+        }),
+        mistake("a set that the pass ends before", not_ended, |stage| within(&stage.full, begin)),
+        mistake("secondary command buffers within a set", not_ended, |stage| {
+            let target = Target::floats(&stage.full, SIZE);
+            let inheritance = vk::CommandBufferInheritanceInfo::default();
+            let secondary = stage.full.record_as(
+                vk::CommandBufferLevel::SECONDARY,
+                &vk::CommandBufferBeginInfo::default().inheritance_info(&inheritance),
+                |_| (),
+            );
+            let secondary = secondary.expect("a secondary command buffer");
+            recording(&stage.full, |commands| {
+                commands.pass(&target, &Pass::zeros(), || {
+                    begin(commands);
+                    // SAFETY: see the crate.
+                    unsafe {
+                        commands.device().cmd_execute_commands(commands.raw, &[secondary.raw]);
+                    };
+                });
+            })
+        }),
+        mistake("the end of a set that has not begun", "VUID-vkCmdEndGaussianSetGAURAST-None-90004", |stage| {
+            within(&stage.full, end)
+        }),
+        mistake("another pipeline within a set", "VUID-vkCmdDraw-None-90005", |stage| {
+            let pipeline = splats().create(&stage.full).expect("a pipeline");
+            changed(&stage.full, None, |commands| commands.bind(&pipeline))
+        }),
         mistake("another camera within a set", other, |stage| {
             changed(&stage.full, None, |commands| {
                 commands.camera(&camera().eye([0.1, 0.0, 0.0]));

@@ -5,14 +5,12 @@ use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST, GaussianProjectionModeGAURAST,
     GaussianResolveInputLocationsGAURAST, GaussianVertexOutputLocationsGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::loader::LAYER;
 use gaurast_testkit::{
-    Bindings, Buffer, Commands, Driver, Gpu, Graphics, Message, Opening, Pass, Resource, Shader,
-    Target, binding, over,
+    Bindings, Buffer, Commands, Driver, Gpu, Graphics, Message, Opening, Pass, Resource, Shader, Target, binding, over,
 };
 
 /// Devices under the layer.
@@ -42,11 +40,7 @@ impl Stage {
         let stage = Self {
             full: open(None),
             bare: open(Some(Features::default().gaussian_primitive_topology(true))),
-            resolving: open(Some(
-                Features::default()
-                    .gaussian_primitive_topology(true)
-                    .resolve_fragment_shader(true),
-            )),
+            resolving: open(Some(Features::default().gaussian_primitive_topology(true).resolve_fragment_shader(true))),
             without: open(Some(Features::default())),
         };
         // That nothing is enabled was said.
@@ -79,9 +73,7 @@ pub fn said_by_the_driver(messages: &[Message]) -> Vec<Message> {
 pub type Splat = [f32; 14];
 
 /// A Gaussian ahead of [`camera`].
-pub const SPLAT: Splat = [
-    0.0, 0.0, 5.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.8, 0.5, 0.5, 0.5,
-];
+pub const SPLAT: Splat = [0.0, 0.0, 5.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.8, 0.5, 0.5, 0.5];
 /// The offsets of the parts of a [`Splat`].
 pub const SCALE: usize = 3;
 pub const ROTATION: usize = 6;
@@ -98,9 +90,7 @@ pub const SIZE: [u32; 2] = [64, 48];
 
 /// Looks along +z from the origin.
 pub fn camera() -> GaussianCameraGAURAST<'static> {
-    GaussianCameraGAURAST::default()
-        .focal_length([100.0, 100.0])
-        .principal_point([32.0, 24.0])
+    GaussianCameraGAURAST::default().focal_length([100.0, 100.0]).principal_point([32.0, 24.0])
 }
 
 pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -114,27 +104,13 @@ pub fn locations() -> GaussianAttributeLocationsGAURAST {
         .first_spherical_harmonics(4)
 }
 
-pub fn attribute(
-    location: u32,
-    binding: u32,
-    format: vk::Format,
-    floats: u32,
-) -> vk::VertexInputAttributeDescription {
-    vk::VertexInputAttributeDescription {
-        location,
-        binding,
-        format,
-        offset: 4 * floats,
-    }
+pub fn attribute(location: u32, binding: u32, format: vk::Format, floats: u32) -> vk::VertexInputAttributeDescription {
+    vk::VertexInputAttributeDescription { location, binding, format, offset: 4 * floats }
 }
 
 /// A right pipeline for [`Splat`]s, to be changed before it is created.
 pub fn splats() -> Graphics<'static> {
-    let (one, three, four) = (
-        vk::Format::R32_SFLOAT,
-        vk::Format::R32G32B32_SFLOAT,
-        vk::Format::R32G32B32A32_SFLOAT,
-    );
+    let (one, three, four) = (vk::Format::R32_SFLOAT, vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT);
     Graphics {
         topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
         attributes: vec![
@@ -154,28 +130,20 @@ pub fn splats() -> Graphics<'static> {
 /// The same with a change of the Gaussian state.
 pub fn with(change: impl FnOnce(State) -> State) -> Graphics<'static> {
     let request = splats();
-    Graphics {
-        gaussian: request.gaussian.map(change),
-        ..request
-    }
+    Graphics { gaussian: request.gaussian.map(change), ..request }
 }
 
 /// A matrix's rows and a factor of the opacity.
 pub type Model = [f32; 13];
 
-pub const IDENTITY: Model = [
-    1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0,
-];
+pub const IDENTITY: Model = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0];
 
 /// A pipeline with a [`Model`] for each instance from binding 1.
 pub fn instanced() -> Graphics<'static> {
-    let mut request =
-        with(|s| s.attribute_locations(locations().first_model_matrix(9).model_opacity(12)));
+    let mut request = with(|s| s.attribute_locations(locations().first_model_matrix(9).model_opacity(12)));
     let row = |row: u32| attribute(9 + row, 1, vk::Format::R32G32B32A32_SFLOAT, 4 * row);
     request.attributes.extend((0..3).map(row));
-    request
-        .attributes
-        .push(attribute(12, 1, vk::Format::R32_SFLOAT, 12));
+    request.attributes.push(attribute(12, 1, vk::Format::R32_SFLOAT, 12));
     request.bindings.push(vk::VertexInputBindingDescription {
         binding: 1,
         stride: size_of::<Model>() as u32,
@@ -201,32 +169,19 @@ pub(crate) use spirv;
 pub fn laid_out(gpu: &Gpu, request: Graphics<'static>) -> (Graphics<'static>, Bindings, Buffer) {
     let buffer = Buffer::new(gpu, 1 << 16);
     let set = Bindings::new(gpu, &[Resource::Storage(buffer.raw)]);
-    let push = vk::PushConstantRange::default()
-        .stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS)
-        .size(128);
-    let request = Graphics {
-        set_layouts: vec![set.layout],
-        push: vec![push],
-        ..request
-    };
+    let push = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS).size(128);
+    let request = Graphics { set_layouts: vec![set.layout], push: vec![push], ..request };
     (request, set, buffer)
 }
 
 pub fn outputs() -> GaussianVertexOutputLocationsGAURAST {
-    GaussianVertexOutputLocationsGAURAST::default()
-        .covariance(1)
-        .opacity(3)
-        .color(4)
-        .depth_key(6)
+    GaussianVertexOutputLocationsGAURAST::default().covariance(1).opacity(3).color(4).depth_key(6)
 }
 
 /// A pipeline whose vertex shader projects.
 pub fn shaded(change: impl FnOnce(State) -> State) -> Graphics<'static> {
     let request = with(|s| {
-        change(
-            s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)
-                .vertex_output_locations(outputs()),
-        )
+        change(s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER).vertex_output_locations(outputs()))
     });
     // The shader takes harmonics from its storage buffer.
     let mut request = request.with_shader(Shader::vertex(spirv!("gaussian.vert")));
@@ -240,9 +195,7 @@ pub fn resolved(
     [accumulated, depth]: [u32; 2],
     change: impl FnOnce(State) -> State,
 ) -> Graphics<'static> {
-    let locations = GaussianResolveInputLocationsGAURAST::default()
-        .accumulated_color(accumulated)
-        .depth(depth);
+    let locations = GaussianResolveInputLocationsGAURAST::default().accumulated_color(accumulated).depth(depth);
     let request = with(|s| change(s.resolve_input_locations(locations)));
     request.with_shader(Shader::fragment(words))
 }
@@ -263,12 +216,7 @@ pub fn recording(gpu: &Gpu, record: impl FnOnce(&Commands)) -> Vec<Message> {
 }
 
 /// The messages as a pass is recorded and executed, in which a pipeline and Gaussians are bound.
-pub fn drawing(
-    gpu: &Gpu,
-    request: &Graphics<'_>,
-    splats: &[Splat],
-    record: impl FnOnce(&Commands),
-) -> Vec<Message> {
+pub fn drawing(gpu: &Gpu, request: &Graphics<'_>, splats: &[Splat], record: impl FnOnce(&Commands)) -> Vec<Message> {
     gpu.messages();
     let pipeline = request.create(gpu).expect("a pipeline");
     let target = Target::floats(gpu, SIZE);
@@ -311,33 +259,17 @@ pub struct Mistake {
     pub make: Make,
 }
 
-pub fn mistake(
-    name: &'static str,
-    id: &'static str,
-    make: impl Fn(&Stage) -> Vec<Message> + 'static,
-) -> Mistake {
-    Mistake {
-        name,
-        id,
-        make: Box::new(make),
-    }
+pub fn mistake(name: &'static str, id: &'static str, make: impl Fn(&Stage) -> Vec<Message> + 'static) -> Mistake {
+    Mistake { name, id, make: Box::new(make) }
 }
 
 /// A pipeline that is wrong, on the device with all features.
-pub fn pipeline(
-    name: &'static str,
-    id: &'static str,
-    request: impl Fn() -> Graphics<'static> + 'static,
-) -> Mistake {
+pub fn pipeline(name: &'static str, id: &'static str, request: impl Fn() -> Graphics<'static> + 'static) -> Mistake {
     mistake(name, id, move |stage| creation(&stage.full, &request()))
 }
 
 /// A wrong pipeline whose shaders need a layout.
-pub fn shaders(
-    name: &'static str,
-    id: &'static str,
-    request: impl Fn() -> Graphics<'static> + 'static,
-) -> Mistake {
+pub fn shaders(name: &'static str, id: &'static str, request: impl Fn() -> Graphics<'static> + 'static) -> Mistake {
     mistake(name, id, move |stage| {
         let (request, _set, _buffer) = laid_out(&stage.full, request());
         creation(&stage.full, &request)

@@ -8,19 +8,12 @@ use super::lavapipe;
 fn check(context: &Context) {
     for kernel in all(Size::Small) {
         let place = format!("{} on {}", kernel.name, context.name);
-        let prepared = context
-            .prepare(&kernel)
-            .unwrap_or_else(|error| panic!("{place}: {error}"));
-        prepared
-            .run()
-            .unwrap_or_else(|error| panic!("{place}: {error}"));
+        let prepared = context.prepare(&kernel).unwrap_or_else(|error| panic!("{place}: {error}"));
+        prepared.run().unwrap_or_else(|error| panic!("{place}: {error}"));
         for expected in &kernel.expected {
             let found = prepared.read(expected.binding);
             if let Some((index, difference)) = expected.values.difference(&found) {
-                panic!(
-                    "{place}: word {index} of binding {}: {difference}",
-                    expected.binding
-                );
+                panic!("{place}: word {index} of binding {}: {difference}", expected.binding);
             }
         }
     }

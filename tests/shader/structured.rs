@@ -36,10 +36,7 @@ fn kernel(spirv: &[u32], inputs: &[[u32; 2]], programs: usize) -> Kernel {
         name: "structured",
         spirv: Cow::Owned(bytemuck::pod_collect_to_vec(spirv)),
         specialization: Vec::new(),
-        buffers: vec![
-            inputs.as_flattened().to_vec(),
-            vec![0xdead_beef; 2 * INVOCATIONS * programs],
-        ],
+        buffers: vec![inputs.as_flattened().to_vec(), vec![0xdead_beef; 2 * INVOCATIONS * programs]],
         uniform: None,
         push: Vec::new(),
         groups: [1, 1, 1],
@@ -54,20 +51,12 @@ fn differences(
     rewrite: impl Fn(Vec<u32>) -> Vec<u32>,
 ) -> Vec<(u64, String)> {
     let inputs = inputs();
-    let programs: Vec<Program> = seeds
-        .clone()
-        .into_par_iter()
-        .map(|seed| generate(seed, &inputs))
-        .collect();
+    let programs: Vec<Program> = seeds.clone().into_par_iter().map(|seed| generate(seed, &inputs)).collect();
     let spirv = rewrite(assemble(&programs));
     let kernel = kernel(&spirv, &inputs, programs.len());
     let place = || format!("seeds {seeds:?} on {}", context.name);
-    let prepared = context
-        .prepare(&kernel)
-        .unwrap_or_else(|error| panic!("{}: {error}", place()));
-    prepared
-        .run()
-        .unwrap_or_else(|error| panic!("{}: {error}", place()));
+    let prepared = context.prepare(&kernel).unwrap_or_else(|error| panic!("{}: {error}", place()));
+    prepared.run().unwrap_or_else(|error| panic!("{}: {error}", place()));
     let found = prepared.read(1);
     let mut wrong = Vec::new();
     for ((seed, program), found) in seeds.zip(&programs).zip(found.chunks(2 * INVOCATIONS)) {
@@ -88,21 +77,14 @@ fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -
     let listed: Vec<u64> = list
         .lines()
         .filter(|line| !line.starts_with('#'))
-        .map(|line| {
-            line.split_once(": ")
-                .expect("a seed, a colon and a reason")
-                .0
-        })
+        .map(|line| line.split_once(": ").expect("a seed, a colon and a reason").0)
         .map(|seed| seed.parse().expect("a number"))
         .collect();
     let wrong: Vec<(u64, String)> = (0..seeds)
         .step_by(PROGRAMS as usize)
         .flat_map(|first| differences(context, first..(first + PROGRAMS).min(seeds), rewrite))
         .collect();
-    let unlisted: Vec<_> = wrong
-        .iter()
-        .filter(|(seed, _)| !listed.contains(seed))
-        .collect();
+    let unlisted: Vec<_> = wrong.iter().filter(|(seed, _)| !listed.contains(seed)).collect();
     assert!(
         unlisted.len() <= 2 * listed.len(),
         "{}: of {seeds} programs {} are wrong, and of these the list lacks {unlisted:#?}",
@@ -138,10 +120,5 @@ fn optimized_programs_give_the_same() {
 
 #[gaurast_runner::test(needs = [Need::Lavapipe])]
 fn random_programs_give_the_same_on_lavapipe() {
-    check(
-        &lavapipe(),
-        SAMPLE,
-        include_str!("../expected_failures/lavapipe_structured.txt"),
-        |words| words,
-    );
+    check(&lavapipe(), SAMPLE, include_str!("../expected_failures/lavapipe_structured.txt"), |words| words);
 }

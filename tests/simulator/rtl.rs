@@ -45,13 +45,7 @@ struct Design {
 
 impl Design {
     const fn of_presets(name: &'static str, format: Format) -> Self {
-        Self {
-            name,
-            format,
-            parameters: &[],
-            exponential: Exponential::Table,
-            bench: OnceLock::new(),
-        }
+        Self { name, format, parameters: &[], exponential: Exponential::Table, bench: OnceLock::new() }
     }
 
     /// The other design of each unit: an adder with two paths, Booth's multiplier and the polynomial.
@@ -113,9 +107,7 @@ fn units_compute_the_models_bits(case: &Case) {
                 // Numbers with magnitudes near 1.
                 _ => {
                     let exponent = (format.bias() + random.random_range(-8..8)) as u32;
-                    let rest = random.random::<u32>()
-                        & mask
-                        & !(((1 << format.exponent) - 1) << format.mantissa);
+                    let rest = random.random::<u32>() & mask & !(((1 << format.exponent) - 1) << format.mantissa);
                     rest | exponent << format.mantissa
                 }
             };
@@ -146,10 +138,7 @@ fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
     let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
     for (index, (ours, theirs)) in rasterized.pixels.iter().zip(&drawn).enumerate() {
         for (pixel, (ours, theirs)) in ours.iter().zip(&theirs.pixels).enumerate() {
-            assert_eq!(
-                ours, theirs,
-                "list {index}, pixel {pixel}: {ours:x?} {theirs:x?}"
-            );
+            assert_eq!(ours, theirs, "list {index}, pixel {pixel}: {ours:x?} {theirs:x?}");
         }
     }
     drawn
@@ -165,10 +154,7 @@ fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
         let module = design.module(setting);
         let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
         let drawn = compare(bench, &module, &lists);
-        contributions += drawn
-            .iter()
-            .map(|drawn| drawn.work.contributions)
-            .sum::<u64>();
+        contributions += drawn.iter().map(|drawn| drawn.work.contributions).sum::<u64>();
     }
     assert!(contributions > 1000 * count as u64, "{contributions}");
 }
@@ -188,10 +174,7 @@ fn the_module_draws_real_tiles_as_the_model_does(case: &Case) {
         let lists = view.lists(format, None, count, 5);
         assert_eq!(lists.len(), count);
         let drawn = compare(bench, &module, &lists);
-        contributions += drawn
-            .iter()
-            .map(|drawn| drawn.work.contributions)
-            .sum::<u64>();
+        contributions += drawn.iter().map(|drawn| drawn.work.contributions).sum::<u64>();
     }
     assert!(contributions > 1000 * count as u64, "{contributions}");
 }
@@ -206,11 +189,7 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
         let cycles = Cycles::of(bench, setting, format, &lists).expect("cycles");
         let [all, busy, dependency, memory, controller, modes] = cycles.by_cause();
         let near = |[ours, model]: [f64; 2], share: f64| {
-            assert!(
-                (ours - model).abs() <= share * all[1],
-                "{setting:?}: {:?}",
-                cycles.by_cause()
-            );
+            assert!((ours - model).abs() <= share * all[1], "{setting:?}: {:?}", cycles.by_cause());
         };
         near(all, if setting.masked { 0.12 } else { 0.08 });
         // In the module, pixels in the pipeline finish later than in the model.
@@ -221,10 +200,7 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
         near(memory, 0.12);
         near(controller, 0.01);
         near(modes, 0.04);
-        assert_eq!(
-            cycles.latency,
-            Latencies::of(format, Exponential::Table).longest() + 1
-        );
+        assert_eq!(cycles.latency, Latencies::of(format, Exponential::Table).longest() + 1);
     }
 }
 
@@ -244,15 +220,9 @@ fn the_presets_have_the_latencies_of_the_module() {
 fn yosys_reads_the_module() {
     let folder = folder().join("yosys");
     rtl::write(&folder).expect("files");
-    let script = format!(
-        "read_verilog -sv -I. {}; hierarchy -check -top raster_module",
-        rtl::sources().join(" ")
-    );
-    let output = std::process::Command::new("yosys")
-        .current_dir(&folder)
-        .args(["-q", "-p", &script])
-        .output()
-        .expect("yosys");
+    let script = format!("read_verilog -sv -I. {}; hierarchy -check -top raster_module", rtl::sources().join(" "));
+    let output =
+        std::process::Command::new("yosys").current_dir(&folder).args(["-q", "-p", &script]).output().expect("yosys");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
 }

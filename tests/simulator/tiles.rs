@@ -35,18 +35,10 @@ impl View {
     }
 
     /// The lists of `count` random tiles that are not empty, selected by a seed.
-    pub fn lists(
-        &self,
-        format: Format,
-        groups: Option<Groups>,
-        count: usize,
-        seed: u64,
-    ) -> Vec<List> {
+    pub fn lists(&self, format: Format, groups: Option<Groups>, count: usize, seed: u64) -> Vec<List> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let [columns, rows] = self.size.map(|side| side.div_ceil(SIDE as u32));
-        let mut tiles: Vec<_> = (0..columns * rows)
-            .map(|index| [index % columns, index / columns])
-            .collect();
+        let mut tiles: Vec<_> = (0..columns * rows).map(|index| [index % columns, index / columns]).collect();
         let mut lists = Vec::new();
         while lists.len() < count && !tiles.is_empty() {
             let at = tiles.swap_remove(random.random_range(0..tiles.len()));
@@ -63,10 +55,7 @@ impl View {
             .filter(|splat| boxes_touch(splat, corner))
             .filter_map(|splat| primitive(splat, format, groups, corner))
             .collect();
-        (!primitives.is_empty()).then_some(List {
-            mode: Mode::Gaussian,
-            primitives,
-        })
+        (!primitives.is_empty()).then_some(List { mode: Mode::Gaussian, primitives })
     }
 }
 
@@ -85,12 +74,7 @@ fn boxes_touch(splat: &Splat, corner: [f64; 2]) -> bool {
 }
 
 /// A Gaussian of a tile's list, evaluated at all pixels or only in the groups in which it covers a pixel's centre.
-fn primitive(
-    splat: &Splat,
-    format: Format,
-    groups: Option<Groups>,
-    corner: [f64; 2],
-) -> Option<Primitive> {
+fn primitive(splat: &Splat, format: Format, groups: Option<Groups>, corner: [f64; 2]) -> Option<Primitive> {
     let [xx, xy, yy] = splat.covariance;
     let exponent = [-0.5 * yy, xy, -0.5 * xx].map(|value| value / splat.determinant);
     let mean = [0, 1].map(|axis| splat.mean[axis] - corner[axis]);
@@ -116,9 +100,7 @@ fn reached(groups: Groups, mean: [f64; 2], [a, b, c]: [f64; 3], opacity: f64) ->
             opacity * (a * dx * dx + b * dx * dy + c * dy * dy).exp() >= 1.0 / 255.0
         })
     };
-    (0..16).fold(0, |mask, group| {
-        mask | u16::from(is_reached(group)) << group
-    })
+    (0..16).fold(0, |mask, group| mask | u16::from(is_reached(group)) << group)
 }
 
 /// A kind of generated Gaussians.
@@ -137,20 +119,14 @@ pub enum Kind {
 pub const KINDS: [Kind; 4] = [Kind::Needles, Kind::Saturated, Kind::Mixed, Kind::Sparse];
 
 /// A generated list of Gaussians.
-pub fn gaussians(
-    format: Format,
-    groups: Option<Groups>,
-    kind: Kind,
-    random: &mut ChaCha8Rng,
-) -> List {
+pub fn gaussians(format: Format, groups: Option<Groups>, kind: Kind, random: &mut ChaCha8Rng) -> List {
     let count = match kind {
         Kind::Saturated => random.random_range(60..300),
         _ => random.random_range(1..200),
     };
     let mut primitives = Vec::new();
     while primitives.len() < count {
-        let scale =
-            |random: &mut ChaCha8Rng, low: f64, high: f64| random.random_range(low..high).exp();
+        let scale = |random: &mut ChaCha8Rng, low: f64, high: f64| random.random_range(low..high).exp();
         let sigmas = match kind {
             Kind::Needles => {
                 let short = scale(random, -0.7, 0.7);
@@ -166,11 +142,7 @@ pub fn gaussians(
         };
         let (sin, cos) = random.random_range(0.0..std::f64::consts::PI).sin_cos();
         let [u, v] = sigmas.map(|sigma| sigma.powi(-2));
-        let [a, b, c] = [
-            u * cos * cos + v * sin * sin,
-            2.0 * (u - v) * sin * cos,
-            u * sin * sin + v * cos * cos,
-        ];
+        let [a, b, c] = [u * cos * cos + v * sin * sin, 2.0 * (u - v) * sin * cos, u * sin * sin + v * cos * cos];
         let exponent = [a, b, c].map(|value| -0.5 * value);
         let mean = [0; 2].map(|_| random.random_range(-4.0..20.0));
         let mask = groups.map_or(u16::MAX, |groups| reached(groups, mean, exponent, opacity));
@@ -186,10 +158,7 @@ pub fn gaussians(
         );
         primitives.push(Primitive::Gaussian(mask, gaussian));
     }
-    List {
-        mode: Mode::Gaussian,
-        primitives,
-    }
+    List { mode: Mode::Gaussian, primitives }
 }
 
 /// A generated list of triangles, some of them needles, each of which covers a part of the tile.
@@ -214,11 +183,7 @@ pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> Lis
             let b = (d2 * (q[0] - p[0]) - d1 * (r[0] - p[0])) / area;
             [a, b, values[0] - a * p[0] - b * p[1]].map(|value| value as f32)
         };
-        let planes = [
-            plane([0.0, inverse[1], 0.0]),
-            plane([0.0, 0.0, inverse[2]]),
-            plane(inverse),
-        ];
+        let planes = [plane([0.0, inverse[1], 0.0]), plane([0.0, 0.0, inverse[2]]), plane(inverse)];
         let weight = |[a, b, c]: [f32; 3], x: f32, y: f32| a * x + b * y + c;
         let covers = |group: usize| {
             (0..16).any(|lane| {
@@ -232,20 +197,11 @@ pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> Lis
             primitives.push(Primitive::Triangle(mask, Triangle::new(format, planes)));
         }
     }
-    List {
-        mode: Mode::Triangle,
-        primitives,
-    }
+    List { mode: Mode::Triangle, primitives }
 }
 
 /// Generated lists: each kind of Gaussians, then triangles, and again from the first.
-pub fn generated(
-    format: Format,
-    groups: Groups,
-    masked: bool,
-    count: usize,
-    seed: u64,
-) -> Vec<List> {
+pub fn generated(format: Format, groups: Groups, masked: bool, count: usize, seed: u64) -> Vec<List> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let list = |index: usize| match KINDS.get(index % (KINDS.len() + 1)) {
         Some(&kind) => gaussians(format, masked.then_some(groups), kind, &mut random),

@@ -74,10 +74,7 @@ pub fn held(options: &TargetOptions, output: &Output) -> Vec<Held> {
             // A float depth, or a sample of a depth that was fetched as a float.
             _ => {
                 let texels = picture.texels::<f32>();
-                texels
-                    .into_iter()
-                    .map(|depth| format.code(depth.into()))
-                    .collect()
+                texels.into_iter().map(|depth| format.code(depth.into())).collect()
             }
         }
     };

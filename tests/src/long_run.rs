@@ -6,9 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::scenes::{Gaussian, SceneBuffers};
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over};
 
 /// The number of scenes.
 pub const SCENES: usize = 24;
@@ -31,17 +29,11 @@ impl Scene {
         let mut gaussian = |_| {
             let z = rng.random_range(1.0..6.0f32);
             Gaussian {
-                position: [
-                    z * rng.random_range(-0.8..0.8),
-                    z * rng.random_range(-0.8..0.8),
-                    z,
-                ],
+                position: [z * rng.random_range(-0.8..0.8), z * rng.random_range(-0.8..0.8), z],
                 scale: [0; 3].map(|_| rng.random_range(-7.0..0.5f32).exp()),
                 rotation: [0; 4].map(|_| rng.random_range(-1.0..1.0)),
                 opacity: rng.random_range(0.0..1.1),
-                sh: (0..(degree + 1) * (degree + 1))
-                    .map(|_| [0; 3].map(|_| rng.random_range(-1.0..1.5)))
-                    .collect(),
+                sh: (0..(degree + 1) * (degree + 1)).map(|_| [0; 3].map(|_| rng.random_range(-1.0..1.5))).collect(),
             }
         };
         let count = 1 + number * 37 % 700;
@@ -57,10 +49,7 @@ impl Scene {
                 ][number % 3],
             )
             .antialiasing(
-                [
-                    GaussianAntialiasingGAURAST::DILATE,
-                    GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
-                ][number % 2],
+                [GaussianAntialiasingGAURAST::DILATE, GaussianAntialiasingGAURAST::OPACITY_COMPENSATED][number % 2],
             )
             .transmittance_floor([1e-4, 0.0][number / 2 % 2]);
         options.blend = vec![over()];
@@ -107,11 +96,7 @@ pub struct Report {
 /// # Panics
 /// If a scene's picture differs from its first one, or if memory grows by more than 16 MiB.
 pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
-    let gpu = Gpu::embedded(&Settings {
-        threads: Some(2),
-        ..Settings::default()
-    })
-    .expect("a device");
+    let gpu = Gpu::embedded(&Settings { threads: Some(2), ..Settings::default() }).expect("a device");
     let scenes: Vec<_> = (0..SCENES).map(Scene::new).collect();
     let first: Vec<_> = scenes.iter().map(|scene| scene.draw(&gpu)).collect();
     assert!(first.iter().flatten().any(|pixel| pixel[3] > 0.0));
@@ -121,9 +106,7 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
         let number = rng.random_range(0..SCENES);
         let drawn = scenes[number].draw(&gpu);
         let same = drawn.iter().zip(&first[number]);
-        let same = same
-            .clone()
-            .all(|(a, b)| a.map(f32::to_bits) == b.map(f32::to_bits));
+        let same = same.clone().all(|(a, b)| a.map(f32::to_bits) == b.map(f32::to_bits));
         assert!(same, "scene {number} is another in frame {frame}");
         if (1..=4).any(|quarter| frame + 1 == quarter * frames / 4) {
             held.push(memory("VmRSS:"));
@@ -134,10 +117,7 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
     let held: Option<Vec<_>> = held.into_iter().collect();
     let memory = held.and_then(|held| <[u64; 6]>::try_from(held).ok());
     if let Some([_, early, .., late, _]) = memory {
-        assert!(
-            late <= early + (16 << 20),
-            "memory grew from {early} to {late} bytes"
-        );
+        assert!(late <= early + (16 << 20), "memory grew from {early} to {late} bytes");
     }
     assert!(gpu.messages().is_empty(), "nothing went wrong");
     Report { frames, memory }

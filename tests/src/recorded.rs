@@ -11,22 +11,9 @@ use timing_studies::stepped;
 /// Machines on which traces are run: a preset, and its changed parameters.
 const MACHINES: [(&str, &[&str]); 6] = [
     ("paper-15x16", &[]),
-    (
-        "paper-15x16",
-        &[
-            "saturation=reached",
-            "triangle_traversal=reached",
-            "hierarchical_depth=true",
-        ],
-    ),
-    (
-        "paper-15x16",
-        &["saturation=none", "batch=128", "mode_switch=100"],
-    ),
-    (
-        "paper-300",
-        &["saturation=block", "memory.bandwidth_gb_s=20"],
-    ),
+    ("paper-15x16", &["saturation=reached", "triangle_traversal=reached", "hierarchical_depth=true"]),
+    ("paper-15x16", &["saturation=none", "batch=128", "mode_switch=100"]),
+    ("paper-300", &["saturation=block", "memory.bandwidth_gb_s=20"]),
     ("single-module", &["saturation=row", "batch=8"]),
     ("fp16", &["saturation=reached", "port_bytes_per_cycle=4"]),
 ];
@@ -61,14 +48,8 @@ impl Agreement {
                 let slow = stepped::rasterize(frame, &machine, 0.0);
                 let name = format!("{name}, frame {number}, {preset} {settings:?}");
                 assert_eq!(fast.switches, slow.switches, "{name}");
-                assert_eq!(
-                    fast.gaussian_evaluations, slow.gaussian_evaluations,
-                    "{name}"
-                );
-                assert_eq!(
-                    fast.triangle_evaluations, slow.triangle_evaluations,
-                    "{name}"
-                );
+                assert_eq!(fast.gaussian_evaluations, slow.gaussian_evaluations, "{name}");
+                assert_eq!(fast.triangle_evaluations, slow.triangle_evaluations, "{name}");
                 if slow.cycles > 0.0 {
                     let error = (fast.cycles - slow.cycles).abs() / slow.cycles;
                     self.errors.push((error, name));
@@ -84,8 +65,7 @@ impl Agreement {
     pub fn judge(&self, least: usize) {
         let worst = self.errors.iter().max_by(|a, b| a.0.total_cmp(&b.0));
         let (worst, name) = worst.expect("traces of something");
-        let mean =
-            self.errors.iter().map(|(error, _)| error).sum::<f64>() / self.errors.len() as f64;
+        let mean = self.errors.iter().map(|(error, _)| error).sum::<f64>() / self.errors.len() as f64;
         assert!(self.errors.len() >= least, "{} runs", self.errors.len());
         assert!(*worst <= 0.02, "{name}: {worst}");
         assert!(mean <= 0.005, "mean {mean}");

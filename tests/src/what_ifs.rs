@@ -53,11 +53,7 @@ const SCENES: [(&str, &str, bool); 2] = [
         "Triangles first: a wall and columns, with depth; then the generated garden's Gaussians, of which they hide some.",
         true,
     ),
-    (
-        "The garden alone",
-        "The same Gaussians, with nothing to hide them but themselves.",
-        false,
-    ),
+    ("The garden alone", "The same Gaussians, with nothing to hide them but themselves.", false),
 ];
 
 /// Presets of the hardware: with fifteen modules memory is the bottleneck, with one the PEs are.
@@ -68,20 +64,14 @@ fn to_clip() -> ToClip {
     let camera = gaurast_scene::garden::camera(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 1000.0f32);
     let depth = [far / (far - near), -near * far / (far - near)];
-    ToClip {
-        camera: camera.to_vulkan().depth_coefficients(depth),
-        size: SIZE,
-    }
+    ToClip { camera: camera.to_vulkan().depth_coefficients(depth), size: SIZE }
 }
 
 /// A wall across the view, and columns in front of it.
 fn colonnade(to_clip: &ToClip) -> Vec<Vertex> {
     // The middle of the wall, about three units in front of the eye; y is up.
     let middle = DVec3::new(1.0, 0.0, 2.6);
-    let (along, away) = (
-        DVec3::new(0.925, 0.0, -0.38),
-        DVec3::new(-0.38, 0.0, -0.925),
-    );
+    let (along, away) = (DVec3::new(0.925, 0.0, -0.38), DVec3::new(-0.38, 0.0, -0.925));
     let mut vertices = Vec::new();
     let mut wall = |[from, to]: [f64; 2], height: f64, behind: f64, shade: f32| {
         let corner = |at: f64, y: f64| {
@@ -108,27 +98,11 @@ fn colonnade(to_clip: &ToClip) -> Vec<Vertex> {
 /// Draws the garden, with or without the colonnade.
 fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
     let to_clip = to_clip();
-    let target = Target::new(
-        gpu,
-        &TargetOptions {
-            size: SIZE,
-            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
-        },
-    );
+    let target = Target::new(gpu, &TargetOptions { size: SIZE, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) });
     let depth_stencil = depth_test(vk::CompareOp::LESS);
-    let triangles = Pipeline::new(
-        gpu,
-        &target,
-        &PipelineOptions {
-            depth_stencil,
-            ..PipelineOptions::default()
-        },
-    );
+    let triangles = Pipeline::new(gpu, &target, &PipelineOptions { depth_stencil, ..PipelineOptions::default() });
     let buffers = SceneBuffers::from(&gaurast_scene::garden::scene(1, GAUSSIANS));
-    let options = GaussianOptions {
-        depth_stencil,
-        ..GaussianOptions::over(buffers.degree, &target)
-    };
+    let options = GaussianOptions { depth_stencil, ..GaussianOptions::over(buffers.degree, &target) };
     let gaussians = GaussianPipeline::new(gpu, &options);
     let scene = GaussianScene::new(gpu, &buffers);
     let walls = colonnade(&to_clip);
@@ -147,10 +121,7 @@ fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
 /// the same on every processor.
 fn work(with_colonnade: bool) -> (FrameWork, Output) {
     let folder = std::env::temp_dir();
-    let path = folder.join(format!(
-        "what_ifs-{}-{with_colonnade}.json",
-        std::process::id()
-    ));
+    let path = folder.join(format!("what_ifs-{}-{with_colonnade}.json", std::process::id()));
     let gpu = Gpu::embedded(&Settings {
         simd: Some(gaurast_runner::SIMD_LEVELS[0]),
         trace: Some(&path),
@@ -171,18 +142,11 @@ fn table(out: &mut String, variants: &[WhatIf], to_first: bool) {
     *out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
     let spent = |variant: &WhatIf| {
         let energy = &variant.simulation.energy;
-        (
-            variant.simulation.raster.cycles,
-            energy.modules() + energy.memory,
-        )
+        (variant.simulation.raster.cycles, energy.modules() + energy.memory)
     };
     for (number, variant) in variants.iter().enumerate() {
         let (cycles, energy) = spent(variant);
-        let before = if to_first {
-            0
-        } else {
-            number.saturating_sub(1)
-        };
+        let before = if to_first { 0 } else { number.saturating_sub(1) };
         let difference = |now: f64, before: f64| match number {
             0 => String::new(),
             _ => format!("{:+.1} %", 100.0 * (now / before - 1.0)),
@@ -210,11 +174,7 @@ fn table(out: &mut String, variants: &[WhatIf], to_first: bool) {
 fn described(frame: &FrameWork) -> String {
     let gaussians = frame.draws.last().expect("a draw of Gaussians");
     let sum = |of: fn(&simdevice::timing::work::TileWork) -> u32| {
-        gaussians
-            .tiles
-            .iter()
-            .map(|tile| u64::from(of(tile)))
-            .sum::<u64>()
+        gaussians.tiles.iter().map(|tile| u64::from(of(tile))).sum::<u64>()
     };
     let percent = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
     let needed = gaussians.needed_pairs();

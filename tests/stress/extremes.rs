@@ -3,8 +3,7 @@
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, TargetOptions,
-    opaque, over,
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, TargetOptions, opaque, over,
 };
 use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
@@ -13,27 +12,15 @@ use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 type Camera = GaussianCameraGAURAST<'static>;
 
 fn gpu() -> Gpu {
-    Gpu::embedded(&Settings {
-        threads: Some(2),
-        ..Settings::default()
-    })
-    .expect("a device")
+    Gpu::embedded(&Settings { threads: Some(2), ..Settings::default() }).expect("a device")
 }
 
 fn camera([width, height]: [u32; 2]) -> Camera {
-    Camera::default()
-        .focal_length([width as f32; 2])
-        .principal_point([0.5 * width as f32, 0.5 * height as f32])
+    Camera::default().focal_length([width as f32; 2]).principal_point([0.5 * width as f32, 0.5 * height as f32])
 }
 
 fn gaussian(z: f32, scale: f32, opacity: f32, color: [f32; 3]) -> Gaussian {
-    Gaussian {
-        position: [0.0, 0.0, z],
-        scale: [scale; 3],
-        rotation: [1.0, 0.0, 0.0, 0.0],
-        opacity,
-        sh: vec![color],
-    }
+    Gaussian { position: [0.0, 0.0, z], scale: [scale; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity, sh: vec![color] }
 }
 
 /// Draws instances of a scene to a target.
@@ -99,8 +86,7 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
     let image: Vec<[f32; 4]> = target.read();
     // All pixels have the same colour, so the oracle draws only one.
-    let view =
-        OracleCamera::new(&camera(size).principal_point([0.5; 2]), [1, 1]).expect("a camera");
+    let view = OracleCamera::new(&camera(size).principal_point([0.5; 2]), [1, 1]).expect("a camera");
     let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
     let middle = image[1024 * 2048 + 1024];
     let judged = verdict(&[middle], &reference, Limits::ENVELOPE_ONLY);
@@ -114,21 +100,12 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
 fn half_float_targets_overflow_to_infinity_at_most() {
     let size = [48, 40];
     let color = [4e5, 1e38, -2e5];
-    let scene = SceneBuffers::new(
-        0,
-        (0..3).map(|z| gaussian(2.0 + z as f32, 0.3, 0.99, color)),
-    );
+    let scene = SceneBuffers::new(0, (0..3).map(|z| gaussian(2.0 + z as f32, 0.3, 0.99, color)));
     let gpu = gpu();
     for blend in [opaque(), over()] {
-        let half = TargetOptions {
-            size,
-            ..TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT)
-        };
+        let half = TargetOptions { size, ..TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT) };
         let target = Target::new(&gpu, &half);
-        let options = GaussianOptions {
-            blend: vec![blend],
-            ..GaussianOptions::over(0, &target)
-        };
+        let options = GaussianOptions { blend: vec![blend], ..GaussianOptions::over(0, &target) };
         draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
         draw(&gpu, &scene, &options, &target, None, 1);
         let texels: Vec<[u16; 4]> = target.read();
@@ -144,39 +121,23 @@ fn half_float_targets_overflow_to_infinity_at_most() {
 fn colors_beyond_every_number_leave_numbers() {
     const MOST: f32 = f32::MAX;
     let size = [48, 40];
-    let colors = [
-        [[MOST; 3]; 9],
-        [[MOST, -MOST, 7e4]; 9],
-        std::array::from_fn(|k| [if k % 2 == 0 { MOST } else { -MOST }; 3]),
-    ];
+    let colors =
+        [[[MOST; 3]; 9], [[MOST, -MOST, 7e4]; 9], std::array::from_fn(|k| [if k % 2 == 0 { MOST } else { -MOST }; 3])];
     let opaque = gaussian(2.0, 50.0, 1.0, [1.0; 3]);
-    let mut gaussians = vec![Gaussian {
-        sh: vec![[1.0; 3]; 9],
-        ..opaque
-    }];
+    let mut gaussians = vec![Gaussian { sh: vec![[1.0; 3]; 9], ..opaque }];
     for (index, color) in (0u8..).zip(colors) {
         let z = 1.0 + f32::from(index);
         for scale in [1e-3, 0.3, 50.0] {
-            gaussians.push(Gaussian {
-                sh: color.to_vec(),
-                ..gaussian(z, scale, 0.5, [0.0; 3])
-            });
+            gaussians.push(Gaussian { sh: color.to_vec(), ..gaussian(z, scale, 0.5, [0.0; 3]) });
         }
     }
     let scene = SceneBuffers::new(2, gaussians);
     let gpu = gpu();
-    for precision in [
-        GaussianPrecisionGAURAST::FLOAT32,
-        GaussianPrecisionGAURAST::FLOAT16,
-    ] {
-        for order in [
-            GaussianOrderGAURAST::VIEW_DEPTH,
-            GaussianOrderGAURAST::PRIMITIVE,
-            GaussianOrderGAURAST::PER_PIXEL,
-        ] {
-            if order == GaussianOrderGAURAST::PER_PIXEL
-                && precision == GaussianPrecisionGAURAST::FLOAT16
-            {
+    for precision in [GaussianPrecisionGAURAST::FLOAT32, GaussianPrecisionGAURAST::FLOAT16] {
+        for order in
+            [GaussianOrderGAURAST::VIEW_DEPTH, GaussianOrderGAURAST::PRIMITIVE, GaussianOrderGAURAST::PER_PIXEL]
+        {
+            if order == GaussianOrderGAURAST::PER_PIXEL && precision == GaussianPrecisionGAURAST::FLOAT16 {
                 continue;
             }
             let mut options = GaussianOptions::new(2);
@@ -190,10 +151,7 @@ fn colors_beyond_every_number_leave_numbers() {
             let target = Target::floats(&gpu, size);
             draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
             let image: Vec<[f32; 4]> = target.read();
-            assert!(
-                image.as_flattened().iter().all(|c| !c.is_nan()),
-                "{precision:?} {order:?}"
-            );
+            assert!(image.as_flattened().iter().all(|c| !c.is_nan()), "{precision:?} {order:?}");
             // In the order of the draw, the opaque one may hide them.
             let is_bright = image.iter().any(|rgba| rgba[0] > 3e4);
             assert!(is_bright || order == GaussianOrderGAURAST::PRIMITIVE);
@@ -246,10 +204,7 @@ fn flushing_to_zero_changes_nothing() {
     let size = [40, 36];
     let black = [-4.0; 3];
     let scene = SceneBuffers::new(0, [gaussian(2.0, 0.2, 0.7, black)]);
-    let options = GaussianOptions {
-        blend: vec![over()],
-        ..GaussianOptions::new(0)
-    };
+    let options = GaussianOptions { blend: vec![over()], ..GaussianOptions::new(0) };
     let picture = || {
         let gpu = gpu();
         let target = Target::floats(&gpu, size);
@@ -258,10 +213,7 @@ fn flushing_to_zero_changes_nothing() {
     };
     let expected = picture();
     let middle = expected[18 * 40 + 20];
-    assert!(
-        middle[0] > 0 && f32::from_bits(middle[0]) < 1e-39,
-        "{middle:?}"
-    );
+    assert!(middle[0] > 0 && f32::from_bits(middle[0]) < 1e-39, "{middle:?}");
     let flushed = {
         let _control = Control::with(FLUSH);
         picture()

@@ -2,9 +2,7 @@
 
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_runner::{Case, Variant, simd_levels};
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -16,9 +14,7 @@ const SIZE: [u32; 2] = [75, 53];
 type Camera = GaussianCameraGAURAST<'static>;
 
 fn camera() -> Camera {
-    Camera::default()
-        .focal_length([60.0; 2])
-        .principal_point([0.5 * SIZE[0] as f32, 0.5 * SIZE[1] as f32])
+    Camera::default().focal_length([60.0; 2]).principal_point([0.5 * SIZE[0] as f32, 0.5 * SIZE[1] as f32])
 }
 
 /// Gaussians at different depths. Their coordinates are multiples of 2^-10 below 16, so that a translation by up to
@@ -47,17 +43,9 @@ fn buffers(gaussians: &[Gaussian]) -> SceneBuffers {
 }
 
 /// Draws sets of Gaussians one after the other, each over the result of the earlier ones.
-fn draw(
-    gpu: &Gpu,
-    sets: &[&[Gaussian]],
-    options: &GaussianOptions,
-    camera: &Camera,
-) -> Vec<[f32; 4]> {
+fn draw(gpu: &Gpu, sets: &[&[Gaussian]], options: &GaussianOptions, camera: &Camera) -> Vec<[f32; 4]> {
     let pipeline = GaussianPipeline::new(gpu, options);
-    let on_device: Vec<_> = sets
-        .iter()
-        .map(|set| GaussianScene::new(gpu, &buffers(set)))
-        .collect();
+    let on_device: Vec<_> = sets.iter().map(|set| GaussianScene::new(gpu, &buffers(set))).collect();
     let target = Target::floats(gpu, SIZE);
     gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
@@ -92,11 +80,7 @@ fn distance(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
 
 /// Few cases, each a whole picture; a failure prints its seed.
 fn cases() -> ProptestConfig {
-    ProptestConfig {
-        cases: 24,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 proptest! {
@@ -288,10 +272,7 @@ fn levels_agree(case: &Case) {
     let property = |(seed, count)| {
         let scene = scene(seed, count);
         let [simplest, other] = levels.map(|level| {
-            let settings = Settings {
-                simd: Some(level),
-                ..Settings::default()
-            };
+            let settings = Settings { simd: Some(level), ..Settings::default() };
             let gpu = Gpu::embedded(&settings).expect("a device");
             draw(&gpu, &[&scene], &without_floors(), &camera())
         });

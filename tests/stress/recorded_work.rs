@@ -12,11 +12,7 @@ fn models_of_the_rasterizer_agree_on_stress_scenes() {
     let mut agreement = Agreement::default();
     for (number, stress) in all().iter().enumerate() {
         let path = folder.path().join(format!("{number}.json"));
-        let gpu = Gpu::embedded(&Settings {
-            trace: Some(&path),
-            ..Settings::default()
-        })
-        .expect("a device");
+        let gpu = Gpu::embedded(&Settings { trace: Some(&path), ..Settings::default() }).expect("a device");
         draw(&gpu, stress);
         drop(gpu);
         agreement.add(stress.name, &read(&path));

@@ -2,8 +2,8 @@
 //! this limit. The limits were chosen before the measurements.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use rand::{Rng, SeedableRng};
@@ -51,17 +51,11 @@ impl Stress {
     }
 
     fn seen_by(self, change: impl FnOnce(Camera) -> Camera) -> Self {
-        Self {
-            camera: change(self.camera),
-            ..self
-        }
+        Self { camera: change(self.camera), ..self }
     }
 
     fn drawn(self, change: impl FnOnce(State) -> State) -> Self {
-        Self {
-            state: change(self.state),
-            ..self
-        }
+        Self { state: change(self.state), ..self }
     }
 
     /// The same scene rasterized in binary16.
@@ -71,11 +65,7 @@ impl Stress {
 
     fn sized(self, size: [u32; 2]) -> Self {
         let focal = 0.8 * size[0].max(size[1]) as f32;
-        Self {
-            camera: camera(size, focal),
-            size,
-            ..self
-        }
+        Self { camera: camera(size, focal), size, ..self }
     }
 
     fn within(self, limit: f64) -> Self {
@@ -83,10 +73,7 @@ impl Stress {
     }
 
     fn invisible(self) -> Self {
-        Self {
-            is_empty: true,
-            ..self
-        }
+        Self { is_empty: true, ..self }
     }
 }
 
@@ -94,20 +81,12 @@ impl Stress {
 const SIZE: [u32; 2] = [131, 97];
 
 fn camera([width, height]: [u32; 2], focal: f32) -> Camera {
-    Camera::default()
-        .focal_length([focal; 2])
-        .principal_point([0.5 * width as f32, 0.5 * height as f32])
+    Camera::default().focal_length([focal; 2]).principal_point([0.5 * width as f32, 0.5 * height as f32])
 }
 
 /// A grey Gaussian without rotation.
 fn gaussian(position: [f32; 3], scale: [f32; 3], opacity: f32) -> Gaussian {
-    Gaussian {
-        position,
-        scale,
-        rotation: [1.0, 0.0, 0.0, 0.0],
-        opacity,
-        sh: vec![[0.3, -0.2, 0.9]],
-    }
+    Gaussian { position, scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity, sh: vec![[0.3, -0.2, 0.9]] }
 }
 
 /// Gaussians in front of the camera with random places, rotations and colours.
@@ -116,11 +95,7 @@ fn many(seed: u64, count: usize, change: impl Fn(&mut ChaCha8Rng, &mut Gaussian)
     let one = |_| {
         let z = rng.random_range(2.0..9.0f32);
         let mut one = gaussian(
-            [
-                z * rng.random_range(-0.6..0.6),
-                z * rng.random_range(-0.5..0.5),
-                z,
-            ],
+            [z * rng.random_range(-0.6..0.6), z * rng.random_range(-0.5..0.5), z],
             [0; 3].map(|_| rng.random_range(0.01..0.3)),
             rng.random_range(0.05..1.0),
         );
@@ -137,20 +112,15 @@ fn layers(count: usize, opacity: impl Fn(usize) -> f32) -> Vec<Gaussian> {
     let one = |index: usize| {
         let z = 2.0 + index as f32 * 1e-3;
         let color = [0, 1, 2].map(|c| ((index * (3 + c)) % 7) as f32 / 2.0 - 1.5);
-        Gaussian {
-            sh: vec![color],
-            ..gaussian([0.0, 0.0, z], [50.0; 3], opacity(index))
-        }
+        Gaussian { sh: vec![color], ..gaussian([0.0, 0.0, z], [50.0; 3], opacity(index)) }
     };
     (0..count).map(one).collect()
 }
 
 const BY_CONTRACT: &str = "the contract: exponents are formed in binary64 and rounded once";
-const BY_LAYERS: &str =
-    "the contract: a layer adds half a unit in the last place, and what is behind weighs less";
+const BY_LAYERS: &str = "the contract: a layer adds half a unit in the last place, and what is behind weighs less";
 
-const BY_WIDE_SUMS: &str =
-    "the contract: where floors are below the usual ones, sums are binary64 and rounded once";
+const BY_WIDE_SUMS: &str = "the contract: where floors are below the usual ones, sums are binary64 and rounded once";
 
 /// Every scene.
 pub fn all() -> Vec<Stress> {
@@ -170,23 +140,15 @@ fn shapes() -> Vec<Stress> {
     };
     const HUGE: f32 = 1e30;
     vec![
-        scaled("needles of ratio 1e6", 1, |rng| {
-            [rng.random_range(1.0..30.0), 1e-5, 1e-5]
-        }),
+        scaled("needles of ratio 1e6", 1, |rng| [rng.random_range(1.0..30.0), 1e-5, 1e-5]),
         scaled("pancakes of ratio 1e6", 2, |rng| {
             let radius = rng.random_range(0.1..3.0);
             [radius, radius, 1e-6]
         }),
-        scaled("giants, thousands of screens wide", 3, |rng| {
-            [0; 3].map(|_| rng.random_range(1e3..1e5))
-        }),
+        scaled("giants, thousands of screens wide", 3, |rng| [0; 3].map(|_| rng.random_range(1e3..1e5))),
         scaled("dust of 1e-6 pixels", 4, |_| [1e-7; 3]),
-        scaled("deviations beyond 1e9 pixels", 5, |rng| {
-            [0; 3].map(|_| rng.random_range(1e8..1e12))
-        }),
-        scaled("scales near binary32's greatest", 6, |rng| {
-            [rng.random_range(1e30..3e38), 1e-3, HUGE]
-        }),
+        scaled("deviations beyond 1e9 pixels", 5, |rng| [0; 3].map(|_| rng.random_range(1e8..1e12))),
+        scaled("scales near binary32's greatest", 6, |rng| [rng.random_range(1e30..3e38), 1e-3, HUGE]),
         Stress::new(
             "points without a filter",
             "a determinant of zero is skipped",
@@ -206,15 +168,10 @@ fn shapes() -> Vec<Stress> {
             [radius, radius * 1e-4, 0.0]
         })
         .drawn(|s| s.low_pass_variance(0.0)),
-        scaled("sub-pixel, compensated", 9, |rng| {
-            [0; 3].map(|_| rng.random_range(1e-6..1e-2))
+        scaled("sub-pixel, compensated", 9, |rng| [0; 3].map(|_| rng.random_range(1e-6..1e-2))).drawn(compensated),
+        scaled("determinants that underflow binary32, compensated", 10, |rng| {
+            [rng.random_range(1e-14..1e-11), 1e-13, 1e-12]
         })
-        .drawn(compensated),
-        scaled(
-            "determinants that underflow binary32, compensated",
-            10,
-            |rng| [rng.random_range(1e-14..1e-11), 1e-13, 1e-12],
-        )
         .drawn(|s| compensated(s).alpha_floor(0.0)),
     ]
 }
@@ -246,14 +203,7 @@ fn depths() -> Vec<Stress> {
         Stress::new(
             "at the eye and about the near plane",
             BY_CONTRACT,
-            vec![
-                at(0.0),
-                at(near),
-                at(next(near, 1)),
-                at(f32::from_bits(near.to_bits() - 1)),
-                at(-1.0),
-                at(1e-30),
-            ],
+            vec![at(0.0), at(near), at(next(near, 1)), at(f32::from_bits(near.to_bits() - 1)), at(-1.0), at(1e-30)],
         ),
         Stress::new("at the eye", "nothing is in front of it", vec![at(0.0); 3]).invisible(),
         Stress::new(
@@ -261,11 +211,7 @@ fn depths() -> Vec<Stress> {
             BY_CONTRACT,
             many(21, 60, |rng, g| {
                 let z = rng.random_range(1e-6..1e-3f32);
-                g.position = [
-                    z * rng.random_range(-0.5..0.5),
-                    z * rng.random_range(-0.4..0.4),
-                    z,
-                ];
+                g.position = [z * rng.random_range(-0.5..0.5), z * rng.random_range(-0.4..0.4), z];
                 g.scale = [1e-6; 3];
             }),
         )
@@ -283,24 +229,13 @@ fn depths() -> Vec<Stress> {
             BY_CONTRACT,
             many(22, 300, |rng, g| {
                 let z = 10f32.powf(rng.random_range(-3.0..6.0));
-                g.position = [
-                    z * rng.random_range(-0.5..0.5),
-                    z * rng.random_range(-0.4..0.4),
-                    z,
-                ];
+                g.position = [z * rng.random_range(-0.5..0.5), z * rng.random_range(-0.4..0.4), z];
                 g.scale = [0.02 * z; 3];
             }),
         )
         .seen_by(|c| c.near_plane(1e-4)),
-        Stress::new(
-            "behind a parallel camera",
-            BY_CONTRACT,
-            many(23, 200, |_, g| g.position[2] -= 6.0),
-        )
-        .seen_by(|c| {
-            c.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
-                .focal_length([14.0, 17.0])
-                .near_plane(-10.0)
+        Stress::new("behind a parallel camera", BY_CONTRACT, many(23, 200, |_, g| g.position[2] -= 6.0)).seen_by(|c| {
+            c.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC).focal_length([14.0, 17.0]).near_plane(-10.0)
         }),
     ]
 }
@@ -309,12 +244,8 @@ fn depths() -> Vec<Stress> {
 fn compositing() -> Vec<Stress> {
     let (floor, ceiling) = (1.0f32 / 255.0, 0.99f32);
     let small = |stress: Stress| stress.sized([20, 18]);
-    let around =
-        |value: f32| [-1, 0, 1].map(|by| f32::from_bits(value.to_bits().wrapping_add_signed(by)));
-    let edges = around(floor)
-        .into_iter()
-        .chain(around(ceiling))
-        .chain([1.0, 1.5, 1e30]);
+    let around = |value: f32| [-1, 0, 1].map(|by| f32::from_bits(value.to_bits().wrapping_add_signed(by)));
+    let edges = around(floor).into_iter().chain(around(ceiling)).chain([1.0, 1.5, 1e30]);
     let edges: Vec<_> = (0u8..)
         .zip(edges)
         .map(|(index, opacity)| {
@@ -322,58 +253,27 @@ fn compositing() -> Vec<Stress> {
             gaussian([x, 0.1, 5.0 + 0.1 * x], [0.1; 3], opacity)
         })
         .collect();
-    let unlimited = |s: State| {
-        s.alpha_floor(0.0)
-            .alpha_ceiling(1.0)
-            .transmittance_floor(0.0)
-    };
+    let unlimited = |s: State| s.alpha_floor(0.0).alpha_ceiling(1.0).transmittance_floor(0.0);
     vec![
-        small(Stress::new(
-            "10,000 layers of 1/254",
-            BY_LAYERS,
-            layers(10_000, |_| 1.0 / 254.0),
-        )),
-        small(Stress::new(
-            "10,000 layers of 1/254, to the end",
-            BY_WIDE_SUMS,
-            layers(10_000, |_| 1.0 / 254.0),
-        ))
-        .drawn(|s| s.transmittance_floor(0.0)),
-        small(Stress::new(
-            "4,096 layers of 0.004, to the end",
-            BY_WIDE_SUMS,
-            layers(4096, |_| 0.004),
-        ))
-        .drawn(|s| s.transmittance_floor(0.0)),
-        small(Stress::new(
-            "4,096 layers of 1/512, to the end",
-            BY_WIDE_SUMS,
-            layers(4096, |_| 1.0 / 512.0),
-        ))
-        .drawn(|s| s.transmittance_floor(0.0).alpha_floor(1.0 / 1024.0)),
-        small(Stress::new(
-            "30,000 layers of 1/4096, no floors",
-            BY_WIDE_SUMS,
-            layers(30_000, |_| 1.0 / 4096.0),
-        ))
-        .drawn(|s| s.transmittance_floor(0.0).alpha_floor(0.0)),
+        small(Stress::new("10,000 layers of 1/254", BY_LAYERS, layers(10_000, |_| 1.0 / 254.0))),
+        small(Stress::new("10,000 layers of 1/254, to the end", BY_WIDE_SUMS, layers(10_000, |_| 1.0 / 254.0)))
+            .drawn(|s| s.transmittance_floor(0.0)),
+        small(Stress::new("4,096 layers of 0.004, to the end", BY_WIDE_SUMS, layers(4096, |_| 0.004)))
+            .drawn(|s| s.transmittance_floor(0.0)),
+        small(Stress::new("4,096 layers of 1/512, to the end", BY_WIDE_SUMS, layers(4096, |_| 1.0 / 512.0)))
+            .drawn(|s| s.transmittance_floor(0.0).alpha_floor(1.0 / 1024.0)),
+        small(Stress::new("30,000 layers of 1/4096, no floors", BY_WIDE_SUMS, layers(30_000, |_| 1.0 / 4096.0)))
+            .drawn(|s| s.transmittance_floor(0.0).alpha_floor(0.0)),
         small(Stress::new(
             "10,000 layers from 1/254 to 0.999",
             BY_WIDE_SUMS,
-            layers(10_000, |index| {
-                1.0 / 254.0 + 0.995 * (index % 100) as f32 / 100.0
-            }),
+            layers(10_000, |index| 1.0 / 254.0 + 0.995 * (index % 100) as f32 / 100.0),
         ))
         .drawn(|s| s.transmittance_floor(0.0).alpha_ceiling(0.999)),
         Stress::new("opacities at floor and ceiling", BY_CONTRACT, edges.clone()),
         Stress::new("no floors, no ceiling, no filter", BY_CONTRACT, edges)
             .drawn(|s| unlimited(s).low_pass_variance(0.0)),
-        Stress::new(
-            "no floors, no ceiling, a cloud",
-            BY_CONTRACT,
-            many(30, 300, |_, _| {}),
-        )
-        .drawn(unlimited),
+        Stress::new("no floors, no ceiling, a cloud", BY_CONTRACT, many(30, 300, |_, _| {})).drawn(unlimited),
         Stress::new(
             "negative and huge colours",
             "the contract, per unit of the greatest colour of 3e5",
@@ -467,21 +367,14 @@ fn cameras() -> Vec<Stress> {
         )
         .seen_by(wide),
         scene("fx is not fy", 53).seen_by(|c| c.focal_length([30.0, 310.0])),
-        scene("principal point outside the picture", 54)
-            .seen_by(|c| c.principal_point([-20.0, 120.0])),
-        scene("a camera that shears", 55)
-            .seen_by(|c| c.rotation([1.0, 0.4, -0.1, 0.0, 0.7, 0.2, 0.1, -0.3, 1.5])),
-        scene("a camera that mirrors", 56)
-            .seen_by(|c| c.rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])),
-        scene("a camera that flattens", 57)
-            .seen_by(|c| c.rotation([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
+        scene("principal point outside the picture", 54).seen_by(|c| c.principal_point([-20.0, 120.0])),
+        scene("a camera that shears", 55).seen_by(|c| c.rotation([1.0, 0.4, -0.1, 0.0, 0.7, 0.2, 0.1, -0.3, 1.5])),
+        scene("a camera that mirrors", 56).seen_by(|c| c.rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])),
+        scene("a camera that flattens", 57).seen_by(|c| c.rotation([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
         scene("one pixel", 58).sized([1, 1]),
         scene("a row of 8192 pixels", 59).sized([8192, 1]),
         scene("a column of 8192 pixels", 60).sized([1, 8192]),
-        scene("a fisheye of 300 degrees", 61).seen_by(|c| {
-            c.model(GaussianCameraModelGAURAST::FISHEYE)
-                .focal_length([25.0; 2])
-                .eye([0.0, 0.0, 5.0])
-        }),
+        scene("a fisheye of 300 degrees", 61)
+            .seen_by(|c| c.model(GaussianCameraModelGAURAST::FISHEYE).focal_length([25.0; 2]).eye([0.0, 0.0, 5.0])),
     ]
 }

@@ -2,22 +2,15 @@
 
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::for_levels::ForLevels;
-use gaurast_testkit::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
 use gaurast_tests::compare::{Limits, assert_contract, verdict};
-use gaurast_tests::oracle::{
-    OracleCamera, OracleState, Reference, render_binary16, render_bounded,
-};
+use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_binary16, render_bounded};
 
 use super::scenes::{Stress, all};
 
 /// Draws a scene.
 pub fn draw(gpu: &Gpu, stress: &Stress) -> Vec<[f32; 4]> {
-    let options = GaussianOptions {
-        state: stress.state,
-        ..GaussianOptions::new(stress.scene.degree)
-    };
+    let options = GaussianOptions { state: stress.state, ..GaussianOptions::new(stress.scene.degree) };
     let pipeline = GaussianPipeline::new(gpu, &options);
     let on_device = GaussianScene::new(gpu, &stress.scene);
     let target = Target::floats(gpu, stress.size);
@@ -40,12 +33,7 @@ fn assert_sane(name: &str, image: &[[f32; 4]]) {
 
 /// A device of a SIMD level.
 fn gpu(level: &str) -> Gpu {
-    Gpu::embedded(&Settings {
-        simd: Some(level),
-        threads: Some(2),
-        ..Settings::default()
-    })
-    .expect("a device")
+    Gpu::embedded(&Settings { simd: Some(level), threads: Some(2), ..Settings::default() }).expect("a device")
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -61,15 +49,11 @@ fn every_scene_keeps_its_limit(case: &Case) {
         });
         let is_empty = reference.nominal.iter().all(|rgba| *rgba == [0.0; 4]);
         assert_eq!(is_empty, stress.is_empty, "{}", stress.name);
-        let limits = Limits {
-            distance: stress.limit,
-            ..Limits::ENVELOPE_ONLY
-        };
+        let limits = Limits { distance: stress.limit, ..Limits::ENVELOPE_ONLY };
         let image = draw(&gpu, &stress);
         let name = format!("{}, {}", stress.name, case.variant());
         assert_sane(&name, &image);
-        let judged =
-            std::panic::catch_unwind(|| assert_contract(&name, &image, &reference, limits));
+        let judged = std::panic::catch_unwind(|| assert_contract(&name, &image, &reference, limits));
         if judged.is_err() {
             failures.push(format!("{name}, since {}", stress.reason));
         }
@@ -91,10 +75,7 @@ fn binary16_is_as_defined(case: &Case) {
             let state = OracleState::from(&stress.state);
             render_binary16(&stress.scene.as_oracle(), &camera, &state)
         });
-        let limits = Limits {
-            distance: 0.0,
-            ..Limits::ENVELOPE_ONLY
-        };
+        let limits = Limits { distance: 0.0, ..Limits::ENVELOPE_ONLY };
         let judged = verdict(&draw(&gpu, &stress), &reference, limits);
         if !judged.holds() || judged.exhausted > 0 {
             failures.push(format!("{}: {judged}", stress.name));

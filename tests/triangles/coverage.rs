@@ -57,11 +57,7 @@ fn aligned(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
 /// Triangles without area: two corners are equal, or all are on a line.
 fn degenerate(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
     let [a, b, _] = aligned(rng);
-    if rng.random() {
-        [a, b, b]
-    } else {
-        [a, b, [0, 1].map(|axis| 0.5 * (a[axis] + b[axis]))]
-    }
+    if rng.random() { [a, b, b] } else { [a, b, [0, 1].map(|axis| 0.5 * (a[axis] + b[axis]))] }
 }
 
 /// Converts pixels to clip coordinates, with or without perspective.
@@ -70,11 +66,7 @@ fn to_triangle(rng: &mut ChaCha8Rng, points: [[f32; 2]; 3]) -> Triangle {
     points.map(|[x, y]| {
         let half = SIZE as f32 / 2.0;
         let z = rng.random_range(0.01..0.99f32);
-        let w = if perspective {
-            rng.random_range(0.5..4.0f32)
-        } else {
-            1.0
-        };
+        let w = if perspective { rng.random_range(0.5..4.0f32) } else { 1.0 };
         // A coordinate that rounding would put outside is clamped.
         let clip = |pixel: f32| ((pixel - half) / half * w).clamp(-w, w);
         [clip(x), clip(y), z * w, w]
@@ -83,14 +75,8 @@ fn to_triangle(rng: &mut ChaCha8Rng, points: [[f32; 2]; 3]) -> Triangle {
 
 /// Triangles within the view volume, of all kinds in fixed proportions.
 fn unclipped(seed: u64, count: usize) -> Vec<Triangle> {
-    const KINDS: [(Kind, u32); 6] = [
-        (sub_pixel, 4000),
-        (small, 3500),
-        (sliver, 1200),
-        (aligned, 1000),
-        (degenerate, 297),
-        (huge, 3),
-    ];
+    const KINDS: [(Kind, u32); 6] =
+        [(sub_pixel, 4000), (small, 3500), (sliver, 1200), (aligned, 1000), (degenerate, 297), (huge, 3)];
     let mut rng = shapes::rng(seed);
     (0..count)
         .map(|_| {
@@ -103,15 +89,11 @@ fn unclipped(seed: u64, count: usize) -> Vec<Triangle> {
 }
 
 fn assert_equal(ours: &Gpu, theirs: &Gpu, triangles: &[Triangle], samples: u32) {
-    let [ours, theirs] =
-        [ours, theirs].map(|gpu| Checksums::new(gpu, triangles, [SIZE; 2], samples));
+    let [ours, theirs] = [ours, theirs].map(|gpu| Checksums::new(gpu, triangles, [SIZE; 2], samples));
     let count = triangles.len() as u32;
     let (our_sums, their_sums) = (ours.draw(0..count), theirs.draw(0..count));
     let covered = their_sums[0].iter().filter(|sums| sums[0] > 0.0).count();
-    assert!(
-        covered > (SIZE * SIZE / 4) as usize,
-        "only {covered} pixels are covered"
-    );
+    assert!(covered > (SIZE * SIZE / 4) as usize, "only {covered} pixels are covered");
     if our_sums == their_sums {
         return;
     }
@@ -150,19 +132,10 @@ fn a_million_triangles_cover_the_same_samples(case: &Case) {
 
 /// True if triangles with an edge near the sample explain the difference of the sums: some of them cover the sample on
 /// one device only.
-fn is_explained(
-    triangles: &[[Position; 3]],
-    place: [u32; 2],
-    ours: [f32; 4],
-    theirs: [f32; 4],
-) -> bool {
+fn is_explained(triangles: &[[Position; 3]], place: [u32; 2], ours: [f32; 4], theirs: [f32; 4]) -> bool {
     let near: Vec<_> = (0..)
         .zip(triangles)
-        .filter(|(_, triangle)| {
-            lines(triangle)
-                .iter()
-                .any(|&line| is_near(line, SMALL, place))
-        })
+        .filter(|(_, triangle)| lines(triangle).iter().any(|&line| is_near(line, SMALL, place)))
         .map(|(index, _)| numbers(index))
         .collect();
     let difference = [0, 1, 2, 3].map(|channel| ours[channel] - theirs[channel]);
@@ -190,16 +163,10 @@ fn clipped_triangles_cover_the_same_samples_but_at_edges(case: &Case) {
     let (_, seed, plane) = planes.expect("planes");
     for samples in [1, 4] {
         let positions = clipped(seed, 1000, plane);
-        let triangles: Vec<_> = positions
-            .iter()
-            .map(|corners| corners.map(to_clip))
-            .collect();
+        let triangles: Vec<_> = positions.iter().map(|corners| corners.map(to_clip)).collect();
         let draw = |gpu| Checksums::new(gpu, &triangles, [SMALL; 2], samples).draw(0..1000);
         let (ours, theirs) = (draw(own()), draw(lavapipe()));
-        assert!(
-            theirs[0].iter().any(|sums| sums[0] > 0.0),
-            "nothing is drawn"
-        );
+        assert!(theirs[0].iter().any(|sums| sums[0] > 0.0), "nothing is drawn");
         let (mut different, mut unexplained) = (0, Vec::new());
         for (sample, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
             let offset = places(samples)[sample];
@@ -208,10 +175,7 @@ fn clipped_triangles_cover_the_same_samples_but_at_edges(case: &Case) {
                     continue;
                 }
                 different += 1;
-                let place = [
-                    16 * (pixel % SMALL) + offset[0],
-                    16 * (pixel / SMALL) + offset[1],
-                ];
+                let place = [16 * (pixel % SMALL) + offset[0], 16 * (pixel / SMALL) + offset[1]];
                 if !is_explained(&positions, place, *ours, *theirs) {
                     unexplained.push((sample, pixel % SMALL, pixel / SMALL));
                 }
@@ -236,11 +200,7 @@ fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
         .flat_map(|row| (0..=cells).map(move |column| (row, column)))
         .map(|(row, column)| {
             let inner = |index: usize| index > 0 && index < cells;
-            let w = if inner(row) && inner(column) {
-                rng.random_range(0.5..3.0f32)
-            } else {
-                1.0
-            };
+            let w = if inner(row) && inner(column) { rng.random_range(0.5..3.0f32) } else { 1.0 };
             let mut along = |index: usize| match index {
                 0 => -1.0,
                 _ if index == cells => 1.0,
@@ -268,12 +228,7 @@ fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
 /// Slivers from one point to the whole border.
 fn star(seed: u64, per_side: usize) -> Vec<Triangle> {
     let mut rng = shapes::rng(seed);
-    let center = [
-        rng.random_range(-0.3..0.3),
-        rng.random_range(-0.3..0.3),
-        0.5,
-        1.0,
-    ];
+    let center = [rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3), 0.5, 1.0];
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let mut border = Vec::new();
     for side in 0..4 {
@@ -284,9 +239,7 @@ fn star(seed: u64, per_side: usize) -> Vec<Triangle> {
             border.push([x, y, 0.5, 1.0]);
         }
     }
-    (0..border.len())
-        .map(|index| [center, border[index], border[(index + 1) % border.len()]])
-        .collect()
+    (0..border.len()).map(|index| [center, border[index], border[(index + 1) % border.len()]]).collect()
 }
 
 /// Checks that every sample is covered by exactly one triangle of the mesh.
@@ -294,9 +247,7 @@ fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
     for samples in [1, 4] {
         let count = triangles.len() as u32;
         // If one triangle covers the sample, the sums are its numbers.
-        let known: std::collections::HashSet<_> = (0..count)
-            .map(|index| numbers(index).map(f32::to_bits))
-            .collect();
+        let known: std::collections::HashSet<_> = (0..count).map(|index| numbers(index).map(f32::to_bits)).collect();
         assert_eq!(known.len(), triangles.len(), "the numbers clash");
         let sums = Checksums::new(gpu, triangles, [SMALL; 2], samples).draw(0..count);
         for (sample, sums) in sums.iter().enumerate() {
@@ -317,13 +268,7 @@ fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
 }
 
 fn drivers() -> Vec<Variant> {
-    vec![
-        Variant::new("this driver"),
-        Variant {
-            needs: vec![Need::Lavapipe],
-            ..Variant::new("lavapipe")
-        },
-    ]
+    vec![Variant::new("this driver"), Variant { needs: vec![Need::Lavapipe], ..Variant::new("lavapipe") }]
 }
 
 #[gaurast_runner::test(needs = [GLSLANG], each = drivers())]

@@ -12,8 +12,7 @@ const FOLDER: &str = env!("CARGO_TARGET_TMPDIR");
 
 /// This driver's device, linked into the process.
 pub fn own() -> &'static Gpu {
-    static OWN: LazyLock<Gpu> =
-        LazyLock::new(|| Gpu::embedded(&Settings::default()).expect("this driver's device"));
+    static OWN: LazyLock<Gpu> = LazyLock::new(|| Gpu::embedded(&Settings::default()).expect("this driver's device"));
     &OWN
 }
 
@@ -38,10 +37,7 @@ pub fn lavapipe() -> &'static Gpu {
 /// # Safety
 /// No other thread may run.
 pub unsafe fn set_environment() {
-    let drivers = [
-        Some(Path::new(FOLDER).join("gaurast_icd.json")),
-        gaurast_runner::lavapipe_manifest(),
-    ];
+    let drivers = [Some(Path::new(FOLDER).join("gaurast_icd.json")), gaurast_runner::lavapipe_manifest()];
     let drivers = std::env::join_paths(drivers.iter().flatten()).expect("paths without separators");
     // SAFETY: the caller guarantees it.
     unsafe {

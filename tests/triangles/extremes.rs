@@ -3,8 +3,8 @@
 
 use ash::vk;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler,
-    Target, TargetOptions, Vertex, blend, depth_test,
+    Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
+    TargetOptions, Vertex, blend, depth_test,
 };
 use gaurast_tests::triangles::shapes;
 
@@ -17,12 +17,7 @@ const SIZE: usize = 128;
 const FORMAT: vk::Format = vk::Format::R32_SFLOAT;
 
 /// Draws vertices in order over zeros; returns the first component of each pixel.
-fn draw(
-    gpu: &Gpu,
-    target: &TargetOptions,
-    options: &PipelineOptions,
-    vertices: &[Vertex],
-) -> Vec<f32> {
+fn draw(gpu: &Gpu, target: &TargetOptions, options: &PipelineOptions, vertices: &[Vertex]) -> Vec<f32> {
     let target = Target::new(gpu, target);
     let pipeline = Pipeline::new(gpu, &target, options);
     let buffer = Buffer::of(gpu, vertices);
@@ -40,10 +35,7 @@ fn draw(
 }
 
 fn vertex(position: [f32; 4], value: f32) -> Vertex {
-    Vertex {
-        position,
-        color: [value; 4],
-    }
+    Vertex { position, color: [value; 4] }
 }
 
 /// Two triangles of four corners, row by row.
@@ -69,14 +61,7 @@ fn flat() -> PipelineOptions<'static> {
 
 /// A pipeline that adds the values of a pixel's triangles.
 fn additive() -> PipelineOptions<'static> {
-    PipelineOptions {
-        blend: vec![blend(
-            vk::BlendFactor::ONE,
-            vk::BlendFactor::ONE,
-            vk::BlendOp::ADD,
-        )],
-        ..flat()
-    }
+    PipelineOptions { blend: vec![blend(vk::BlendFactor::ONE, vk::BlendFactor::ONE, vk::BlendOp::ADD)], ..flat() }
 }
 
 /// Draws a ground plane that begins in front of the eye's plane, on it or behind it, and extends far away. Its distance
@@ -84,22 +69,10 @@ fn additive() -> PipelineOptions<'static> {
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn grounds_reach_from_the_eye_to_the_horizon() {
     let gpu = own();
-    for (near, far) in [
-        (0.5f32, 1e6f32),
-        (1e-6, 1e6),
-        (1e-30, 1e6),
-        (0.0, 1e6),
-        (-5.0, 1e6),
-        (-1e6, 1e6),
-    ] {
+    for (near, far) in [(0.5f32, 1e6f32), (1e-6, 1e6), (1e-30, 1e6), (0.0, 1e6), (-5.0, 1e6), (-1e6, 1e6)] {
         let wide = 2.0 * far;
         let corner = |x: f32, w: f32| vertex([x, 1.0, 0.5 * w, w], w);
-        let ground = quad([
-            corner(-wide, near),
-            corner(wide, near),
-            corner(-wide, far),
-            corner(wide, far),
-        ]);
+        let ground = quad([corner(-wide, near), corner(wide, near), corner(-wide, far), corner(wide, far)]);
         let target = TargetOptions::of(FORMAT);
         let image = draw(gpu, &target, &PipelineOptions::default(), &ground);
         for (row, values) in image.chunks(SIZE).enumerate() {
@@ -113,10 +86,7 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
             let tolerance = distance * distance / 64.0 / 256.0 + 1e-6 * distance;
             for value in values {
                 let error = (f64::from(*value) - distance).abs();
-                assert!(
-                    error <= tolerance,
-                    "row {row}, {near}: {value} is not {distance}"
-                );
+                assert!(error <= tolerance, "row {row}, {near}: {value} is not {distance}");
             }
         }
     }
@@ -127,9 +97,7 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn corners_far_outside_move_no_edge() {
     let gpu = own();
-    for far in [
-        1.0, 1.5, 63.0, 256.0, 511.9, 1e4, 3e5, 1e9, 1e12, 1e19, 1e20, 1e30, 1e38, 3.4e38f32,
-    ] {
+    for far in [1.0, 1.5, 63.0, 256.0, 511.9, 1e4, 3e5, 1e9, 1e12, 1e19, 1e20, 1e30, 1e38, 3.4e38f32] {
         let corner = |x: f32, y: f32, value| vertex([x, y, 0.5, 1.0], value);
         let halves = |value: [f32; 2]| {
             let upper = [[-far, -far], [far, far], [far, -far]];
@@ -194,10 +162,7 @@ fn depths_a_step_apart_are_told_apart() {
         cases.push((vk::Format::X8_D24_UNORM_PACK32, depths));
     }
     for code in [0u32, 1, 30_000, 65_533] {
-        cases.push((
-            vk::Format::D16_UNORM,
-            [of_bits(16, code), of_bits(16, code + 1)],
-        ));
+        cases.push((vk::Format::D16_UNORM, [of_bits(16, code), of_bits(16, code + 1)]));
     }
     for depth in [1e-30f32, 1e-6, 0.1, 0.5, 0.999_999_9] {
         cases.push((vk::Format::D32_SFLOAT, [depth, depth.next_up()]));
@@ -205,14 +170,8 @@ fn depths_a_step_apart_are_told_apart() {
     for (format, [near, far]) in cases {
         let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
         assert!(gpu.format_features(format).contains(needed), "{format:?}");
-        let target = TargetOptions {
-            depth: Some(format),
-            ..TargetOptions::of(FORMAT)
-        };
-        let pipeline = PipelineOptions {
-            depth_stencil: depth_test(vk::CompareOp::LESS),
-            ..flat()
-        };
+        let target = TargetOptions { depth: Some(format), ..TargetOptions::of(FORMAT) };
+        let pipeline = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..flat() };
         for order in [[(near, 1.0), (far, 2.0)], [(far, 2.0), (near, 1.0)]] {
             let planes = order.map(|(z, value)| shapes::whole(z, [value; 4]));
             let image = draw(gpu, &target, &pipeline, &planes.concat());
@@ -228,19 +187,11 @@ fn depths_a_step_apart_are_told_apart() {
 fn layers_in_one_plane_have_one_depth() {
     let gpu = own();
     const LAYERS: usize = 5000;
-    let corners = [
-        [-0.9, -0.8, 0.1, 1.0],
-        [3.6, -2.0, 1.9, 4.0],
-        [-0.1, 0.45, 0.3, 0.5],
-    ];
-    let layers: Vec<Vertex> = (1..=LAYERS)
-        .flat_map(|number| corners.map(|position| vertex(position, number as f32)))
-        .collect();
+    let corners = [[-0.9, -0.8, 0.1, 1.0], [3.6, -2.0, 1.9, 4.0], [-0.1, 0.45, 0.3, 0.5]];
+    let layers: Vec<Vertex> =
+        (1..=LAYERS).flat_map(|number| corners.map(|position| vertex(position, number as f32))).collect();
     for format in [vk::Format::D32_SFLOAT, vk::Format::D16_UNORM] {
-        let target = TargetOptions {
-            depth: Some(format),
-            ..TargetOptions::of(FORMAT)
-        };
+        let target = TargetOptions { depth: Some(format), ..TargetOptions::of(FORMAT) };
         let all = (LAYERS * (LAYERS + 1) / 2) as f32;
         for (compare, blended, expected) in [
             (vk::CompareOp::LESS, false, 1.0),
@@ -248,10 +199,8 @@ fn layers_in_one_plane_have_one_depth() {
             (vk::CompareOp::LESS, true, 1.0),
             (vk::CompareOp::LESS_OR_EQUAL, true, all),
         ] {
-            let pipeline = PipelineOptions {
-                depth_stencil: depth_test(compare),
-                ..if blended { additive() } else { flat() }
-            };
+            let pipeline =
+                PipelineOptions { depth_stencil: depth_test(compare), ..if blended { additive() } else { flat() } };
             let image = draw(gpu, &target, &pipeline, &layers);
             let covered: Vec<_> = image.iter().filter(|value| **value != 0.0).collect();
             assert!(covered.len() > 1500, "{} pixels", covered.len());
@@ -290,19 +239,10 @@ fn textures_are_exact_at_the_edges_of_their_modes() {
     let gpu = own();
     let value = |index: i64| (index * 29 + 7) as f64 / 255.0;
     let texels: Vec<[u8; 4]> = (0..TEXELS).map(|i| [(i * 29 + 7) as u8; 4]).collect();
-    let options = ImageOptions::new(
-        vk::Format::R8G8B8A8_UNORM,
-        [TEXELS as u32, 1],
-        vk::ImageUsageFlags::empty(),
-    );
+    let options = ImageOptions::new(vk::Format::R8G8B8A8_UNORM, [TEXELS as u32, 1], vk::ImageUsageFlags::empty());
     let image = Image::textured(gpu, &options, &[texels]);
-    let modes = [
-        Mode::REPEAT,
-        Mode::MIRRORED_REPEAT,
-        Mode::CLAMP_TO_EDGE,
-        Mode::CLAMP_TO_BORDER,
-        Mode::MIRROR_CLAMP_TO_EDGE,
-    ];
+    let modes =
+        [Mode::REPEAT, Mode::MIRRORED_REPEAT, Mode::CLAMP_TO_EDGE, Mode::CLAMP_TO_BORDER, Mode::MIRROR_CLAMP_TO_EDGE];
     for mode in modes {
         for filter in [vk::Filter::NEAREST, vk::Filter::LINEAR] {
             let sampler = vk::SamplerCreateInfo::default()
@@ -339,10 +279,7 @@ fn textures_are_exact_at_the_edges_of_their_modes() {
                 let Some(far) = far else {
                     // The value is that of some texel or of the border.
                     let range = value(0) - 1e-6..=BORDER + 1e-6;
-                    assert!(
-                        range.contains(&drawn),
-                        "{mode:?} {filter:?} ({x}, {y}): {drawn}"
-                    );
+                    assert!(range.contains(&drawn), "{mode:?} {filter:?} ({x}, {y}): {drawn}");
                     continue;
                 };
                 let place = ((x as f64 - 64.0) / 32.0 + far) * TEXELS as f64;
@@ -354,10 +291,7 @@ fn textures_are_exact_at_the_edges_of_their_modes() {
                     let share = place - 0.5 - first;
                     (1.0 - share) * at(first as i64) + share * at(first as i64 + 1)
                 };
-                assert!(
-                    (drawn - expected).abs() <= 1e-6,
-                    "{mode:?} {filter:?} ({x}, {y}): {drawn} is not {expected}"
-                );
+                assert!((drawn - expected).abs() <= 1e-6, "{mode:?} {filter:?} ({x}, {y}): {drawn} is not {expected}");
             }
         }
     }

@@ -3,8 +3,7 @@
 use ash::vk;
 use gaurast_runner::Need;
 use gaurast_testkit::{
-    Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
-    fetch_sample,
+    Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test, fetch_sample,
 };
 use gaurast_tests::triangles::shapes;
 
@@ -19,12 +18,7 @@ const W: [f64; 3] = [1.0, 4.0, 0.5];
 const VALUES: [f64; 3] = [0.0, 1.0, 0.25];
 
 /// The positions of the four samples in a pixel.
-const PLACES: [[f64; 2]; 4] = [
-    [0.375, 0.125],
-    [0.875, 0.375],
-    [0.125, 0.625],
-    [0.625, 0.875],
-];
+const PLACES: [[f64; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
 
 /// The value at a point in pixels, in binary64, and true if the point is inside by a `margin` in barycentric
 /// coordinates.
@@ -34,11 +28,7 @@ fn exact(x: f64, y: f64, margin: f64) -> (f64, bool) {
     let areas = [area(b, c), area(c, a), area(a, b)];
     let sum: f64 = areas.iter().sum();
     let shares = areas.map(|area| area / sum);
-    let over_w = |values: [f64; 3]| -> f64 {
-        (0..3)
-            .map(|index| shares[index] * values[index] / W[index])
-            .sum()
-    };
+    let over_w = |values: [f64; 3]| -> f64 { (0..3).map(|index| shares[index] * values[index] / W[index]).sum() };
     let value = over_w(VALUES) / over_w([1.0; 3]);
     (value, shares.iter().all(|&share| share > margin))
 }
@@ -46,10 +36,7 @@ fn exact(x: f64, y: f64, margin: f64) -> (f64, bool) {
 fn vertices() -> Vec<Vertex> {
     let corner = |index: usize| {
         let [x, y] = PIXELS[index].map(|pixel| (pixel / 64.0 - 1.0) * W[index]);
-        Vertex {
-            position: [x, y, 0.5 * W[index], W[index]].map(|c| c as f32),
-            color: [VALUES[index] as f32; 4],
-        }
+        Vertex { position: [x, y, 0.5 * W[index], W[index]].map(|c| c as f32), color: [VALUES[index] as f32; 4] }
     };
     (0..3).map(corner).collect()
 }
@@ -70,21 +57,14 @@ fn greatest_error(values: &[f32], [dx, dy]: [f64; 2]) -> f64 {
 }
 
 fn draw(gpu: &Gpu, samples: u32, qualifier: &str) -> Vec<Vec<f32>> {
-    let options = TargetOptions {
-        samples,
-        resolve: false,
-        ..TargetOptions::of(vk::Format::R32_SFLOAT)
-    };
+    let options = TargetOptions { samples, resolve: false, ..TargetOptions::of(vk::Format::R32_SFLOAT) };
     let target = Target::new(gpu, &options);
     let fragment = format!(
         "layout(location = 0) {qualifier} in vec4 v_color;
          layout(location = 0) out vec4 color;
          void main() {{ color = v_color; }}"
     );
-    let options = PipelineOptions {
-        fragment: Some(&fragment),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { fragment: Some(&fragment), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let buffer = Buffer::of(gpu, &vertices());
     gpu.run(|commands| {
@@ -99,9 +79,7 @@ fn draw(gpu: &Gpu, samples: u32, qualifier: &str) -> Vec<Vec<f32>> {
         let bytes = image.read(vk::ImageAspectFlags::COLOR, 4);
         return vec![bytemuck::pod_collect_to_vec(&bytes)];
     }
-    (0..samples)
-        .map(|sample| fetch_sample(gpu, image, sample).texels())
-        .collect()
+    (0..samples).map(|sample| fetch_sample(gpu, image, sample).texels()).collect()
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]
@@ -122,11 +100,7 @@ fn perspective_is_exact_at_samples() {
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn lines_are_exact_at_samples() {
     let gpu = own();
-    let options = TargetOptions {
-        samples: 4,
-        resolve: false,
-        ..TargetOptions::of(vk::Format::R32_SFLOAT)
-    };
+    let options = TargetOptions { samples: 4, resolve: false, ..TargetOptions::of(vk::Format::R32_SFLOAT) };
     let target = Target::new(gpu, &options);
     let options = PipelineOptions {
         topology: vk::PrimitiveTopology::LINE_LIST,
@@ -139,10 +113,8 @@ fn lines_are_exact_at_samples() {
     };
     let pipeline = Pipeline::new(gpu, &target, &options);
     // The line from (10, 20) to (110, 60), in pixels of 128.
-    let ends = [[10.0f32, 20.0, 1.0], [110.0, 60.0, 2.0]].map(|[x, y, value]| Vertex {
-        position: [x / 64.0 - 1.0, y / 64.0 - 1.0, 0.5, 1.0],
-        color: [value; 4],
-    });
+    let ends = [[10.0f32, 20.0, 1.0], [110.0, 60.0, 2.0]]
+        .map(|[x, y, value]| Vertex { position: [x / 64.0 - 1.0, y / 64.0 - 1.0, 0.5, 1.0], color: [value; 4] });
     let buffer = Buffer::of(gpu, &ends);
     gpu.run(|commands| {
         commands.pass(&target, &Pass::zeros(), || {
@@ -185,10 +157,7 @@ impl Sliver {
             let on_line = a[axis] + along * (b[axis] - a[axis]);
             grid((on_line + beside * normal[axis]).clamp(4.0, 124.0))
         };
-        Self {
-            pixels: [a, b, [third(0), third(1)]],
-            depths: [0; 3].map(|_| rng.random_range(0.05..0.95)),
-        }
+        Self { pixels: [a, b, [third(0), third(1)]], depths: [0; 3].map(|_| rng.random_range(0.05..0.95)) }
     }
 
     /// The depth of its plane, in binary64.
@@ -204,20 +173,14 @@ impl Sliver {
     fn vertices(&self, number: usize) -> [Vertex; 3] {
         [0, 1, 2].map(|index| {
             let [x, y] = self.pixels[index].map(|pixel| (pixel / 64.0 - 1.0) as f32);
-            Vertex {
-                position: [x, y, self.depths[index], 1.0],
-                color: [number as f32; 4],
-            }
+            Vertex { position: [x, y, self.depths[index], 1.0], color: [number as f32; 4] }
         })
     }
 }
 
 /// The greatest error of the depth of slivers that a device drew, and the number of their pixels.
 fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
-    let options = TargetOptions {
-        depth: Some(vk::Format::D32_SFLOAT),
-        ..TargetOptions::of(vk::Format::R32_SFLOAT)
-    };
+    let options = TargetOptions { depth: Some(vk::Format::D32_SFLOAT), ..TargetOptions::of(vk::Format::R32_SFLOAT) };
     let target = Target::new(gpu, &options);
     let pipeline = PipelineOptions {
         vertex: "layout(location = 0) in vec4 position;
@@ -234,9 +197,7 @@ fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
     };
     let pipeline = Pipeline::new(gpu, &target, &pipeline);
     let numbered = (1..).zip(slivers);
-    let vertices: Vec<_> = numbered
-        .flat_map(|(n, sliver)| sliver.vertices(n))
-        .collect();
+    let vertices: Vec<_> = numbered.flat_map(|(n, sliver)| sliver.vertices(n)).collect();
     let buffer = Buffer::of(gpu, &vertices);
     gpu.run(|commands| {
         commands.pass(&target, &Pass::zeros(), || {
@@ -245,9 +206,7 @@ fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
             commands.draw(0..vertices.len() as u32);
         });
     });
-    let read = |image: &Image, aspect| -> Vec<f32> {
-        bytemuck::pod_collect_to_vec(&image.read(aspect, 4))
-    };
+    let read = |image: &Image, aspect| -> Vec<f32> { bytemuck::pod_collect_to_vec(&image.read(aspect, 4)) };
     let numbers = read(&target.colors[0], vk::ImageAspectFlags::COLOR);
     let depth = target.depth.as_ref().expect("a depth attachment");
     let depths = read(depth, vk::ImageAspectFlags::DEPTH);

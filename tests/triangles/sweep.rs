@@ -24,8 +24,7 @@ fn try_draw(scene: &Scene, gpu: &Gpu) -> Result<Output, String> {
 
 fn words(panic: &dyn Any) -> String {
     let text = panic.downcast_ref::<String>().cloned();
-    text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
-        .unwrap_or_else(|| "a panic".to_owned())
+    text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string)).unwrap_or_else(|| "a panic".to_owned())
 }
 
 /// A variant for each scene.
@@ -91,9 +90,7 @@ fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
         for picture in output.iter().flat_map(|output| &output.pictures) {
             let file = format!("{name}-{}-{who}.png", picture.name.replace(' ', "_"));
             let path = Path::new(&folder).join(file);
-            for_people(picture)
-                .save(&path)
-                .expect("a picture is written");
+            for_people(picture).save(&path).expect("a picture is written");
         }
     }
 }
@@ -103,12 +100,9 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
     let ours = ours?;
     let found = differences(&ours, theirs);
     let expected = Expected::read();
-    let is_excused = |difference: &Difference| {
-        (expected.exceptions(name)).any(|exception| exception.excuses(difference))
-    };
-    let inexcusable: Vec<_> = (found.into_iter())
-        .filter(|difference| !is_excused(difference))
-        .collect();
+    let is_excused =
+        |difference: &Difference| (expected.exceptions(name)).any(|exception| exception.excuses(difference));
+    let inexcusable: Vec<_> = (found.into_iter()).filter(|difference| !is_excused(difference)).collect();
     if inexcusable.is_empty() {
         return Ok(());
     }
@@ -124,9 +118,6 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
 #[gaurast_runner::test]
 fn every_listed_name_is_that_of_a_scene() {
     let expected = Expected::read();
-    let unknown: Vec<_> = expected
-        .names()
-        .filter(|name| scenes::find(name).is_none())
-        .collect();
+    let unknown: Vec<_> = expected.names().filter(|name| scenes::find(name).is_none()).collect();
     assert!(unknown.is_empty(), "{unknown:?}");
 }

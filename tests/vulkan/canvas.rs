@@ -3,8 +3,7 @@
 
 use ash::vk;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Graphics, Image, ImageOptions, Pipeline, Resource, Sampler, Shader,
-    attribute, binding,
+    Bindings, Buffer, Gpu, Graphics, Image, ImageOptions, Pipeline, Resource, Sampler, Shader, attribute, binding,
 };
 
 use crate::devices::{image, open};
@@ -31,10 +30,7 @@ pub fn deep_vertex([x, y, z]: [f32; 3], [r, g, b, a]: [f32; 4]) -> Vertex {
 pub fn colored() -> Graphics<'static> {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
     Graphics {
-        shaders: vec![
-            Shader::vertex(spirv!("colored.vert")),
-            Shader::fragment(spirv!("colored.frag")),
-        ],
+        shaders: vec![Shader::vertex(spirv!("colored.vert")), Shader::fragment(spirv!("colored.frag"))],
         push: vec![
             vk::PushConstantRange::default()
                 .stage_flags(vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
@@ -61,11 +57,7 @@ pub const PIXELS: usize = (WIDTH * HEIGHT) as usize;
 
 /// A triangle that covers the whole canvas.
 pub fn everything(color: [f32; 4]) -> [Vertex; 3] {
-    [
-        vertex(-1.0, -1.0, color),
-        vertex(3.0, -1.0, color),
-        vertex(-1.0, 3.0, color),
-    ]
+    [vertex(-1.0, -1.0, color), vertex(3.0, -1.0, color), vertex(-1.0, 3.0, color)]
 }
 
 /// The number of pixels of a colour.
@@ -89,11 +81,7 @@ impl Canvas {
     /// A canvas of a colour format without depth.
     pub fn of(format: vk::Format) -> Self {
         let gpu = open();
-        Self {
-            image: image(&gpu, format, [WIDTH, HEIGHT]),
-            depth: None,
-            gpu,
-        }
+        Self { image: image(&gpu, format, [WIDTH, HEIGHT]), depth: None, gpu }
     }
 
     /// A canvas of floats with depth and stencil.
@@ -101,10 +89,7 @@ impl Canvas {
         let canvas = Self::new();
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
         let options = ImageOptions::new(DEPTH_FORMAT, [WIDTH, HEIGHT], usage);
-        Self {
-            depth: Some(Image::new(&canvas.gpu, &options)),
-            ..canvas
-        }
+        Self { depth: Some(Image::new(&canvas.gpu, &options)), ..canvas }
     }
 
     /// The image's pixels, if they are floats.
@@ -137,9 +122,7 @@ impl Canvas {
         vertices: &[T],
         record: impl FnOnce(&ash::Device, vk::CommandBuffer, &Pipeline),
     ) -> Vec<[f32; 4]> {
-        let made = request
-            .create(&self.gpu)
-            .unwrap_or_else(|error| panic!("{error}: {:?}", self.gpu.messages()));
+        let made = request.create(&self.gpu).unwrap_or_else(|error| panic!("{error}: {:?}", self.gpu.messages()));
         let vertices = Buffer::of(&self.gpu, vertices);
         self.pass(&[&self.image], |device, commands| {
             // SAFETY: see the crate.
@@ -204,17 +187,11 @@ impl Canvas {
     ) {
         let depth = self.depth.as_ref().map(|depth| {
             attachment(depth).clear_value(vk::ClearValue {
-                depth_stencil: vk::ClearDepthStencilValue {
-                    depth: CLEAR_DEPTH,
-                    stencil: 0,
-                },
+                depth_stencil: vk::ClearDepthStencilValue { depth: CLEAR_DEPTH, stencil: 0 },
             })
         });
         let mut rendering = vk::RenderingInfo::default()
-            .render_area(vk::Rect2D {
-                offset: vk::Offset2D::default(),
-                extent: extent(&self.image),
-            })
+            .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent: extent(&self.image) })
             .layer_count(layers)
             .color_attachments(color);
         if let Some(depth) = &depth {
@@ -244,9 +221,7 @@ fn attachment(image: &Image) -> vk::RenderingAttachmentInfo<'static> {
         .image_layout(vk::ImageLayout::GENERAL)
         .load_op(vk::AttachmentLoadOp::CLEAR)
         .store_op(vk::AttachmentStoreOp::STORE)
-        .clear_value(vk::ClearValue {
-            color: vk::ClearColorValue { float32: CLEAR },
-        })
+        .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: CLEAR } })
 }
 
 /// An image of several layers with a view of them all.
@@ -263,10 +238,7 @@ pub fn layered_image(gpu: &Gpu, layers: u32) -> Image {
 /// An image of several samples.
 pub fn sampled_image(gpu: &Gpu, samples: vk::SampleCountFlags) -> Image {
     let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT;
-    let options = ImageOptions {
-        samples: samples.as_raw(),
-        ..ImageOptions::new(FORMAT, [WIDTH, HEIGHT], usage)
-    };
+    let options = ImageOptions { samples: samples.as_raw(), ..ImageOptions::new(FORMAT, [WIDTH, HEIGHT], usage) };
     Image::new(gpu, &options)
 }
 

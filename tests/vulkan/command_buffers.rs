@@ -2,8 +2,7 @@
 
 use crate::devices::{image, open};
 use crate::scene::{
-    CENTER, FORMAT, Scene, area, assert_close, at, pass_with, premultiplied, set_viewport, splat,
-    splats,
+    CENTER, FORMAT, Scene, area, assert_close, at, pass_with, premultiplied, set_viewport, splat, splats,
 };
 use ash::vk;
 use gaurast_testkit::{Buffer, Gpu, Recorded};
@@ -37,12 +36,9 @@ fn command_buffers_are_reset_alone_or_with_their_pool() {
     let begin = vk::CommandBufferBeginInfo::default();
     // SAFETY: see the crate.
     unsafe {
-        let info = vk::CommandPoolCreateInfo::default()
-            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+        let info = vk::CommandPoolCreateInfo::default().flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
         let pool = device.create_command_pool(&info, None).unwrap();
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .command_buffer_count(1);
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
         let command_buffers = device.allocate_command_buffers(&info).unwrap();
         let commands = command_buffers[0];
         let submit = || {
@@ -83,9 +79,7 @@ fn a_pool_without_single_resets_refuses_them() {
     unsafe {
         let info = vk::CommandPoolCreateInfo::default();
         let pool = device.create_command_pool(&info, None).unwrap();
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .command_buffer_count(2);
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(2);
         let buffers = device.allocate_command_buffers(&info).unwrap();
         let begin = vk::CommandBufferBeginInfo::default();
         device.begin_command_buffer(buffers[0], &begin).unwrap();
@@ -124,10 +118,7 @@ fn commands_that_are_refused_fail_the_recording() {
     });
     assert_eq!(recorded.unwrap_err(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
     let told = gpu.message_texts().concat();
-    assert!(
-        told.contains("vkCmdBindIndexBuffer") && told.contains("NONE"),
-        "{told}"
-    );
+    assert!(told.contains("vkCmdBindIndexBuffer") && told.contains("NONE"), "{told}");
 }
 
 /// Breaks VUID-vkEndCommandBuffer-commandBuffer-00060.
@@ -135,9 +126,7 @@ fn commands_that_are_refused_fail_the_recording() {
 fn a_pass_that_does_not_end_fails_the_recording() {
     let gpu = open();
     let image = image(&gpu, vk::Format::R8G8B8A8_UNORM, [4, 4]);
-    let info = vk::RenderingInfo::default()
-        .render_area(area(&image))
-        .layer_count(1);
+    let info = vk::RenderingInfo::default().render_area(area(&image)).layer_count(1);
     let recorded = gpu.try_record(|recording| {
         let (device, commands) = recording.raw();
         // SAFETY: see the crate.

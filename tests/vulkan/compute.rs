@@ -41,9 +41,8 @@ fn arrays_of_descriptors_are_indexed_at_run_time() {
     let gpu = open();
     let sets: &[&[_]] = &[&[(0, STORAGE, 4)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]];
     let kernel = Compute::new(&gpu, &spirv!("descriptors.comp"), sets);
-    let sources: Vec<_> = (0..4u32)
-        .map(|which| Buffer::of(&gpu, &(0..64).map(|i| 1000 * which + i).collect::<Vec<_>>()))
-        .collect();
+    let sources: Vec<_> =
+        (0..4u32).map(|which| Buffer::of(&gpu, &(0..64).map(|i| 1000 * which + i).collect::<Vec<_>>())).collect();
     let numbers = Buffer::of(&gpu, &[10u32, 0, 0, 0, 0, 0, 0, 20]);
     let target = Buffer::new(&gpu, 256);
     let sets = kernel.sets.allocate();
@@ -68,13 +67,7 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
     let target = Buffer::of(&gpu, &[0u32; 256]);
     let set = kernel.sets.allocate()[0];
     write(&gpu, set, (0, 0), dynamic, &[whole(&source).range(256)]);
-    write(
-        &gpu,
-        set,
-        (1, 0),
-        dynamic,
-        &[whole(&target).offset(16).range(256)],
-    );
+    write(&gpu, set, (1, 0), dynamic, &[whole(&target).offset(16).range(256)]);
     let bind_point = vk::PipelineBindPoint::COMPUTE;
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
@@ -83,14 +76,7 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
         // SAFETY: see the crate.
         unsafe {
             let offsets = [128 * 4, 32 * 4];
-            device.cmd_bind_descriptor_sets(
-                commands,
-                bind_point,
-                kernel.layout,
-                0,
-                &[set],
-                &offsets,
-            );
+            device.cmd_bind_descriptor_sets(commands, bind_point, kernel.layout, 0, &[set], &offsets);
             device.cmd_dispatch(commands, 1, 1, 1);
         }
     });
@@ -113,16 +99,9 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
 fn specialization_constants_change_the_kernel() {
     let gpu = open();
     let bindings: &[_] = &[(0, STORAGE, 1)];
-    let entry = |id, offset| {
-        vk::SpecializationMapEntry::default()
-            .constant_id(id)
-            .offset(offset)
-            .size(4)
-    };
+    let entry = |id, offset| vk::SpecializationMapEntry::default().constant_id(id).offset(offset).size(4);
     let run = |entries: &[vk::SpecializationMapEntry], data: &[u8]| {
-        let info = vk::SpecializationInfo::default()
-            .map_entries(entries)
-            .data(data);
+        let info = vk::SpecializationInfo::default().map_entries(entries).data(data);
         let words = spirv!("specialization.comp");
         let kernel = Compute::specialized(&gpu, &words, &[bindings], &info);
         let target = Buffer::of(&gpu, &[0f32; 64]);
@@ -131,14 +110,8 @@ fn specialization_constants_change_the_kernel() {
     };
     let values = run(&[], &[]);
     assert_eq!((values[0], values[1], values[63]), (5.0, 0.0, 1.0));
-    let data: Vec<u8> = [8u32, 3, 2.5f32.to_bits(), 1]
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .collect();
-    let values = run(
-        &[entry(0, 0), entry(1, 4), entry(2, 8), entry(3, 12)],
-        &data,
-    );
+    let data: Vec<u8> = [8u32, 3, 2.5f32.to_bits(), 1].iter().flat_map(|word| word.to_le_bytes()).collect();
+    let values = run(&[entry(0, 0), entry(1, 4), entry(2, 8), entry(3, 12)], &data);
     let expected: Vec<_> = (0..8).map(|i| -((i + 3) as f32) * 2.5).collect();
     assert_eq!(values[..8], expected);
     assert_eq!((values[8], values[63]), (0.0, 8.0));
@@ -153,12 +126,7 @@ fn noted(target: &Buffer, count: [u32; 3]) -> Vec<[u32; 3]> {
     let mut locals: Vec<_> = notes.iter().map(|note| note[2]).collect();
     locals.sort_unstable();
     let groups = notes.len() / 12;
-    assert!(
-        locals
-            .iter()
-            .enumerate()
-            .all(|(i, &local)| local as usize == i / groups)
-    );
+    assert!(locals.iter().enumerate().all(|(i, &local)| local as usize == i / groups));
     let mut ids: Vec<_> = notes
         .iter()
         .filter(|note| note[2] == 0)
@@ -240,10 +208,7 @@ fn atomics_lose_nothing() {
     let count = groups * 128;
     let values = data.values::<u32>();
     let xored = (0..count).fold(0, |all, i| all ^ i);
-    assert_eq!(
-        values[..4],
-        [count * (count - 1) / 2, count - 1, 7, u32::MAX]
-    );
+    assert_eq!(values[..4], [count * (count - 1) / 2, count - 1, 7, u32::MAX]);
     assert_eq!(values[4..6], [0xffff_0000, xored]);
     assert!((1000..1000 + count).contains(&values[6]));
     assert_eq!(values[7], count);
@@ -258,13 +223,7 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
     let target = Buffer::new(&gpu, 32 * 12);
     let set = kernel.sets.allocate()[0];
     // 8 of 128 words are bound, so that a write beyond them would be visible in the rest.
-    write(
-        &gpu,
-        set,
-        (0, 0),
-        STORAGE,
-        &[whole(&data).offset(64).range(32)],
-    );
+    write(&gpu, set, (0, 0), STORAGE, &[whole(&data).offset(64).range(32)]);
     write(&gpu, set, (2, 0), STORAGE, &[whole(&target)]);
     for stride in [1, 3, 1 << 20, 0x0800_0001] {
         data.write(&(100..228u32).collect::<Vec<_>>());
@@ -275,11 +234,7 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
             let far = i.wrapping_mul(stride);
             let inside = far < 8;
             let read = if inside { 116 + far } else { 0 };
-            assert_eq!(
-                found[3 * i as usize],
-                read,
-                "stride {stride}, invocation {i}"
-            );
+            assert_eq!(found[3 * i as usize], read, "stride {stride}, invocation {i}");
             assert_eq!(found[3 * i as usize + 1], 8);
         }
         let outside = kept[..16].iter().chain(&kept[24..]);

@@ -16,9 +16,7 @@ impl Context {
     pub fn new(entry: ash::Entry, extensions: &[&CStr]) -> Self {
         let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
         let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        let info = vk::InstanceCreateInfo::default()
-            .application_info(&application)
-            .enabled_extension_names(&names);
+        let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&names);
         // SAFETY: the creation info is valid.
         let instance = unsafe { entry.create_instance(&info, None) }.expect("an instance");
         Self::of(entry, instance)
@@ -29,16 +27,9 @@ impl Context {
         // SAFETY: the instance is live.
         let physical_devices = unsafe { instance.enumerate_physical_devices() }.unwrap();
         let &[physical_device] = physical_devices.as_slice() else {
-            panic!(
-                "there is one physical device, not {}",
-                physical_devices.len()
-            );
+            panic!("there is one physical device, not {}", physical_devices.len());
         };
-        Self {
-            entry,
-            instance,
-            physical_device,
-        }
+        Self { entry, instance, physical_device }
     }
 
     /// Creates an instance of the loader's first driver.
@@ -64,10 +55,7 @@ impl Context {
             .enabled_extension_names(&names)
             .push_next(features);
         // SAFETY: the creation info is valid.
-        unsafe {
-            self.instance
-                .create_device(self.physical_device, &info, None)
-        }
+        unsafe { self.instance.create_device(self.physical_device, &info, None) }
     }
 }
 

@@ -15,11 +15,7 @@ fn pools_give_what_they_have() {
     let gpu = open();
     let one = set_layout(&gpu, &[(0, STORAGE, 1)], NO_FLAGS);
     let many = set_layout(&gpu, &[(0, STORAGE, 2), (5, UNIFORM, 3)], NO_FLAGS);
-    let size = |ty, count| {
-        vk::DescriptorPoolSize::default()
-            .ty(ty)
-            .descriptor_count(count)
-    };
+    let size = |ty, count| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count);
     let sizes = [size(STORAGE, 2), size(UNIFORM, 3), size(STORAGE, 2)];
     let info = vk::DescriptorPoolCreateInfo::default()
         .flags(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET)
@@ -29,9 +25,7 @@ fn pools_give_what_they_have() {
     unsafe {
         let pool = gpu.device().create_descriptor_pool(&info, None).unwrap();
         let allocate = |layouts: &[vk::DescriptorSetLayout]| {
-            let info = vk::DescriptorSetAllocateInfo::default()
-                .descriptor_pool(pool)
-                .set_layouts(layouts);
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(layouts);
             gpu.device().allocate_descriptor_sets(&info)
         };
         let exhausted = Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY);
@@ -40,9 +34,7 @@ fn pools_give_what_they_have() {
         let first = allocate(&[many]).unwrap();
         let second = allocate(&[one, one]).unwrap();
         assert_eq!(allocate(&[one]), exhausted, "all sets are given");
-        gpu.device()
-            .free_descriptor_sets(pool, &second[..1])
-            .unwrap();
+        gpu.device().free_descriptor_sets(pool, &second[..1]).unwrap();
         assert_eq!(allocate(&[many]), exhausted, "descriptors, one set freed");
         let third = allocate(&[one]).unwrap();
         let all = [first[0], second[1], third[0], vk::DescriptorSet::null()];
@@ -62,19 +54,13 @@ fn pools_give_what_they_have() {
 fn pools_give_descriptors_of_other_types() {
     let gpu = open();
     let both = set_layout(&gpu, &[(0, UNIFORM, 1), (1, STORAGE, 1)], NO_FLAGS);
-    let sizes = [vk::DescriptorPoolSize::default()
-        .ty(STORAGE)
-        .descriptor_count(3)];
-    let info = vk::DescriptorPoolCreateInfo::default()
-        .max_sets(3)
-        .pool_sizes(&sizes);
+    let sizes = [vk::DescriptorPoolSize::default().ty(STORAGE).descriptor_count(3)];
+    let info = vk::DescriptorPoolCreateInfo::default().max_sets(3).pool_sizes(&sizes);
     // SAFETY: see the crate.
     unsafe {
         let pool = gpu.device().create_descriptor_pool(&info, None).unwrap();
         let layouts = [both];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(pool)
-            .set_layouts(&layouts);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         gpu.device().allocate_descriptor_sets(&info).unwrap();
         assert_eq!(
             gpu.device().allocate_descriptor_sets(&info),
@@ -94,48 +80,25 @@ fn descriptors_are_copied_between_sets() {
     let source = Buffer::of(&gpu, &(0..64u32).collect::<Vec<_>>());
     let target = Buffer::of(&gpu, &[0u32; 64]);
     let templates = set_layout(&gpu, &[(0, STORAGE, 4)], NO_FLAGS);
-    let sizes = [vk::DescriptorPoolSize::default()
-        .ty(STORAGE)
-        .descriptor_count(4)];
-    let pool_info = vk::DescriptorPoolCreateInfo::default()
-        .max_sets(1)
-        .pool_sizes(&sizes);
+    let sizes = [vk::DescriptorPoolSize::default().ty(STORAGE).descriptor_count(4)];
+    let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
     // SAFETY: see the crate.
     unsafe {
-        let pool = gpu
-            .device()
-            .create_descriptor_pool(&pool_info, None)
-            .unwrap();
+        let pool = gpu.device().create_descriptor_pool(&pool_info, None).unwrap();
         let layouts = [templates];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(pool)
-            .set_layouts(&layouts);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         let from = gpu.device().allocate_descriptor_sets(&info).unwrap()[0];
-        write(
-            &gpu,
-            from,
-            (0, 1),
-            STORAGE,
-            &[whole(&source), whole(&target)],
-        );
+        write(&gpu, from, (0, 1), STORAGE, &[whole(&source), whole(&target)]);
         let set = kernel.sets.allocate()[0];
         // Both bindings in one copy: it continues from one binding into the next.
-        let copies = [vk::CopyDescriptorSet::default()
-            .src_set(from)
-            .src_array_element(1)
-            .dst_set(set)
-            .descriptor_count(2)];
+        let copies =
+            [vk::CopyDescriptorSet::default().src_set(from).src_array_element(1).dst_set(set).descriptor_count(2)];
         gpu.device().update_descriptor_sets(&[], &copies);
         gpu.device().destroy_descriptor_pool(pool, None);
         gpu.device().destroy_descriptor_set_layout(templates, None);
         kernel.run(&[set], &[2, 1], [1, 1, 1]);
     }
-    assert!(
-        target
-            .values::<u32>()
-            .into_iter()
-            .eq((0..64).map(|i| 2 * i + 1))
-    );
+    assert!(target.values::<u32>().into_iter().eq((0..64).map(|i| 2 * i + 1)));
 }
 
 /// The application's own structure that an update template reads.
@@ -154,10 +117,7 @@ fn template_entries() -> [vk::DescriptorUpdateTemplateEntry; 2] {
             .descriptor_type(STORAGE)
             .offset(offset)
     };
-    [
-        entry(0, std::mem::offset_of!(Resources, source)),
-        entry(1, std::mem::offset_of!(Resources, target)),
-    ]
+    [entry(0, std::mem::offset_of!(Resources, source)), entry(1, std::mem::offset_of!(Resources, target))]
 }
 
 #[gaurast_runner::test]
@@ -172,31 +132,17 @@ fn templates_update_sets() {
         .descriptor_update_entries(&entries)
         .template_type(vk::DescriptorUpdateTemplateType::DESCRIPTOR_SET)
         .descriptor_set_layout(kernel.sets.layouts[0]);
-    let resources = Resources {
-        padding: 0,
-        target: whole(&target),
-        source: whole(&source),
-    };
+    let resources = Resources { padding: 0, target: whole(&target), source: whole(&source) };
     let set = kernel.sets.allocate()[0];
     // SAFETY: see the crate; the data is what the template describes.
     unsafe {
-        let template = gpu
-            .device()
-            .create_descriptor_update_template(&info, None)
-            .unwrap();
+        let template = gpu.device().create_descriptor_update_template(&info, None).unwrap();
         let data = (&raw const resources).cast();
-        gpu.device()
-            .update_descriptor_set_with_template(set, template, data);
-        gpu.device()
-            .destroy_descriptor_update_template(template, None);
+        gpu.device().update_descriptor_set_with_template(set, template, data);
+        gpu.device().destroy_descriptor_update_template(template, None);
     }
     kernel.run(&[set], &[5, 0], [1, 1, 1]);
-    assert!(
-        target
-            .values::<u32>()
-            .into_iter()
-            .eq((0..64).map(|i| 5 * i))
-    );
+    assert!(target.values::<u32>().into_iter().eq((0..64).map(|i| 5 * i)));
 }
 
 #[gaurast_runner::test]
@@ -210,11 +156,7 @@ fn descriptors_are_pushed() {
     let kernel = Compute::over(&gpu, &words, Sets::of(&gpu, layouts, &[bindings]), &none);
     let push = ash::khr::push_descriptor::Device::new(gpu.instance(), gpu.device());
     let source = Buffer::of(&gpu, &(0..64u32).collect::<Vec<_>>());
-    let targets = [
-        Buffer::new(&gpu, 256),
-        Buffer::new(&gpu, 256),
-        Buffer::new(&gpu, 256),
-    ];
+    let targets = [Buffer::new(&gpu, 256), Buffer::new(&gpu, 256), Buffer::new(&gpu, 256)];
     let bind_point = vk::PipelineBindPoint::COMPUTE;
     let entries = template_entries();
     let info = vk::DescriptorUpdateTemplateCreateInfo::default()
@@ -222,24 +164,14 @@ fn descriptors_are_pushed() {
         .template_type(vk::DescriptorUpdateTemplateType::PUSH_DESCRIPTORS_KHR)
         .pipeline_bind_point(bind_point)
         .pipeline_layout(kernel.layout);
-    let resources = Resources {
-        padding: 0,
-        target: whole(&targets[2]),
-        source: whole(&source),
-    };
+    let resources = Resources { padding: 0, target: whole(&targets[2]), source: whole(&source) };
     // SAFETY: see the crate; the data is what the template describes.
     unsafe {
-        let template = gpu
-            .device()
-            .create_descriptor_update_template(&info, None)
-            .unwrap();
+        let template = gpu.device().create_descriptor_update_template(&info, None).unwrap();
         gpu.run(|recording| {
             let (device, commands) = recording.raw();
             let write = |binding, infos| {
-                vk::WriteDescriptorSet::default()
-                    .dst_binding(binding)
-                    .descriptor_type(STORAGE)
-                    .buffer_info(infos)
+                vk::WriteDescriptorSet::default().dst_binding(binding).descriptor_type(STORAGE).buffer_info(infos)
             };
             kernel.bind(commands, &[]);
             let infos = [whole(&source), whole(&targets[0]), whole(&targets[1])].map(|info| [info]);
@@ -257,8 +189,7 @@ fn descriptors_are_pushed() {
             push.cmd_push_descriptor_set_with_template(commands, template, kernel.layout, 0, data);
             device.cmd_dispatch(commands, 1, 1, 1);
         });
-        gpu.device()
-            .destroy_descriptor_update_template(template, None);
+        gpu.device().destroy_descriptor_update_template(template, None);
     }
     for (addend, target) in (1..).zip(targets) {
         assert!(target.values::<u32>().into_iter().eq(addend..64 + addend));
@@ -310,10 +241,7 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
     let gpu = open();
     let words = spirv!("descriptors.comp");
     let refused = |sets: &[&[Binding]], complaint: &str| {
-        let layouts: Vec<_> = sets
-            .iter()
-            .map(|set| set_layout(&gpu, set, NO_FLAGS))
-            .collect();
+        let layouts: Vec<_> = sets.iter().map(|set| set_layout(&gpu, set, NO_FLAGS)).collect();
         let none = vk::SpecializationInfo::default();
         assert!(Kernel::create(&gpu, &words, &layouts, &none).is_err());
         for layout in layouts {
@@ -321,49 +249,30 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
             unsafe { gpu.device().destroy_descriptor_set_layout(layout, None) };
         }
         let messages = gpu.message_texts();
-        assert!(
-            messages.iter().any(|m| m.contains(complaint)),
-            "{complaint}: {messages:?}"
-        );
+        assert!(messages.iter().any(|m| m.contains(complaint)), "{complaint}: {messages:?}");
     };
     refused(&[], "set 0, binding 0");
     refused(&[&[(0, STORAGE, 4)]], "set 1, binding");
-    refused(
-        &[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]],
-        "has 3 descriptors in the pipeline layout",
-    );
-    refused(
-        &[&[(0, STORAGE, 4)], &[(0, STORAGE, 2), (3, STORAGE, 1)]],
-        "UniformBuffer",
-    );
+    refused(&[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]], "has 3 descriptors in the pipeline layout");
+    refused(&[&[(0, STORAGE, 4)], &[(0, STORAGE, 2), (3, STORAGE, 1)]], "UniformBuffer");
 }
 
 #[gaurast_runner::test]
 fn shaders_that_cannot_run_are_refused_with_the_instruction() {
     let gpu = open();
-    let layouts = [set_layout(
-        &gpu,
-        &[(0, STORAGE, 1), (1, STORAGE, 1)],
-        NO_FLAGS,
-    )];
+    let layouts = [set_layout(&gpu, &[(0, STORAGE, 1), (1, STORAGE, 1)], NO_FLAGS)];
     let refused = |words: &[u32], complaint: &str| {
         let none = vk::SpecializationInfo::default();
         let created = Kernel::create(&gpu, words, &layouts, &none);
         assert!(created.is_err(), "{complaint}");
         let messages = gpu.message_texts();
-        assert!(
-            messages.iter().any(|m| m.contains(complaint)),
-            "{complaint}: {messages:?}"
-        );
+        assert!(messages.iter().any(|m| m.contains(complaint)), "{complaint}: {messages:?}");
     };
     let whole = spirv!("push_constants.comp");
     refused(&whole[..4], "SPIR-V");
     refused(&whole[..whole.len() - 3], "SPIR-V");
     // The first OpIMul (132) gets an operand that does not exist, and then an opcode that does not exist.
-    let multiply = whole
-        .iter()
-        .position(|&word| word == 5 << 16 | 132)
-        .unwrap();
+    let multiply = whole.iter().position(|&word| word == 5 << 16 | 132).unwrap();
     let mut changed = whole.clone();
     changed[multiply + 4] = 12345;
     refused(&changed, "OpIMul");

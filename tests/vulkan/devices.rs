@@ -27,11 +27,7 @@ pub const COLOR_LAYERS: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers 
 
 /// The options for opening a driver's device with all that it supports.
 pub const fn everything_of(driver: Driver) -> Opening<'static> {
-    Opening {
-        all_extensions: true,
-        robust: true,
-        ..Opening::of(driver)
-    }
+    Opening { all_extensions: true, robust: true, ..Opening::of(driver) }
 }
 
 /// Opens this driver's device with all that it supports.
@@ -40,10 +36,7 @@ pub fn open() -> Gpu {
 }
 
 fn with_features_of_gaussians(features: GaussianFeatures<'static>) -> Gpu {
-    let opening = Opening {
-        gaussian: Some(features),
-        ..everything_of(Driver::Embedded)
-    };
+    let opening = Opening { gaussian: Some(features), ..everything_of(Driver::Embedded) };
     Gpu::open(&opening).expect("a device")
 }
 
@@ -64,9 +57,7 @@ pub fn gaussian(gpu: &Gpu) -> &gaussian_primitive_topology::Device {
 
 /// Memory of a type.
 pub fn allocate(gpu: &Gpu, size: u64, memory_type: u32) -> vk::DeviceMemory {
-    let info = vk::MemoryAllocateInfo::default()
-        .allocation_size(size)
-        .memory_type_index(memory_type);
+    let info = vk::MemoryAllocateInfo::default().allocation_size(size).memory_type_index(memory_type);
     // SAFETY: see the crate.
     unsafe { gpu.device().allocate_memory(&info, None) }.expect("memory")
 }
@@ -74,14 +65,8 @@ pub fn allocate(gpu: &Gpu, size: u64, memory_type: u32) -> vk::DeviceMemory {
 /// A 2D image for use as an attachment; a colour image can also be sampled and stored to.
 pub fn image(gpu: &Gpu, format: vk::Format, size: [u32; 2]) -> Image {
     let usage = match format {
-        vk::Format::D32_SFLOAT | vk::Format::D16_UNORM => {
-            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
-        }
-        _ => {
-            vk::ImageUsageFlags::COLOR_ATTACHMENT
-                | vk::ImageUsageFlags::SAMPLED
-                | vk::ImageUsageFlags::STORAGE
-        }
+        vk::Format::D32_SFLOAT | vk::Format::D16_UNORM => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        _ => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE,
     };
     Image::new(gpu, &ImageOptions::new(format, size, usage))
 }

@@ -38,11 +38,8 @@ fn two_triangles(depths: [f32; 2]) -> Vec<Vertex> {
 
 fn depth_test(request: &mut Graphics<'_>) {
     request.depth_format = DEPTH_FORMAT;
-    request.depth_stencil = request
-        .depth_stencil
-        .depth_test_enable(true)
-        .depth_write_enable(true)
-        .depth_compare_op(vk::CompareOp::LESS);
+    request.depth_stencil =
+        request.depth_stencil.depth_test_enable(true).depth_write_enable(true).depth_compare_op(vk::CompareOp::LESS);
 }
 
 /// Draws where the stencil is 0, and increments it.
@@ -99,10 +96,7 @@ fn constant_blend(request: &mut Graphics<'_>) {
 
 fn bounds_test(request: &mut Graphics<'_>) {
     request.depth_format = DEPTH_FORMAT;
-    request.depth_stencil = request
-        .depth_stencil
-        .depth_bounds_test_enable(true)
-        .max_depth_bounds(1.0);
+    request.depth_stencil = request.depth_stencil.depth_bounds_test_enable(true).max_depth_bounds(1.0);
 }
 
 /// Records a command that sets state. Its arguments may depend on the setting.
@@ -282,43 +276,23 @@ fn cases() -> Vec<Case> {
 }
 
 fn culled(on: bool) -> vk::CullModeFlags {
-    if on {
-        vk::CullModeFlags::BACK
-    } else {
-        vk::CullModeFlags::NONE
-    }
+    if on { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE }
 }
 
 fn face(on: bool) -> vk::FrontFace {
-    if on {
-        vk::FrontFace::CLOCKWISE
-    } else {
-        vk::FrontFace::COUNTER_CLOCKWISE
-    }
+    if on { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE }
 }
 
 fn topology(on: bool) -> vk::PrimitiveTopology {
-    if on {
-        vk::PrimitiveTopology::TRIANGLE_STRIP
-    } else {
-        vk::PrimitiveTopology::TRIANGLE_LIST
-    }
+    if on { vk::PrimitiveTopology::TRIANGLE_STRIP } else { vk::PrimitiveTopology::TRIANGLE_LIST }
 }
 
 fn compare(on: bool) -> vk::CompareOp {
-    if on {
-        vk::CompareOp::LESS
-    } else {
-        vk::CompareOp::GREATER
-    }
+    if on { vk::CompareOp::LESS } else { vk::CompareOp::GREATER }
 }
 
 fn pass_op(on: bool) -> vk::StencilOp {
-    if on {
-        vk::StencilOp::INVERT
-    } else {
-        vk::StencilOp::KEEP
-    }
+    if on { vk::StencilOp::INVERT } else { vk::StencilOp::KEEP }
 }
 
 fn mask(on: bool) -> u32 {
@@ -356,10 +330,7 @@ fn dynamic_state_is_what_static_state_is() {
     let canvas = Canvas::with_depth();
     for case in cases() {
         let request = |on| {
-            let mut request = Graphics {
-                depth_format: DEPTH_FORMAT,
-                ..colored()
-            };
+            let mut request = Graphics { depth_format: DEPTH_FORMAT, ..colored() };
             (case.base)(&mut request);
             (case.fixed)(&mut request, on);
             request
@@ -380,31 +351,10 @@ fn dynamic_state_is_what_static_state_is() {
 #[gaurast_runner::test]
 fn viewports_and_scissors_come_with_their_count() {
     let canvas = Canvas::new();
-    let request = Graphics {
-        viewports: 0,
-        dynamic: vec![S::VIEWPORT_WITH_COUNT, S::SCISSOR_WITH_COUNT],
-        ..colored()
-    };
-    let vertices = [
-        vertex(-1.0, -1.0, RED),
-        vertex(3.0, -1.0, RED),
-        vertex(-1.0, 3.0, RED),
-    ];
-    let half = vk::Rect2D {
-        offset: vk::Offset2D { x: 0, y: 10 },
-        extent: vk::Extent2D {
-            width: WIDTH,
-            height: 5,
-        },
-    };
-    let viewport = vk::Viewport {
-        x: 8.0,
-        y: 0.0,
-        width: 16.0,
-        height: HEIGHT as f32,
-        min_depth: 0.0,
-        max_depth: 1.0,
-    };
+    let request = Graphics { viewports: 0, dynamic: vec![S::VIEWPORT_WITH_COUNT, S::SCISSOR_WITH_COUNT], ..colored() };
+    let vertices = [vertex(-1.0, -1.0, RED), vertex(3.0, -1.0, RED), vertex(-1.0, 3.0, RED)];
+    let half = vk::Rect2D { offset: vk::Offset2D { x: 0, y: 10 }, extent: vk::Extent2D { width: WIDTH, height: 5 } };
+    let viewport = vk::Viewport { x: 8.0, y: 0.0, width: 16.0, height: HEIGHT as f32, min_depth: 0.0, max_depth: 1.0 };
     let pixels = canvas.draw(&request, &vertices, |device, commands, _| {
         // SAFETY: see the crate.
         unsafe {

@@ -4,8 +4,7 @@ use crate::context::{Context, everything};
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
-    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
 };
 use gaurast_testkit::{Message, Messages};
 use std::ffi::{CStr, c_char, c_void};
@@ -14,17 +13,11 @@ use std::sync::Mutex;
 #[gaurast_runner::test]
 fn a_device_is_created_used_and_destroyed() {
     let context = Context::embedded(&[]);
-    let mut gaussian = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
-        .gaussian_primitive_topology(true);
-    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
-        .dynamic_rendering(true)
-        .synchronization2(true);
-    let mut features = vk::PhysicalDeviceFeatures2::default()
-        .push_next(&mut gaussian)
-        .push_next(&mut vulkan13);
-    let device = context
-        .device(&[gaussian_primitive_topology::NAME], &mut features)
-        .unwrap();
+    let mut gaussian =
+        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default().gaussian_primitive_topology(true);
+    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian).push_next(&mut vulkan13);
+    let device = context.device(&[gaussian_primitive_topology::NAME], &mut features).unwrap();
     // SAFETY: the device is live, and destroyed last.
     unsafe {
         let queue = device.get_device_queue(0, 0);
@@ -52,16 +45,11 @@ fn the_device_says_what_it_is() {
         .push_next(&mut vulkan11);
     // SAFETY: the physical device is the instance's, and the chain is valid.
     unsafe {
-        context
-            .instance
-            .get_physical_device_properties2(context.physical_device, &mut properties);
+        context.instance.get_physical_device_properties2(context.physical_device, &mut properties);
     }
     let properties = properties.properties;
     assert_eq!(properties.device_type, vk::PhysicalDeviceType::CPU);
-    assert_eq!(
-        properties.device_name_as_c_str().unwrap(),
-        c"GauRast simulated device"
-    );
+    assert_eq!(properties.device_name_as_c_str().unwrap(), c"GauRast simulated device");
     assert_eq!(driver.driver_name_as_c_str().unwrap(), c"GauRast");
     assert_eq!(driver.conformance_version.major, 0);
     assert!(properties.limits.max_vertex_input_attributes >= 32);
@@ -69,13 +57,7 @@ fn the_device_says_what_it_is() {
     assert_eq!(properties.limits.max_image_dimension2_d, 16384);
     assert_ne!(vulkan11.device_uuid, [0; 16]);
     assert!(vulkan11.max_memory_allocation_size >= 1 << 30);
-    assert_eq!(
-        gaussian.tile_size,
-        vk::Extent2D {
-            width: 16,
-            height: 16
-        }
-    );
+    assert_eq!(gaussian.tile_size, vk::Extent2D { width: 16, height: 16 });
     assert_eq!(gaussian.max_spherical_harmonics_degree, 4);
 }
 
@@ -83,16 +65,8 @@ fn the_device_says_what_it_is() {
 fn memory_can_be_hidden_from_the_host_or_shared_with_it() {
     let context = Context::embedded(&[]);
     // SAFETY: the physical device is the instance's.
-    let memory = unsafe {
-        context
-            .instance
-            .get_physical_device_memory_properties(context.physical_device)
-    };
-    let types: Vec<_> = memory
-        .memory_types_as_slice()
-        .iter()
-        .map(|memory_type| memory_type.property_flags)
-        .collect();
+    let memory = unsafe { context.instance.get_physical_device_memory_properties(context.physical_device) };
+    let types: Vec<_> = memory.memory_types_as_slice().iter().map(|memory_type| memory_type.property_flags).collect();
     let shared = vk::MemoryPropertyFlags::DEVICE_LOCAL
         | vk::MemoryPropertyFlags::HOST_VISIBLE
         | vk::MemoryPropertyFlags::HOST_COHERENT;
@@ -107,8 +81,7 @@ fn what_is_not_there_is_refused() {
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
     let debug = ash::ext::debug_utils::Instance::new(&context.entry, &context.instance);
     // SAFETY: `heard` outlives the messenger.
-    let messenger =
-        unsafe { debug.create_debug_utils_messenger(&everything(&heard), None) }.unwrap();
+    let messenger = unsafe { debug.create_debug_utils_messenger(&everything(&heard), None) }.unwrap();
 
     let refusal = |extensions: &[&CStr], features: &mut vk::PhysicalDeviceFeatures2<'_>| {
         let error = context.device(extensions, features).err();
@@ -116,12 +89,7 @@ fn what_is_not_there_is_refused() {
     };
     let (error, messages) = refusal(&[c"VK_EXT_mesh_shader"], &mut Default::default());
     assert_eq!(error, Some(vk::Result::ERROR_EXTENSION_NOT_PRESENT));
-    assert!(
-        messages
-            .iter()
-            .any(|message| message.text.contains("VK_EXT_mesh_shader")),
-        "{messages:?}"
-    );
+    assert!(messages.iter().any(|message| message.text.contains("VK_EXT_mesh_shader")), "{messages:?}");
 
     let mut features = vk::PhysicalDeviceFeatures2::default();
     features.features.texture_compression_etc2 = vk::TRUE;
@@ -130,13 +98,9 @@ fn what_is_not_there_is_refused() {
     assert_eq!(messages.len(), 1, "{messages:?}");
     let Message { id, text } = &messages[0];
     assert_eq!(id, "GAURAST-error");
-    assert!(
-        text.contains("vkCreateDevice") && text.contains("textureCompressionETC2"),
-        "{text}"
-    );
+    assert!(text.contains("vkCreateDevice") && text.contains("textureCompressionETC2"), "{text}");
 
-    let mut chained =
-        vk::PhysicalDeviceVulkan13Features::default().texture_compression_astc_hdr(true);
+    let mut chained = vk::PhysicalDeviceVulkan13Features::default().texture_compression_astc_hdr(true);
     let (error, _) = refusal(
         &[gaussian_primitive_topology::NAME],
         &mut vk::PhysicalDeviceFeatures2::default().push_next(&mut chained),
@@ -155,18 +119,11 @@ fn an_instance_refuses_what_it_lacks_and_says_so() {
     let heard = Messages::default();
     let mut messenger = everything(&heard);
     let names = [c"VK_KHR_xcb_surface".as_ptr()];
-    let info = vk::InstanceCreateInfo::default()
-        .enabled_extension_names(&names)
-        .push_next(&mut messenger);
+    let info = vk::InstanceCreateInfo::default().enabled_extension_names(&names).push_next(&mut messenger);
     // SAFETY: the creation info is valid.
     let error = unsafe { entry.create_instance(&info, None) }.err();
     assert_eq!(error, Some(vk::Result::ERROR_EXTENSION_NOT_PRESENT));
-    assert!(
-        heard
-            .take()
-            .iter()
-            .any(|message| message.text.contains("VK_KHR_xcb_surface"))
-    );
+    assert!(heard.take().iter().any(|message| message.text.contains("VK_KHR_xcb_surface")));
 
     let names = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
     let info = vk::InstanceCreateInfo::default().enabled_layer_names(&names);
@@ -201,10 +158,7 @@ unsafe extern "system" fn hear_report(
 }
 
 /// Creation info of a callback that stores reports of these kinds.
-fn listening(
-    heard: &Mutex<Vec<Report>>,
-    flags: vk::DebugReportFlagsEXT,
-) -> vk::DebugReportCallbackCreateInfoEXT<'_> {
+fn listening(heard: &Mutex<Vec<Report>>, flags: vk::DebugReportFlagsEXT) -> vk::DebugReportCallbackCreateInfoEXT<'_> {
     vk::DebugReportCallbackCreateInfoEXT::default()
         .flags(flags)
         .pfn_callback(Some(hear_report))
@@ -225,12 +179,7 @@ fn report_callbacks_hear_the_driver_and_the_application() {
         let info = listening(heard, flags);
         // SAFETY: what is heard outlives the callback.
         let result = unsafe {
-            (reports.create_debug_report_callback_ext)(
-                instance,
-                &raw const info,
-                std::ptr::null(),
-                &raw mut callback,
-            )
+            (reports.create_debug_report_callback_ext)(instance, &raw const info, std::ptr::null(), &raw mut callback)
         };
         assert_eq!(result, vk::Result::SUCCESS);
         callback
@@ -253,10 +202,7 @@ fn report_callbacks_hear_the_driver_and_the_application() {
     assert_eq!(heard, taken(&all));
     let (flags, _, _, _, prefix, text) = &heard[0];
     assert_eq!((*flags, prefix.as_str()), (Flags::ERROR, "GAURAST-error"));
-    assert!(
-        text.contains("vkCreateDevice") && text.contains("VK_EXT_mesh_shader"),
-        "{text}"
-    );
+    assert!(text.contains("vkCreateDevice") && text.contains("VK_EXT_mesh_shader"), "{text}");
 
     // SAFETY: the strings are valid.
     unsafe {
@@ -271,14 +217,7 @@ fn report_callbacks_hear_the_driver_and_the_application() {
             c"hello".as_ptr(),
         );
     }
-    let sent = (
-        Flags::WARNING,
-        7,
-        8,
-        -9,
-        "test".to_owned(),
-        "hello".to_owned(),
-    );
+    let sent = (Flags::WARNING, 7, 8, -9, "test".to_owned(), "hello".to_owned());
     assert_eq!((taken(&errors), taken(&all)), (vec![], vec![sent]));
 
     destroy(of_errors);
@@ -291,9 +230,7 @@ fn report_callbacks_hear_the_driver_and_the_application() {
 
     let mut callback = listening(&errors, Flags::ERROR);
     let names = [c"VK_KHR_xcb_surface".as_ptr()];
-    let info = vk::InstanceCreateInfo::default()
-        .enabled_extension_names(&names)
-        .push_next(&mut callback);
+    let info = vk::InstanceCreateInfo::default().enabled_extension_names(&names).push_next(&mut callback);
     // SAFETY: the creation info is valid.
     let error = unsafe { context.entry.create_instance(&info, None) }.err();
     assert_eq!(error, Some(vk::Result::ERROR_EXTENSION_NOT_PRESENT));
@@ -305,14 +242,10 @@ fn applications_may_send_messages() {
     let heard = Messages::default();
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
     let debug = ash::ext::debug_utils::Instance::new(&context.entry, &context.instance);
-    let data = vk::DebugUtilsMessengerCallbackDataEXT::default()
-        .message_id_name(c"test")
-        .message(c"hello");
+    let data = vk::DebugUtilsMessengerCallbackDataEXT::default().message_id_name(c"test").message(c"hello");
     // SAFETY: `heard` outlives the messenger, and the message is valid.
     unsafe {
-        let messenger = debug
-            .create_debug_utils_messenger(&everything(&heard), None)
-            .unwrap();
+        let messenger = debug.create_debug_utils_messenger(&everything(&heard), None).unwrap();
         debug.submit_debug_utils_message(
             vk::DebugUtilsMessageSeverityFlagsEXT::INFO,
             vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
@@ -320,10 +253,7 @@ fn applications_may_send_messages() {
         );
         debug.destroy_debug_utils_messenger(messenger, None);
     }
-    let expected = Message {
-        id: "test".to_owned(),
-        text: "hello".to_owned(),
-    };
+    let expected = Message { id: "test".to_owned(), text: "hello".to_owned() };
     assert_eq!(heard.take(), [expected]);
 }
 
@@ -332,24 +262,14 @@ fn device_commands_appear_with_their_extension() {
     let context = Context::embedded(&[]);
     let found = |device: &ash::Device, name: &CStr| {
         // SAFETY: the device is live.
-        unsafe {
-            context
-                .instance
-                .get_device_proc_addr(device.handle(), name.as_ptr())
-        }
-        .is_some()
+        unsafe { context.instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some()
     };
     let set_camera = c"vkCmdSetGaussianCamerasGAURAST";
     let bare = context.device(&[], &mut Default::default()).unwrap();
     assert!(!found(&bare, set_camera));
     assert!(!found(&bare, c"vkCreateDevice"));
     assert!(found(&bare, c"vkCmdDraw"));
-    let extended = context
-        .device(
-            &[gaussian_primitive_topology::NAME],
-            &mut Default::default(),
-        )
-        .unwrap();
+    let extended = context.device(&[gaussian_primitive_topology::NAME], &mut Default::default()).unwrap();
     assert!(found(&extended, set_camera));
     // SAFETY: the devices are live and not used again.
     unsafe {
@@ -361,26 +281,13 @@ fn device_commands_appear_with_their_extension() {
 #[gaurast_runner::test]
 fn enumeration_may_be_cut_short() {
     let context = Context::embedded(&[]);
-    let enumerate = context
-        .instance
-        .fp_v1_0()
-        .enumerate_device_extension_properties;
+    let enumerate = context.instance.fp_v1_0().enumerate_device_extension_properties;
     let mut count = 1;
     let mut extensions = [vk::ExtensionProperties::default(); 2];
     // SAFETY: the array is large enough for `count` extensions.
-    let result = unsafe {
-        enumerate(
-            context.physical_device,
-            std::ptr::null(),
-            &mut count,
-            extensions.as_mut_ptr(),
-        )
-    };
+    let result = unsafe { enumerate(context.physical_device, std::ptr::null(), &mut count, extensions.as_mut_ptr()) };
     assert_eq!((result, count), (vk::Result::INCOMPLETE, 1));
-    assert_eq!(
-        extensions[0].extension_name_as_c_str().unwrap(),
-        gaussian_primitive_topology::NAME
-    );
+    assert_eq!(extensions[0].extension_name_as_c_str().unwrap(), gaussian_primitive_topology::NAME);
     assert_eq!(extensions[1].extension_name_as_c_str().unwrap(), c"");
 }
 
@@ -390,10 +297,7 @@ fn counters_are_enumerated_with_their_descriptions() {
     let performance = ash::khr::performance_query::Instance::new(&context.entry, &context.instance);
     // SAFETY: the physical device is the instance's.
     let count = unsafe {
-        performance.enumerate_physical_device_queue_family_performance_query_counters_len(
-            context.physical_device,
-            0,
-        )
+        performance.enumerate_physical_device_queue_family_performance_query_counters_len(context.physical_device, 0)
     }
     .unwrap();
     assert!(count > 10);
@@ -409,27 +313,16 @@ fn counters_are_enumerated_with_their_descriptions() {
         )
     }
     .unwrap();
-    let names: Vec<_> = descriptions
-        .iter()
-        .map(|d| d.name_as_c_str().unwrap())
-        .collect();
+    let names: Vec<_> = descriptions.iter().map(|d| d.name_as_c_str().unwrap()).collect();
     assert!(names.contains(&c"gaussians drawn"), "{names:?}");
-    assert!(
-        counters
-            .iter()
-            .all(|c| c.storage == vk::PerformanceCounterStorageKHR::UINT64)
-    );
+    assert!(counters.iter().all(|c| c.storage == vk::PerformanceCounterStorageKHR::UINT64));
 }
 
 /// A device with the features of Vulkan 1.2 and 1.3 that tests below use.
 fn device_with_core_features(context: &Context) -> ash::Device {
-    let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
-        .timeline_semaphore(true)
-        .host_query_reset(true);
+    let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).host_query_reset(true);
     let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default().private_data(true);
-    let mut features = vk::PhysicalDeviceFeatures2::default()
-        .push_next(&mut vulkan12)
-        .push_next(&mut vulkan13);
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan12).push_next(&mut vulkan13);
     context.device(&[], &mut features).unwrap()
 }
 
@@ -437,9 +330,8 @@ fn device_with_core_features(context: &Context) -> ash::Device {
 fn timelines_are_signalled_by_host_and_queue() {
     let context = Context::embedded(&[]);
     let device = device_with_core_features(&context);
-    let mut timeline = vk::SemaphoreTypeCreateInfo::default()
-        .semaphore_type(vk::SemaphoreType::TIMELINE)
-        .initial_value(3);
+    let mut timeline =
+        vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(3);
     let info = vk::SemaphoreCreateInfo::default().push_next(&mut timeline);
     // SAFETY: the device is live, and destroyed last; the semaphore is idle when it is destroyed.
     unsafe {
@@ -448,9 +340,7 @@ fn timelines_are_signalled_by_host_and_queue() {
         let semaphores = [semaphore];
         let wait = |value, timeout| {
             let values = [value];
-            let info = vk::SemaphoreWaitInfo::default()
-                .semaphores(&semaphores)
-                .values(&values);
+            let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
             device.wait_semaphores(&info, timeout)
         };
         assert_eq!(wait(3, 0), Ok(()));
@@ -467,12 +357,8 @@ fn timelines_are_signalled_by_host_and_queue() {
             .signal_semaphores(&semaphores)
             .push_next(&mut values);
         let queue = device.get_device_queue(0, 0);
-        device
-            .queue_submit(queue, &[submit], vk::Fence::null())
-            .unwrap();
-        let signal = vk::SemaphoreSignalInfo::default()
-            .semaphore(semaphore)
-            .value(4);
+        device.queue_submit(queue, &[submit], vk::Fence::null()).unwrap();
+        let signal = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(4);
         device.signal_semaphore(&signal).unwrap();
         assert_eq!(wait(7, u64::MAX), Ok(()));
         device.queue_wait_idle(queue).unwrap();
@@ -491,9 +377,7 @@ fn private_data_is_kept_per_object_and_slot() {
         let slots = [(); 2].map(|()| device.create_private_data_slot(&info, None).unwrap());
         let queue = device.get_device_queue(0, 0);
         device.set_private_data(queue, slots[0], 5).unwrap();
-        device
-            .set_private_data(device.handle(), slots[0], 6)
-            .unwrap();
+        device.set_private_data(device.handle(), slots[0], 6).unwrap();
         assert_eq!(device.get_private_data(queue, slots[0]), 5);
         assert_eq!(device.get_private_data(device.handle(), slots[0]), 6);
         assert_eq!(device.get_private_data(queue, slots[1]), 0);
@@ -513,19 +397,12 @@ fn core_commands_that_do_not_work_yet_fail() {
     let device = context.device(&[], &mut Default::default()).unwrap();
     // SAFETY: everything is destroyed after its last use.
     unsafe {
-        let messenger = debug
-            .create_debug_utils_messenger(&everything(&heard), None)
-            .unwrap();
-        let error = device
-            .create_sampler_ycbcr_conversion(&Default::default(), None)
-            .err();
+        let messenger = debug.create_debug_utils_messenger(&everything(&heard), None).unwrap();
+        let error = device.create_sampler_ycbcr_conversion(&Default::default(), None).err();
         assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
         let messages = heard.take();
         assert_eq!(messages[0].id, "GAURAST-unsupported-command");
-        assert!(
-            messages[0].text.contains("vkCreateSamplerYcbcrConversion"),
-            "{messages:?}"
-        );
+        assert!(messages[0].text.contains("vkCreateSamplerYcbcrConversion"), "{messages:?}");
         debug.destroy_debug_utils_messenger(messenger, None);
         device.destroy_device(None);
     }

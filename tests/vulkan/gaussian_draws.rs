@@ -1,9 +1,7 @@
 //! Gaussian draws, from pipeline and camera to pixels.
 
 use crate::devices::gaussian;
-use crate::scene::{
-    CENTER, Scene, Splat, assert_close, at, over, pass, premultiplied, splat, splats,
-};
+use crate::scene::{CENTER, Scene, Splat, assert_close, at, over, pass, premultiplied, splat, splats};
 use ash::vk;
 use gaurast_testkit::{Buffer, Graphics};
 
@@ -33,10 +31,7 @@ fn a_gaussian_is_brightest_at_its_mean() {
 
 #[gaurast_runner::test]
 fn alpha_becomes_coverage_without_a_fragment_stage() {
-    let gaussians = [
-        splat([0.0, 0.0, 9.0], 0.3, 0.9, BLUE),
-        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
-    ];
+    let gaussians = [splat([0.0, 0.0, 9.0], 0.3, 0.9, BLUE), splat([0.0, 0.0, 5.0], 0.1, 0.5, RED)];
     let clear = [0.2, 0.4, 0.6, 0.0];
     let [plain, covering] = [false, true].map(|alpha_to_coverage| {
         let request = Graphics {
@@ -70,36 +65,24 @@ fn alpha_becomes_coverage_without_a_fragment_stage() {
 
 #[gaurast_runner::test]
 fn gaussians_are_sorted_and_blended_over_the_background() {
-    let gaussians = [
-        splat([0.0, 0.0, 9.0], 0.1, 0.6, BLUE),
-        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
-    ];
-    let request = Graphics {
-        blend: vec![over()],
-        ..splats()
-    };
+    let gaussians = [splat([0.0, 0.0, 9.0], 0.1, 0.6, BLUE), splat([0.0, 0.0, 5.0], 0.1, 0.5, RED)];
+    let request = Graphics { blend: vec![over()], ..splats() };
     let scene = Scene::new(&gaussians, &request);
     let clear = [0.2, 0.4, 0.6, 1.0];
     let pixels = scene.draw(clear, |device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_draw(commands, 2, 1, 0, 0) };
     });
-    let [r, g, b]: [f32; 3] =
-        std::array::from_fn(|i| 0.5 * RED[i] + 0.5 * 0.6 * BLUE[i] + 0.5 * 0.4 * clear[i]);
+    let [r, g, b]: [f32; 3] = std::array::from_fn(|i| 0.5 * RED[i] + 0.5 * 0.6 * BLUE[i] + 0.5 * 0.4 * clear[i]);
     assert_close(at(&pixels, CENTER), [r, g, b, 1.0]);
     assert_eq!(at(&pixels, (0, 0)), clear);
 }
 
 #[gaurast_runner::test]
 fn blend_constants_may_be_dynamic() {
-    let blend = over()
-        .src_color_blend_factor(vk::BlendFactor::CONSTANT_COLOR)
-        .dst_color_blend_factor(vk::BlendFactor::ZERO);
-    let mut request = Graphics {
-        blend: vec![blend],
-        blend_constants: [1.0; 4],
-        ..splats()
-    };
+    let blend =
+        over().src_color_blend_factor(vk::BlendFactor::CONSTANT_COLOR).dst_color_blend_factor(vk::BlendFactor::ZERO);
+    let mut request = Graphics { blend: vec![blend], blend_constants: [1.0; 4], ..splats() };
     request.dynamic.push(vk::DynamicState::BLEND_CONSTANTS);
     let scene = Scene::new(&[splat([0.0, 0.0, 5.0], 0.1, 0.5, RED)], &request);
     let pixels = scene.draw([0.0; 4], |device, commands| {
@@ -118,14 +101,7 @@ fn a_negative_viewport_height_draws_the_same_picture() {
     let scene = scene(&[splat([0.1, 0.4, 5.0], 0.1, 0.8, RED)]);
     let draw = |y: f32, height: f32| {
         scene.draw([0.0; 4], |device, commands| {
-            let viewports = [vk::Viewport {
-                x: 0.0,
-                y,
-                width: 64.0,
-                height,
-                min_depth: 0.0,
-                max_depth: 1.0,
-            }];
+            let viewports = [vk::Viewport { x: 0.0, y, width: 64.0, height, min_depth: 0.0, max_depth: 1.0 }];
             // SAFETY: see the crate.
             unsafe {
                 device.cmd_set_viewport(commands, 0, &viewports);
@@ -155,10 +131,7 @@ fn the_scissor_cuts_and_does_not_move() {
     let whole = draw(None);
     let cut = draw(Some(vk::Rect2D {
         offset: vk::Offset2D { x: 32, y: 20 },
-        extent: vk::Extent2D {
-            width: 3,
-            height: 100,
-        },
+        extent: vk::Extent2D { width: 3, height: 100 },
     }));
     for y in 0..48 {
         for x in 0..64 {
@@ -171,10 +144,7 @@ fn the_scissor_cuts_and_does_not_move() {
 
 #[gaurast_runner::test]
 fn an_index_buffer_picks_gaussians() {
-    let scene = scene(&[
-        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
-        splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE),
-    ]);
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.5, RED), splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE)]);
     let indices = Buffer::of(&scene.gpu, &[9u16, 0, 0, 7]);
     let pixels = scene.draw([0.0; 4], |device, commands| {
         // SAFETY: see the crate.
@@ -214,10 +184,7 @@ fn instances_move_gaussians_by_attributes_of_their_own() {
 
 #[gaurast_runner::test]
 fn indirect_draws_read_their_numbers_when_they_execute() {
-    let scene = scene(&[
-        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
-        splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE),
-    ]);
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.5, RED), splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE)]);
     let numbers = Buffer::of(&scene.gpu, &[0u32; 5]);
     let indices = Buffer::of(&scene.gpu, &[1u32, 0]);
     let commands = scene
@@ -248,16 +215,9 @@ fn indirect_draws_read_their_numbers_when_they_execute() {
 
 #[gaurast_runner::test]
 fn the_number_of_indirect_draws_may_lie_in_a_buffer() {
-    let scene = scene(&[
-        splat([-1.0, 0.0, 5.0], 0.02, 0.5, RED),
-        splat([1.0, 0.0, 5.0], 0.02, 0.7, BLUE),
-    ]);
+    let scene = scene(&[splat([-1.0, 0.0, 5.0], 0.02, 0.5, RED), splat([1.0, 0.0, 5.0], 0.02, 0.7, BLUE)]);
     let numbers = Buffer::of(&scene.gpu, &[1u32, 1, 0, 0, 1, 1, 1, 0]);
-    for (count, drawn) in [
-        (0u32, [false, false]),
-        (1, [true, false]),
-        (9, [true, true]),
-    ] {
+    for (count, drawn) in [(0u32, [false, false]), (1, [true, false]), (9, [true, true])] {
         let count = Buffer::of(&scene.gpu, &[count]);
         let pixels = scene.draw([0.0; 4], |device, commands| {
             let (numbers, count) = (numbers.raw, count.raw);
@@ -287,10 +247,7 @@ fn a_draw_without_a_camera_draws_nothing_and_says_so() {
     });
     assert!(scene.pixels().iter().all(|pixel| *pixel == [0.25; 4]));
     let messages = scene.gpu.message_texts().concat();
-    assert!(
-        messages.contains("vkCmdSetGaussianCamerasGAURAST"),
-        "{messages}"
-    );
+    assert!(messages.contains("vkCmdSetGaussianCamerasGAURAST"), "{messages}");
 }
 
 #[gaurast_runner::test]
@@ -305,9 +262,6 @@ fn a_camera_that_is_none_fails_the_recording() {
             gaussian.cmd_set_gaussian_cameras(commands, &[camera]);
         }
     });
-    assert_eq!(
-        recorded.unwrap_err(),
-        vk::Result::ERROR_VALIDATION_FAILED_EXT
-    );
+    assert_eq!(recorded.unwrap_err(), vk::Result::ERROR_VALIDATION_FAILED_EXT);
     assert!(scene.gpu.message_texts().concat().contains("nearPlane"));
 }

@@ -1,13 +1,9 @@
 //! The extension beside state and features that are made for triangles, and the colours in attachments.
 
 use crate::devices::{gaussian, image, open};
-use crate::scene::{
-    FORMAT, HEIGHT, Scene, Splat, WIDTH, camera, over, pass, pass_with, set_viewport, splat, splats,
-};
+use crate::scene::{FORMAT, HEIGHT, Scene, Splat, WIDTH, camera, over, pass, pass_with, set_viewport, splat, splats};
 use ash::vk;
-use gaurast_testkit::{
-    Buffer, Gpu, Graphics, Image, ImageOptions, Pass, Target, TargetOptions, TransformFeedback,
-};
+use gaurast_testkit::{Buffer, Gpu, Graphics, Image, ImageOptions, Pass, Target, TargetOptions, TransformFeedback};
 
 /// Three Gaussians, one behind the others.
 fn gaussians() -> [Splat; 3] {
@@ -32,25 +28,11 @@ fn picture(request: &Graphics<'_>) -> Vec<[f32; 4]> {
 }
 
 /// Rasterization that has no effect on Gaussians.
-fn rasterizations() -> Vec<(
-    &'static str,
-    vk::PipelineRasterizationStateCreateInfo<'static>,
-)> {
+fn rasterizations() -> Vec<(&'static str, vk::PipelineRasterizationStateCreateInfo<'static>)> {
     let raster = splats().raster;
     vec![
-        (
-            "culling",
-            raster
-                .cull_mode(vk::CullModeFlags::FRONT_AND_BACK)
-                .front_face(vk::FrontFace::CLOCKWISE),
-        ),
-        (
-            "depth bias",
-            raster
-                .depth_bias_enable(true)
-                .depth_bias_constant_factor(1e6)
-                .depth_bias_slope_factor(1e6),
-        ),
+        ("culling", raster.cull_mode(vk::CullModeFlags::FRONT_AND_BACK).front_face(vk::FrontFace::CLOCKWISE)),
+        ("depth bias", raster.depth_bias_enable(true).depth_bias_constant_factor(1e6).depth_bias_slope_factor(1e6)),
         ("depth clamp", raster.depth_clamp_enable(true)),
         ("lines", raster.polygon_mode(vk::PolygonMode::LINE)),
         ("points", raster.polygon_mode(vk::PolygonMode::POINT)),
@@ -73,13 +55,7 @@ fn depths(gpu: &Gpu, request: &Graphics<'_>, set: impl FnOnce(vk::CommandBuffer)
     };
     let pipeline = request.create(gpu).expect("a pipeline");
     let splats = Buffer::of(gpu, gaussians().as_flattened());
-    let pass = Pass {
-        depth: vk::ClearDepthStencilValue {
-            depth: 0.0,
-            stencil: 0,
-        },
-        ..Pass::clear(BEHIND)
-    };
+    let pass = Pass { depth: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 }, ..Pass::clear(BEHIND) };
     let output = target.draw(gpu, &pass, |commands| {
         commands.bind(&pipeline);
         commands.vertices(&splats);
@@ -163,14 +139,8 @@ fn dynamic_blending_is_that_of_the_pipeline() {
     use vk::DynamicState as S;
     let (gpu, states) = with_dynamic_state_3();
     let (one, add) = (vk::BlendFactor::ONE, vk::BlendOp::ADD);
-    let blended = |blend| Graphics {
-        blend: vec![blend],
-        ..splats()
-    };
-    let masked = Graphics {
-        sample_mask: Some(0),
-        ..blended(over())
-    };
+    let blended = |blend| Graphics { blend: vec![blend], ..splats() };
+    let masked = Graphics { sample_mask: Some(0), ..blended(over()) };
     let red = vk::ColorComponentFlags::R;
     let sum = vk::ColorBlendEquationEXT::default()
         .src_color_blend_factor(one)
@@ -198,14 +168,8 @@ fn dynamic_blending_is_that_of_the_pipeline() {
     let plain = depths(&gpu, &blended(over()), |_| {});
     for (state, expected) in [
         (S::COLOR_BLEND_ENABLE_EXT, blended(crate::scene::replace())),
-        (
-            S::COLOR_BLEND_EQUATION_EXT,
-            blended(gaurast_testkit::blend(one, one, add)),
-        ),
-        (
-            S::COLOR_WRITE_MASK_EXT,
-            blended(over().color_write_mask(red)),
-        ),
+        (S::COLOR_BLEND_EQUATION_EXT, blended(gaurast_testkit::blend(one, one, add))),
+        (S::COLOR_WRITE_MASK_EXT, blended(over().color_write_mask(red))),
         (S::SAMPLE_MASK_EXT, masked),
         (S::LOGIC_OP_ENABLE_EXT, blended(over())),
     ] {
@@ -223,10 +187,7 @@ fn dynamic_blending_is_that_of_the_pipeline() {
 fn sample_shading_changes_nothing_without_a_fragment_stage() {
     let gpu = open();
     let resolved = |shading: bool| {
-        let options = TargetOptions {
-            size: [WIDTH, HEIGHT],
-            ..TargetOptions::of(FORMAT).multisampled()
-        };
+        let options = TargetOptions { size: [WIDTH, HEIGHT], ..TargetOptions::of(FORMAT).multisampled() };
         let target = Target::new(&gpu, &options);
         let request = Graphics {
             multisample: vk::PipelineMultisampleStateCreateInfo::default()
@@ -258,14 +219,9 @@ fn sample_shading_changes_nothing_without_a_fragment_stage() {
 fn no_shading_rates_are_offered() {
     let gpu = open();
     // SAFETY: see the crate.
-    let offered = unsafe {
-        gpu.instance()
-            .enumerate_device_extension_properties(gpu.physical_device())
-    }
-    .expect("the extensions");
-    let names: Vec<_> = (offered.iter())
-        .map(|one| one.extension_name_as_c_str().expect("a name"))
-        .collect();
+    let offered =
+        unsafe { gpu.instance().enumerate_device_extension_properties(gpu.physical_device()) }.expect("the extensions");
+    let names: Vec<_> = (offered.iter()).map(|one| one.extension_name_as_c_str().expect("a name")).collect();
     assert!(names.contains(&gaurast::gaussian_primitive_topology::NAME));
     for absent in [
         ash::khr::fragment_shading_rate::NAME,
@@ -273,20 +229,16 @@ fn no_shading_rates_are_offered() {
         ash::ext::conservative_rasterization::NAME,
         ash::ext::sample_locations::NAME,
     ] {
-        assert!(
-            !names.contains(&absent),
-            "{absent:?} needs tests with Gaussians"
-        );
+        assert!(!names.contains(&absent), "{absent:?} needs tests with Gaussians");
     }
 }
 
 /// The picture is the same, and nothing is written.
 #[gaurast_runner::test]
 fn transform_feedback_captures_nothing_of_gaussians() {
-    let mut features =
-        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default().transform_feedback(true);
-    let gpu = Gpu::extended(&[ash::ext::transform_feedback::NAME], &mut features)
-        .expect("a device with transform feedback");
+    let mut features = vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default().transform_feedback(true);
+    let gpu =
+        Gpu::extended(&[ash::ext::transform_feedback::NAME], &mut features).expect("a device with transform feedback");
     let feedback = TransformFeedback::new(&gpu);
     let captured = Buffer::with_usage(&gpu, 1024, TransformFeedback::usage());
     captured.write(&[7u32; 256]);
@@ -320,10 +272,7 @@ fn transform_feedback_captures_nothing_of_gaussians() {
 #[gaurast_runner::test]
 fn rasterization_is_not_discarded() {
     let gpu = open();
-    let request = Graphics {
-        raster: splats().raster.rasterizer_discard_enable(true),
-        ..splats()
-    };
+    let request = Graphics { raster: splats().raster.rasterizer_discard_enable(true), ..splats() };
     let refused = request.create(&gpu).expect_err("it is refused");
     assert_eq!(refused, vk::Result::ERROR_VALIDATION_FAILED_EXT);
     let heard = gpu.message_texts().concat();
@@ -384,15 +333,11 @@ fn indices_beyond_their_buffer_are_zeros() {
 /// Draws of a set that are switched off have no Gaussians in it; the set's commands are executed whatever the word.
 #[gaurast_runner::test]
 fn draws_are_conditional_and_sets_are_not() {
-    let mut features =
-        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::default().conditional_rendering(true);
+    let mut features = vk::PhysicalDeviceConditionalRenderingFeaturesEXT::default().conditional_rendering(true);
     let name = ash::ext::conditional_rendering::NAME;
     let gpu = Gpu::extended(&[name], &mut features).expect("a device");
     let functions = ash::ext::conditional_rendering::Device::new(gpu.instance(), gpu.device());
-    let request = Graphics {
-        blend: vec![over()],
-        ..splats()
-    };
+    let request = Graphics { blend: vec![over()], ..splats() };
     let scene = Scene::on(gpu.clone(), &gaussians(), &request);
     let words = Buffer::of(&gpu, &[0u32, 1]);
     let draw = |second: Option<u64>, draws: [(u32, u32); 2], whole: bool| {
@@ -401,9 +346,7 @@ fn draws_are_conditional_and_sets_are_not() {
             // SAFETY: see the crate.
             unsafe {
                 let begin = |offset| {
-                    let info = vk::ConditionalRenderingBeginInfoEXT::default()
-                        .buffer(words.raw)
-                        .offset(offset);
+                    let info = vk::ConditionalRenderingBeginInfoEXT::default().buffer(words.raw).offset(offset);
                     (functions.fp().cmd_begin_conditional_rendering_ext)(commands, &info);
                 };
                 let end = || (functions.fp().cmd_end_conditional_rendering_ext)(commands);
@@ -438,18 +381,11 @@ fn each_draw_of_a_command_of_several_is_a_set() {
     let mut features = vk::PhysicalDeviceMultiDrawFeaturesEXT::default().multi_draw(true);
     let gpu = Gpu::extended(&[ash::ext::multi_draw::NAME], &mut features).expect("a device");
     let functions = ash::ext::multi_draw::Device::new(gpu.instance(), gpu.device());
-    let request = Graphics {
-        blend: vec![over()],
-        ..splats()
-    };
+    let request = Graphics { blend: vec![over()], ..splats() };
     let scene = Scene::on(gpu.clone(), &gaussians(), &request);
     let draws = [(2, 1), (0, 2)];
     let several = scene.draw(BEHIND, |_, commands| {
-        let draws = draws.map(|(first, count)| {
-            vk::MultiDrawInfoEXT::default()
-                .first_vertex(first)
-                .vertex_count(count)
-        });
+        let draws = draws.map(|(first, count)| vk::MultiDrawInfoEXT::default().first_vertex(first).vertex_count(count));
         let stride = size_of::<vk::MultiDrawInfoEXT>() as u32;
         // SAFETY: see the crate.
         unsafe { (functions.fp().cmd_draw_multi_ext)(commands, 2, draws.as_ptr(), 1, 0, stride) };
@@ -463,17 +399,11 @@ fn each_draw_of_a_command_of_several_is_a_set() {
         })
     };
     assert!(several == one_by_one(draws));
-    assert!(
-        several != one_by_one([draws[1], draws[0]]),
-        "the order of draws shows"
-    );
+    assert!(several != one_by_one([draws[1], draws[0]]), "the order of draws shows");
 }
 
 /// Records a secondary command buffer for [`Scene`]'s pass.
-fn secondary(
-    scene: &Scene,
-    record: impl FnOnce(&ash::Device, vk::CommandBuffer),
-) -> gaurast_testkit::Recorded {
+fn secondary(scene: &Scene, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> gaurast_testkit::Recorded {
     let formats = [FORMAT];
     let mut rendering = vk::CommandBufferInheritanceRenderingInfo::default()
         .color_attachment_formats(&formats)
@@ -508,10 +438,7 @@ fn executed(
 /// Neither cameras nor sets cross from one command buffer to another; a secondary command buffer may hold whole sets.
 #[gaurast_runner::test]
 fn cameras_and_sets_stay_in_their_command_buffer() {
-    let request = Graphics {
-        blend: vec![over()],
-        ..splats()
-    };
+    let request = Graphics { blend: vec![over()], ..splats() };
     let scene = Scene::new(&gaussians(), &request);
     let own = gaussian(&scene.gpu);
     let draws = |device: &ash::Device, commands| {
@@ -589,10 +516,7 @@ fn cameras_and_sets_stay_in_their_command_buffer() {
 #[gaurast_runner::test]
 fn integer_attachments_are_left_as_they_are() {
     let format = vk::Format::R8G8B8A8_UINT;
-    let request = Graphics {
-        formats: vec![format],
-        ..splats()
-    };
+    let request = Graphics { formats: vec![format], ..splats() };
     let mut scene = Scene::new(&gaussians(), &request);
     scene.image = image(&scene.gpu, format, [WIDTH, HEIGHT]);
     let draw = |device: &ash::Device, commands| {
@@ -613,20 +537,12 @@ fn integer_attachments_are_left_as_they_are() {
 
 /// Light as sRGB has it.
 fn encoded(light: f64) -> f64 {
-    if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    }
+    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// The bytes of the picture in an attachment of a format, and what is behind it there.
 fn bytes(format: vk::Format) -> Vec<[u8; 4]> {
-    let request = Graphics {
-        formats: vec![format],
-        blend: vec![over()],
-        ..splats()
-    };
+    let request = Graphics { formats: vec![format], blend: vec![over()], ..splats() };
     let mut scene = Scene::new(&gaussians(), &request);
     let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT;
     let options = ImageOptions::new(format, [WIDTH, HEIGHT], usage);
@@ -645,11 +561,7 @@ fn bytes(format: vk::Format) -> Vec<[u8; 4]> {
 
 #[gaurast_runner::test]
 fn srgb_attachments_take_sums_for_light_and_others_take_them_as_they_are() {
-    let request = Graphics {
-        formats: vec![FORMAT],
-        blend: vec![over()],
-        ..splats()
-    };
+    let request = Graphics { formats: vec![FORMAT], blend: vec![over()], ..splats() };
     let exact = picture(&request);
     let plain = bytes(vk::Format::R8G8B8A8_UNORM);
     let light = bytes(vk::Format::R8G8B8A8_SRGB);
@@ -686,9 +598,7 @@ fn every_interaction_has_a_test() {
         include_str!("../layer/samples.rs"),
         include_str!("../../driver/src/pipeline/dynamic_state.rs"),
     ];
-    let stated: Vec<&str> = (TEXT.split("[[interaction-").skip(1))
-        .filter_map(|rest| rest.split("]]").next())
-        .collect();
+    let stated: Vec<&str> = (TEXT.split("[[interaction-").skip(1)).filter_map(|rest| rest.split("]]").next()).collect();
     assert!(stated.len() > 20, "{stated:?}");
     let rows = PAGE.lines().filter_map(|line| {
         let (anchor, tests) = line.strip_prefix("| `interaction-")?.split_once("` | ")?;
@@ -703,10 +613,7 @@ fn every_interaction_has_a_test() {
         assert!(!names.is_empty(), "{anchor}");
         for name in names {
             let function = format!("fn {name}(");
-            assert!(
-                SOURCES.iter().any(|source| source.contains(&function)),
-                "{name}"
-            );
+            assert!(SOURCES.iter().any(|source| source.contains(&function)), "{name}");
         }
     }
 }

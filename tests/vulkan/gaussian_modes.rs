@@ -12,21 +12,13 @@ fn interleaved() -> Vec<Splat> {
         let (half, place) = (index / 8, index % 8);
         let z = 4.0 + place as f32 + 0.5 * half as f32;
         let color = [0.9, 0.5, 0.1].map(|c| (c + 0.11 * index as f32) % 1.0);
-        splat(
-            [0.05 * place as f32, -0.03 * half as f32, z],
-            0.1,
-            0.4,
-            color,
-        )
+        splat([0.05 * place as f32, -0.03 * half as f32, z], 0.1, 0.4, color)
     };
     (0..16).map(one).collect()
 }
 
 fn blended() -> Graphics<'static> {
-    Graphics {
-        blend: vec![over()],
-        ..splats()
-    }
+    Graphics { blend: vec![over()], ..splats() }
 }
 
 /// Draws the two halves one after the other, and records `between` between them.
@@ -93,9 +85,7 @@ fn draws_between_begin_and_end_are_one_sorted_set() {
 fn innocent_commands_do_not_end_a_set() {
     let scene = Scene::new(&interleaved(), &blended());
     let whole = merged(&scene, |_, _| {});
-    let info = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::TIMESTAMP)
-        .query_count(1);
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(1);
     // SAFETY: see the crate.
     let pool = unsafe { scene.gpu.device().create_query_pool(&info, None) }.unwrap();
     // SAFETY: see the crate.
@@ -124,15 +114,9 @@ fn innocent_commands_do_not_end_a_set() {
 fn a_set_is_drawn_where_it_ends() {
     let scene = Scene::new(&interleaved(), &blended());
     let clear = |device: &ash::Device, commands| {
-        let value = vk::ClearValue {
-            color: vk::ClearColorValue { float32: [0.5; 4] },
-        };
-        let attachment = vk::ClearAttachment::default()
-            .aspect_mask(vk::ImageAspectFlags::COLOR)
-            .clear_value(value);
-        let rect = vk::ClearRect::default()
-            .rect(crate::scene::area(&scene.image))
-            .layer_count(1);
+        let value = vk::ClearValue { color: vk::ClearColorValue { float32: [0.5; 4] } };
+        let attachment = vk::ClearAttachment::default().aspect_mask(vk::ImageAspectFlags::COLOR).clear_value(value);
+        let rect = vk::ClearRect::default().rect(crate::scene::area(&scene.image)).layer_count(1);
         // SAFETY: see the crate.
         unsafe { device.cmd_clear_attachments(commands, &[attachment], &[rect]) };
     };
@@ -160,9 +144,7 @@ impl CameraSet {
             .descriptor_type(kind)
             .descriptor_count(1)
             .stage_flags(vk::ShaderStageFlags::VERTEX)];
-        let sizes = [vk::DescriptorPoolSize::default()
-            .ty(kind)
-            .descriptor_count(1)];
+        let sizes = [vk::DescriptorPoolSize::default().ty(kind).descriptor_count(1)];
         let device = &gpu.device();
         // SAFETY: see the crate.
         unsafe {
@@ -170,20 +152,11 @@ impl CameraSet {
             let set_layouts = [device.create_descriptor_set_layout(&info, None).unwrap()];
             let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
             let layout = device.create_pipeline_layout(&info, None).unwrap();
-            let info = vk::DescriptorPoolCreateInfo::default()
-                .max_sets(1)
-                .pool_sizes(&sizes);
+            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
             let pool = device.create_descriptor_pool(&info, None).unwrap();
-            let info = vk::DescriptorSetAllocateInfo::default()
-                .descriptor_pool(pool)
-                .set_layouts(&set_layouts);
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&set_layouts);
             let set = device.allocate_descriptor_sets(&info).unwrap()[0];
-            Self {
-                set_layout: set_layouts[0],
-                layout,
-                pool,
-                set,
-            }
+            Self { set_layout: set_layouts[0], layout, pool, set }
         }
     }
 
@@ -192,8 +165,7 @@ impl CameraSet {
         unsafe {
             gpu.device().destroy_descriptor_pool(self.pool, None);
             gpu.device().destroy_pipeline_layout(self.layout, None);
-            gpu.device()
-                .destroy_descriptor_set_layout(self.set_layout, None);
+            gpu.device().destroy_descriptor_set_layout(self.set_layout, None);
         }
     }
 }
@@ -213,18 +185,12 @@ fn the_camera_may_come_from_a_uniform_buffer() {
     let moved = camera().eye([0.25, -0.5, 1.0]).focal_length([90.0, 110.0]);
     // The bytes of two cameras and of an invalid one.
     let mut bytes = vec![0u8; 1024];
-    for (offset, camera) in [
-        (0, camera()),
-        (256, moved),
-        (512, camera().near_plane(-1.0)),
-    ] {
+    for (offset, camera) in [(0, camera()), (256, moved), (512, camera().near_plane(-1.0))] {
         let data = GaussianCameraDataGAURAST::from(&camera).to_bytes();
         bytes[offset..offset + data.len()].copy_from_slice(&data);
     }
     let buffer = Buffer::of(&scene.gpu, &bytes);
-    let infos = [vk::DescriptorBufferInfo::default()
-        .buffer(buffer.raw)
-        .range(128)];
+    let infos = [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(128)];
     let write = vk::WriteDescriptorSet::default()
         .dst_set(camera_set.set)
         .dst_binding(3)
@@ -244,8 +210,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
                         let point = vk::PipelineBindPoint::GRAPHICS;
                         let layout = camera_set.layout;
                         let (sets, offsets) = ([camera_set.set], [offset]);
-                        device
-                            .cmd_bind_descriptor_sets(commands, point, layout, 0, &sets, &offsets);
+                        device.cmd_bind_descriptor_sets(commands, point, layout, 0, &sets, &offsets);
                     }
                     device.cmd_draw(commands, 16, 1, 0, 0);
                 }

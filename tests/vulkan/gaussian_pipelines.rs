@@ -4,8 +4,8 @@ use crate::devices::open;
 use crate::scene::{over, replace, splats};
 use ash::vk;
 use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Gpu, Graphics, Shader};
 
@@ -20,10 +20,7 @@ fn create(gpu: &Gpu, request: &Graphics<'_>) -> Result<(), (vk::Result, String)>
 fn with_state(change: impl FnOnce(State) -> State) -> Graphics<'static> {
     let request = splats();
     let gaussian = request.gaussian.map(change);
-    Graphics {
-        gaussian,
-        ..request
-    }
+    Graphics { gaussian, ..request }
 }
 
 fn assert_refused(gpu: &Gpu, request: &Graphics<'_>, error: vk::Result, word: &str) {
@@ -36,10 +33,7 @@ fn assert_refused(gpu: &Gpu, request: &Graphics<'_>, error: vk::Result, word: &s
 #[gaurast_runner::test]
 fn a_pipeline_without_the_structure_is_refused() {
     let gpu = open();
-    let request = Graphics {
-        gaussian: None,
-        ..splats()
-    };
+    let request = Graphics { gaussian: None, ..splats() };
     let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
     assert_refused(&gpu, &request, error, "must chain");
 }
@@ -50,35 +44,17 @@ fn values_outside_their_ranges_are_refused() {
     let bad = [
         (with_state(|s| s.spherical_harmonics_degree(5)), "Degree"),
         (with_state(|s| s.low_pass_variance(-0.1)), "lowPassVariance"),
-        (
-            with_state(|s| s.low_pass_variance(f32::INFINITY)),
-            "lowPassVariance",
-        ),
-        (
-            with_state(|s| s.low_pass_variance(f32::NAN)),
-            "lowPassVariance",
-        ),
+        (with_state(|s| s.low_pass_variance(f32::INFINITY)), "lowPassVariance"),
+        (with_state(|s| s.low_pass_variance(f32::NAN)), "lowPassVariance"),
         (with_state(|s| s.alpha_floor(-0.1)), "alphaFloor"),
         (with_state(|s| s.alpha_floor(1.5)), "alphaFloor"),
         (with_state(|s| s.alpha_floor(f32::NAN)), "alphaFloor"),
         (with_state(|s| s.alpha_ceiling(1.1)), "alphaCeiling"),
         (with_state(|s| s.alpha_ceiling(0.0)), "alphaCeiling"),
-        (
-            with_state(|s| s.alpha_floor(0.5).alpha_ceiling(0.4)),
-            "alphaCeiling",
-        ),
-        (
-            with_state(|s| s.transmittance_floor(1.0)),
-            "transmittanceFloor",
-        ),
-        (
-            with_state(|s| s.transmittance_floor(-1.0)),
-            "transmittanceFloor",
-        ),
-        (
-            with_state(|s| s.order(GaussianOrderGAURAST::from_raw(9))),
-            "order",
-        ),
+        (with_state(|s| s.alpha_floor(0.5).alpha_ceiling(0.4)), "alphaCeiling"),
+        (with_state(|s| s.transmittance_floor(1.0)), "transmittanceFloor"),
+        (with_state(|s| s.transmittance_floor(-1.0)), "transmittanceFloor"),
+        (with_state(|s| s.order(GaussianOrderGAURAST::from_raw(9))), "order"),
     ];
     for (request, word) in bad {
         let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
@@ -94,10 +70,7 @@ fn values_outside_their_ranges_are_refused() {
 #[gaurast_runner::test]
 fn modes_that_are_not_built_are_refused_by_their_feature() {
     let gpu = open();
-    let request = Graphics {
-        blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)],
-        ..splats()
-    };
+    let request = Graphics { blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)], ..splats() };
     let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
     assert_refused(&gpu, &request, absent, "dualSrcBlend");
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
@@ -122,10 +95,7 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
         assert_refused(&gpu, &request, error, word);
     }
-    let logic = Graphics {
-        logic_op: Some(vk::LogicOp::CLEAR),
-        ..splats()
-    };
+    let logic = Graphics { logic_op: Some(vk::LogicOp::CLEAR), ..splats() };
     create(&gpu, &logic).unwrap();
     let tested = Graphics {
         depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default().depth_test_enable(true),
@@ -141,10 +111,7 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
 fn attributes_must_be_in_the_vertex_input_state() {
     let gpu = open();
     let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
-    for (index, name) in ["position", "scale", "rotation", "opacity", "coefficient 0"]
-        .into_iter()
-        .enumerate()
-    {
+    for (index, name) in ["position", "scale", "rotation", "opacity", "coefficient 0"].into_iter().enumerate() {
         let mut missing = splats();
         missing.attributes.retain(|a| a.location != index as u32);
         assert_refused(&gpu, &missing, error, name);
@@ -168,10 +135,7 @@ fn fixed_function_projection_has_no_vertex_stage() {
     let gpu = open();
     let code = [0x0723_0203, 0x0001_0000, 0, 1, 0];
     let stage = |stage| Shader::new(stage, code.to_vec());
-    let mut request = Graphics {
-        shaders: vec![stage(vk::ShaderStageFlags::VERTEX)],
-        ..splats()
-    };
+    let mut request = Graphics { shaders: vec![stage(vk::ShaderStageFlags::VERTEX)], ..splats() };
     let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
     assert_refused(&gpu, &request, error, "VERTEX");
     request.shaders = vec![stage(vk::ShaderStageFlags::GEOMETRY)];
@@ -194,16 +158,11 @@ fn gaussians_have_no_tessellation_or_geometry_stage() {
     let code = [0x0723_0203, 0x0001_0000, 0, 1, 0];
     let shaders = |stages: &[Stage]| {
         let shaders = stages.iter();
-        shaders
-            .map(|&stage| Shader::new(stage, code.to_vec()))
-            .collect()
+        shaders.map(|&stage| Shader::new(stage, code.to_vec())).collect()
     };
     let projected = |mode| with_state(|s| s.projection_mode(mode));
     let modes = [
-        (
-            GaussianProjectionModeGAURAST::FIXED_FUNCTION,
-            Stage::FRAGMENT,
-        ),
+        (GaussianProjectionModeGAURAST::FIXED_FUNCTION, Stage::FRAGMENT),
         (GaussianProjectionModeGAURAST::VERTEX_SHADER, Stage::VERTEX),
     ];
     for (mode, used) in modes {
@@ -212,10 +171,7 @@ fn gaussians_have_no_tessellation_or_geometry_stage() {
             &[Stage::TESSELLATION_EVALUATION],
             &[Stage::GEOMETRY],
         ] {
-            let request = Graphics {
-                shaders: shaders(&[&[used], stages].concat()),
-                ..projected(mode)
-            };
+            let request = Graphics { shaders: shaders(&[&[used], stages].concat()), ..projected(mode) };
             let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
             let refused = format!("must not have a stage {:?}", stages[0]);
             assert_refused(&gpu, &request, error, &refused);
@@ -228,16 +184,10 @@ fn gaussians_have_no_tessellation_or_geometry_stage() {
 #[gaurast_runner::test]
 fn blend_state_and_attachments_correspond() {
     let gpu = open();
-    let request = Graphics {
-        blend: vec![replace(); 2],
-        ..splats()
-    };
+    let request = Graphics { blend: vec![replace(); 2], ..splats() };
     let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
     assert_refused(&gpu, &request, error, "attachmentCount");
-    let request = Graphics {
-        dynamic: vec![vk::DynamicState::SCISSOR],
-        ..splats()
-    };
+    let request = Graphics { dynamic: vec![vk::DynamicState::SCISSOR], ..splats() };
     assert_refused(&gpu, &request, error, "viewport");
 }
 
@@ -246,10 +196,7 @@ fn compute_pipelines_without_a_shader_are_refused_with_null_handles() {
     let gpu = open();
     let infos = [vk::ComputePipelineCreateInfo::default(); 2];
     // SAFETY: see the crate.
-    let created = unsafe {
-        gpu.device()
-            .create_compute_pipelines(vk::PipelineCache::null(), &infos, None)
-    };
+    let created = unsafe { gpu.device().create_compute_pipelines(vk::PipelineCache::null(), &infos, None) };
     let (pipelines, error) = created.unwrap_err();
     assert_eq!(error, vk::Result::ERROR_VALIDATION_FAILED_EXT);
     assert_eq!(pipelines, [vk::Pipeline::null(); 2]);

@@ -7,9 +7,9 @@ use crate::scene::{FORMAT, HEIGHT, WIDTH, over, pass, splats};
 use crate::spirv;
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, GaussianResolveInputLocationsGAURAST,
-    GaussianVertexOutputLocationsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, GaussianResolveInputLocationsGAURAST, GaussianVertexOutputLocationsGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Image, Shader};
 
@@ -52,9 +52,7 @@ fn shapes() -> Vec<f32> {
 }
 
 fn harmonics() -> Vec<f32> {
-    (0..COUNT)
-        .flat_map(|index| (0..HARMONICS).map(move |k| random(index, 11 + k) - 0.4))
-        .collect()
+    (0..COUNT).flat_map(|index| (0..HARMONICS).map(move |k| random(index, 11 + k) - 0.4)).collect()
 }
 
 fn camera() -> GaussianCameraGAURAST<'static> {
@@ -84,11 +82,7 @@ fn constants() -> Vec<f32> {
 }
 
 pub fn outputs() -> GaussianVertexOutputLocationsGAURAST {
-    GaussianVertexOutputLocationsGAURAST::default()
-        .covariance(1)
-        .opacity(3)
-        .color(4)
-        .depth_key(6)
+    GaussianVertexOutputLocationsGAURAST::default().covariance(1).opacity(3).color(4).depth_key(6)
 }
 
 /// A pipeline over the scene's buffers, with or without a shader.
@@ -98,11 +92,7 @@ pub fn request(shaded: bool) -> Graphics<'static> {
     request.bindings[0].stride = 4 * SHAPE;
     if shaded {
         let mode = GaussianProjectionModeGAURAST::VERTEX_SHADER;
-        let with = |state: State| {
-            state
-                .projection_mode(mode)
-                .vertex_output_locations(outputs())
-        };
+        let with = |state: State| state.projection_mode(mode).vertex_output_locations(outputs());
         request.gaussian = request.gaussian.map(with);
         return request;
     }
@@ -140,13 +130,8 @@ struct Stage {
 fn ranges() -> [vk::PushConstantRange; 2] {
     let camera = 4 * constants().len() as u32;
     [
-        vk::PushConstantRange::default()
-            .stage_flags(vk::ShaderStageFlags::VERTEX)
-            .size(camera),
-        vk::PushConstantRange::default()
-            .stage_flags(vk::ShaderStageFlags::FRAGMENT)
-            .offset(camera)
-            .size(16),
+        vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(camera),
+        vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::FRAGMENT).offset(camera).size(16),
     ]
 }
 
@@ -157,9 +142,7 @@ impl Stage {
         let harmonics = Buffer::of(gpu, &harmonics());
         let set = canvas.storage_set(&harmonics);
         let (layouts, ranges) = ([set.layout], ranges());
-        let info = vk::PipelineLayoutCreateInfo::default()
-            .set_layouts(&layouts)
-            .push_constant_ranges(&ranges);
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(&ranges);
         // SAFETY: see the crate.
         let layout = unsafe { gpu.device().create_pipeline_layout(&info, None).unwrap() };
         Self {
@@ -177,8 +160,7 @@ impl Stage {
 
     /// The request with the stage and the layout added.
     fn complete(&self, request: Graphics<'static>) -> Graphics<'static> {
-        let shaded =
-            |state: &State| state.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER;
+        let shaded = |state: &State| state.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER;
         if request.gaussian.as_ref().is_some_and(shaded) {
             let stage = Shader::vertex(spirv!("gaussian.vert"));
             self.laid_out(request.with_shader(stage))
@@ -189,11 +171,7 @@ impl Stage {
 
     /// The request with the layout added.
     fn laid_out(&self, request: Graphics<'static>) -> Graphics<'static> {
-        Graphics {
-            set_layouts: vec![self.set.layout],
-            push: ranges().to_vec(),
-            ..request
-        }
+        Graphics { set_layouts: vec![self.set.layout], push: ranges().to_vec(), ..request }
     }
 
     /// The request with a resolve shader, which reads the accumulated colour and the depths at these locations.
@@ -203,23 +181,14 @@ impl Stage {
         shader: &Shader,
         [accumulated, depth]: [u32; 2],
     ) -> Graphics<'static> {
-        let locations = GaussianResolveInputLocationsGAURAST::default()
-            .accumulated_color(accumulated)
-            .depth(depth);
+        let locations = GaussianResolveInputLocationsGAURAST::default().accumulated_color(accumulated).depth(depth);
         let with = |state: State| state.resolve_input_locations(locations);
         let request = self.laid_out(request.with_shader(shader.clone()));
-        Graphics {
-            gaussian: request.gaussian.map(with),
-            ..request
-        }
+        Graphics { gaussian: request.gaussian.map(with), ..request }
     }
 
     /// The picture of the scene by a pipeline; `record` records the draws.
-    fn draw(
-        &self,
-        request: Graphics<'static>,
-        record: impl FnOnce(&ash::Device, vk::CommandBuffer),
-    ) -> Vec<[f32; 4]> {
+    fn draw(&self, request: Graphics<'static>, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> Vec<[f32; 4]> {
         let gpu = &self.canvas.gpu;
         let pipeline = self.complete(request).create(gpu).unwrap();
         gpu.run(|recording| {
@@ -243,10 +212,7 @@ impl Stage {
 
     /// Binds the shader's inputs.
     fn bind(&self, device: &ash::Device, commands: vk::CommandBuffer) {
-        let (point, stage) = (
-            vk::PipelineBindPoint::GRAPHICS,
-            vk::ShaderStageFlags::VERTEX,
-        );
+        let (point, stage) = (vk::PipelineBindPoint::GRAPHICS, vk::ShaderStageFlags::VERTEX);
         let constants = constants();
         let bytes = bytemuck::cast_slice(&constants);
         // SAFETY: see the crate.
@@ -258,25 +224,13 @@ impl Stage {
 
     /// Draws the scene with both kinds of projection, in the state that `change` makes, and compares the pictures.
     #[track_caller]
-    fn compare(
-        &self,
-        what: &str,
-        change: impl Fn(State) -> State,
-        record: impl Fn(&ash::Device, vk::CommandBuffer),
-    ) {
+    fn compare(&self, what: &str, change: impl Fn(State) -> State, record: impl Fn(&ash::Device, vk::CommandBuffer)) {
         let [fixed, shaded] = [false, true].map(|shaded| {
             let request = request(shaded);
-            let request = Graphics {
-                gaussian: request.gaussian.map(&change),
-                blend: vec![over()],
-                ..request
-            };
+            let request = Graphics { gaussian: request.gaussian.map(&change), blend: vec![over()], ..request };
             self.draw(request, &record)
         });
-        assert!(
-            fixed.iter().filter(|pixel| pixel[3] > 0.5).count() > 1000,
-            "{what}"
-        );
+        assert!(fixed.iter().filter(|pixel| pixel[3] > 0.5).count() > 1000, "{what}");
         let differences = std::iter::zip(fixed.as_flattened(), shaded.as_flattened());
         let worst = differences.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst <= 1e-5, "{what}: {worst}");
@@ -303,11 +257,7 @@ fn a_vertex_shader_may_do_what_the_device_does() {
     let stage = Stage::new();
     stage.compare("default", |state| state, draw_all);
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
-    stage.compare(
-        "compensated",
-        |state| state.antialiasing(compensated),
-        draw_all,
-    );
+    stage.compare("compensated", |state| state.antialiasing(compensated), draw_all);
     let primitive = GaussianOrderGAURAST::PRIMITIVE;
     stage.compare("as drawn", |state| state.order(primitive), draw_all);
     let thresholds = |state: State| state.alpha_ceiling(0.7).alpha_floor(0.02);
@@ -349,10 +299,7 @@ fn vertices_are_named_as_for_other_shaders() {
 #[gaurast_runner::test]
 fn what_a_shader_is_bound_to_may_change_within_a_set() {
     let stage = Stage::new();
-    let blended = || Graphics {
-        blend: vec![over()],
-        ..request(true)
-    };
+    let blended = || Graphics { blend: vec![over()], ..request(true) };
     let whole = stage.draw(blended(), draw_all);
     let gaussian = gaussian(&stage.canvas.gpu);
     let in_two = stage.draw(blended(), |device, commands| {
@@ -387,33 +334,22 @@ pub fn broken() -> Vec<(&'static str, String)> {
     let with = |locations: GaussianVertexOutputLocationsGAURAST| {
         let request = request(true);
         let state = request.gaussian;
-        Graphics {
-            gaussian: state.map(|state| state.vertex_output_locations(locations)),
-            ..request
-        }
+        Graphics { gaussian: state.map(|state| state.vertex_output_locations(locations)), ..request }
     };
     let location = "VUID-VkGaussianVertexOutputLocationsGAURAST-None-90020";
     let by_distance = || {
         let request = with(outputs().depth_key(unused));
         let state = request.gaussian;
-        Graphics {
-            gaussian: state.map(|state| state.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
-            ..request
-        }
+        Graphics { gaussian: state.map(|state| state.order(GaussianOrderGAURAST::RADIAL_DISTANCE)), ..request }
     };
     let per_pixel = || {
         let request = request(true);
         let state = request.gaussian;
-        Graphics {
-            gaussian: state.map(|state| state.order(GaussianOrderGAURAST::PER_PIXEL)),
-            ..request
-        }
+        Graphics { gaussian: state.map(|state| state.order(GaussianOrderGAURAST::PER_PIXEL)), ..request }
     };
     let resolved = |shader, locations| stage.resolved(request(false), shader, locations);
     let half = |mut request: Graphics<'static>| {
-        let state = request
-            .gaussian
-            .map(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16));
+        let state = request.gaussian.map(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16));
         request.gaussian = state;
         request
     };
@@ -431,31 +367,16 @@ pub fn broken() -> Vec<(&'static str, String)> {
         (read, resolved(&stage.toned, [3, 5])),
         (read, resolved(&stage.toned, [5, 2])),
         (read, resolved(&stage.woven, [0, 0])),
-        (
-            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
-            resolved(&stage.deep, [0, 1]),
-        ),
-        (
-            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
-            half(resolved(&stage.toned, [0, 1])),
-        ),
+        ("VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024", resolved(&stage.deep, [0, 1])),
+        ("VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031", half(resolved(&stage.toned, [0, 1]))),
         // Not written, too narrow, and used twice.
         (location, with(outputs().covariance(9))),
         (location, with(outputs().color(3))),
         (location, with(outputs().opacity(unused))),
         (location, with(outputs().depth_key(3))),
-        (
-            "VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072",
-            with_camera(),
-        ),
-        (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
-            by_distance(),
-        ),
-        (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-90022",
-            per_pixel(),
-        ),
+        ("VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072", with_camera()),
+        ("VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021", by_distance()),
+        ("VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-90022", per_pixel()),
     ];
     let heard = requests.map(|(id, request)| {
         let error = stage.complete(request).create(gpu).expect_err(id);

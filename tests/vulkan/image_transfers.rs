@@ -40,11 +40,7 @@ fn clear(device: &ash::Device, commands: vk::CommandBuffer, image: &Image, float
 }
 
 fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
-    vk::Extent3D {
-        width,
-        height,
-        depth,
-    }
+    vk::Extent3D { width, height, depth }
 }
 
 const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
@@ -117,9 +113,7 @@ fn memory_holds_every_sample() {
     assert!(size(X4) >= 4 * size(vk::SampleCountFlags::TYPE_1));
     let refused = [
         create_info(8).samples(vk::SampleCountFlags::TYPE_2),
-        create_info(8)
-            .flags(vk::ImageCreateFlags::CUBE_COMPATIBLE)
-            .array_layers(6),
+        create_info(8).flags(vk::ImageCreateFlags::CUBE_COMPATIBLE).array_layers(6),
         create_info(8).tiling(vk::ImageTiling::LINEAR),
     ];
     for info in refused {
@@ -139,9 +133,7 @@ fn blits_scale_through_both_entry_points() {
     let zero = vk::Offset3D::default();
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let upload = [vk::BufferImageCopy::default()
-            .image_subresource(COLOR_LAYERS)
-            .image_extent(extent(2, 1, 1))];
+        let upload = [vk::BufferImageCopy::default().image_subresource(COLOR_LAYERS).image_extent(extent(2, 1, 1))];
         let top = vk::ImageBlit::default()
             .src_subresource(COLOR_LAYERS)
             .src_offsets([zero, corner(2, 1)])
@@ -151,22 +143,11 @@ fn blits_scale_through_both_entry_points() {
             .src_subresource(COLOR_LAYERS)
             .src_offsets([zero, corner(2, 1)])
             .dst_subresource(COLOR_LAYERS)
-            .dst_offsets([
-                vk::Offset3D { x: 4, y: 1, z: 0 },
-                vk::Offset3D { x: 0, y: 2, z: 1 },
-            ])];
+            .dst_offsets([vk::Offset3D { x: 4, y: 1, z: 0 }, vk::Offset3D { x: 0, y: 2, z: 1 }])];
         // SAFETY: see the crate.
         unsafe {
             device.cmd_copy_buffer_to_image(commands, texels.raw, source.raw, GENERAL, &upload);
-            device.cmd_blit_image(
-                commands,
-                source.raw,
-                GENERAL,
-                target.raw,
-                GENERAL,
-                &[top],
-                vk::Filter::LINEAR,
-            );
+            device.cmd_blit_image(commands, source.raw, GENERAL, target.raw, GENERAL, &[top], vk::Filter::LINEAR);
             let info = vk::BlitImageInfo2::default()
                 .src_image(source.raw)
                 .src_image_layout(GENERAL)
@@ -178,16 +159,7 @@ fn blits_scale_through_both_entry_points() {
         }
     });
     let (dark, light) = ([0u8, 0, 0, 255], [200, 100, 40, 255]);
-    let expected = [
-        dark,
-        [50, 25, 10, 255],
-        [150, 75, 30, 255],
-        light,
-        light,
-        light,
-        dark,
-        dark,
-    ];
+    let expected = [dark, [50, 25, 10, 255], [150, 75, 30, 255], light, light, light, dark, dark];
     assert_eq!(target.colors::<[u8; 4]>(), expected);
 }
 
@@ -200,29 +172,17 @@ fn one_region_copies_depth_and_stencil() {
     };
     let (source, target) = (make(), make());
     let both = vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL;
-    let layers = |aspect_mask| vk::ImageSubresourceLayers {
-        aspect_mask,
-        ..COLOR_LAYERS
-    };
+    let layers = |aspect_mask| vk::ImageSubresourceLayers { aspect_mask, ..COLOR_LAYERS };
     let depths = Buffer::new(&gpu, 32);
     let stencils = Buffer::new(&gpu, 8);
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let range = vk::ImageSubresourceRange {
-            aspect_mask: both,
-            ..COLOR
-        };
+        let range = vk::ImageSubresourceRange { aspect_mask: both, ..COLOR };
         let clear = |image: &Image, depth, stencil| {
             let value = vk::ClearDepthStencilValue { depth, stencil };
             // SAFETY: see the crate.
             unsafe {
-                device.cmd_clear_depth_stencil_image(
-                    commands,
-                    image.raw,
-                    GENERAL,
-                    &value,
-                    &[range],
-                );
+                device.cmd_clear_depth_stencil_image(commands, image.raw, GENERAL, &value, &[range]);
             }
         };
         clear(&source, 0.25, 7);
@@ -233,9 +193,8 @@ fn one_region_copies_depth_and_stencil() {
             .dst_offset(vk::Offset3D { x: 2, y: 1, z: 0 })
             .extent(extent(2, 1, 1));
         let read = |aspect, buffer: &Buffer| {
-            let region = [vk::BufferImageCopy::default()
-                .image_subresource(layers(aspect))
-                .image_extent(extent(4, 2, 1))];
+            let region =
+                [vk::BufferImageCopy::default().image_subresource(layers(aspect)).image_extent(extent(4, 2, 1))];
             // SAFETY: see the crate.
             unsafe {
                 device.cmd_copy_image_to_buffer(commands, target.raw, GENERAL, buffer.raw, &region);
@@ -257,29 +216,17 @@ fn one_region_copies_depth_and_stencil() {
 #[gaurast_runner::test]
 fn slices_become_layers_of_another_format() {
     let gpu = open();
-    let solid = ImageOptions {
-        view: vk::ImageViewType::TYPE_3D,
-        size: [2, 1, 3],
-        ..shape(FORMAT, 2, 1)
-    };
-    let stack = ImageOptions {
-        layers: 4,
-        ..shape(vk::Format::R32_UINT, 2, 1)
-    };
+    let solid = ImageOptions { view: vk::ImageViewType::TYPE_3D, size: [2, 1, 3], ..shape(FORMAT, 2, 1) };
+    let stack = ImageOptions { layers: 4, ..shape(vk::Format::R32_UINT, 2, 1) };
     let (source, target) = (Image::new(&gpu, &solid), Image::new(&gpu, &stack));
     let texels: [u32; 6] = [0x0403_0201, 5, 6, 7, 8, u32::MAX];
     let data = Buffer::of(&gpu, &texels);
     let out = Buffer::new(&gpu, 32);
-    let layers = |base_array_layer, layer_count| vk::ImageSubresourceLayers {
-        base_array_layer,
-        layer_count,
-        ..COLOR_LAYERS
-    };
+    let layers =
+        |base_array_layer, layer_count| vk::ImageSubresourceLayers { base_array_layer, layer_count, ..COLOR_LAYERS };
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let upload = [vk::BufferImageCopy::default()
-            .image_subresource(COLOR_LAYERS)
-            .image_extent(extent(2, 1, 3))];
+        let upload = [vk::BufferImageCopy::default().image_subresource(COLOR_LAYERS).image_extent(extent(2, 1, 3))];
         let copy = [vk::ImageCopy::default()
             .src_subresource(COLOR_LAYERS)
             .src_offset(vk::Offset3D { x: 0, y: 0, z: 1 })
@@ -289,10 +236,7 @@ fn slices_become_layers_of_another_format() {
             .image_subresource(layers(0, vk::REMAINING_ARRAY_LAYERS))
             .image_extent(extent(2, 1, 1))];
         let zero = vk::ClearColorValue { uint32: [9; 4] };
-        let all = vk::ImageSubresourceRange {
-            layer_count: vk::REMAINING_ARRAY_LAYERS,
-            ..COLOR
-        };
+        let all = vk::ImageSubresourceRange { layer_count: vk::REMAINING_ARRAY_LAYERS, ..COLOR };
         // SAFETY: see the crate.
         unsafe {
             device.cmd_clear_color_image(commands, target.raw, GENERAL, &zero, &[all]);

@@ -22,16 +22,12 @@ fn texel(x: usize, y: usize) -> [u8; 2] {
 
 fn picture(gpu: &Gpu) -> Image {
     let image = image(gpu, vk::Format::R8G8B8A8_UNORM, [8, 8]);
-    let texels: Vec<[u8; 4]> = (0..64)
-        .map(|i| texel(i % 8, i / 8))
-        .map(|[red, green]| [red, green, 0, 255])
-        .collect();
+    let texels: Vec<[u8; 4]> = (0..64).map(|i| texel(i % 8, i / 8)).map(|[red, green]| [red, green, 0, 255]).collect();
     let data = Buffer::of(gpu, &texels);
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let region = [vk::BufferImageCopy::default()
-            .image_subresource(COLOR_LAYERS)
-            .image_extent(extent(&image).into())];
+        let region =
+            [vk::BufferImageCopy::default().image_subresource(COLOR_LAYERS).image_extent(extent(&image).into())];
         let layout = vk::ImageLayout::GENERAL;
         // SAFETY: see the crate.
         unsafe {
@@ -53,17 +49,12 @@ fn kernels_read_and_write_images() {
     // SAFETY: see the crate.
     unsafe {
         let sampler = |filter| {
-            let info = vk::SamplerCreateInfo::default()
-                .mag_filter(filter)
-                .min_filter(filter);
+            let info = vk::SamplerCreateInfo::default().mag_filter(filter).min_filter(filter);
             device.create_sampler(&info, None).unwrap()
         };
         let (linear, nearest) = (sampler(vk::Filter::LINEAR), sampler(vk::Filter::NEAREST));
         let view = |buffer, format| {
-            let info = vk::BufferViewCreateInfo::default()
-                .buffer(buffer)
-                .format(format)
-                .range(vk::WHOLE_SIZE);
+            let info = vk::BufferViewCreateInfo::default().buffer(buffer).format(format).range(vk::WHOLE_SIZE);
             device.create_buffer_view(&info, None).unwrap()
         };
         let numbers_view = [view(numbers.raw, vk::Format::R8_UINT)];
@@ -80,18 +71,10 @@ fn kernels_read_and_write_images() {
             })
             .subresource_range(crate::devices::COLOR);
         let swapped = device.create_image_view(&swapped, None).unwrap();
-        let image = |view| {
-            vk::DescriptorImageInfo::default()
-                .image_view(view)
-                .image_layout(vk::ImageLayout::GENERAL)
-        };
+        let image = |view| vk::DescriptorImageInfo::default().image_view(view).image_layout(vk::ImageLayout::GENERAL);
         let set = kernel.sets.allocate()[0];
-        let write = |binding, ty| {
-            vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(binding)
-                .descriptor_type(ty)
-        };
+        let write =
+            |binding, ty| vk::WriteDescriptorSet::default().dst_set(set).dst_binding(binding).descriptor_type(ty);
         let combined = [image(source.view).sampler(linear)];
         let pictures = [image(source.view), image(swapped)];
         let plain = [vk::DescriptorImageInfo::default().sampler(nearest)];
@@ -121,10 +104,7 @@ fn kernels_read_and_write_images() {
         let (u, v) = (cell(x).floor(), cell(y).floor());
         let red = 16.0 * u + 8.0 + 2.0 * v + 1.0;
         let green = texel(x, y)[if x % 2 == 0 { 1 } else { 0 }];
-        assert!(
-            (f64::from(found[0]) - red).abs() <= 1.0,
-            "{x}, {y}: {found:?}, {red}"
-        );
+        assert!((f64::from(found[0]) - red).abs() <= 1.0, "{x}, {y}: {found:?}, {red}");
         assert_eq!(found[1..], [green, 10 * x as u8, 255], "{x}, {y}");
     }
     assert_eq!(counts.values::<u32>()[..8], [28; 8]);

@@ -11,11 +11,8 @@ fn nothing_is_left_when_everything_is_destroyed() {
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
     let debug = ash::ext::debug_utils::Instance::new(&context.entry, &context.instance);
     // SAFETY: `heard` outlives the messenger.
-    let messenger =
-        unsafe { debug.create_debug_utils_messenger(&everything(&heard), None) }.unwrap();
-    let device = context
-        .device(&[], &mut vk::PhysicalDeviceFeatures2::default())
-        .unwrap();
+    let messenger = unsafe { debug.create_debug_utils_messenger(&everything(&heard), None) }.unwrap();
+    let device = context.device(&[], &mut vk::PhysicalDeviceFeatures2::default()).unwrap();
     // Instance, physical device, messenger, device, queue.
     assert_eq!(vulkan_gaurast::live_handles(), 5);
     // SAFETY: each is live and not used again.

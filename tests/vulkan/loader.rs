@@ -11,24 +11,13 @@ fn a_device_is_created_and_destroyed(case: &Case) {
     through_the_loader(case, || {
         let context = Context::loaded(&[ash::ext::debug_utils::NAME]);
         // SAFETY: the physical device is the instance's.
-        let properties = unsafe {
-            context
-                .instance
-                .get_physical_device_properties(context.physical_device)
-        };
-        assert_eq!(
-            properties.device_name_as_c_str().unwrap(),
-            c"GauRast simulated device"
-        );
+        let properties = unsafe { context.instance.get_physical_device_properties(context.physical_device) };
+        assert_eq!(properties.device_name_as_c_str().unwrap(), c"GauRast simulated device");
         let device = context
-            .device(
-                &[gaurast::gaussian_primitive_topology::NAME],
-                &mut vk::PhysicalDeviceFeatures2::default(),
-            )
+            .device(&[gaurast::gaussian_primitive_topology::NAME], &mut vk::PhysicalDeviceFeatures2::default())
             .unwrap();
         // The loader does not know this command, so the pointer comes from the driver.
-        let functions =
-            gaurast::gaussian_primitive_topology::Device::new(&context.instance, &device);
+        let functions = gaurast::gaussian_primitive_topology::Device::new(&context.instance, &device);
         assert_eq!(functions.device(), device.handle());
         // SAFETY: the device is live, and destroyed last.
         unsafe {
@@ -46,9 +35,7 @@ fn the_library_is_loaded_and_unloaded_many_times(case: &Case) {
         let entry = loader();
         for _ in 0..20 {
             let context = Context::new(entry.clone(), &[]);
-            let device = context
-                .device(&[], &mut vk::PhysicalDeviceFeatures2::default())
-                .unwrap();
+            let device = context.device(&[], &mut vk::PhysicalDeviceFeatures2::default()).unwrap();
             // SAFETY: the device is live and not used again.
             unsafe { device.destroy_device(None) };
         }
@@ -60,14 +47,11 @@ fn the_library_is_loaded_and_unloaded_many_times(case: &Case) {
 fn counters_are_enumerated(case: &Case) {
     through_the_loader(case, || {
         let context = Context::loaded(&[]);
-        let performance =
-            ash::khr::performance_query::Instance::new(&context.entry, &context.instance);
+        let performance = ash::khr::performance_query::Instance::new(&context.entry, &context.instance);
         // SAFETY: the physical device is the instance's.
         let count = unsafe {
-            performance.enumerate_physical_device_queue_family_performance_query_counters_len(
-                context.physical_device,
-                0,
-            )
+            performance
+                .enumerate_physical_device_queue_family_performance_query_counters_len(context.physical_device, 0)
         };
         assert!(count.unwrap() > 10);
     });
@@ -77,10 +61,7 @@ const VALIDATION: &str = "VK_LAYER_KHRONOS_validation";
 
 /// A variant without layers and one under the validation layer.
 fn layers() -> Vec<Variant> {
-    let validated = Variant {
-        name: VALIDATION.to_owned(),
-        needs: vec![Need::ValidationLayer],
-    };
+    let validated = Variant { name: VALIDATION.to_owned(), needs: vec![Need::ValidationLayer] };
     vec![Variant::new("no layer"), validated]
 }
 
@@ -101,14 +82,8 @@ fn vulkaninfo_lists_the_device(case: &Case) {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}{errors}");
     assert!(text.contains("GauRast simulated device"), "{text}");
-    assert!(
-        text.contains("VK_GAURAST_gaussian_primitive_topology"),
-        "{text}"
-    );
-    assert!(
-        !errors.contains("vulkan_gaurast"),
-        "the driver complains: {errors}"
-    );
+    assert!(text.contains("VK_GAURAST_gaussian_primitive_topology"), "{text}");
+    assert!(!errors.contains("vulkan_gaurast"), "the driver complains: {errors}");
 }
 
 /// The shared library exports the loader's symbols and no Vulkan command.
@@ -123,10 +98,7 @@ fn only_the_loaders_symbols_are_exported() {
     let text = String::from_utf8_lossy(&output.stdout);
     let mut symbols: Vec<_> = text.lines().filter(|name| name.starts_with("vk")).collect();
     symbols.sort_unstable();
-    let wanted = [
-        "vk_icdGetInstanceProcAddr",
-        "vk_icdGetPhysicalDeviceProcAddr",
-        "vk_icdNegotiateLoaderICDInterfaceVersion",
-    ];
+    let wanted =
+        ["vk_icdGetInstanceProcAddr", "vk_icdGetPhysicalDeviceProcAddr", "vk_icdNegotiateLoaderICDInterfaceVersion"];
     assert_eq!(symbols, wanted);
 }

@@ -13,24 +13,17 @@ fn mapped_memory_keeps_what_is_written() {
     // SAFETY: see the crate.
     unsafe {
         let device = gpu.device();
-        let mapped = device
-            .map_memory(memory, 0, vk::WHOLE_SIZE, NO_FLAGS)
-            .unwrap();
+        let mapped = device.map_memory(memory, 0, vk::WHOLE_SIZE, NO_FLAGS).unwrap();
         let bytes = mapped.cast::<u8>();
         assert_eq!(bytes.add(999).read(), 0, "memory begins zeroed");
         bytes.add(500).write(7);
-        let range = [vk::MappedMemoryRange::default()
-            .memory(memory)
-            .size(vk::WHOLE_SIZE)];
+        let range = [vk::MappedMemoryRange::default().memory(memory).size(vk::WHOLE_SIZE)];
         device.flush_mapped_memory_ranges(&range).unwrap();
         device.invalidate_mapped_memory_ranges(&range).unwrap();
         device.unmap_memory(memory);
         let mapped = device.map_memory(memory, 500, 10, NO_FLAGS).unwrap();
         assert_eq!(mapped.cast::<u8>().read(), 7);
-        assert!(
-            device.map_memory(memory, 0, 10, NO_FLAGS).is_err(),
-            "mapped"
-        );
+        assert!(device.map_memory(memory, 0, 10, NO_FLAGS).is_err(), "mapped");
         // Freeing memory also unmaps it.
         device.free_memory(memory, None);
     }
@@ -42,21 +35,13 @@ fn memory_is_mapped_by_a_structure_too() {
     let memory = allocate(&gpu, 1000, MAPPABLE);
     let device = gpu.device().handle();
     let commands = ash::khr::map_memory2::Device::new(gpu.instance(), gpu.device());
-    let map_info = vk::MemoryMapInfoKHR::default()
-        .memory(memory)
-        .offset(500)
-        .size(vk::WHOLE_SIZE);
+    let map_info = vk::MemoryMapInfoKHR::default().memory(memory).offset(500).size(vk::WHOLE_SIZE);
     let unmap_info = vk::MemoryUnmapInfoKHR::default().memory(memory);
     let mut mapped = std::ptr::null_mut();
     // SAFETY: see the crate.
     unsafe {
-        let (map, unmap) = (
-            commands.fp().map_memory2_khr,
-            commands.fp().unmap_memory2_khr,
-        );
-        map(device, &raw const map_info, &raw mut mapped)
-            .result()
-            .unwrap();
+        let (map, unmap) = (commands.fp().map_memory2_khr, commands.fp().unmap_memory2_khr);
+        map(device, &raw const map_info, &raw mut mapped).result().unwrap();
         mapped.cast::<u8>().write(7);
         let again = map(device, &raw const map_info, &raw mut mapped).result();
         assert!(again.is_err(), "mapped");
@@ -75,10 +60,7 @@ fn device_only_memory_is_not_mapped() {
     let memory = allocate(&gpu, 1000, DEVICE_ONLY);
     // SAFETY: see the crate.
     unsafe {
-        let error = gpu
-            .device()
-            .map_memory(memory, 0, 10, NO_FLAGS)
-            .unwrap_err();
+        let error = gpu.device().map_memory(memory, 0, 10, NO_FLAGS).unwrap_err();
         assert_eq!(error, vk::Result::ERROR_MEMORY_MAP_FAILED);
         assert_eq!(gpu.device().get_device_memory_commitment(memory), 1000);
         gpu.device().free_memory(memory, None);
@@ -90,17 +72,12 @@ fn device_only_memory_is_not_mapped() {
 fn the_heap_is_finite() {
     let gpu = open();
     let allocate = |size| {
-        let info = vk::MemoryAllocateInfo::default()
-            .allocation_size(size)
-            .memory_type_index(DEVICE_ONLY);
+        let info = vk::MemoryAllocateInfo::default().allocation_size(size).memory_type_index(DEVICE_ONLY);
         // SAFETY: see the crate.
         unsafe { gpu.device().allocate_memory(&info, None) }
     };
     for size in [u64::MAX, 1 << 60] {
-        assert_eq!(
-            allocate(size).unwrap_err(),
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
-        );
+        assert_eq!(allocate(size).unwrap_err(), vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
     }
     let memory = allocate(1 << 20).unwrap();
     // SAFETY: see the crate.
@@ -130,9 +107,7 @@ fn resources_outlive_the_memory_object_that_they_are_bound_to() {
 #[gaurast_runner::test]
 fn binding_is_checked() {
     let gpu = open();
-    let info = vk::BufferCreateInfo::default()
-        .size(1000)
-        .usage(vk::BufferUsageFlags::TRANSFER_SRC);
+    let info = vk::BufferCreateInfo::default().size(1000).usage(vk::BufferUsageFlags::TRANSFER_SRC);
     let memory = allocate(&gpu, 1024, MAPPABLE);
     // SAFETY: see the crate.
     unsafe {
@@ -140,9 +115,7 @@ fn binding_is_checked() {
         let buffer = device.create_buffer(&info, None).unwrap();
         assert!(device.bind_buffer_memory(buffer, memory, 1024).is_err());
         assert!(device.bind_buffer_memory(buffer, memory, 1).is_err());
-        let binds = [vk::BindBufferMemoryInfo::default()
-            .buffer(buffer)
-            .memory(memory)];
+        let binds = [vk::BindBufferMemoryInfo::default().buffer(buffer).memory(memory)];
         device.bind_buffer_memory2(&binds).unwrap();
         assert!(device.bind_buffer_memory(buffer, memory, 0).is_err());
         device.destroy_buffer(buffer, None);
@@ -157,11 +130,7 @@ fn requirements_are_the_same_however_they_are_asked_for() {
     let info = vk::ImageCreateInfo::default()
         .image_type(vk::ImageType::TYPE_2D)
         .format(vk::Format::R8G8B8A8_UNORM)
-        .extent(vk::Extent3D {
-            width: 100,
-            height: 50,
-            depth: 1,
-        })
+        .extent(vk::Extent3D { width: 100, height: 50, depth: 1 })
         .mip_levels(1)
         .array_layers(1)
         .samples(vk::SampleCountFlags::TYPE_1)
@@ -174,19 +143,13 @@ fn requirements_are_the_same_however_they_are_asked_for() {
         let mut dedicated = vk::MemoryDedicatedRequirements::default();
         let mut second = vk::MemoryRequirements2::default().push_next(&mut dedicated);
         let query = vk::ImageMemoryRequirementsInfo2::default().image(image);
-        gpu.device()
-            .get_image_memory_requirements2(&query, &mut second);
+        gpu.device().get_image_memory_requirements2(&query, &mut second);
         let second = second.memory_requirements;
         assert_eq!(first.size, second.size);
         assert_eq!(first.alignment, second.alignment);
-        let subresource = vk::ImageSubresource {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            mip_level: 0,
-            array_layer: 0,
-        };
-        let layout = gpu
-            .device()
-            .get_image_subresource_layout(image, subresource);
+        let subresource =
+            vk::ImageSubresource { aspect_mask: vk::ImageAspectFlags::COLOR, mip_level: 0, array_layer: 0 };
+        let layout = gpu.device().get_image_subresource_layout(image, subresource);
         assert!(layout.row_pitch >= 100 * 4);
         assert_eq!(layout.size, layout.row_pitch * 50);
         assert!(layout.offset + layout.size <= first.size);
@@ -208,13 +171,9 @@ fn dedicated_is_not_asked_for() -> (vk::Bool32, vk::Bool32) {
     let query = vk::BufferMemoryRequirementsInfo2::default().buffer(buffer.raw);
     // SAFETY: see the crate.
     unsafe {
-        gpu.device()
-            .get_buffer_memory_requirements2(&query, &mut requirements);
+        gpu.device().get_buffer_memory_requirements2(&query, &mut requirements);
     }
-    (
-        dedicated.prefers_dedicated_allocation,
-        dedicated.requires_dedicated_allocation,
-    )
+    (dedicated.prefers_dedicated_allocation, dedicated.requires_dedicated_allocation)
 }
 
 /// Breaks VUID-VkImageCreateInfo-extent-02252, VUID-VkImageCreateInfo-mipLevels-00958,
@@ -226,11 +185,7 @@ fn images_beyond_the_limits_are_refused() {
     let good = vk::ImageCreateInfo::default()
         .image_type(vk::ImageType::TYPE_2D)
         .format(vk::Format::R8G8B8A8_UNORM)
-        .extent(vk::Extent3D {
-            width: 4,
-            height: 4,
-            depth: 1,
-        })
+        .extent(vk::Extent3D { width: 4, height: 4, depth: 1 })
         .mip_levels(1)
         .array_layers(1)
         .samples(vk::SampleCountFlags::TYPE_1)
@@ -243,8 +198,7 @@ fn images_beyond_the_limits_are_refused() {
         good.array_layers(u32::MAX),
         good.samples(vk::SampleCountFlags::TYPE_2),
         good.format(vk::Format::G8_B8R8_2PLANE_420_UNORM),
-        good.format(vk::Format::R8G8B8A8_SRGB)
-            .usage(vk::ImageUsageFlags::STORAGE),
+        good.format(vk::Format::R8G8B8A8_SRGB).usage(vk::ImageUsageFlags::STORAGE),
         good.flags(vk::ImageCreateFlags::SPARSE_BINDING),
     ];
     for info in bad {

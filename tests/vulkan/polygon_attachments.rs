@@ -1,8 +1,8 @@
 //! The processing of fragments: attachments, blending, depth and samples.
 
 use crate::canvas::{
-    BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything,
-    sampled_image, vertex,
+    BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything, sampled_image,
+    vertex,
 };
 use crate::devices::image;
 use crate::scene::{FORMAT, HEIGHT, WIDTH, assert_close, at, replace};
@@ -17,10 +17,7 @@ fn two_attachments_are_written_and_masked() {
     let other = image(gpu, FORMAT, [WIDTH, HEIGHT]);
     let mut request = colored().with_shader(Shader::fragment(spirv!("two_targets.frag")));
     request.formats = vec![FORMAT; 2];
-    request.blend = vec![
-        replace(),
-        replace().color_write_mask(vk::ColorComponentFlags::G),
-    ];
+    request.blend = vec![replace(), replace().color_write_mask(vk::ColorComponentFlags::G)];
     let made = request.create(gpu).unwrap();
     let vertices = Buffer::of(gpu, everything(RED).as_flattened());
     canvas.pass(&[&canvas.image, &other], |device, commands| {
@@ -50,20 +47,13 @@ fn two_sources_are_blended() {
     ];
     let pixels = canvas.draw_vertices(&request, &everything([1.0, 1.0, 1.0, 0.5]));
     let blend = |factor: f32| factor + 0.25 * (1.0 - factor);
-    assert_close(
-        at(&pixels, (5, 5)),
-        [blend(0.5), blend(0.25), blend(0.125), 0.5],
-    );
+    assert_close(at(&pixels, (5, 5)), [blend(0.5), blend(0.25), blend(0.125), 0.5]);
 }
 
 #[gaurast_runner::test]
 fn a_logic_operation_works_on_bits() {
     let canvas = Canvas::of(vk::Format::R8G8B8A8_UNORM);
-    let request = Graphics {
-        logic_op: Some(vk::LogicOp::XOR),
-        formats: vec![vk::Format::R8G8B8A8_UNORM],
-        ..colored()
-    };
+    let request = Graphics { logic_op: Some(vk::LogicOp::XOR), formats: vec![vk::Format::R8G8B8A8_UNORM], ..colored() };
     let made = request.create(&canvas.gpu).unwrap();
     let color = [15.0 / 255.0, 1.0, 0.0, 51.0 / 255.0];
     let vertices = Buffer::of(&canvas.gpu, everything(color).as_flattened());
@@ -78,11 +68,7 @@ fn a_logic_operation_works_on_bits() {
     let clear = 64u8;
     let expected = [clear ^ 15, clear ^ 255, clear, 51];
     let texels: Vec<[u8; 4]> = canvas.image.colors();
-    assert!(
-        texels.iter().all(|texel| *texel == expected),
-        "{:?}",
-        texels[0]
-    );
+    assert!(texels.iter().all(|texel| *texel == expected), "{:?}", texels[0]);
 }
 
 #[gaurast_runner::test]
@@ -119,11 +105,7 @@ fn several_samples_make_smooth_edges() {
         ..colored()
     };
     let made = request.create(gpu).unwrap();
-    let vertices = [
-        vertex(-1.0, -1.0, RED),
-        vertex(1.0, -1.0, RED),
-        vertex(-1.0, 1.0, RED),
-    ];
+    let vertices = [vertex(-1.0, -1.0, RED), vertex(1.0, -1.0, RED), vertex(-1.0, 1.0, RED)];
     let vertices = Buffer::of(gpu, vertices.as_flattened());
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
@@ -140,10 +122,7 @@ fn several_samples_make_smooth_edges() {
     let (inside, outside) = (count(&pixels, RED), count(&pixels, CLEAR));
     assert_eq!(at(&pixels, (0, 0)), RED);
     let edge = PIXELS - inside - outside;
-    assert!(
-        (HEIGHT as usize..3 * WIDTH as usize).contains(&edge),
-        "{edge}"
-    );
+    assert!((HEIGHT as usize..3 * WIDTH as usize).contains(&edge), "{edge}");
     for pixel in &pixels {
         let covered = (pixel[0] - CLEAR[0]) / (RED[0] - CLEAR[0]) * 4.0;
         assert!((covered - covered.round()).abs() < 1e-5, "{pixel:?}");
@@ -186,37 +165,20 @@ fn resolved(canvas: &Canvas, request: &Graphics<'_>, color: [f32; 4]) -> [f32; 4
 #[gaurast_runner::test]
 fn samples_are_shaded_masked_and_covered() {
     let canvas = Canvas::new();
-    let four = vk::PipelineMultisampleStateCreateInfo::default()
-        .rasterization_samples(vk::SampleCountFlags::TYPE_4);
-    let request = Graphics {
-        multisample: four,
-        ..colored()
-    };
+    let four = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_4);
+    let request = Graphics { multisample: four, ..colored() };
     assert_close(resolved(&canvas, &request, RED), RED);
-    let each = request
-        .clone()
-        .with_shader(Shader::fragment(spirv!("per_sample.frag")));
+    let each = request.clone().with_shader(Shader::fragment(spirv!("per_sample.frag")));
     assert_close(resolved(&canvas, &each, RED), [15.0 / 4.0, 0.0, 0.0, 1.0]);
     let mask = [0b0101u32];
     let masked = Graphics {
-        multisample: vk::PipelineMultisampleStateCreateInfo {
-            p_sample_mask: mask.as_ptr(),
-            ..four
-        },
+        multisample: vk::PipelineMultisampleStateCreateInfo { p_sample_mask: mask.as_ptr(), ..four },
         ..each
     };
     let clear = CLEAR[0] * 0.5;
-    assert_close(
-        resolved(&canvas, &masked, RED),
-        [5.0 / 4.0 + clear, clear, clear, 0.5],
-    );
+    assert_close(resolved(&canvas, &masked, RED), [5.0 / 4.0 + clear, clear, clear, 0.5]);
     // An alpha of one half covers two samples, and is replaced by one there.
-    let covering = Graphics {
-        multisample: four
-            .alpha_to_coverage_enable(true)
-            .alpha_to_one_enable(true),
-        ..colored()
-    };
+    let covering = Graphics { multisample: four.alpha_to_coverage_enable(true).alpha_to_one_enable(true), ..colored() };
     let expected = [clear, 0.5 + clear, clear, 0.5];
     assert_close(resolved(&canvas, &covering, GREEN), expected);
 }

@@ -1,8 +1,8 @@
 //! Draws of points, lines and triangles.
 
 use crate::canvas::{
-    BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, Vertex, colored, count, deep_vertex,
-    everything, layered_image, read_layer, vertex,
+    BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, Vertex, colored, count, deep_vertex, everything,
+    layered_image, read_layer, vertex,
 };
 use crate::scene::{HEIGHT, WIDTH, assert_close, at, extent};
 use crate::spirv;
@@ -12,11 +12,7 @@ use gaurast_testkit::{Buffer, Graphics, Pipeline, Shader};
 #[gaurast_runner::test]
 fn a_triangle_covers_what_it_covers() {
     let canvas = Canvas::new();
-    let vertices = [
-        vertex(-1.0, -1.0, RED),
-        vertex(1.0, -1.0, RED),
-        vertex(-1.0, 1.0, RED),
-    ];
+    let vertices = [vertex(-1.0, -1.0, RED), vertex(1.0, -1.0, RED), vertex(-1.0, 1.0, RED)];
     let pixels = canvas.draw_vertices(&colored(), &vertices);
     assert_eq!(at(&pixels, (0, 0)), RED);
     assert_eq!(at(&pixels, (WIDTH - 1, HEIGHT - 1)), CLEAR);
@@ -36,11 +32,8 @@ fn a_triangle_covers_what_it_covers() {
 fn colours_are_interpolated() {
     let canvas = Canvas::new();
     let color = |x: f32, y: f32| [x, y, 0.5, 1.0];
-    let vertices = [
-        vertex(-1.0, -1.0, color(0.0, 0.0)),
-        vertex(3.0, -1.0, color(2.0, 0.0)),
-        vertex(-1.0, 3.0, color(0.0, 2.0)),
-    ];
+    let vertices =
+        [vertex(-1.0, -1.0, color(0.0, 0.0)), vertex(3.0, -1.0, color(2.0, 0.0)), vertex(-1.0, 3.0, color(0.0, 2.0))];
     let pixels = canvas.draw_vertices(&colored(), &vertices);
     for (x, y) in [(0, 0), (17, 31), (63, 47), (40, 3)] {
         let (s, t) = (x as f32 + 0.5, y as f32 + 0.5);
@@ -58,11 +51,9 @@ fn indices_choose_vertices() {
     let words = Buffer::of(gpu, &[77u32, 0, 1, 2]);
     let halves = Buffer::of(gpu, &[77u16, 0, 1, 2]);
     let bytes = Buffer::of(gpu, &[77u8, 0, 1, 2]);
-    for (buffer, ty) in [
-        (words, vk::IndexType::UINT32),
-        (halves, vk::IndexType::UINT16),
-        (bytes, vk::IndexType::UINT8_KHR),
-    ] {
+    for (buffer, ty) in
+        [(words, vk::IndexType::UINT32), (halves, vk::IndexType::UINT16), (bytes, vk::IndexType::UINT8_KHR)]
+    {
         let pixels = canvas.draw(&colored(), &vertices, |device, commands, _| {
             // SAFETY: see the crate.
             unsafe {
@@ -77,10 +68,7 @@ fn indices_choose_vertices() {
 /// A pipeline that draws a quad per instance, each in a cell, with `numbered.vert`.
 fn cells(divisor: Option<u32>) -> Graphics<'static> {
     Graphics {
-        shaders: vec![
-            Shader::vertex(spirv!("numbered.vert")),
-            colored().shaders[1].clone(),
-        ],
+        shaders: vec![Shader::vertex(spirv!("numbered.vert")), colored().shaders[1].clone()],
         bindings: vec![vk::VertexInputBindingDescription {
             binding: 0,
             stride: 2,
@@ -93,10 +81,7 @@ fn cells(divisor: Option<u32>) -> Graphics<'static> {
             offset: 0,
         }],
         divisors: divisor
-            .map(|divisor| vk::VertexInputBindingDivisorDescriptionKHR {
-                binding: 0,
-                divisor,
-            })
+            .map(|divisor| vk::VertexInputBindingDivisorDescriptionKHR { binding: 0, divisor })
             .into_iter()
             .collect(),
         topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
@@ -143,39 +128,27 @@ fn indirect_draws_are_numbered() {
     let one = Buffer::of(gpu, &[1u32]);
     let indices = Buffer::of(gpu, &[0u16, 1, 2, 3]);
     let indexed = Buffer::of(gpu, &[4u32, 1, 0, 5, 3]);
-    let pixels = canvas.draw_of(
-        &cells(None),
-        places.as_flattened(),
-        |device, commands, _| {
-            // SAFETY: see the crate.
-            unsafe { device.cmd_draw_indirect(commands, draws.raw, 0, 2, 20) };
-        },
-    );
+    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw_indirect(commands, draws.raw, 0, 2, 20) };
+    });
     assert_eq!(cell(&pixels, 0, 0), [0.0, 0.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), [2.0, 2.0, 1.0, 1.0]);
     assert_eq!(cell(&pixels, 3, 3), [3.0, 2.0, 1.0, 1.0]);
-    let pixels = canvas.draw_of(
-        &cells(None),
-        places.as_flattened(),
-        |device, commands, _| {
-            let (draws, one) = (draws.raw, one.raw);
-            // SAFETY: see the crate.
-            unsafe { device.cmd_draw_indirect_count(commands, draws, 0, one, 0, 2, 20) };
-        },
-    );
+    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
+        let (draws, one) = (draws.raw, one.raw);
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw_indirect_count(commands, draws, 0, one, 0, 2, 20) };
+    });
     assert_eq!(cell(&pixels, 0, 0), [0.0, 0.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), CLEAR);
-    let pixels = canvas.draw_of(
-        &cells(None),
-        places.as_flattened(),
-        |device, commands, _| {
-            // SAFETY: see the crate.
-            unsafe {
-                device.cmd_bind_index_buffer(commands, indices.raw, 0, vk::IndexType::UINT16);
-                device.cmd_draw_indexed_indirect(commands, indexed.raw, 0, 1, 20);
-            }
-        },
-    );
+    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_bind_index_buffer(commands, indices.raw, 0, vk::IndexType::UINT16);
+            device.cmd_draw_indexed_indirect(commands, indexed.raw, 0, 1, 20);
+        }
+    });
     assert_eq!(cell(&pixels, 3, 3), [3.0, 3.0, 0.0, 1.0]);
 }
 
@@ -185,42 +158,20 @@ fn the_provoking_vertex_is_chosen() {
     let mut vertices = everything(RED);
     vertices[2] = vertex(-1.0, 3.0, BLUE);
     let mut request = colored().with_shader(Shader::fragment(spirv!("flat.frag")));
-    assert_eq!(
-        count(&canvas.draw_vertices(&request, &vertices), RED),
-        PIXELS
-    );
+    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), RED), PIXELS);
     request.provoking_last = true;
-    assert_eq!(
-        count(&canvas.draw_vertices(&request, &vertices), BLUE),
-        PIXELS
-    );
+    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), BLUE), PIXELS);
 }
 
 /// The provoking vertices of each topology's primitives, as in "Primitive Topologies" of the specification: one vertex
 /// for each primitive, with the first-vertex and the last-vertex convention.
 const PROVOKING: [(vk::PrimitiveTopology, &[usize], &[usize]); 6] = [
-    (
-        vk::PrimitiveTopology::POINT_LIST,
-        &[0, 1, 2, 3, 4, 5],
-        &[0, 1, 2, 3, 4, 5],
-    ),
+    (vk::PrimitiveTopology::POINT_LIST, &[0, 1, 2, 3, 4, 5], &[0, 1, 2, 3, 4, 5]),
     (vk::PrimitiveTopology::LINE_LIST, &[0, 2, 4], &[1, 3, 5]),
-    (
-        vk::PrimitiveTopology::LINE_STRIP,
-        &[0, 1, 2, 3, 4],
-        &[1, 2, 3, 4, 5],
-    ),
+    (vk::PrimitiveTopology::LINE_STRIP, &[0, 1, 2, 3, 4], &[1, 2, 3, 4, 5]),
     (vk::PrimitiveTopology::TRIANGLE_LIST, &[0, 3], &[2, 5]),
-    (
-        vk::PrimitiveTopology::TRIANGLE_STRIP,
-        &[0, 1, 2, 3],
-        &[2, 3, 4, 5],
-    ),
-    (
-        vk::PrimitiveTopology::TRIANGLE_FAN,
-        &[1, 2, 3, 4],
-        &[2, 3, 4, 5],
-    ),
+    (vk::PrimitiveTopology::TRIANGLE_STRIP, &[0, 1, 2, 3], &[2, 3, 4, 5]),
+    (vk::PrimitiveTopology::TRIANGLE_FAN, &[1, 2, 3, 4], &[2, 3, 4, 5]),
 ];
 
 /// The corners of a hexagon, which make visible primitives in every topology.
@@ -238,12 +189,8 @@ fn each_primitive_has_its_provoking_vertex() {
     let vertices = hexagon();
     for (topology, first, last) in PROVOKING {
         for (provoking_last, expected) in [(false, first), (true, last)] {
-            let request = Graphics {
-                topology,
-                provoking_last,
-                ..colored()
-            }
-            .with_shader(Shader::fragment(spirv!("flat.frag")));
+            let request =
+                Graphics { topology, provoking_last, ..colored() }.with_shader(Shader::fragment(spirv!("flat.frag")));
             // Later primitives hide earlier ones, so each one is read before the next is drawn.
             let seen: Vec<usize> = (0..expected.len())
                 .map(|primitive| {
@@ -253,10 +200,7 @@ fn each_primitive_has_its_provoking_vertex() {
                             device.cmd_draw(commands, vertices_to(topology, primitive), 1, 0, 0);
                         };
                     });
-                    let before: Vec<f32> = expected[..primitive]
-                        .iter()
-                        .map(|&vertex| vertex as f32 + 1.0)
-                        .collect();
+                    let before: Vec<f32> = expected[..primitive].iter().map(|&vertex| vertex as f32 + 1.0).collect();
                     let new = pixels
                         .iter()
                         .find(|pixel| **pixel != CLEAR && !before.contains(&pixel[0]))
@@ -284,10 +228,7 @@ fn vertices_to(topology: vk::PrimitiveTopology, primitive: usize) -> u32 {
 #[gaurast_runner::test]
 fn points_have_the_size_that_the_shader_says() {
     let canvas = Canvas::new();
-    let request = Graphics {
-        topology: vk::PrimitiveTopology::POINT_LIST,
-        ..colored()
-    };
+    let request = Graphics { topology: vk::PrimitiveTopology::POINT_LIST, ..colored() };
     // The common corner of the four pixels in the middle.
     let pixels = canvas.draw_vertices(&request, &[vertex(0.0, 0.0, RED)]);
     assert_eq!(count(&pixels, RED), 16);
@@ -301,10 +242,7 @@ fn primitives_go_to_their_viewport_and_layer() {
     let gpu = &canvas.gpu;
     let layers = layered_image(gpu, 2);
     let request = Graphics {
-        shaders: vec![
-            Shader::vertex(spirv!("placed.vert")),
-            colored().shaders[1].clone(),
-        ],
+        shaders: vec![Shader::vertex(spirv!("placed.vert")), colored().shaders[1].clone()],
         bindings: vec![],
         attributes: vec![],
         viewports: 2,
@@ -323,10 +261,7 @@ fn primitives_go_to_their_viewport_and_layer() {
                 min_depth: 0.0,
                 max_depth: 1.0,
             };
-            let whole = vk::Rect2D {
-                offset: vk::Offset2D::default(),
-                extent: extent(&layers),
-            };
+            let whole = vk::Rect2D { offset: vk::Offset2D::default(), extent: extent(&layers) };
             // SAFETY: see the crate.
             unsafe {
                 device.cmd_set_viewport(commands, 0, &[viewport(0), viewport(half)]);
@@ -340,11 +275,7 @@ fn primitives_go_to_their_viewport_and_layer() {
         let pixels = read_layer(&layers, layer);
         for side in 0..2 {
             let expected = [(layer * 2 + side + 1) as f32; 4];
-            assert_eq!(
-                at(&pixels, (side * half + 3, 7)),
-                expected,
-                "{layer} {side}"
-            );
+            assert_eq!(at(&pixels, (side * half + 3, 7)), expected, "{layer} {side}");
         }
     }
 }
@@ -359,10 +290,7 @@ fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
     assert!(told.contains("CULL_MODE"), "{told}");
     let mut request = colored();
     request.attributes[1].binding = 3;
-    request.bindings.push(vk::VertexInputBindingDescription {
-        binding: 3,
-        ..request.bindings[0]
-    });
+    request.bindings.push(vk::VertexInputBindingDescription { binding: 3, ..request.bindings[0] });
     let pixels = canvas.draw_vertices(&request, &everything(RED));
     assert_eq!(count(&pixels, CLEAR), PIXELS);
     let told = canvas.gpu.message_texts().concat();
@@ -375,11 +303,7 @@ fn polygons_may_be_drawn_as_lines_or_points() {
     let drawn = |mode| {
         let mut request = colored();
         request.raster.polygon_mode = mode;
-        let vertices = [
-            vertex(-0.5, -0.5, RED),
-            vertex(0.5, -0.5, RED),
-            vertex(-0.5, 0.5, RED),
-        ];
+        let vertices = [vertex(-0.5, -0.5, RED), vertex(0.5, -0.5, RED), vertex(-0.5, 0.5, RED)];
         count(&canvas.draw_vertices(&request, &vertices), RED)
     };
     let fill = drawn(vk::PolygonMode::FILL);
@@ -416,13 +340,7 @@ fn shaders_clip_and_cull() {
     assert_eq!(at(&pixels, (WIDTH / 2, 9)), RED);
     // One vertex inside is enough to keep the primitive.
     let mut vertices = everything(BLUE);
-    assert_eq!(
-        count(&canvas.draw_vertices(&request, &vertices), CLEAR),
-        PIXELS
-    );
+    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), CLEAR), PIXELS);
     vertices[1] = vertex(3.0, -1.0, RED);
-    assert_eq!(
-        count(&canvas.draw_vertices(&request, &vertices), CLEAR),
-        PIXELS / 2
-    );
+    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), CLEAR), PIXELS / 2);
 }

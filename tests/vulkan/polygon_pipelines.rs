@@ -41,15 +41,9 @@ fn every_topology_has_pipelines() {
         T::TRIANGLE_LIST_WITH_ADJACENCY,
         T::TRIANGLE_STRIP_WITH_ADJACENCY,
     ] {
-        let request = Graphics {
-            topology,
-            ..colored()
-        };
+        let request = Graphics { topology, ..colored() };
         assert_made(&gpu, &request);
-        let restarting = Graphics {
-            restart: true,
-            ..request
-        };
+        let restarting = Graphics { restart: true, ..request };
         match topology {
             T::POINT_LIST
             | T::LINE_LIST
@@ -61,10 +55,7 @@ fn every_topology_has_pipelines() {
             _ => assert_made(&gpu, &restarting),
         }
     }
-    let request = Graphics {
-        topology: T::PATCH_LIST,
-        ..colored()
-    };
+    let request = Graphics { topology: T::PATCH_LIST, ..colored() };
     assert_refused(&gpu, &request, USAGE, "no tessellation stages");
     assert!(gpu.message_texts().is_empty());
 }
@@ -96,17 +87,11 @@ fn stages_are_those_that_the_device_has() {
 #[gaurast_runner::test]
 fn stages_and_layout_correspond() {
     let gpu = open();
-    let request = Graphics {
-        has_layout: false,
-        ..colored()
-    };
+    let request = Graphics { has_layout: false, ..colored() };
     assert_refused(&gpu, &request, USAGE, "layout");
     let request = colored().with_shader(Shader::fragment(spirv!("tinted.frag")));
     assert_refused(&gpu, &request, USAGE, "binding 0");
-    let request = Graphics {
-        shaders: vec![Shader::vertex(spirv!("triangle.vert"))],
-        ..colored()
-    };
+    let request = Graphics { shaders: vec![Shader::vertex(spirv!("triangle.vert"))], ..colored() };
     assert_refused(&gpu, &request, USAGE, "push constants 16 to 80");
 }
 
@@ -114,10 +99,7 @@ fn stages_and_layout_correspond() {
 fn a_fragment_input_that_nobody_writes_is_warned_of() {
     let gpu = open();
     let request = Graphics {
-        shaders: vec![
-            Shader::vertex(spirv!("colored.vert")),
-            Shader::fragment(spirv!("two_targets.frag")),
-        ],
+        shaders: vec![Shader::vertex(spirv!("colored.vert")), Shader::fragment(spirv!("two_targets.frag"))],
         formats: vec![crate::scene::FORMAT; 2],
         blend: vec![replace(); 2],
         ..colored()
@@ -126,12 +108,8 @@ fn a_fragment_input_that_nobody_writes_is_warned_of() {
     assert!(gpu.message_texts().is_empty());
     let mut request = colored();
     request.shaders[0] = Shader::vertex(spirv!("block.vert"));
-    request.attributes = (0..=4)
-        .map(|location| vk::VertexInputAttributeDescription {
-            location,
-            ..request.attributes[0]
-        })
-        .collect();
+    request.attributes =
+        (0..=4).map(|location| vk::VertexInputAttributeDescription { location, ..request.attributes[0] }).collect();
     assert_made(&gpu, &request);
     let messages = gpu.message_texts().concat();
     assert!(messages.contains("location 0"), "{messages:?}");
@@ -154,10 +132,7 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
     let mut unread = colored();
     unread.attributes[1].format = vk::Format::BC7_UNORM_BLOCK;
     assert_refused(&gpu, &unread, USAGE, "BC7_UNORM_BLOCK");
-    let mut cells = Graphics {
-        shaders: vec![Shader::vertex(spirv!("numbered.vert"))],
-        ..colored()
-    };
+    let mut cells = Graphics { shaders: vec![Shader::vertex(spirv!("numbered.vert"))], ..colored() };
     assert_refused(&gpu, &cells, USAGE, "Float");
     cells.attributes[0].format = vk::Format::R8G8_UINT;
     assert_made(&gpu, &cells);
@@ -166,15 +141,9 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
 #[gaurast_runner::test]
 fn attributes_of_64_bits_are_refused() {
     let gpu = open();
-    let request = Graphics {
-        shaders: vec![Shader::vertex(spirv!("double_attribute.vert"))],
-        ..colored()
-    };
+    let request = Graphics { shaders: vec![Shader::vertex(spirv!("double_attribute.vert"))], ..colored() };
     assert_refused(&gpu, &request, USAGE, "width: 64");
-    let outputs = Graphics {
-        shaders: vec![Shader::vertex(spirv!("doubles.vert"))],
-        ..colored()
-    };
+    let outputs = Graphics { shaders: vec![Shader::vertex(spirv!("doubles.vert"))], ..colored() };
     assert_made(&gpu, &outputs);
 }
 
@@ -190,10 +159,7 @@ fn state_that_is_ignored_may_be_anything() {
         ..colored()
     };
     assert_made(&gpu, &request);
-    let request = Graphics {
-        depth_format: vk::Format::D32_SFLOAT,
-        ..request
-    };
+    let request = Graphics { depth_format: vk::Format::D32_SFLOAT, ..request };
     assert_refused(&gpu, &request, USAGE, "77");
     let request = request.with_dynamic(vk::DynamicState::DEPTH_COMPARE_OP);
     assert_made(&gpu, &request);
@@ -215,27 +181,15 @@ fn state_that_is_ignored_may_be_anything() {
 #[gaurast_runner::test]
 fn counts_correspond() {
     let gpu = open();
-    let request = Graphics {
-        blend: vec![replace(); 2],
-        ..colored()
-    };
+    let request = Graphics { blend: vec![replace(); 2], ..colored() };
     assert_refused(&gpu, &request, USAGE, "attachmentCount");
-    let request = Graphics {
-        viewports: 17,
-        ..colored()
-    };
+    let request = Graphics { viewports: 17, ..colored() };
     assert_refused(&gpu, &request, USAGE, "maxViewports");
-    let request = Graphics {
-        dynamic: vec![],
-        ..colored()
-    };
+    let request = Graphics { dynamic: vec![], ..colored() };
     assert_refused(&gpu, &request, USAGE, "not dynamic");
     let request = Graphics {
         viewports: 0,
-        dynamic: vec![
-            vk::DynamicState::VIEWPORT_WITH_COUNT,
-            vk::DynamicState::SCISSOR_WITH_COUNT,
-        ],
+        dynamic: vec![vk::DynamicState::VIEWPORT_WITH_COUNT, vk::DynamicState::SCISSOR_WITH_COUNT],
         ..colored()
     };
     assert_made(&gpu, &request);
@@ -250,10 +204,7 @@ fn state_that_the_device_lacks_is_refused() {
         ..colored()
     };
     assert_refused(&gpu, &request, LACKING, "TYPE_8");
-    for state in [
-        vk::DynamicState::RASTERIZATION_SAMPLES_EXT,
-        vk::DynamicState::SAMPLE_LOCATIONS_ENABLE_EXT,
-    ] {
+    for state in [vk::DynamicState::RASTERIZATION_SAMPLES_EXT, vk::DynamicState::SAMPLE_LOCATIONS_ENABLE_EXT] {
         let request = colored().with_dynamic(state);
         assert_refused(&gpu, &request, LACKING, &format!("{state:?}"));
     }

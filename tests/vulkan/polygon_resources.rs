@@ -16,13 +16,7 @@ fn push_constants_move_vertices() {
         let offset = [1.0f32, 0.0, 0.0, 0.0];
         // SAFETY: see the crate.
         unsafe {
-            device.cmd_push_constants(
-                commands,
-                made.layout,
-                stages,
-                0,
-                bytemuck::cast_slice(&offset),
-            );
+            device.cmd_push_constants(commands, made.layout, stages, 0, bytemuck::cast_slice(&offset));
             device.cmd_draw(commands, 3, 1, 0, 0);
         }
     });
@@ -38,13 +32,7 @@ fn textures_uniforms_and_specialization_constants_reach_the_fragment_stage() {
     let texels = [[255u8, 0, 0, 255], [0, 255, 51, 255]];
     let tint = Buffer::of(gpu, &[0.5f32, 0.25, 1.0, 1.0]);
     let sampler = canvas.nearest_sampler();
-    let set = Bindings::new(
-        gpu,
-        &[
-            Resource::Uniform(tint.raw),
-            Resource::Texture(texture.view, sampler.raw),
-        ],
-    );
+    let set = Bindings::new(gpu, &[Resource::Uniform(tint.raw), Resource::Texture(texture.view, sampler.raw)]);
     texture.upload(vk::ImageAspectFlags::COLOR, texels.as_flattened());
     let mut request = colored().with_shader(Shader::fragment(spirv!("tinted.frag")));
     request.shaders[1].constants = vec![(3, 2.0f32.to_bits())];
@@ -75,10 +63,7 @@ fn both_stages_store() {
     let counts = Buffer::of(gpu, &[0u32; 5]);
     let set = canvas.storage_set(&counts);
     let request = Graphics {
-        shaders: vec![
-            Shader::vertex(spirv!("stores.vert")),
-            Shader::fragment(spirv!("stores.frag")),
-        ],
+        shaders: vec![Shader::vertex(spirv!("stores.vert")), Shader::fragment(spirv!("stores.frag"))],
         set_layouts: vec![set.layout],
         ..colored()
     };
@@ -109,11 +94,7 @@ fn queries_count_samples_and_invocations() {
         | vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS;
     let pool = |info: vk::QueryPoolCreateInfo| {
         // SAFETY: see the crate.
-        unsafe {
-            device
-                .create_query_pool(&info.query_count(1), None)
-                .unwrap()
-        }
+        unsafe { device.create_query_pool(&info.query_count(1), None).unwrap() }
     };
     let occlusion = pool(vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION));
     let counted = pool(
@@ -145,13 +126,9 @@ fn queries_count_samples_and_invocations() {
     let flags = vk::QueryResultFlags::WAIT;
     // SAFETY: see the crate.
     unsafe {
-        device
-            .get_query_pool_results(occlusion, 0, &mut samples, flags)
-            .unwrap();
+        device.get_query_pool_results(occlusion, 0, &mut samples, flags).unwrap();
         let flags = flags | vk::QueryResultFlags::TYPE_64;
-        device
-            .get_query_pool_results(counted, 0, &mut statistics, flags)
-            .unwrap();
+        device.get_query_pool_results(counted, 0, &mut statistics, flags).unwrap();
         device.destroy_query_pool(occlusion, None);
         device.destroy_query_pool(counted, None);
     }

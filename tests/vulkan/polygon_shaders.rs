@@ -1,9 +1,6 @@
 //! Features of shaders of points, lines and triangles.
 
-use crate::canvas::{
-    CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything,
-    vertex,
-};
+use crate::canvas::{CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything, vertex};
 use crate::devices::open;
 use crate::scene::{HEIGHT, WIDTH, assert_close, at};
 use crate::spirv;
@@ -23,10 +20,7 @@ fn fragments_read_clip_and_cull_distances() {
     let pixels = canvas.draw_vertices(&request, &vertices);
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
-            let (s, t) = (
-                (x as f32 + 0.5) / WIDTH as f32,
-                (y as f32 + 0.5) / HEIGHT as f32,
-            );
+            let (s, t) = ((x as f32 + 0.5) / WIDTH as f32, (y as f32 + 0.5) / HEIGHT as f32);
             let found = at(&pixels, (x, y));
             if 2.0 * s < 0.5 {
                 assert_eq!(found, CLEAR, "{x} {y}");
@@ -52,8 +46,7 @@ fn vertices_and_fragments_use_subgroups() {
     let gpu = &canvas.gpu;
     // SAFETY: see the crate.
     unsafe {
-        gpu.instance()
-            .get_physical_device_properties2(gpu.physical_device(), &mut properties);
+        gpu.instance().get_physical_device_properties2(gpu.physical_device(), &mut properties);
     }
     let draws = vk::ShaderStageFlags::ALL_GRAPHICS & subgroups.supported_stages;
     assert_eq!(draws, vk::ShaderStageFlags::ALL_GRAPHICS);
@@ -72,14 +65,8 @@ fn a_depth_that_breaks_its_promise_is_written() {
             .depth_compare_op(vk::CompareOp::GREATER),
         ..colored().with_shader(Shader::fragment(spirv!("unchanged_depth.frag")))
     };
-    let second = Graphics {
-        shaders: colored().shaders,
-        ..request.clone()
-    }
-    .create(&canvas.gpu)
-    .unwrap();
-    let at_depth =
-        |depth, color| everything(color).map(|[x, y, ..]| deep_vertex([x, y, depth], color));
+    let second = Graphics { shaders: colored().shaders, ..request.clone() }.create(&canvas.gpu).unwrap();
+    let at_depth = |depth, color| everything(color).map(|[x, y, ..]| deep_vertex([x, y, depth], color));
     // The second draw is between the depth of the first triangle and the depth that its shader wrote.
     let vertices = [at_depth(0.6, RED), at_depth(0.65, GREEN)].concat();
     let pixels = canvas.draw(&request, &vertices, |device, commands, _| {
@@ -97,10 +84,7 @@ fn a_depth_that_breaks_its_promise_is_written() {
 fn stages_without_their_feature_are_refused() {
     let gpu = open();
     let mut request = colored();
-    request.shaders.push(Shader {
-        stage: vk::ShaderStageFlags::COMPUTE,
-        ..request.shaders[0].clone()
-    });
+    request.shaders.push(Shader { stage: vk::ShaderStageFlags::COMPUTE, ..request.shaders[0].clone() });
     let refused = request.create(&gpu).map(drop);
     let message = gpu.message_texts().concat();
     let lacking = vk::Result::ERROR_FEATURE_NOT_PRESENT;

@@ -15,13 +15,9 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
     ];
     let scene = Scene::new(&gaussians, &splats());
     let device = scene.gpu.device();
-    let counters = [
-        Counter::GaussiansDrawn as u32,
-        Counter::GaussiansRead as u32,
-    ];
-    let mut performance = vk::QueryPoolPerformanceCreateInfoKHR::default()
-        .queue_family_index(0)
-        .counter_indices(&counters);
+    let counters = [Counter::GaussiansDrawn as u32, Counter::GaussiansRead as u32];
+    let mut performance =
+        vk::QueryPoolPerformanceCreateInfoKHR::default().queue_family_index(0).counter_indices(&counters);
     let info = vk::QueryPoolCreateInfo::default()
         .query_type(vk::QueryType::PERFORMANCE_QUERY_KHR)
         .query_count(1)
@@ -33,21 +29,14 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
     // SAFETY: see the crate.
     unsafe {
         let available = instance
-            .enumerate_physical_device_queue_family_performance_query_counters_len(
-                scene.gpu.physical_device(),
-                0,
-            )
+            .enumerate_physical_device_queue_family_performance_query_counters_len(scene.gpu.physical_device(), 0)
             .unwrap();
         assert_eq!(available, Counter::ALL.len());
-        device_functions
-            .acquire_profiling_lock(&vk::AcquireProfilingLockInfoKHR::default())
-            .unwrap();
+        device_functions.acquire_profiling_lock(&vk::AcquireProfilingLockInfoKHR::default()).unwrap();
         let pool = device.create_query_pool(&info, None).unwrap();
         device.reset_query_pool(pool, 0, 1);
         let mut results = [[0u64; 2]];
-        let read = |results: &mut [[u64; 2]], flags| {
-            device.get_query_pool_results(pool, 0, results, flags)
-        };
+        let read = |results: &mut [[u64; 2]], flags| device.get_query_pool_results(pool, 0, results, flags);
         let unavailable = read(&mut results, vk::QueryResultFlags::empty());
         assert_eq!(unavailable.unwrap_err(), vk::Result::NOT_READY);
         scene.gpu.run(|recording| {
@@ -69,10 +58,7 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
 
 #[gaurast_runner::test]
 fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
-    let gaussians = [
-        splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3]),
-        splat([0.1, 0.0, 6.0], 0.1, 0.8, [0.5; 3]),
-    ];
+    let gaussians = [splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3]), splat([0.1, 0.0, 6.0], 0.1, 0.8, [0.5; 3])];
     let masked = Graphics {
         blend: vec![crate::scene::replace().color_write_mask(vk::ColorComponentFlags::empty())],
         ..splats()
@@ -81,9 +67,7 @@ fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
     let [shown, hidden] = [splats(), masked].map(|request| {
         let scene = Scene::new(&gaussians, &request);
         let device = scene.gpu.device();
-        let info = vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::OCCLUSION)
-            .query_count(1);
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(1);
         let mut samples = [0u32];
         // SAFETY: see the crate.
         unsafe {
@@ -98,9 +82,7 @@ fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
                 });
                 device.cmd_end_query(commands, pool, 0);
             });
-            device
-                .get_query_pool_results(pool, 0, &mut samples, vk::QueryResultFlags::WAIT)
-                .unwrap();
+            device.get_query_pool_results(pool, 0, &mut samples, vk::QueryResultFlags::WAIT).unwrap();
             device.destroy_query_pool(pool, None);
         }
         let pixels = scene.pixels();
@@ -115,9 +97,7 @@ fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
 fn timestamps_ascend_and_are_copied_with_their_availability() {
     let gpu = open();
     let device = gpu.device();
-    let info = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::TIMESTAMP)
-        .query_count(3);
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(3);
     let buffer = Buffer::new(&gpu, 48);
     let stage = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
     // SAFETY: see the crate.
@@ -137,9 +117,7 @@ fn timestamps_ascend_and_are_copied_with_their_availability() {
         assert_eq!(copied.iter().map(|c| c[1]).collect::<Vec<_>>(), [1, 1, 0]);
         let mut read = [0u64; 2];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        device
-            .get_query_pool_results(pool, 0, &mut read, flags)
-            .unwrap();
+        device.get_query_pool_results(pool, 0, &mut read, flags).unwrap();
         assert_eq!(read, [copied[0][0], copied[1][0]]);
         device.destroy_query_pool(pool, None);
     }
@@ -152,15 +130,8 @@ fn clocks_are_read_together() {
     let instance = ash::ext::calibrated_timestamps::Instance::new(gpu.entry(), gpu.instance());
     let clocks = ash::ext::calibrated_timestamps::Device::new(gpu.instance(), gpu.device());
     // SAFETY: see the crate.
-    let domains = unsafe {
-        instance
-            .get_physical_device_calibrateable_time_domains(gpu.physical_device())
-            .unwrap()
-    };
-    let host = [
-        vk::TimeDomainKHR::CLOCK_MONOTONIC,
-        vk::TimeDomainKHR::CLOCK_MONOTONIC_RAW,
-    ];
+    let domains = unsafe { instance.get_physical_device_calibrateable_time_domains(gpu.physical_device()).unwrap() };
+    let host = [vk::TimeDomainKHR::CLOCK_MONOTONIC, vk::TimeDomainKHR::CLOCK_MONOTONIC_RAW];
     assert_eq!(domains, [vk::TimeDomainKHR::DEVICE, host[0], host[1]]);
     let read = || {
         let of = |domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain);
@@ -168,9 +139,7 @@ fn clocks_are_read_together() {
         // SAFETY: see the crate.
         unsafe { clocks.get_calibrated_timestamps(&infos).unwrap() }
     };
-    let info = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::TIMESTAMP)
-        .query_count(1);
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(1);
     let (before, deviation_before) = read();
     let mut written = [0u64; 1];
     // SAFETY: see the crate.
@@ -184,17 +153,14 @@ fn clocks_are_read_together() {
             device.cmd_write_timestamp(commands, stage, pool, 0);
         });
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        device
-            .get_query_pool_results(pool, 0, &mut written, flags)
-            .unwrap();
+        device.get_query_pool_results(pool, 0, &mut written, flags).unwrap();
         device.destroy_query_pool(pool, None);
     }
     let (after, deviation_after) = read();
     assert!((before[0]..=after[0]).contains(&written[0]));
     let passed = [0, 1].map(|clock: usize| after[clock] - before[clock]);
     assert!(passed[0].abs_diff(passed[1]) <= deviation_before + deviation_after);
-    let windows = vk::CalibratedTimestampInfoKHR::default()
-        .time_domain(vk::TimeDomainKHR::QUERY_PERFORMANCE_COUNTER);
+    let windows = vk::CalibratedTimestampInfoKHR::default().time_domain(vk::TimeDomainKHR::QUERY_PERFORMANCE_COUNTER);
     // SAFETY: see the crate.
     unsafe { assert!(clocks.get_calibrated_timestamps(&[windows]).is_err()) };
 }

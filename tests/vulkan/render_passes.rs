@@ -10,9 +10,7 @@ const GREEN: [u8; 4] = [0, 255, 0, 255];
 const WHITE: [u8; 4] = [255; 4];
 
 fn clear_value(float32: [f32; 4]) -> vk::ClearValue {
-    vk::ClearValue {
-        color: vk::ClearColorValue { float32 },
-    }
+    vk::ClearValue { color: vk::ClearColorValue { float32 } }
 }
 
 fn attachment(load: vk::AttachmentLoadOp) -> vk::AttachmentDescription {
@@ -26,41 +24,23 @@ fn attachment(load: vk::AttachmentLoadOp) -> vk::AttachmentDescription {
 }
 
 fn reference(attachment: u32) -> vk::AttachmentReference {
-    vk::AttachmentReference {
-        attachment,
-        layout: vk::ImageLayout::GENERAL,
-    }
+    vk::AttachmentReference { attachment, layout: vk::ImageLayout::GENERAL }
 }
 
 /// A clear of colour attachment 0 inside a pass.
-fn clear_attachment(
-    device: &ash::Device,
-    commands: vk::CommandBuffer,
-    value: [f32; 4],
-    rect: vk::Rect2D,
-) {
+fn clear_attachment(device: &ash::Device, commands: vk::CommandBuffer, value: [f32; 4], rect: vk::Rect2D) {
     let attachments = [vk::ClearAttachment {
         aspect_mask: vk::ImageAspectFlags::COLOR,
         color_attachment: 0,
         clear_value: clear_value(value),
     }];
-    let rects = [vk::ClearRect {
-        rect,
-        base_array_layer: 0,
-        layer_count: 1,
-    }];
+    let rects = [vk::ClearRect { rect, base_array_layer: 0, layer_count: 1 }];
     // SAFETY: see the crate.
     unsafe { device.cmd_clear_attachments(commands, &attachments, &rects) };
 }
 
 fn corner() -> vk::Rect2D {
-    vk::Rect2D {
-        offset: vk::Offset2D { x: 1, y: 0 },
-        extent: vk::Extent2D {
-            width: 2,
-            height: 1,
-        },
-    }
+    vk::Rect2D { offset: vk::Offset2D { x: 1, y: 0 }, extent: vk::Extent2D { width: 2, height: 1 } }
 }
 
 fn framebuffer(gpu: &Gpu, pass: vk::RenderPass, images: &[&Image]) -> vk::Framebuffer {
@@ -83,9 +63,7 @@ fn a_pass_clears_and_stores() {
     let attachments = [attachment(vk::AttachmentLoadOp::CLEAR)];
     let references = [reference(0)];
     let subpasses = [vk::SubpassDescription::default().color_attachments(&references)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
     // SAFETY: see the crate.
     unsafe {
         let pass = gpu.device().create_render_pass(&info, None).unwrap();
@@ -118,14 +96,10 @@ fn a_pass_clears_and_stores() {
 fn subpasses_follow_each_other() {
     let gpu = open();
     let images = [image(&gpu, FORMAT, [4, 2]), image(&gpu, FORMAT, [4, 2])];
-    let attachments = [
-        attachment(vk::AttachmentLoadOp::CLEAR),
-        attachment(vk::AttachmentLoadOp::CLEAR),
-    ];
+    let attachments = [attachment(vk::AttachmentLoadOp::CLEAR), attachment(vk::AttachmentLoadOp::CLEAR)];
     let references = [[reference(0)], [reference(1)], [reference(0)]];
-    let subpasses = references
-        .each_ref()
-        .map(|references| vk::SubpassDescription::default().color_attachments(references));
+    let subpasses =
+        references.each_ref().map(|references| vk::SubpassDescription::default().color_attachments(references));
     let writes = vk::AccessFlags::COLOR_ATTACHMENT_WRITE;
     let stage = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT;
     let dependencies = [vk::SubpassDependency::default()
@@ -135,10 +109,8 @@ fn subpasses_follow_each_other() {
         .dst_stage_mask(stage)
         .src_access_mask(writes)
         .dst_access_mask(writes)];
-    let info = vk::RenderPassCreateInfo::default()
-        .dependencies(&dependencies)
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let info =
+        vk::RenderPassCreateInfo::default().dependencies(&dependencies).attachments(&attachments).subpasses(&subpasses);
     // SAFETY: see the crate.
     unsafe {
         let pass = gpu.device().create_render_pass(&info, None).unwrap();
@@ -189,11 +161,8 @@ fn passes_load_what_is_there_within_their_area() {
             .load_op(load)
             .store_op(vk::AttachmentStoreOp::STORE)
             .clear_value(clear_value([1.0; 4]))];
-        let info = vk::RenderingInfo::default()
-            .flags(flags)
-            .render_area(rect)
-            .layer_count(1)
-            .color_attachments(&attachments);
+        let info =
+            vk::RenderingInfo::default().flags(flags).render_area(rect).layer_count(1).color_attachments(&attachments);
         // SAFETY: see the crate.
         unsafe { device.cmd_begin_rendering(commands, &info) };
     };
@@ -209,20 +178,8 @@ fn passes_load_what_is_there_within_their_area() {
         clear_attachment(device, commands, [0.0, 1.0, 0.0, 1.0], corner());
         end();
         // Only the area is cleared; resuming the pass does not clear again.
-        let left = vk::Rect2D {
-            extent: vk::Extent2D {
-                width: 2,
-                height: 2,
-            },
-            ..Default::default()
-        };
-        begin(
-            device,
-            commands,
-            clear,
-            left,
-            vk::RenderingFlags::SUSPENDING,
-        );
+        let left = vk::Rect2D { extent: vk::Extent2D { width: 2, height: 2 }, ..Default::default() };
+        begin(device, commands, clear, left, vk::RenderingFlags::SUSPENDING);
         clear_attachment(device, commands, [0.0, 1.0, 0.0, 1.0], left);
         end();
         begin(device, commands, clear, left, vk::RenderingFlags::RESUMING);
@@ -239,12 +196,8 @@ fn what_a_subpass_only_reads_is_cleared_for_it() {
     let images = [image(&gpu, FORMAT, [4, 2]), image(&gpu, FORMAT, [4, 2])];
     let attachments = [attachment(vk::AttachmentLoadOp::CLEAR); 2];
     let (written, read) = ([reference(0)], [reference(1)]);
-    let subpasses = [vk::SubpassDescription::default()
-        .color_attachments(&written)
-        .input_attachments(&read)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let subpasses = [vk::SubpassDescription::default().color_attachments(&written).input_attachments(&read)];
+    let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
     // SAFETY: see the crate.
     unsafe {
         let pass = gpu.device().create_render_pass(&info, None).unwrap();
@@ -276,11 +229,7 @@ fn slices_of_solid_images_are_rendered_to() {
         .flags(vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE)
         .image_type(vk::ImageType::TYPE_3D)
         .format(FORMAT)
-        .extent(vk::Extent3D {
-            width: 4,
-            height: 2,
-            depth: 3,
-        })
+        .extent(vk::Extent3D { width: 4, height: 2, depth: 3 })
         .mip_levels(1)
         .array_layers(1)
         .samples(vk::SampleCountFlags::TYPE_1)
@@ -315,10 +264,8 @@ fn slices_of_solid_images_are_rendered_to() {
                 .load_op(vk::AttachmentLoadOp::CLEAR)
                 .store_op(vk::AttachmentStoreOp::STORE)
                 .clear_value(clear_value([0.0, 1.0, 0.0, 1.0]))];
-            let info = vk::RenderingInfo::default()
-                .render_area(area(&out))
-                .layer_count(2)
-                .color_attachments(&attachments);
+            let info =
+                vk::RenderingInfo::default().render_area(area(&out)).layer_count(2).color_attachments(&attachments);
             device.cmd_begin_rendering(commands, &info);
             device.cmd_end_rendering(commands);
         });
@@ -327,10 +274,7 @@ fn slices_of_solid_images_are_rendered_to() {
                 let (device, commands) = recording.raw();
                 let copy = vk::ImageCopy::default()
                     .src_subresource(crate::devices::COLOR_LAYERS)
-                    .src_offset(vk::Offset3D {
-                        z: slice as i32,
-                        ..Default::default()
-                    })
+                    .src_offset(vk::Offset3D { z: slice as i32, ..Default::default() })
                     .dst_subresource(crate::devices::COLOR_LAYERS)
                     .extent(extent(&out).into());
                 device.cmd_copy_image(commands, solid, general, out.raw, general, &[copy]);

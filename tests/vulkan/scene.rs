@@ -2,8 +2,8 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Buffer, Gpu, Graphics, Image, Pipeline, binding};
 
@@ -27,20 +27,17 @@ pub fn splat(position: [f32; 3], scale: f32, opacity: f32, color: [f32; 3]) -> S
     let basis = 0.282_094_8;
     let [r, g, b] = color.map(|c| (c - 0.5) / basis);
     let [x, y, z] = position;
-    [
-        x, y, z, scale, scale, scale, 1.0, 0.0, 0.0, 0.0, opacity, r, g, b,
-    ]
+    [x, y, z, scale, scale, scale, 1.0, 0.0, 0.0, 0.0, opacity, r, g, b]
 }
 
 /// The options of a pipeline for [`Splat`]s over one colour attachment, which may be changed before it is created.
 pub fn splats() -> Graphics<'static> {
-    let attribute =
-        |location: u32, format: vk::Format, floats: u32| vk::VertexInputAttributeDescription {
-            location,
-            binding: 0,
-            format,
-            offset: floats * 4,
-        };
+    let attribute = |location: u32, format: vk::Format, floats: u32| vk::VertexInputAttributeDescription {
+        location,
+        binding: 0,
+        format,
+        offset: floats * 4,
+    };
     let locations = GaussianAttributeLocationsGAURAST::default()
         .position(0)
         .scale(1)
@@ -57,18 +54,14 @@ pub fn splats() -> Graphics<'static> {
             attribute(4, vk::Format::R32G32B32_SFLOAT, 11),
         ],
         bindings: vec![binding(0, size_of::<Splat>() as u32)],
-        gaussian: Some(
-            PipelineGaussianStateCreateInfoGAURAST::default().attribute_locations(locations),
-        ),
+        gaussian: Some(PipelineGaussianStateCreateInfoGAURAST::default().attribute_locations(locations)),
         ..Graphics::default()
     }
 }
 
 /// A camera at the origin that looks along +z, with the principal point at the centre of pixel [`CENTER`].
 pub fn camera() -> GaussianCameraGAURAST<'static> {
-    GaussianCameraGAURAST::default()
-        .focal_length([100.0, 100.0])
-        .principal_point([32.5, 24.5])
+    GaussianCameraGAURAST::default().focal_length([100.0, 100.0]).principal_point([32.5, 24.5])
 }
 
 /// An image's width and height.
@@ -79,10 +72,7 @@ pub fn extent(image: &Image) -> vk::Extent2D {
 
 /// All of an image.
 pub fn area(image: &Image) -> vk::Rect2D {
-    vk::Rect2D {
-        offset: vk::Offset2D::default(),
-        extent: extent(image),
-    }
+    vk::Rect2D { offset: vk::Offset2D::default(), extent: extent(image) }
 }
 
 /// Sets viewport and scissor to all of an image.
@@ -103,13 +93,7 @@ pub fn set_viewport(device: &ash::Device, commands: vk::CommandBuffer, image: &I
 }
 
 /// Records a pass that clears `image` and sets viewport and scissor, with the commands of `record`.
-pub fn pass(
-    device: &ash::Device,
-    commands: vk::CommandBuffer,
-    image: &Image,
-    clear: [f32; 4],
-    record: impl FnOnce(),
-) {
+pub fn pass(device: &ash::Device, commands: vk::CommandBuffer, image: &Image, clear: [f32; 4], record: impl FnOnce()) {
     let flags = vk::RenderingFlags::empty();
     pass_with(flags, device, commands, image, clear, || {
         set_viewport(device, commands, image);
@@ -131,9 +115,7 @@ pub fn pass_with(
         .image_layout(vk::ImageLayout::GENERAL)
         .load_op(vk::AttachmentLoadOp::CLEAR)
         .store_op(vk::AttachmentStoreOp::STORE)
-        .clear_value(vk::ClearValue {
-            color: vk::ClearColorValue { float32: clear },
-        })];
+        .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: clear } })];
     let rendering = vk::RenderingInfo::default()
         .flags(flags)
         .render_area(area(image))
@@ -170,11 +152,7 @@ impl Scene {
     }
 
     /// Draws in a pass that clears to `clear`; `record` records the draw.
-    pub fn draw(
-        &self,
-        clear: [f32; 4],
-        draw: impl FnOnce(&ash::Device, vk::CommandBuffer),
-    ) -> Vec<[f32; 4]> {
+    pub fn draw(&self, clear: [f32; 4], draw: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> Vec<[f32; 4]> {
         self.gpu.run(|recording| {
             let (device, commands) = recording.raw();
             pass(device, commands, &self.image, clear, || {
@@ -214,9 +192,6 @@ pub fn premultiplied(color: [f32; 3], alpha: f32) -> [f32; 4] {
 }
 
 pub fn assert_close(actual: [f32; 4], expected: [f32; 4]) {
-    let close = actual
-        .iter()
-        .zip(expected)
-        .all(|(a, e)| (a - e).abs() <= 5e-6);
+    let close = actual.iter().zip(expected).all(|(a, e)| (a - e).abs() <= 5e-6);
     assert!(close, "{actual:?} is not {expected:?}");
 }

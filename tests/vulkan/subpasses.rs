@@ -5,9 +5,7 @@ use crate::devices::{COLOR_LAYERS, open};
 use crate::scene::{FORMAT, HEIGHT, WIDTH, area, extent, set_viewport};
 use crate::spirv;
 use ash::vk;
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Graphics, Image, ImageOptions, Pipeline, Resource, Shader,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Graphics, Image, ImageOptions, Pipeline, Resource, Shader};
 
 const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 const RED: [f32; 4] = [1.0, 0.25, 0.0, 1.0];
@@ -16,16 +14,11 @@ const FAR: f32 = 0.75;
 
 fn image(gpu: &Gpu, format: vk::Format, samples: vk::SampleCountFlags) -> Image {
     let usage = match format {
-        vk::Format::D32_SFLOAT | vk::Format::D32_SFLOAT_S8_UINT => {
-            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
-        }
+        vk::Format::D32_SFLOAT | vk::Format::D32_SFLOAT_S8_UINT => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
         _ => vk::ImageUsageFlags::COLOR_ATTACHMENT,
     };
     let usage = usage | vk::ImageUsageFlags::INPUT_ATTACHMENT;
-    let options = ImageOptions {
-        samples: samples.as_raw(),
-        ..ImageOptions::new(format, [WIDTH, HEIGHT], usage)
-    };
+    let options = ImageOptions { samples: samples.as_raw(), ..ImageOptions::new(format, [WIDTH, HEIGHT], usage) };
     Image::new(gpu, &options)
 }
 
@@ -42,10 +35,7 @@ fn description(format: vk::Format, samples: vk::SampleCountFlags) -> vk::Attachm
 }
 
 fn reference(attachment: u32) -> vk::AttachmentReference {
-    vk::AttachmentReference {
-        attachment,
-        layout: GENERAL,
-    }
+    vk::AttachmentReference { attachment, layout: GENERAL }
 }
 
 /// A render pass of two subpasses, the second of which reads what the first wrote.
@@ -55,10 +45,8 @@ fn render_pass(
     subpasses: &[vk::SubpassDescription],
 ) -> vk::RenderPass {
     let dependencies = [dependency()];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(attachments)
-        .subpasses(subpasses)
-        .dependencies(&dependencies);
+    let info =
+        vk::RenderPassCreateInfo::default().attachments(attachments).subpasses(subpasses).dependencies(&dependencies);
     // SAFETY: see the crate.
     unsafe { gpu.device().create_render_pass(&info, None).unwrap() }
 }
@@ -68,24 +56,15 @@ fn dependency() -> vk::SubpassDependency {
     vk::SubpassDependency::default()
         .src_subpass(0)
         .dst_subpass(1)
-        .src_stage_mask(
-            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
-                | vk::PipelineStageFlags::LATE_FRAGMENT_TESTS,
-        )
+        .src_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT | vk::PipelineStageFlags::LATE_FRAGMENT_TESTS)
         .dst_stage_mask(vk::PipelineStageFlags::FRAGMENT_SHADER)
-        .src_access_mask(
-            vk::AccessFlags::COLOR_ATTACHMENT_WRITE
-                | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE,
-        )
+        .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE)
         .dst_access_mask(vk::AccessFlags::INPUT_ATTACHMENT_READ)
 }
 
 /// A set of input attachments.
 fn inputs(canvas: &Canvas, images: &[Image]) -> Bindings {
-    let resources: Vec<_> = images
-        .iter()
-        .map(|image| Resource::Input(image.view))
-        .collect();
+    let resources: Vec<_> = images.iter().map(|image| Resource::Input(image.view)).collect();
     Bindings::new(&canvas.gpu, &resources)
 }
 
@@ -115,12 +94,7 @@ impl TwoDraws<'_> {
             let framebuffer = gpu.device().create_framebuffer(&info, None).unwrap();
             gpu.run(|recording| {
                 let (device, commands) = recording.raw();
-                let depth = vk::ClearValue {
-                    depth_stencil: vk::ClearDepthStencilValue {
-                        depth: FAR,
-                        stencil: 0,
-                    },
-                };
+                let depth = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: FAR, stencil: 0 } };
                 // The colours' clear values do not matter as long as they are black.
                 let values = [vk::ClearValue::default(), depth, depth];
                 let begin = vk::RenderPassBeginInfo::default()
@@ -158,11 +132,7 @@ fn a_subpass_reads_what_an_earlier_one_left() {
     let gpu = &canvas.gpu;
     let one = vk::SampleCountFlags::TYPE_1;
     let depth_format = vk::Format::D32_SFLOAT;
-    let images = [
-        image(gpu, FORMAT, one),
-        image(gpu, depth_format, one),
-        image(gpu, FORMAT, one),
-    ];
+    let images = [image(gpu, FORMAT, one), image(gpu, depth_format, one), image(gpu, FORMAT, one)];
     let attachments = [
         description(FORMAT, one),
         description(depth_format, one),
@@ -171,12 +141,8 @@ fn a_subpass_reads_what_an_earlier_one_left() {
     let (first, depth, last) = ([reference(0)], reference(1), [reference(2)]);
     let read = [reference(0), reference(1)];
     let subpasses = [
-        vk::SubpassDescription::default()
-            .color_attachments(&first)
-            .depth_stencil_attachment(&depth),
-        vk::SubpassDescription::default()
-            .color_attachments(&last)
-            .input_attachments(&read),
+        vk::SubpassDescription::default().color_attachments(&first).depth_stencil_attachment(&depth),
+        vk::SubpassDescription::default().color_attachments(&last).input_attachments(&read),
     ];
     let pass = render_pass(gpu, &attachments, &subpasses);
     let set = inputs(&canvas, &images[..2]);
@@ -195,15 +161,7 @@ fn a_subpass_reads_what_an_earlier_one_left() {
     };
     let made = [writes_depth, reads].map(|request| request.create(gpu).unwrap());
     let (drawn, all) = (half(RED), everything(BLACK));
-    TwoDraws {
-        canvas: &canvas,
-        pass,
-        images: &images,
-        made: &made,
-        vertices: [&drawn, &all],
-        set: set.set,
-    }
-    .run();
+    TwoDraws { canvas: &canvas, pass, images: &images, made: &made, vertices: [&drawn, &all], set: set.set }.run();
     let written = images[0].colors::<[f32; 4]>();
     let read = images[2].colors::<[f32; 4]>();
     let mut counts = [0, 0];
@@ -224,11 +182,7 @@ fn samples_are_resolved_and_read_one_by_one() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
     let (one, four) = (vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4);
-    let images = [
-        image(gpu, FORMAT, four),
-        image(gpu, FORMAT, one),
-        image(gpu, FORMAT, one),
-    ];
+    let images = [image(gpu, FORMAT, four), image(gpu, FORMAT, one), image(gpu, FORMAT, one)];
     let attachments = [
         description(FORMAT, four).store_op(vk::AttachmentStoreOp::DONT_CARE),
         description(FORMAT, one).load_op(vk::AttachmentLoadOp::DONT_CARE),
@@ -236,12 +190,8 @@ fn samples_are_resolved_and_read_one_by_one() {
     ];
     let (many, resolved, last) = ([reference(0)], [reference(1)], [reference(2)]);
     let subpasses = [
-        vk::SubpassDescription::default()
-            .color_attachments(&many)
-            .resolve_attachments(&resolved),
-        vk::SubpassDescription::default()
-            .color_attachments(&last)
-            .input_attachments(&many),
+        vk::SubpassDescription::default().color_attachments(&many).resolve_attachments(&resolved),
+        vk::SubpassDescription::default().color_attachments(&last).input_attachments(&many),
     ];
     let pass = render_pass(gpu, &attachments, &subpasses);
     let set = inputs(&canvas, &images[..1]);
@@ -257,41 +207,24 @@ fn samples_are_resolved_and_read_one_by_one() {
     };
     let made = [multisampled, reads].map(|request| request.create(gpu).unwrap());
     let (drawn, all) = (half(RED), everything(BLACK));
-    TwoDraws {
-        canvas: &canvas,
-        pass,
-        images: &images,
-        made: &made,
-        vertices: [&drawn, &all],
-        set: set.set,
-    }
-    .run();
+    TwoDraws { canvas: &canvas, pass, images: &images, made: &made, vertices: [&drawn, &all], set: set.set }.run();
     let means = images[1].colors::<[f32; 4]>();
     let read = images[2].colors::<[f32; 4]>();
     let mut counts = [0; 5];
     let mut differ = 0;
     for (mean, read) in means.into_iter().zip(read) {
         let covered = 4.0 * mean[0];
-        assert!(
-            covered.fract() == 0.0 && mean[1] == 0.25 * mean[0],
-            "{mean:?}"
-        );
+        assert!(covered.fract() == 0.0 && mean[1] == 0.25 * mean[0], "{mean:?}");
         counts[covered as usize] += 1;
         // The difference of two samples is 0 or 1, and it is 0 if all four samples agree.
-        assert!(
-            [0.0, 1.0].contains(&read[0]) && read[1] == 0.25 * read[0],
-            "{read:?}"
-        );
+        assert!([0.0, 1.0].contains(&read[0]) && read[1] == 0.25 * read[0], "{read:?}");
         if [0.0, 4.0].contains(&covered) {
             assert_eq!(read, [0.0, 0.0, 0.0, mean[3]], "{mean:?}");
         }
         differ += u32::from(read[0] == 1.0);
     }
     assert!(counts[0] > 100 && counts[4] > 100, "{counts:?}");
-    assert!(
-        counts[1..4].iter().sum::<u32>() > 10 && differ > 10,
-        "{counts:?} {differ}"
-    );
+    assert!(counts[1..4].iter().sum::<u32>() > 10 && differ > 10, "{counts:?} {differ}");
     // SAFETY: see the crate.
     unsafe { gpu.device().destroy_render_pass(pass, None) };
 }
@@ -322,22 +255,14 @@ fn check_resolve(gpu: &Gpu, modes: [vk::ResolveModeFlags; 2], expected: (f32, u8
             .final_layout(GENERAL)
     });
     let both = vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL;
-    let [many, single] = [0, 1].map(|attachment| {
-        vk::AttachmentReference2::default()
-            .attachment(attachment)
-            .layout(GENERAL)
-            .aspect_mask(both)
-    });
+    let [many, single] = [0, 1]
+        .map(|attachment| vk::AttachmentReference2::default().attachment(attachment).layout(GENERAL).aspect_mask(both));
     let mut resolve = vk::SubpassDescriptionDepthStencilResolve::default()
         .depth_resolve_mode(modes[0])
         .stencil_resolve_mode(modes[1])
         .depth_stencil_resolve_attachment(&single);
-    let subpasses = [vk::SubpassDescription2::default()
-        .depth_stencil_attachment(&many)
-        .push_next(&mut resolve)];
-    let info = vk::RenderPassCreateInfo2::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let subpasses = [vk::SubpassDescription2::default().depth_stencil_attachment(&many).push_next(&mut resolve)];
+    let info = vk::RenderPassCreateInfo2::default().attachments(&attachments).subpasses(&subpasses);
     let views = [&images[0], &images[1]].map(|image| image.attachment);
     let texels = u64::from(WIDTH * HEIGHT);
     let buffers = [4, 1].map(|size| Buffer::new(gpu, texels * size));
@@ -353,9 +278,8 @@ fn check_resolve(gpu: &Gpu, modes: [vk::ResolveModeFlags; 2], expected: (f32, u8
         let framebuffer = gpu.device().create_framebuffer(&info, None).unwrap();
         gpu.run(|recording| {
             let (device, commands) = recording.raw();
-            let value = |depth, stencil| vk::ClearValue {
-                depth_stencil: vk::ClearDepthStencilValue { depth, stencil },
-            };
+            let value =
+                |depth, stencil| vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil } };
             let values = [value(0.375, 9), value(1.0, 1)];
             let begin = vk::RenderPassBeginInfo::default()
                 .render_pass(pass)
@@ -367,10 +291,7 @@ fn check_resolve(gpu: &Gpu, modes: [vk::ResolveModeFlags; 2], expected: (f32, u8
             let aspects = [vk::ImageAspectFlags::DEPTH, vk::ImageAspectFlags::STENCIL];
             for (aspect_mask, buffer) in aspects.into_iter().zip(&buffers) {
                 let region = vk::BufferImageCopy::default()
-                    .image_subresource(vk::ImageSubresourceLayers {
-                        aspect_mask,
-                        ..COLOR_LAYERS
-                    })
+                    .image_subresource(vk::ImageSubresourceLayers { aspect_mask, ..COLOR_LAYERS })
                     .image_extent(extent(&images[1]).into());
                 let (from, to) = (images[1].raw, buffer.raw);
                 device.cmd_copy_image_to_buffer(commands, from, GENERAL, to, &[region]);

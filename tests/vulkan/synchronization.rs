@@ -47,10 +47,7 @@ fn a_wait_is_for_any_fence_or_for_all() {
     unsafe {
         let unsignaled = vk::FenceCreateInfo::default();
         let signaled = unsignaled.flags(vk::FenceCreateFlags::SIGNALED);
-        let fences = [
-            device.create_fence(&unsignaled, None).unwrap(),
-            device.create_fence(&signaled, None).unwrap(),
-        ];
+        let fences = [device.create_fence(&unsignaled, None).unwrap(), device.create_fence(&signaled, None).unwrap()];
         device.wait_for_fences(&fences, false, 0).unwrap();
         let begin = Instant::now();
         let waited = device.wait_for_fences(&fences, true, 10_000_000);
@@ -84,17 +81,13 @@ fn binary_semaphores_order_submissions() {
         let stages = [vk::PipelineStageFlags::ALL_COMMANDS];
         for _ in 0..3 {
             let submits = [
-                vk::SubmitInfo::default()
-                    .command_buffers(&first)
-                    .signal_semaphores(&semaphores),
+                vk::SubmitInfo::default().command_buffers(&first).signal_semaphores(&semaphores),
                 vk::SubmitInfo::default()
                     .wait_semaphores(&semaphores)
                     .wait_dst_stage_mask(&stages)
                     .command_buffers(&second),
             ];
-            device
-                .queue_submit(gpu.queue(), &submits, vk::Fence::null())
-                .unwrap();
+            device.queue_submit(gpu.queue(), &submits, vk::Fence::null()).unwrap();
             device.device_wait_idle().unwrap();
             assert_eq!(buffer.values::<u32>(), [2]);
         }
@@ -108,9 +101,8 @@ fn the_host_signals_a_timeline_that_a_queue_waits_for() {
     let device = gpu.device();
     // SAFETY: see the crate.
     unsafe {
-        let mut kind = vk::SemaphoreTypeCreateInfo::default()
-            .semaphore_type(vk::SemaphoreType::TIMELINE)
-            .initial_value(5);
+        let mut kind =
+            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(5);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         let semaphore = device.create_semaphore(&info, None).unwrap();
         assert_eq!(device.get_semaphore_counter_value(semaphore).unwrap(), 5);
@@ -122,23 +114,12 @@ fn the_host_signals_a_timeline_that_a_queue_waits_for() {
             .semaphore(semaphore)
             .value(9)
             .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let submits = [vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waits)
-            .signal_semaphore_infos(&signals)];
-        device
-            .queue_submit2(gpu.queue(), &submits, vk::Fence::null())
-            .unwrap();
+        let submits = [vk::SubmitInfo2::default().wait_semaphore_infos(&waits).signal_semaphore_infos(&signals)];
+        device.queue_submit2(gpu.queue(), &submits, vk::Fence::null()).unwrap();
         let (semaphores, values) = ([semaphore], [9]);
-        let wait = vk::SemaphoreWaitInfo::default()
-            .semaphores(&semaphores)
-            .values(&values);
-        assert_eq!(
-            device.wait_semaphores(&wait, 1_000_000).unwrap_err(),
-            vk::Result::TIMEOUT
-        );
-        let signal = vk::SemaphoreSignalInfo::default()
-            .semaphore(semaphore)
-            .value(6);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        assert_eq!(device.wait_semaphores(&wait, 1_000_000).unwrap_err(), vk::Result::TIMEOUT);
+        let signal = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(6);
         device.signal_semaphore(&signal).unwrap();
         device.wait_semaphores(&wait, u64::MAX).unwrap();
         assert_eq!(device.get_semaphore_counter_value(semaphore).unwrap(), 9);
@@ -170,9 +151,7 @@ fn queues_and_hosts_set_events() {
             .unwrap();
         let command_buffers = [commands.raw];
         let submits = [vk::SubmitInfo::default().command_buffers(&command_buffers)];
-        device
-            .queue_submit(gpu.queue(), &submits, vk::Fence::null())
-            .unwrap();
+        device.queue_submit(gpu.queue(), &submits, vk::Fence::null()).unwrap();
         std::thread::sleep(Duration::from_millis(5));
         assert_eq!(buffer.values::<u32>(), [0], "the queue waits");
         device.set_event(event).unwrap();

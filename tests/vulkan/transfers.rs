@@ -14,10 +14,8 @@ fn buffers_are_filled_updated_and_copied() {
     let target = Buffer::new(&gpu, 32);
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let regions = [
-            vk::BufferCopy::default().dst_offset(16).size(8),
-            vk::BufferCopy::default().src_offset(12).size(4),
-        ];
+        let regions =
+            [vk::BufferCopy::default().dst_offset(16).size(8), vk::BufferCopy::default().src_offset(12).size(4)];
         // SAFETY: see the crate.
         unsafe {
             device.cmd_fill_buffer(commands, source.raw, 0, vk::WHOLE_SIZE, 0x0101_0101);
@@ -26,14 +24,8 @@ fn buffers_are_filled_updated_and_copied() {
             device.cmd_update_buffer(commands, source.raw, 4, &data);
             data.fill(0);
             device.cmd_copy_buffer(commands, source.raw, target.raw, &regions);
-            let region2 = [vk::BufferCopy2::default()
-                .src_offset(4)
-                .dst_offset(28)
-                .size(4)];
-            let copy2 = vk::CopyBufferInfo2::default()
-                .src_buffer(source.raw)
-                .dst_buffer(target.raw)
-                .regions(&region2);
+            let region2 = [vk::BufferCopy2::default().src_offset(4).dst_offset(28).size(4)];
+            let copy2 = vk::CopyBufferInfo2::default().src_buffer(source.raw).dst_buffer(target.raw).regions(&region2);
             device.cmd_copy_buffer2(commands, &copy2);
         }
     });
@@ -53,26 +45,16 @@ fn images_are_cleared_and_copied_there_and_back() {
     let texels = Buffer::of(&gpu, &[[9u8, 8, 7, 6], [1, 2, 3, 4]]);
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let clear = vk::ClearColorValue {
-            float32: [1.0, 0.0, 0.2, 1.0],
-        };
+        let clear = vk::ClearColorValue { float32: [1.0, 0.0, 0.2, 1.0] };
         let to_image = [vk::BufferImageCopy::default()
             .image_subresource(COLOR_LAYERS)
             .image_offset(vk::Offset3D { x: 3, y: 4, z: 0 })
-            .image_extent(vk::Extent3D {
-                width: 2,
-                height: 1,
-                depth: 1,
-            })];
+            .image_extent(vk::Extent3D { width: 2, height: 1, depth: 1 })];
         let between = [vk::ImageCopy::default()
             .src_subresource(COLOR_LAYERS)
             .src_offset(vk::Offset3D { x: 2, y: 3, z: 0 })
             .dst_subresource(COLOR_LAYERS)
-            .extent(vk::Extent3D {
-                width: 3,
-                height: 2,
-                depth: 1,
-            })];
+            .extent(vk::Extent3D { width: 3, height: 2, depth: 1 })];
         // SAFETY: see the crate.
         unsafe {
             device.cmd_clear_color_image(commands, first.raw, GENERAL, &clear, &[COLOR]);
@@ -106,10 +88,7 @@ fn depth_images_are_cleared() {
     let buffer = Buffer::new(&gpu, 64);
     gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        let value = vk::ClearDepthStencilValue {
-            depth: 0.625,
-            stencil: 0,
-        };
+        let value = vk::ClearDepthStencilValue { depth: 0.625, stencil: 0 };
         let depth = vk::ImageAspectFlags::DEPTH;
         let range = vk::ImageSubresourceRange {
             aspect_mask: depth,
@@ -118,10 +97,7 @@ fn depth_images_are_cleared() {
             ..COLOR
         };
         let region = [vk::BufferImageCopy::default()
-            .image_subresource(vk::ImageSubresourceLayers {
-                aspect_mask: depth,
-                ..COLOR_LAYERS
-            })
+            .image_subresource(vk::ImageSubresourceLayers { aspect_mask: depth, ..COLOR_LAYERS })
             .image_extent(extent(&image).into())];
         // SAFETY: see the crate.
         unsafe {
@@ -149,10 +125,7 @@ fn a_copy_outside_its_buffer_fails_the_recording() {
             // SAFETY: see the crate.
             unsafe { device.cmd_copy_buffer(commands, source.raw, target.raw, &[region]) };
         });
-        assert_eq!(
-            recorded.unwrap_err(),
-            vk::Result::ERROR_VALIDATION_FAILED_EXT
-        );
+        assert_eq!(recorded.unwrap_err(), vk::Result::ERROR_VALIDATION_FAILED_EXT);
         let messages = gpu.message_texts().concat();
         assert!(messages.contains("vkCmdCopyBuffer"), "{messages}");
         assert!(messages.contains("vkEndCommandBuffer"), "{messages}");
@@ -164,18 +137,9 @@ fn subresources_that_an_image_lacks_fail_the_recording() {
     let gpu = open();
     let image = image(&gpu, vk::Format::R8G8B8A8_UNORM, [4, 4]);
     let ranges = [
-        vk::ImageSubresourceRange {
-            base_mip_level: 1,
-            ..COLOR
-        },
-        vk::ImageSubresourceRange {
-            layer_count: 2,
-            ..COLOR
-        },
-        vk::ImageSubresourceRange {
-            aspect_mask: vk::ImageAspectFlags::DEPTH,
-            ..COLOR
-        },
+        vk::ImageSubresourceRange { base_mip_level: 1, ..COLOR },
+        vk::ImageSubresourceRange { layer_count: 2, ..COLOR },
+        vk::ImageSubresourceRange { aspect_mask: vk::ImageAspectFlags::DEPTH, ..COLOR },
     ];
     for range in ranges {
         let recorded = gpu.try_record(|recording| {

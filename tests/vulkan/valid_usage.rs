@@ -4,18 +4,16 @@ use crate::devices::{gaussian, open, without_modes};
 use crate::scene::{Scene, camera, splat, splats};
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianCameraSourceGAURAST,
+    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Gpu, Graphics, Shader};
 use std::collections::BTreeSet;
 
-const SPECIFICATION: &str =
-    include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
+const SPECIFICATION: &str = include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
 
 /// The statements that the registry implies.
 const IMPLICIT: &str = include_str!("../../api/spec/implicit_valid_usage.adoc");
@@ -77,20 +75,14 @@ type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 fn with(change: impl FnOnce(State) -> State) -> Graphics<'static> {
     let request = splats();
-    Graphics {
-        gaussian: request.gaussian.map(change),
-        ..request
-    }
+    Graphics { gaussian: request.gaussian.map(change), ..request }
 }
 
 fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {
     let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
         .exponential_error(exponential_error)
         .contribution_budget(contribution_budget);
-    Graphics {
-        approximation: Some(approximation),
-        ..splats()
-    }
+    Graphics { approximation: Some(approximation), ..splats() }
 }
 
 fn within(cut_off: GaussianCutOffGAURAST, deviations: f32, floor: f32) -> Graphics<'static> {
@@ -98,10 +90,7 @@ fn within(cut_off: GaussianCutOffGAURAST, deviations: f32, floor: f32) -> Graphi
         .cut_off(cut_off)
         .cut_off_deviations(deviations)
         .compensation_floor(floor);
-    Graphics {
-        footprint: Some(footprint),
-        ..splats()
-    }
+    Graphics { footprint: Some(footprint), ..splats() }
 }
 
 /// Pipelines that break one statement each.
@@ -115,36 +104,15 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     vec![
         (
             "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
-            Graphics {
-                raster: splats().raster.rasterizer_discard_enable(true),
-                ..splats()
-            },
+            Graphics { raster: splats().raster.rasterizer_discard_enable(true), ..splats() },
         ),
-        (
-            "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
-            Graphics {
-                viewports: 2,
-                ..splats()
-            },
-        ),
+        ("VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081", Graphics { viewports: 2, ..splats() }),
         (
             "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
             splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE),
         ),
-        (
-            "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
-            Graphics {
-                gaussian: None,
-                ..splats()
-            },
-        ),
-        (
-            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
-            Graphics {
-                restart: true,
-                ..splats()
-            },
-        ),
+        ("VUID-VkGraphicsPipelineCreateInfo-topology-90007", Graphics { gaussian: None, ..splats() }),
+        ("VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009", Graphics { restart: true, ..splats() }),
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
             with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
@@ -180,30 +148,18 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
             with(|s| s.low_pass_variance(f32::NAN)),
         ),
-        (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
-            with(|s| s.alpha_floor(-1.0)),
-        ),
-        (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
-            with(|s| s.alpha_ceiling(0.0)),
-        ),
+        ("VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012", with(|s| s.alpha_floor(-1.0))),
+        ("VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013", with(|s| s.alpha_ceiling(0.0))),
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
             with(|s| s.transmittance_floor(1.0)),
         ),
-        (
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051",
-            allowing(-0.1, 0.0),
-        ),
+        ("VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051", allowing(-0.1, 0.0)),
         (
             "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052",
             allowing(0.0, f32::NAN),
         ),
-        (
-            "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
-            missing(2),
-        ),
+        ("VUID-VkGaussianAttributeLocationsGAURAST-None-90015", missing(2)),
         (
             "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
             with(|s| s.attribute_locations(s.attribute_locations.model_opacity(0))),
@@ -218,8 +174,7 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90029",
             with(|s| {
-                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
-                    .linearization(GaussianLinearizationGAURAST::UNSCENTED)
+                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D).linearization(GaussianLinearizationGAURAST::UNSCENTED)
             }),
         ),
         (
@@ -231,15 +186,9 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
         ),
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030",
-            with(|s| {
-                s.precision(GaussianPrecisionGAURAST::FLOAT16)
-                    .order(GaussianOrderGAURAST::PER_PIXEL)
-            }),
+            with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16).order(GaussianOrderGAURAST::PER_PIXEL)),
         ),
-        (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025",
-            with(|s| s.camera_source(buffer)),
-        ),
+        ("VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025", with(|s| s.camera_source(buffer))),
     ]
 }
 
@@ -248,77 +197,34 @@ fn modes() -> Vec<(&'static str, Graphics<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
     vec![
-        (
-            "vertexShaderProjection",
-            with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
-        ),
-        (
-            "radialDistanceOrder",
-            with(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
-        ),
-        (
-            "primitiveOrder",
-            with(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
-        ),
-        (
-            "perPixelOrder",
-            with(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
-        ),
-        (
-            "rasterizationFloat16",
-            with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
-        ),
+        ("vertexShaderProjection", with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER))),
+        ("radialDistanceOrder", with(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE))),
+        ("primitiveOrder", with(|s| s.order(GaussianOrderGAURAST::PRIMITIVE))),
+        ("perPixelOrder", with(|s| s.order(GaussianOrderGAURAST::PER_PIXEL))),
+        ("rasterizationFloat16", with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16))),
         ("opacityCompensation", with(|s| s.antialiasing(compensated))),
-        (
-            "unscentedProjection",
-            with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
-        ),
-        (
-            "gaussian2D",
-            with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
-        ),
+        ("unscentedProjection", with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED))),
+        ("gaussian2D", with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D))),
         ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
         ("gaussianApproximation", allowing(1e-3, 0.0)),
-        (
-            "gaussianCutOff",
-            within(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0),
-        ),
-        (
-            "opacityCompensationFloor",
-            within(GaussianCutOffGAURAST::NONE, 0.0, 0.5),
-        ),
+        ("gaussianCutOff", within(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0)),
+        ("opacityCompensationFloor", within(GaussianCutOffGAURAST::NONE, 0.0, 0.5)),
         ("resolveGaussianIndices", naming_gaussians()),
-        (
-            "attributeActivation",
-            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE)),
-        ),
+        ("attributeActivation", with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE))),
         (
             "sphericalHarmonicsBuffer",
             with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER)),
         ),
         (
             "gaussianDynamicState",
-            Graphics {
-                dynamic: vec![gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST],
-                ..splats()
-            },
+            Graphics { dynamic: vec![gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST], ..splats() },
         ),
-        (
-            "gaussianMultiview",
-            Graphics {
-                view_mask: 1,
-                ..splats()
-            },
-        ),
-        (
-            "gaussianInstancing",
-            with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9))),
-        ),
+        ("gaussianMultiview", Graphics { view_mask: 1, ..splats() }),
+        ("gaussianInstancing", with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9)))),
         (
             "gaussianDepthStencil",
             Graphics {
-                depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
-                    .depth_test_enable(true),
+                depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default().depth_test_enable(true),
                 depth_format: vk::Format::D32_SFLOAT,
                 ..splats()
             },
@@ -338,38 +244,14 @@ fn modes() -> Vec<(&'static str, Graphics<'static>)> {
 fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
     let nan = f32::NAN;
     vec![
-        (
-            "VUID-VkGaussianCameraGAURAST-model-parameter",
-            camera().model(GaussianCameraModelGAURAST::from_raw(77)),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-rotation-90064",
-            camera().rotation([nan; 9]),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-eye-90065",
-            camera().eye([f64::INFINITY; 3]),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
-            camera().principal_point([nan, 0.0]),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
-            camera().depth_coefficients([0.0, nan]),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-focalLength-90068",
-            camera().focal_length([0.0, 1.0]),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-nearPlane-90069",
-            camera().near_plane(0.0),
-        ),
-        (
-            "VUID-VkGaussianCameraGAURAST-farPlane-90070",
-            camera().far_plane(0.1),
-        ),
+        ("VUID-VkGaussianCameraGAURAST-model-parameter", camera().model(GaussianCameraModelGAURAST::from_raw(77))),
+        ("VUID-VkGaussianCameraGAURAST-rotation-90064", camera().rotation([nan; 9])),
+        ("VUID-VkGaussianCameraGAURAST-eye-90065", camera().eye([f64::INFINITY; 3])),
+        ("VUID-VkGaussianCameraGAURAST-principalPoint-90066", camera().principal_point([nan, 0.0])),
+        ("VUID-VkGaussianCameraGAURAST-depthCoefficients-90067", camera().depth_coefficients([0.0, nan])),
+        ("VUID-VkGaussianCameraGAURAST-focalLength-90068", camera().focal_length([0.0, 1.0])),
+        ("VUID-VkGaussianCameraGAURAST-nearPlane-90069", camera().near_plane(0.0)),
+        ("VUID-VkGaussianCameraGAURAST-farPlane-90070", camera().far_plane(0.1)),
     ]
 }
 
@@ -392,10 +274,7 @@ fn every_statement_is_reported_by_its_id() {
     for (id, request) in pipelines() {
         heard(id, refused(&gpu, &request, invalid, id));
     }
-    heard(
-        "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
-        with_a_vertex_stage(&gpu),
-    );
+    heard("VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008", with_a_vertex_stage(&gpu));
     for (id, messages) in crate::gaussian_shaders::broken() {
         heard(id, messages);
     }
@@ -422,19 +301,10 @@ fn every_statement_is_reported_by_its_id() {
         *found.unwrap_or_else(|| panic!("no statement is of {feature}"))
     };
     for (feature, request) in modes() {
-        heard(
-            of_feature(feature),
-            refused(&bare, &request, absent, feature),
-        );
+        heard(of_feature(feature), refused(&bare, &request, absent, feature));
     }
-    heard(
-        of_feature("resolveFragmentShader"),
-        with_a_fragment_stage(&bare),
-    );
-    heard(
-        of_feature("gaussianPrimitiveTopology"),
-        without_the_topology(),
-    );
+    heard(of_feature("resolveFragmentShader"), with_a_fragment_stage(&bare));
+    heard(of_feature("gaussianPrimitiveTopology"), without_the_topology());
     // [`a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so`] breaks this one.
     tested.insert("VUID-VkGaussianCameraGAURAST-model-90079");
     let untested: Vec<_> = stated.difference(&tested).collect();
@@ -482,10 +352,7 @@ fn naming_gaussians() -> Graphics<'static> {
 /// The messages when a pipeline has a stage.
 fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
     let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
-    let request = Graphics {
-        shaders: vec![Shader::new(stage, code)],
-        ..splats()
-    };
+    let request = Graphics { shaders: vec![Shader::new(stage, code)], ..splats() };
     refused(gpu, &request, result, "a stage")
 }
 
@@ -507,11 +374,7 @@ fn without_the_topology() -> String {
 
 #[gaurast_runner::test]
 fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
-    let scene = Scene::on(
-        without_modes(),
-        &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
-        &splats(),
-    );
+    let scene = Scene::on(without_modes(), &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], &splats());
     for model in [
         GaussianCameraModelGAURAST::ORTHOGRAPHIC,
         GaussianCameraModelGAURAST::FISHEYE,

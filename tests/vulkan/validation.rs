@@ -3,9 +3,7 @@
 use crate::devices::{MAPPABLE, everything_of, gaussian};
 use crate::scene::{CENTER, Scene, assert_close, at, pass, premultiplied, splat, splats};
 use ash::vk;
-use gaurast::vk::{
-    GaussianSphericalHarmonicsBufferGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-};
+use gaurast::vk::{GaussianSphericalHarmonicsBufferGAURAST, PipelineGaussianStateCreateFlagsGAURAST};
 use gaurast_runner::{Case, Need};
 use gaurast_testkit::loader::{through_the_loader, through_the_loader_with};
 use gaurast_testkit::{Driver, Gpu, Graphics, Opening};
@@ -35,10 +33,7 @@ fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
     through_the_loader(case, || {
         let color = [0.9, 0.2, 0.1];
         let gaussians = [splat([0.0, 0.0, 5.0], 0.1, 0.8, color)];
-        let opening = Opening {
-            layers: &[LAYER],
-            ..everything_of(Driver::Loaded)
-        };
+        let opening = Opening { layers: &[LAYER], ..everything_of(Driver::Loaded) };
         let gpu = Gpu::open(&opening).expect("a device");
         let scene = Scene::on(gpu, &gaussians, &splats());
         let pixels = scene.draw([0.0; 4], |device, commands| {
@@ -48,10 +43,8 @@ fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
         assert_close(at(&pixels, CENTER), premultiplied(color, 0.8));
         let messages = scene.gpu.message_texts();
         let ids: BTreeSet<_> = messages.iter().map(|message| id(message)).collect();
-        let unexpected: Vec<_> = messages
-            .iter()
-            .filter(|message| !EXPECTED.contains(&id(message)) && !message.contains(ADVICE))
-            .collect();
+        let unexpected: Vec<_> =
+            messages.iter().filter(|message| !EXPECTED.contains(&id(message)) && !message.contains(ADVICE)).collect();
         assert!(unexpected.is_empty(), "{unexpected:#?}");
         let layer_was_there = "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter";
         assert!(ids.contains(layer_was_there), "{ids:?}");
@@ -59,10 +52,7 @@ fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
 }
 
 /// The variable by which the layer looks for hazards, too.
-const FIND_HAZARDS: (&str, &str) = (
-    "VK_LAYER_ENABLES",
-    "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT",
-);
+const FIND_HAZARDS: (&str, &str) = ("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT");
 
 /// A buffer that is copied to and has an address.
 fn addressed(gpu: &Gpu, size: u64) -> (vk::Buffer, vk::DeviceMemory, u64) {
@@ -74,8 +64,7 @@ fn addressed(gpu: &Gpu, size: u64) -> (vk::Buffer, vk::DeviceMemory, u64) {
     unsafe {
         let buffer = device.create_buffer(&info, None).unwrap();
         let needed = device.get_buffer_memory_requirements(buffer);
-        let mut flags =
-            vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+        let mut flags = vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
         let allocation = vk::MemoryAllocateInfo::default()
             .allocation_size(needed.size)
             .memory_type_index(MAPPABLE)
@@ -92,17 +81,11 @@ fn addressed(gpu: &Gpu, size: u64) -> (vk::Buffer, vk::DeviceMemory, u64) {
 #[gaurast_runner::test(needs = [Need::ValidationLayer])]
 fn harmonics_from_a_buffer_are_synchronized_as_the_text_says(case: &Case) {
     through_the_loader_with(case, &[FIND_HAZARDS], || {
-        let opening = Opening {
-            layers: &[LAYER],
-            ..everything_of(Driver::Loaded)
-        };
+        let opening = Opening { layers: &[LAYER], ..everything_of(Driver::Loaded) };
         let gpu = Gpu::open(&opening).expect("a device");
         let request = splats();
         let flag = PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER;
-        let request = Graphics {
-            gaussian: request.gaussian.map(|state| state.flags(flag)),
-            ..request
-        };
+        let request = Graphics { gaussian: request.gaussian.map(|state| state.flags(flag)), ..request };
         let gaussians = [splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.9, 0.2, 0.1])];
         let scene = Scene::on(gpu, &gaussians, &request);
         let (buffer, memory, address) = addressed(&scene.gpu, 12);
@@ -112,9 +95,8 @@ fn harmonics_from_a_buffer_are_synchronized_as_the_text_says(case: &Case) {
             .format(vk::Format::R32G32B32_SFLOAT)
             .stride(12);
         use vk::{AccessFlags as Access, PipelineStageFlags as Stage};
-        let written = [vk::MemoryBarrier::default()
-            .src_access_mask(Access::TRANSFER_WRITE)
-            .dst_access_mask(Access::SHADER_READ)];
+        let written =
+            [vk::MemoryBarrier::default().src_access_mask(Access::TRANSFER_WRITE).dst_access_mask(Access::SHADER_READ)];
         let no = vk::DependencyFlags::empty();
         scene.gpu.run(|recording| {
             let (device, commands) = recording.raw();

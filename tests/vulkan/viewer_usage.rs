@@ -6,11 +6,9 @@ use crate::scene::{Scene, camera, splat, splats};
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
-    DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST, GaussianAntialiasingGAURAST,
-    GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianOrderGAURAST,
-    GaussianSphericalHarmonicsBufferGAURAST,
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
+    DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianOrderGAURAST,
+    GaussianSphericalHarmonicsBufferGAURAST, PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
     PipelineGaussianStateCreateFlagsGAURAST,
 };
 use gaurast_testkit::{Gpu, Graphics};
@@ -34,10 +32,7 @@ fn refused(gpu: &Gpu, request: &Graphics) -> String {
 }
 
 /// The messages of a draw that draws nothing.
-fn draws_nothing(
-    request: &Graphics,
-    record: impl FnOnce(&Scene, &ash::Device, vk::CommandBuffer),
-) -> String {
+fn draws_nothing(request: &Graphics, record: impl FnOnce(&Scene, &ash::Device, vk::CommandBuffer)) -> String {
     let scene = Scene::new(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], request);
     let pixels = scene.draw([0.25; 4], |device, commands| {
         record(&scene, device, commands);
@@ -71,8 +66,7 @@ fn harmonics_buffers() -> Vec<(&'static str, String)> {
     let (buffer, memory, address) = unsafe {
         let buffer = device.create_buffer(&info, None).unwrap();
         let needed = device.get_buffer_memory_requirements(buffer);
-        let mut flags =
-            vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+        let mut flags = vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
         let allocation = vk::MemoryAllocateInfo::default()
             .allocation_size(needed.size)
             .memory_type_index(crate::devices::MAPPABLE)
@@ -97,20 +91,14 @@ fn harmonics_buffers() -> Vec<(&'static str, String)> {
     }
     let request = splats();
     let flag = PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER;
-    let request = Graphics {
-        gaussian: request.gaussian.map(|state| state.flags(flag)),
-        ..request
-    };
+    let request = Graphics { gaussian: request.gaussian.map(|state| state.flags(flag)), ..request };
     let none = draws_nothing(&request, |_, device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
     });
     let format = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-90017";
     vec![
-        (
-            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016",
-            too_long,
-        ),
+        ("VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016", too_long),
         (format, integers),
         (format, too_few),
         ("VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018", none),
@@ -124,55 +112,38 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
     // SAFETY: see the crate.
     let commands: [(&'static str, Set<'_>); 9] = unsafe {
         [
-            (
-                "VUID-vkCmdSetGaussianOrderGAURAST-order-parameter",
-                &|own, commands| {
-                    own.cmd_set_gaussian_order(commands, GaussianOrderGAURAST::from_raw(77));
-                },
-            ),
-            (
-                "VUID-vkCmdSetGaussianAntialiasingGAURAST-antialiasing-parameter",
-                &|own, commands| {
-                    let none = GaussianAntialiasingGAURAST::from_raw(77);
-                    own.cmd_set_gaussian_antialiasing(commands, none);
-                },
-            ),
-            (
-                "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053",
-                &|own, commands| own.cmd_set_gaussian_low_pass_variance(commands, f32::INFINITY),
-            ),
-            (
-                "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054",
-                &|own, commands| {
-                    own.cmd_set_gaussian_alpha_floor(commands, 1.5);
-                },
-            ),
-            (
-                "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055",
-                &|own, commands| own.cmd_set_gaussian_alpha_ceiling(commands, 0.0),
-            ),
-            (
-                "VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-90056",
-                &|own, commands| own.cmd_set_gaussian_transmittance_floor(commands, 1.0),
-            ),
+            ("VUID-vkCmdSetGaussianOrderGAURAST-order-parameter", &|own, commands| {
+                own.cmd_set_gaussian_order(commands, GaussianOrderGAURAST::from_raw(77));
+            }),
+            ("VUID-vkCmdSetGaussianAntialiasingGAURAST-antialiasing-parameter", &|own, commands| {
+                let none = GaussianAntialiasingGAURAST::from_raw(77);
+                own.cmd_set_gaussian_antialiasing(commands, none);
+            }),
+            ("VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053", &|own, commands| {
+                own.cmd_set_gaussian_low_pass_variance(commands, f32::INFINITY)
+            }),
+            ("VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054", &|own, commands| {
+                own.cmd_set_gaussian_alpha_floor(commands, 1.5);
+            }),
+            ("VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055", &|own, commands| {
+                own.cmd_set_gaussian_alpha_ceiling(commands, 0.0)
+            }),
+            ("VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-90056", &|own, commands| {
+                own.cmd_set_gaussian_transmittance_floor(commands, 1.0)
+            }),
             (
                 "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-90057",
                 &|own, commands| own.cmd_set_gaussian_spherical_harmonics_degree(commands, 5),
             ),
-            (
-                "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058",
-                &|own, commands| own.cmd_set_gaussian_exponential_error(commands, f32::NAN),
-            ),
-            (
-                "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059",
-                &|own, commands| own.cmd_set_gaussian_contribution_budget(commands, -1.0),
-            ),
+            ("VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058", &|own, commands| {
+                own.cmd_set_gaussian_exponential_error(commands, f32::NAN)
+            }),
+            ("VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059", &|own, commands| {
+                own.cmd_set_gaussian_contribution_budget(commands, -1.0)
+            }),
         ]
     };
-    let mut broken: Vec<_> = commands
-        .into_iter()
-        .map(|(id, command)| (id, set(command)))
-        .collect();
+    let mut broken: Vec<_> = commands.into_iter().map(|(id, command)| (id, set(command))).collect();
     let drawn = |state, value: Set<'_>| {
         let mut request = splats();
         request.dynamic.push(state);
@@ -183,19 +154,15 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
         })
     };
     // SAFETY: see the crate.
-    let ceiling = drawn(
-        DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST,
-        &|own, commands| unsafe { own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3) },
-    );
+    let ceiling = drawn(DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, &|own, commands| unsafe {
+        own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3)
+    });
     // SAFETY: see the crate.
-    let degree = drawn(
-        DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
-        &|own, commands| unsafe { own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1) },
-    );
-    broken.extend([
-        ("VUID-vkCmdDraw-dynamic-90060", ceiling),
-        ("VUID-vkCmdDraw-sphericalHarmonicsDegree-90061", degree),
-    ]);
+    let degree = drawn(DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST, &|own, commands| unsafe {
+        own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1)
+    });
+    broken
+        .extend([("VUID-vkCmdDraw-dynamic-90060", ceiling), ("VUID-vkCmdDraw-sphericalHarmonicsDegree-90061", degree)]);
     broken
 }
 
@@ -267,10 +234,7 @@ fn sets() -> Vec<(&'static str, String)> {
         unsafe { device.cmd_bind_pipeline(commands, point, other.raw) };
     });
     vec![
-        (
-            "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
-            feature,
-        ),
+        ("VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001", feature),
         ("VUID-vkCmdBeginGaussianSetGAURAST-renderpass", outside),
         ("VUID-vkCmdBeginGaussianSetGAURAST-None-90002", twice),
         ("VUID-vkCmdEndGaussianSetGAURAST-None-90004", not_begun),
@@ -304,19 +268,11 @@ fn cameras_by_view() -> Vec<(&'static str, String)> {
             let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
             state.camera_source(buffer).camera_count(count)
         });
-        let request = Graphics {
-            view_mask: 0b101,
-            set_layouts: layouts.to_vec(),
-            gaussian: state,
-            ..request
-        };
+        let request = Graphics { view_mask: 0b101, set_layouts: layouts.to_vec(), gaussian: state, ..request };
         refused(&gpu, &request)
     };
     let views = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026";
-    let by_view = Graphics {
-        view_mask: 0b101,
-        ..splats()
-    };
+    let by_view = Graphics { view_mask: 0b101, ..splats() };
     let of_view = draws_nothing(&by_view, |scene, device, commands| {
         let gaussian = gaussian(&scene.gpu);
         // SAFETY: see the crate.
@@ -348,8 +304,7 @@ fn properties_meet_their_limits() {
     // SAFETY: see the crate.
     unsafe {
         let device = gpu.physical_device();
-        gpu.instance()
-            .get_physical_device_properties2(device, &mut all);
+        gpu.instance().get_physical_device_properties2(device, &mut all);
     }
     let attributes = all.properties.limits.max_vertex_input_attributes;
     assert!(own.tile_size.width >= 1 && own.tile_size.height >= 1);

@@ -27,9 +27,7 @@ fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
         let lost = Err(vk::Result::ERROR_DEVICE_LOST);
         assert_eq!(doomed.device().queue_wait_idle(doomed.queue()), lost);
         assert_eq!(doomed.device().device_wait_idle(), lost);
-        let submitted = doomed
-            .device()
-            .queue_submit(doomed.queue(), &[], vk::Fence::null());
+        let submitted = doomed.device().queue_submit(doomed.queue(), &[], vk::Fence::null());
         assert_eq!(submitted, lost);
         doomed.device().destroy_fence(fence, None);
     }
@@ -77,13 +75,8 @@ fn lose(gpu: &Gpu) -> vk::Fence {
     let started = Instant::now();
     // SAFETY: see the crate.
     let fence = unsafe {
-        let fence = gpu
-            .device()
-            .create_fence(&vk::FenceCreateInfo::default(), None)
-            .unwrap();
-        gpu.device()
-            .queue_submit(gpu.queue(), &submits, fence)
-            .unwrap();
+        let fence = gpu.device().create_fence(&vk::FenceCreateInfo::default(), None).unwrap();
+        gpu.device().queue_submit(gpu.queue(), &submits, fence).unwrap();
         let waited = gpu.device().wait_for_fences(&[fence], true, u64::MAX);
         assert_eq!(waited, Err(vk::Result::ERROR_DEVICE_LOST));
         fence

@@ -139,10 +139,7 @@ pub(crate) use tagged_structure;
 /// A loader of `device`'s functions, for [`DeviceFn::load`].
 ///
 /// [`DeviceFn::load`]: crate::gaussian_primitive_topology::DeviceFn::load
-pub(crate) fn device_loader(
-    instance: &ash::Instance,
-    device: ash::vk::Device,
-) -> impl FnMut(&CStr) -> *const c_void {
+pub(crate) fn device_loader(instance: &ash::Instance, device: ash::vk::Device) -> impl FnMut(&CStr) -> *const c_void {
     move |name| {
         // SAFETY: `device` is the handle of a live `ash::Device` made from `instance`, and `name`
         // is a terminated string.

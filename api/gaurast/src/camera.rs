@@ -37,9 +37,7 @@ impl fmt::Display for CameraError {
         f.write_str(match self {
             Self::NotFinite => "the camera has an infinite or undefined number",
             Self::NotRigid => "the view is not a rotation with a translation",
-            Self::UnsupportedProjection => {
-                "the projection is neither perspective nor orthographic along the view axis"
-            }
+            Self::UnsupportedProjection => "the projection is neither perspective nor orthographic along the view axis",
             Self::OppositeDirection => "the projection looks backwards along the view axis",
             Self::EmptyViewport => "the viewport has no area",
             Self::InvalidDepthRange => "the depth range is empty or not in front of the camera",
@@ -145,11 +143,7 @@ impl GaussianCameraGAURAST<'_> {
         principal_point: [f32; 2],
     ) -> Result<Self, CameraError> {
         let intrinsics = [focal_length, principal_point];
-        let finite = camera_to_world
-            .as_flattened()
-            .iter()
-            .chain(&eye)
-            .all(|x| x.is_finite())
+        let finite = camera_to_world.as_flattened().iter().chain(&eye).all(|x| x.is_finite())
             && intrinsics.as_flattened().iter().all(|x| x.is_finite());
         if !finite {
             return Err(CameraError::NotFinite);
@@ -174,11 +168,7 @@ impl GaussianCameraGAURAST<'_> {
     /// # Errors
     ///
     /// [`CameraError::EmptyViewport`], and as for [`from_pose`](Self::from_pose).
-    pub fn panorama(
-        camera_to_world: &[[f64; 3]; 3],
-        eye: [f64; 3],
-        viewport: [f32; 2],
-    ) -> Result<Self, CameraError> {
+    pub fn panorama(camera_to_world: &[[f64; 3]; 3], eye: [f64; 3], viewport: [f32; 2]) -> Result<Self, CameraError> {
         let [width, height] = viewport.map(f64::from);
         if !viewport.iter().all(|side| side.is_finite()) {
             return Err(CameraError::NotFinite);
@@ -187,17 +177,10 @@ impl GaussianCameraGAURAST<'_> {
             return Err(CameraError::EmptyViewport);
         }
         let height = height.abs();
-        let focal_length = [
-            width / core::f64::consts::TAU,
-            height / core::f64::consts::PI,
-        ];
+        let focal_length = [width / core::f64::consts::TAU, height / core::f64::consts::PI];
         let principal_point = [0.5 * width, 0.5 * height];
-        let camera = Self::from_pose(
-            camera_to_world,
-            eye,
-            focal_length.map(|f| f as f32),
-            principal_point.map(|c| c as f32),
-        )?;
+        let camera =
+            Self::from_pose(camera_to_world, eye, focal_length.map(|f| f as f32), principal_point.map(|c| c as f32))?;
         Ok(camera.model(GaussianCameraModelGAURAST::EQUIRECTANGULAR))
     }
 
@@ -230,18 +213,11 @@ impl GaussianCameraGAURAST<'_> {
         }
         // Depth is linear in z or in 1/z, so two points determine it.
         let variable = |z: f32| {
-            if orthographic {
-                f64::from(z)
-            } else {
-                f64::from(z).recip()
-            }
+            if orthographic { f64::from(z) } else { f64::from(z).recip() }
         };
         let slope = (depths[1] - depths[0]) / (variable(far) - variable(near));
         let offset = depths[1] - slope * variable(far);
-        Ok(self
-            .near_plane(near)
-            .far_plane(far)
-            .depth_coefficients([offset as f32, slope as f32]))
+        Ok(self.near_plane(near).far_plane(far).depth_coefficients([offset as f32, slope as f32]))
     }
 }
 
@@ -268,11 +244,7 @@ fn from_matrices(
     viewport: [f32; 2],
     forward: f64,
 ) -> Result<GaussianCameraGAURAST<'static>, CameraError> {
-    let finite = view
-        .as_flattened()
-        .iter()
-        .chain(projection.as_flattened())
-        .all(|x| x.is_finite())
+    let finite = view.as_flattened().iter().chain(projection.as_flattened()).all(|x| x.is_finite())
         && viewport.iter().all(|x| x.is_finite());
     if !finite {
         return Err(CameraError::NotFinite);
@@ -308,20 +280,12 @@ fn from_matrices(
         .near_plane(near)
         .far_plane(far)
         .depth_coefficients(projection.depth_coefficients.map(|c| c as f32));
-    if fits_binary32(&camera) {
-        Ok(camera)
-    } else {
-        Err(CameraError::NotFinite)
-    }
+    if fits_binary32(&camera) { Ok(camera) } else { Err(CameraError::NotFinite) }
 }
 
 /// True if every number is finite after rounding to binary32. The far plane may be infinite.
 fn fits_binary32(camera: &GaussianCameraGAURAST<'_>) -> bool {
-    let pairs = [
-        camera.focal_length,
-        camera.principal_point,
-        camera.depth_coefficients,
-    ];
+    let pairs = [camera.focal_length, camera.principal_point, camera.depth_coefficients];
     pairs.as_flattened().iter().all(|x| x.is_finite())
         && camera.near_plane.is_finite()
         && camera.eye.iter().all(|x| x.is_finite())
@@ -337,11 +301,7 @@ fn decompose_view(view: &[[f64; 4]; 4]) -> Result<([[f64; 3]; 3], [f64; 3]), Cam
     }
     // The eye solves axes * eye = -translation. The true inverse, not the transpose, keeps the translation exact if the
     // eye is far away and the axes have rounding errors.
-    let cofactors = [
-        cross(axes[1], axes[2]),
-        cross(axes[2], axes[0]),
-        cross(axes[0], axes[1]),
-    ];
+    let cofactors = [cross(axes[1], axes[2]), cross(axes[2], axes[0]), cross(axes[0], axes[1])];
     let determinant = dot(axes[0], cofactors[0]);
     let eye = [0, 1, 2].map(|i| {
         let sum: f64 = (0..3).map(|r| cofactors[r][i] * view[3][r]).sum();
@@ -351,26 +311,14 @@ fn decompose_view(view: &[[f64; 4]; 4]) -> Result<([[f64; 3]; 3], [f64; 3]), Cam
 }
 
 /// Decomposes a perspective or orthographic matrix that looks along `forward`.
-fn decompose_projection(
-    projection: &[[f64; 4]; 4],
-    forward: f64,
-) -> Result<Projection, CameraError> {
-    let row = |r: usize| {
-        [
-            projection[0][r],
-            projection[1][r],
-            projection[2][r],
-            projection[3][r],
-        ]
-    };
+fn decompose_projection(projection: &[[f64; 4]; 4], forward: f64) -> Result<Projection, CameraError> {
+    let row = |r: usize| [projection[0][r], projection[1][r], projection[2][r], projection[3][r]];
     let [x, y, z, w] = [row(0), row(1), row(2), row(3)];
     let is_zero = |row: [f64; 4], element: usize| {
         let largest = row.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
         row[element].abs() <= 1e-6 * largest
     };
-    let only = |row: [f64; 4], used: [usize; 2]| {
-        (0..4).all(|element| used.contains(&element) || is_zero(row, element))
-    };
+    let only = |row: [f64; 4], used: [usize; 2]| (0..4).all(|element| used.contains(&element) || is_zero(row, element));
 
     let orthographic = is_zero(w, 2);
     // x and y are shifted in proportion to w, which is a constant or z.
@@ -405,10 +353,7 @@ fn decompose_projection(
     Ok(Projection {
         orthographic,
         scale: [x[0] / divisor, y[1] / divisor],
-        offset: [
-            direction * x[shift] / divisor,
-            direction * y[shift] / divisor,
-        ],
+        offset: [direction * x[shift] / divisor, direction * y[shift] / divisor],
         depth_coefficients,
     })
 }
@@ -422,11 +367,7 @@ fn depth_planes(projection: &Projection) -> Result<(f32, f32), CameraError> {
         }
         // A depth that is reached only behind the camera, or not at all, is never reached ahead.
         let distance = c1 / (depth - c0);
-        if distance > 0.0 {
-            distance
-        } else {
-            f64::INFINITY
-        }
+        if distance > 0.0 { distance } else { f64::INFINITY }
     };
     let [a, b] = [distance_at(0.0), distance_at(1.0)];
     let (near, far) = (a.min(b) as f32, a.max(b) as f32);
@@ -461,9 +402,5 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -10,15 +10,13 @@ use ash::vk;
 
 use crate::ash_compat;
 use crate::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST,
-    GaussianSphericalHarmonicsBufferGAURAST, PFN_vkCmdBeginGaussianSetGAURAST,
-    PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST, PFN_vkCmdEndGaussianSetGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianSphericalHarmonicsBufferGAURAST,
+    PFN_vkCmdBeginGaussianSetGAURAST, PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST, PFN_vkCmdEndGaussianSetGAURAST,
     PFN_vkCmdSetGaussianAlphaCeilingGAURAST, PFN_vkCmdSetGaussianAlphaFloorGAURAST,
     PFN_vkCmdSetGaussianAntialiasingGAURAST, PFN_vkCmdSetGaussianCamerasGAURAST,
     PFN_vkCmdSetGaussianContributionBudgetGAURAST, PFN_vkCmdSetGaussianExponentialErrorGAURAST,
     PFN_vkCmdSetGaussianLowPassVarianceGAURAST, PFN_vkCmdSetGaussianOrderGAURAST,
-    PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
-    PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
+    PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST, PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
 };
 
 /// The extension's name, for `ppEnabledExtensionNames`.
@@ -84,11 +82,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_cameras_gaurast)(
-                command_buffer,
-                cameras.len() as u32,
-                cameras.as_ptr(),
-            );
+            (self.fp.cmd_set_gaussian_cameras_gaurast)(command_buffer, cameras.len() as u32, cameras.as_ptr());
         }
     }
     /// Begins a sorted set: the Gaussians of all draws up to `vkCmdEndGaussianSetGAURAST` are
@@ -133,11 +127,7 @@ impl Device {
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
     #[doc(alias = "vkCmdSetGaussianOrderGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_order(
-        &self,
-        command_buffer: vk::CommandBuffer,
-        order: GaussianOrderGAURAST,
-    ) {
+    pub unsafe fn cmd_set_gaussian_order(&self, command_buffer: vk::CommandBuffer, order: GaussianOrderGAURAST) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
             (self.fp.cmd_set_gaussian_order_gaurast)(command_buffer, order);
@@ -171,11 +161,7 @@ impl Device {
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
     #[doc(alias = "vkCmdSetGaussianLowPassVarianceGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_low_pass_variance(
-        &self,
-        command_buffer: vk::CommandBuffer,
-        low_pass_variance: f32,
-    ) {
+    pub unsafe fn cmd_set_gaussian_low_pass_variance(&self, command_buffer: vk::CommandBuffer, low_pass_variance: f32) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
             (self.fp.cmd_set_gaussian_low_pass_variance_gaurast)(command_buffer, low_pass_variance);
@@ -190,11 +176,7 @@ impl Device {
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
     #[doc(alias = "vkCmdSetGaussianAlphaFloorGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_alpha_floor(
-        &self,
-        command_buffer: vk::CommandBuffer,
-        alpha_floor: f32,
-    ) {
+    pub unsafe fn cmd_set_gaussian_alpha_floor(&self, command_buffer: vk::CommandBuffer, alpha_floor: f32) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
             (self.fp.cmd_set_gaussian_alpha_floor_gaurast)(command_buffer, alpha_floor);
@@ -209,11 +191,7 @@ impl Device {
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
     #[doc(alias = "vkCmdSetGaussianAlphaCeilingGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_alpha_ceiling(
-        &self,
-        command_buffer: vk::CommandBuffer,
-        alpha_ceiling: f32,
-    ) {
+    pub unsafe fn cmd_set_gaussian_alpha_ceiling(&self, command_buffer: vk::CommandBuffer, alpha_ceiling: f32) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
             (self.fp.cmd_set_gaussian_alpha_ceiling_gaurast)(command_buffer, alpha_ceiling);
@@ -236,10 +214,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_transmittance_floor_gaurast)(
-                command_buffer,
-                transmittance_floor,
-            );
+            (self.fp.cmd_set_gaussian_transmittance_floor_gaurast)(command_buffer, transmittance_floor);
         }
     }
     /// Sets the degree of spherical harmonics that Gaussian draws evaluate; at most that of the
@@ -259,10 +234,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_spherical_harmonics_degree_gaurast)(
-                command_buffer,
-                spherical_harmonics_degree,
-            );
+            (self.fp.cmd_set_gaussian_spherical_harmonics_degree_gaurast)(command_buffer, spherical_harmonics_degree);
         }
     }
     /// Sets the greatest relative error of the exponential in Gaussian draws, for pipelines with
@@ -274,11 +246,7 @@ impl Device {
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
     #[doc(alias = "vkCmdSetGaussianExponentialErrorGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_exponential_error(
-        &self,
-        command_buffer: vk::CommandBuffer,
-        exponential_error: f32,
-    ) {
+    pub unsafe fn cmd_set_gaussian_exponential_error(&self, command_buffer: vk::CommandBuffer, exponential_error: f32) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
             (self.fp.cmd_set_gaussian_exponential_error_gaurast)(command_buffer, exponential_error);
@@ -301,10 +269,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_contribution_budget_gaurast)(
-                command_buffer,
-                contribution_budget,
-            );
+            (self.fp.cmd_set_gaussian_contribution_budget_gaurast)(command_buffer, contribution_budget);
         }
     }
     /// Binds the buffer that the spherical harmonics of the Gaussian draws that follow are read
@@ -352,15 +317,13 @@ pub struct DeviceFn {
     /// `vkCmdSetGaussianTransmittanceFloorGAURAST`.
     pub cmd_set_gaussian_transmittance_floor_gaurast: PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
     /// `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`.
-    pub cmd_set_gaussian_spherical_harmonics_degree_gaurast:
-        PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
+    pub cmd_set_gaussian_spherical_harmonics_degree_gaurast: PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
     /// `vkCmdSetGaussianExponentialErrorGAURAST`.
     pub cmd_set_gaussian_exponential_error_gaurast: PFN_vkCmdSetGaussianExponentialErrorGAURAST,
     /// `vkCmdSetGaussianContributionBudgetGAURAST`.
     pub cmd_set_gaussian_contribution_budget_gaurast: PFN_vkCmdSetGaussianContributionBudgetGAURAST,
     /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
-    pub cmd_bind_gaussian_spherical_harmonics_gaurast:
-        PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
+    pub cmd_bind_gaussian_spherical_harmonics_gaurast: PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
 }
 
 impl DeviceFn {
@@ -383,17 +346,11 @@ impl DeviceFn {
                     cmd_set_gaussian_cameras_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCamerasGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCamerasGAURAST>(function) }
                 }
             },
             cmd_begin_gaussian_set_gaurast: {
-                unsafe extern "system" fn cmd_begin_gaussian_set_gaurast(
-                    _command_buffer: vk::CommandBuffer,
-                ) {
+                unsafe extern "system" fn cmd_begin_gaussian_set_gaurast(_command_buffer: vk::CommandBuffer) {
                     panic!("Unable to load cmd_begin_gaussian_set_gaurast")
                 }
                 let function = load(c"vkCmdBeginGaussianSetGAURAST");
@@ -401,17 +358,11 @@ impl DeviceFn {
                     cmd_begin_gaussian_set_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdBeginGaussianSetGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdBeginGaussianSetGAURAST>(function) }
                 }
             },
             cmd_end_gaussian_set_gaurast: {
-                unsafe extern "system" fn cmd_end_gaussian_set_gaurast(
-                    _command_buffer: vk::CommandBuffer,
-                ) {
+                unsafe extern "system" fn cmd_end_gaussian_set_gaurast(_command_buffer: vk::CommandBuffer) {
                     panic!("Unable to load cmd_end_gaussian_set_gaurast")
                 }
                 let function = load(c"vkCmdEndGaussianSetGAURAST");
@@ -419,11 +370,7 @@ impl DeviceFn {
                     cmd_end_gaussian_set_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdEndGaussianSetGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdEndGaussianSetGAURAST>(function) }
                 }
             },
             cmd_set_gaussian_order_gaurast: {
@@ -438,11 +385,7 @@ impl DeviceFn {
                     cmd_set_gaussian_order_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianOrderGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianOrderGAURAST>(function) }
                 }
             },
             cmd_set_gaussian_antialiasing_gaurast: {
@@ -457,11 +400,7 @@ impl DeviceFn {
                     cmd_set_gaussian_antialiasing_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAntialiasingGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAntialiasingGAURAST>(function) }
                 }
             },
             cmd_set_gaussian_low_pass_variance_gaurast: {
@@ -477,10 +416,7 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdSetGaussianLowPassVarianceGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianLowPassVarianceGAURAST>(function)
                     }
                 }
             },
@@ -496,11 +432,7 @@ impl DeviceFn {
                     cmd_set_gaussian_alpha_floor_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaFloorGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaFloorGAURAST>(function) }
                 }
             },
             cmd_set_gaussian_alpha_ceiling_gaurast: {
@@ -515,11 +447,7 @@ impl DeviceFn {
                     cmd_set_gaussian_alpha_ceiling_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
-                    unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaCeilingGAURAST>(
-                            function,
-                        )
-                    }
+                    unsafe { core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaCeilingGAURAST>(function) }
                 }
             },
             cmd_set_gaussian_transmittance_floor_gaurast: {
@@ -535,10 +463,7 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianTransmittanceFloorGAURAST>(function)
                     }
                 }
             },
@@ -555,10 +480,9 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST>(
+                            function,
+                        )
                     }
                 }
             },
@@ -575,10 +499,7 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdSetGaussianExponentialErrorGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianExponentialErrorGAURAST>(function)
                     }
                 }
             },
@@ -595,10 +516,7 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdSetGaussianContributionBudgetGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianContributionBudgetGAURAST>(function)
                     }
                 }
             },
@@ -615,10 +533,7 @@ impl DeviceFn {
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<
-                            *const c_void,
-                            PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
-                        >(function)
+                        core::mem::transmute::<*const c_void, PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST>(function)
                     }
                 }
             },

@@ -28,14 +28,8 @@ pub(crate) struct State {
 
 impl State {
     /// The recording of a command buffer, and the objects.
-    pub(crate) fn recording(
-        &mut self,
-        commands: vk::CommandBuffer,
-    ) -> (&mut Recording, &mut Objects) {
-        (
-            self.recordings.entry(commands).or_default(),
-            &mut self.objects,
-        )
+    pub(crate) fn recording(&mut self, commands: vk::CommandBuffer) -> (&mut Recording, &mut Objects) {
+        (self.recordings.entry(commands).or_default(), &mut self.objects)
     }
 }
 
@@ -120,9 +114,7 @@ impl Device {
             catch_unwind(AssertUnwindSafe(|| look(&mut state, &mut faults)))
         };
         if looked.is_err() {
-            eprintln!(
-                "VK_LAYER_GAURAST_validation: a defect of the layer; a command goes unchecked"
-            );
+            eprintln!("VK_LAYER_GAURAST_validation: a defect of the layer; a command goes unchecked");
         }
         self.tell(&faults);
     }

@@ -49,8 +49,7 @@ plain!(
 );
 
 /// The features of the extension that are enabled.
-pub(crate) type Features =
-    Plain<gvk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>>;
+pub(crate) type Features = Plain<gvk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>>;
 /// The Gaussian state of a pipeline.
 pub(crate) type GaussianState = Plain<gvk::PipelineGaussianStateCreateInfoGAURAST<'static>>;
 /// A camera.

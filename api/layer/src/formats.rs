@@ -37,11 +37,8 @@ impl Format {
         let is_packed = parts.next().is_some_and(|part| part.starts_with("PACK"));
         let is_color = |c: char| "RGBA".contains(c);
         let components = layout.chars().filter(|&c| is_color(c)).count() as u32;
-        let bits: Vec<u32> = (layout.split(is_color).skip(1))
-            .map(|bits| bits.parse().unwrap_or(0))
-            .collect();
-        let is_rgba =
-            "RGBA".starts_with(&layout.chars().filter(|&c| is_color(c)).collect::<String>());
+        let bits: Vec<u32> = (layout.split(is_color).skip(1)).map(|bits| bits.parse().unwrap_or(0)).collect();
+        let is_rgba = "RGBA".starts_with(&layout.chars().filter(|&c| is_color(c)).collect::<String>());
         let width = bits.first().copied().unwrap_or(0);
         let is_even = bits.iter().all(|&other| other == width) && is_rgba && !is_packed;
         let kind_of = match (kind, width) {
@@ -80,9 +77,7 @@ impl Format {
                 (Kind::Unorm8, &[a]) => f32::from(a) / 255.0,
                 (Kind::Snorm8, &[a]) => (f32::from(a.cast_signed()) / 127.0).max(-1.0),
                 (Kind::Unorm16, &[a, b]) => f32::from(u16::from_le_bytes([a, b])) / 65535.0,
-                (Kind::Snorm16, &[a, b]) => {
-                    (f32::from(i16::from_le_bytes([a, b])) / 32767.0).max(-1.0)
-                }
+                (Kind::Snorm16, &[a, b]) => (f32::from(i16::from_le_bytes([a, b])) / 32767.0).max(-1.0),
                 _ => return None,
             };
         }

@@ -86,10 +86,7 @@ pub(crate) unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
         // SAFETY: every structure of a chain begins with its type and the next one's address; those of the holder's
         // type are the loader's, which lets layers change them. Nothing but these members is touched in others.
         unsafe {
-            if (*structure).s_type == L::HOLDER
-                && (*structure).function == LINK
-                && !(*structure).link.is_null()
-            {
+            if (*structure).s_type == L::HOLDER && (*structure).function == LINK && !(*structure).link.is_null() {
                 let link = *(*structure).link;
                 (*structure).link = link.next();
                 return Some(link);
@@ -104,9 +101,7 @@ pub(crate) unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
 ///
 /// # Safety
 /// `first` is null or begins a valid chain that outlives `'a`.
-pub(crate) unsafe fn chain<'a>(
-    first: *const c_void,
-) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
+pub(crate) unsafe fn chain<'a>(first: *const c_void) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
     let mut next = first.cast::<vk::BaseInStructure<'a>>();
     std::iter::from_fn(move || {
         // SAFETY: the caller's promise; every structure of a chain begins as `VkBaseInStructure` does.

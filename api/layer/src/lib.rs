@@ -77,9 +77,7 @@ unsafe extern "system" fn get_instance_proc_addr(
         return unsafe { transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get) };
     }
     if instance == vk::Instance::null() {
-        return hooks::instance_hook(command)
-            .map(plain)
-            .filter(|_| command == c"vkCreateInstance");
+        return hooks::instance_hook(command).map(plain).filter(|_| command == c"vkCreateInstance");
     }
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
@@ -87,19 +85,14 @@ unsafe extern "system" fn get_instance_proc_addr(
     let get_device: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
         // SAFETY: as above.
-        return unsafe {
-            transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device)
-        };
+        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device) };
     }
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
     Some(hook.map_or(next, plain))
 }
 
 /// `vkGetDeviceProcAddr`.
-unsafe extern "system" fn get_device_proc_addr(
-    device: vk::Device,
-    name: *const c_char,
-) -> vk::PFN_vkVoidFunction {
+unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { interface::string(name) };
     let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;

@@ -193,11 +193,7 @@ impl Objects {
 }
 
 /// Bytes that transfers have written, if they wrote all of them.
-fn from_shadow(
-    shadow: &BTreeMap<u64, Arc<Vec<u8>>>,
-    offset: u64,
-    length: usize,
-) -> Option<Vec<u8>> {
+fn from_shadow(shadow: &BTreeMap<u64, Arc<Vec<u8>>>, offset: u64, length: usize) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(length);
     while bytes.len() < length {
         let place = offset + bytes.len() as u64;

@@ -114,23 +114,12 @@ pub(crate) struct Recording {
 impl Recording {
     /// A command buffer of a pool, in which nothing is recorded.
     pub(crate) fn new(pool: vk::CommandPool) -> Self {
-        Self {
-            pool,
-            ..Self::default()
-        }
+        Self { pool, ..Self::default() }
     }
 
     /// Begins a subpass, in which nothing is drawn yet.
-    pub(crate) fn begin_pass(
-        &mut self,
-        subpass: Subpass,
-        object: Option<(Arc<RenderPass>, usize)>,
-    ) {
-        self.pass = Some(Pass {
-            subpass,
-            object,
-            drawn: Vec::new(),
-        });
+    pub(crate) fn begin_pass(&mut self, subpass: Subpass, object: Option<(Arc<RenderPass>, usize)>) {
+        self.pass = Some(Pass { subpass, object, drawn: Vec::new() });
     }
 
     /// Goes on with the next subpass.

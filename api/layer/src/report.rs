@@ -68,11 +68,7 @@ pub(crate) struct Messengers(Mutex<Vec<Messenger>>);
 
 impl Messengers {
     /// Remembers a messenger.
-    pub(crate) fn add(
-        &self,
-        handle: vk::DebugUtilsMessengerEXT,
-        info: &vk::DebugUtilsMessengerCreateInfoEXT<'_>,
-    ) {
+    pub(crate) fn add(&self, handle: vk::DebugUtilsMessengerEXT, info: &vk::DebugUtilsMessengerCreateInfoEXT<'_>) {
         self.lock().push(Messenger {
             handle,
             severity: info.message_severity,
@@ -96,20 +92,13 @@ impl Messengers {
             eprintln!("{NAME}: {kind}: {} [{}]", fault.text, fault.id);
             return;
         }
-        let severity = if fault.is_error {
-            Severity::ERROR
-        } else {
-            Severity::WARNING
-        };
+        let severity = if fault.is_error { Severity::ERROR } else { Severity::WARNING };
         let types = vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION;
         let id = CString::new(fault.id).unwrap_or_default();
         let text = CString::new(format!("{NAME}: {}", fault.text)).unwrap_or_default();
-        let data = vk::DebugUtilsMessengerCallbackDataEXT::default()
-            .message_id_name(&id)
-            .message(&text);
+        let data = vk::DebugUtilsMessengerCallbackDataEXT::default().message_id_name(&id).message(&text);
         for messenger in messengers {
-            let listens =
-                messenger.severity.contains(severity) && messenger.types.intersects(types);
+            let listens = messenger.severity.contains(severity) && messenger.types.intersects(types);
             if let Some(callback) = messenger.callback.filter(|_| listens) {
                 let user_data = messenger.user_data as *mut c_void;
                 // SAFETY: the application gave the function and its pointer for such calls, and destroys the messenger

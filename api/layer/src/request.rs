@@ -6,8 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 use gaurast::vk::{
     GaussianCutOffGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::facts::GaussianState;
@@ -59,10 +59,7 @@ impl Request {
     ///
     /// # Safety
     /// The creation info is valid.
-    pub(crate) unsafe fn read(
-        info: &vk::GraphicsPipelineCreateInfo<'_>,
-        objects: &Objects,
-    ) -> Option<Self> {
+    pub(crate) unsafe fn read(info: &vk::GraphicsPipelineCreateInfo<'_>, objects: &Objects) -> Option<Self> {
         // SAFETY: pointers of a valid creation info are null, or valid with their counts.
         unsafe {
             let library = find::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next);
@@ -70,8 +67,7 @@ impl Request {
                 return None;
             }
             let dynamic = info.p_dynamic_state.as_ref();
-            let dynamic =
-                dynamic.map(|state| slice(state.p_dynamic_states, state.dynamic_state_count));
+            let dynamic = dynamic.map(|state| slice(state.p_dynamic_states, state.dynamic_state_count));
             let dynamic = dynamic.unwrap_or_default().to_vec();
             let assembly = info.p_input_assembly_state.as_ref();
             let raster = info.p_rasterization_state.as_ref();
@@ -79,36 +75,27 @@ impl Request {
             let depth = info.p_depth_stencil_state.as_ref();
             let viewport = info.p_viewport_state.as_ref();
             let blend = info.p_color_blend_state.as_ref();
-            let approximation =
-                find::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(info.p_next);
-            let footprint =
-                find::<PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(info.p_next);
+            let approximation = find::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(info.p_next);
+            let footprint = find::<PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(info.p_next);
             let gaussian = find::<PipelineGaussianStateCreateInfoGAURAST<'_>>(info.p_next);
             let stages = slice(info.p_stages, info.stage_count);
             let is_dynamic = |state: &vk::DynamicState| dynamic.contains(state);
             let static_viewport = viewport
-                .filter(|state| {
-                    !is_dynamic(&vk::DynamicState::VIEWPORT) && state.viewport_count > 0
-                })
+                .filter(|state| !is_dynamic(&vk::DynamicState::VIEWPORT) && state.viewport_count > 0)
                 .and_then(|state| state.p_viewports.as_ref())
                 .map(|v| [v.x, v.y, v.width, v.height]);
             Some(Self {
-                draws_gaussians: assembly.is_some_and(|state| {
-                    state.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST
-                }),
+                draws_gaussians: assembly
+                    .is_some_and(|state| state.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST),
                 restart: assembly.is_some_and(|state| state.primitive_restart_enable != 0),
                 gaussian: gaussian.map(GaussianState::of),
-                approximation: approximation
-                    .map(|numbers| [numbers.exponential_error, numbers.contribution_budget]),
+                approximation: approximation.map(|numbers| [numbers.exponential_error, numbers.contribution_budget]),
                 footprint: footprint.map(|state| Footprint {
                     cut_off: state.cut_off,
                     cut_off_deviations: state.cut_off_deviations,
                     compensation_floor: state.compensation_floor,
                 }),
-                stages: stages
-                    .iter()
-                    .map(|stage| read_stage(stage, objects))
-                    .collect(),
+                stages: stages.iter().map(|stage| read_stage(stage, objects)).collect(),
                 vertex_input: (!is_dynamic(&vk::DynamicState::VERTEX_INPUT_EXT))
                     .then(|| read_vertex_input(info.p_vertex_input_state.as_ref())),
                 subpass: read_subpass(info, objects),
@@ -124,12 +111,8 @@ impl Request {
                         || state.depth_bounds_test_enable != 0
                         || state.stencil_test_enable != 0
                 }),
-                writes_depth: depth.is_some_and(|state| {
-                    state.depth_test_enable != 0 && state.depth_write_enable != 0
-                }),
-                samples: multisample.map_or(vk::SampleCountFlags::TYPE_1, |state| {
-                    state.rasterization_samples
-                }),
+                writes_depth: depth.is_some_and(|state| state.depth_test_enable != 0 && state.depth_write_enable != 0),
+                samples: multisample.map_or(vk::SampleCountFlags::TYPE_1, |state| state.rasterization_samples),
                 viewport_count: if is_dynamic(&vk::DynamicState::VIEWPORT_WITH_COUNT) {
                     1
                 } else {
@@ -144,9 +127,7 @@ impl Request {
 
     /// Reports whether a stage is there.
     pub(crate) fn has(&self, stages: vk::ShaderStageFlags) -> bool {
-        self.stages
-            .iter()
-            .any(|stage| stages.intersects(stage.stage))
+        self.stages.iter().any(|stage| stages.intersects(stage.stage))
     }
 
     /// Reports whether a state is dynamic.
@@ -168,11 +149,7 @@ unsafe fn read_stage(stage: &vk::PipelineShaderStageCreateInfo<'_>, objects: &Ob
                 Arc::new(slice(info.p_code, count).to_vec())
             }),
         };
-        Stage {
-            stage: stage.stage,
-            words,
-            entry: string(stage.p_name).to_bytes().to_vec(),
-        }
+        Stage { stage: stage.stage, words, entry: string(stage.p_name).to_bytes().to_vec() }
     }
 }
 
@@ -188,21 +165,10 @@ unsafe fn read_vertex_input(
     unsafe {
         let divisors = find::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(state.p_next);
         let divisors = divisors
-            .map(|info| {
-                slice(
-                    info.p_vertex_binding_divisors,
-                    info.vertex_binding_divisor_count,
-                )
-            })
+            .map(|info| slice(info.p_vertex_binding_divisors, info.vertex_binding_divisor_count))
             .unwrap_or_default();
-        let bindings = slice(
-            state.p_vertex_binding_descriptions,
-            state.vertex_binding_description_count,
-        );
-        let attributes = slice(
-            state.p_vertex_attribute_descriptions,
-            state.vertex_attribute_description_count,
-        );
+        let bindings = slice(state.p_vertex_binding_descriptions, state.vertex_binding_description_count);
+        let attributes = slice(state.p_vertex_attribute_descriptions, state.vertex_attribute_description_count);
         let binding = |b: &vk::VertexInputBindingDescription| {
             let divisor = divisors.iter().find(|divisor| divisor.binding == b.binding);
             let binding = VertexBinding {
@@ -213,17 +179,10 @@ unsafe fn read_vertex_input(
             (b.binding, binding)
         };
         let attribute = |a: &vk::VertexInputAttributeDescription| {
-            let attribute = Attribute {
-                binding: a.binding,
-                format: a.format,
-                offset: a.offset,
-            };
+            let attribute = Attribute { binding: a.binding, format: a.format, offset: a.offset };
             (a.location, attribute)
         };
-        (
-            bindings.iter().map(binding).collect(),
-            attributes.iter().map(attribute).collect(),
-        )
+        (bindings.iter().map(binding).collect(), attributes.iter().map(attribute).collect())
     }
 }
 
@@ -240,10 +199,7 @@ unsafe fn read_subpass(info: &vk::GraphicsPipelineCreateInfo<'_>, objects: &Obje
         let Some(rendering) = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next) else {
             return Subpass::default();
         };
-        let formats = slice(
-            rendering.p_color_attachment_formats,
-            rendering.color_attachment_count,
-        );
+        let formats = slice(rendering.p_color_attachment_formats, rendering.color_attachment_count);
         let depth = if rendering.depth_attachment_format == vk::Format::UNDEFINED {
             rendering.stencil_attachment_format
         } else {

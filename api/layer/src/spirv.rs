@@ -60,28 +60,18 @@ impl Module {
             // OpEntryPoint: model, id, name, interface.
             (15, [_, _, rest @ ..]) => {
                 let bytes: Vec<u8> = rest.iter().flat_map(|word| word.to_le_bytes()).collect();
-                let length = bytes
-                    .iter()
-                    .position(|&byte| byte == 0)
-                    .unwrap_or(bytes.len());
+                let length = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
                 let after = rest.get(length / 4 + 1..).unwrap_or_default();
-                self.entries
-                    .push((bytes[..length].to_vec(), after.to_vec()));
+                self.entries.push((bytes[..length].to_vec(), after.to_vec()));
             }
             (71, [id, decoration, rest @ ..]) => {
                 let value = rest.first().copied().unwrap_or(0);
-                self.decorations
-                    .entry((*id, None))
-                    .or_default()
-                    .insert(*decoration, value);
+                self.decorations.entry((*id, None)).or_default().insert(*decoration, value);
             }
             (72, [id, member, decoration, rest @ ..]) => {
                 let value = rest.first().copied().unwrap_or(0);
                 let key = (*id, Some(*member));
-                self.decorations
-                    .entry(key)
-                    .or_default()
-                    .insert(*decoration, value);
+                self.decorations.entry(key).or_default().insert(*decoration, value);
             }
             (22, [id, width, ..]) => self.define(*id, Type::Float(*width)),
             (20 | 21, [id, ..]) => self.define(*id, Type::Other),
@@ -105,10 +95,7 @@ impl Module {
     }
 
     fn decoration(&self, id: u32, member: Option<u32>, decoration: u32) -> Option<u32> {
-        self.decorations
-            .get(&(id, member))?
-            .get(&decoration)
-            .copied()
+        self.decorations.get(&(id, member))?.get(&decoration).copied()
     }
 
     /// The variables of an entry point in a storage class, with what they point at.
@@ -133,19 +120,15 @@ impl Module {
                 }
                 location + 1
             }
-            Some(&Type::Matrix(of, count)) => {
-                (0..count).fold(location, |at, _| self.place(of, at, component, slots))
-            }
+            Some(&Type::Matrix(of, count)) => (0..count).fold(location, |at, _| self.place(of, at, component, slots)),
             Some(&Type::Array(of, length)) => {
                 let length = self.constants.get(&length).copied().unwrap_or(1).min(64);
                 (0..length).fold(location, |at, _| self.place(of, at, component, slots))
             }
-            Some(Type::Structure(members)) => {
-                (0..).zip(members).fold(location, |at, (index, &member)| {
-                    let at = self.decoration(id, Some(index), LOCATION).unwrap_or(at);
-                    self.place(member, at, component, slots)
-                })
-            }
+            Some(Type::Structure(members)) => (0..).zip(members).fold(location, |at, (index, &member)| {
+                let at = self.decoration(id, Some(index), LOCATION).unwrap_or(at);
+                self.place(member, at, component, slots)
+            }),
             Some(&Type::Float(width)) => {
                 slots.insert((location, component), width == 32);
                 location + 1
@@ -188,9 +171,6 @@ impl Interface {
     /// The interface of an entry point in a storage class.
     pub(crate) fn of(words: &[u32], entry: &[u8], class: u32) -> Self {
         let module = Module::parse(words);
-        Self {
-            slots: module.slots(entry, class),
-            writes_depth: module.writes_depth(entry),
-        }
+        Self { slots: module.slots(entry, class), writes_depth: module.writes_depth(entry) }
     }
 }

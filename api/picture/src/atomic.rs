@@ -64,9 +64,8 @@ mod unnamed {
         }
         let written = format!("/proc/self/fd/{}", file.as_raw_fd());
         // It gets a name of its own first, because a link can't replace a file.
-        let named = builder().make_in(folder(path), |name| {
-            Ok(linkat(CWD, &written, CWD, name, AtFlags::SYMLINK_FOLLOW)?)
-        });
+        let named =
+            builder().make_in(folder(path), |name| Ok(linkat(CWD, &written, CWD, name, AtFlags::SYMLINK_FOLLOW)?));
         let replaced = named.ok()?.into_temp_path().persist(path);
         Some(replaced.map_err(|error| error.error))
     }
@@ -85,13 +84,8 @@ mod tests {
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).expect("readable");
-        let name = |entry: io::Result<std::fs::DirEntry>| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .into_string()
-                .expect("text")
-        };
+        let name =
+            |entry: io::Result<std::fs::DirEntry>| entry.expect("an entry").file_name().into_string().expect("text");
         entries.map(name).collect()
     }
 
@@ -108,10 +102,7 @@ mod tests {
         assert!(write_atomically(&missing, b"x").is_err());
         let taken = folder.path().join("b");
         std::fs::create_dir(&taken).expect("a folder");
-        assert!(
-            write_atomically(&taken, b"x").is_err(),
-            "a folder is no file"
-        );
+        assert!(write_atomically(&taken, b"x").is_err(), "a folder is no file");
         assert_eq!(names(folder.path()).len(), 2);
     }
 

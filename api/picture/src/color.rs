@@ -61,26 +61,19 @@ impl FromStr for Background {
         if let Some(bytes) = lower.strip_prefix('#').and_then(hexadecimal) {
             return Ok(of_bytes(bytes));
         }
-        let numbers: Option<Vec<f32>> = lower
-            .split(',')
-            .map(|word| word.trim().parse().ok().filter(|x: &f32| x.is_finite()))
-            .collect();
-        numbers
-            .and_then(|numbers| numbers.try_into().ok())
-            .map(Self::Color)
-            .ok_or(
-                "a colour is transparent, one of CSS's basic names such as white, #rgb, #rrggbb, or three numbers with \
+        let numbers: Option<Vec<f32>> =
+            lower.split(',').map(|word| word.trim().parse().ok().filter(|x: &f32| x.is_finite())).collect();
+        numbers.and_then(|numbers| numbers.try_into().ok()).map(Self::Color).ok_or(
+            "a colour is transparent, one of CSS's basic names such as white, #rgb, #rrggbb, or three numbers with \
                  commas between them, each 0 to 1",
-            )
+        )
     }
 }
 
 /// The bytes of `rgb` or `rrggbb`.
 fn hexadecimal(digits: &str) -> Option<[u8; 3]> {
-    let digits: Vec<u8> = digits
-        .chars()
-        .map(|digit| digit.to_digit(16).map(|digit| digit as u8))
-        .collect::<Option<_>>()?;
+    let digits: Vec<u8> =
+        digits.chars().map(|digit| digit.to_digit(16).map(|digit| digit as u8)).collect::<Option<_>>()?;
     match digits[..] {
         [r, g, b] => Some([r, g, b].map(|digit| 17 * digit)),
         [r, rr, g, gg, b, bb] => Some([16 * r + rr, 16 * g + gg, 16 * b + bb]),
@@ -102,9 +95,7 @@ mod tests {
         assert_eq!(color("#0f8"), color("#00ff88"));
         assert_eq!(color("teal"), color("#008080"));
         assert_eq!(color("0,0.5,-1"), Ok(Background::Color([0.0, 0.5, -1.0])));
-        for bad in [
-            "", "whitish", "#ff", "#ggg", "1,1", "1,1,nan", "1,1,1,1", "#+1+1+1",
-        ] {
+        for bad in ["", "whitish", "#ff", "#ggg", "1,1", "1,1,nan", "1,1,1,1", "#+1+1+1"] {
             assert!(color(bad).is_err(), "{bad}");
         }
     }

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 use exr::image::write::WritableImage;
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding as ExrEncoding, FlatSamples, Image, Layer,
-    LayerAttributes, SpecificChannels, Text, Vec2,
+    AnyChannel, AnyChannels, AttributeValue, Encoding as ExrEncoding, FlatSamples, Image, Layer, LayerAttributes,
+    SpecificChannels, Text, Vec2,
 };
 use thiserror::Error;
 
@@ -86,9 +86,7 @@ impl PictureFormat {
             Some("webp") => Ok(Self::WebP),
             Some("exr") => Ok(Self::Exr),
             Some("ppm") => Ok(Self::Ppm),
-            _ => Err(OutputError::UnknownFormat {
-                path: path.to_owned(),
-            }),
+            _ => Err(OutputError::UnknownFormat { path: path.to_owned() }),
         }
     }
 
@@ -154,13 +152,7 @@ impl Colors {
 
 impl Default for Encoding<'_> {
     fn default() -> Self {
-        Self {
-            background: None,
-            depth: None,
-            quality: DEFAULT_QUALITY,
-            linear: false,
-            colors: Colors::Srgb,
-        }
+        Self { background: None, depth: None, quality: DEFAULT_QUALITY, linear: false, colors: Colors::Srgb }
     }
 }
 
@@ -178,10 +170,7 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// [`OutputError::Io`].
 pub fn check_place(path: &Path) -> Result<(), OutputError> {
-    let io = |source| OutputError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = |source| OutputError::Io { path: path.to_owned(), source };
     let is_folder = |path: &Path| path.metadata().map(|metadata| metadata.is_dir());
     if !is_folder(folder(path)).map_err(io)? {
         return Err(io(io::ErrorKind::NotADirectory.into()));
@@ -197,15 +186,8 @@ pub fn check_place(path: &Path) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// See [`OutputError`].
-pub fn write(
-    path: &Path,
-    picture: &Picture,
-    background: Option<[f32; 3]>,
-) -> Result<(), OutputError> {
-    let encoding = Encoding {
-        background: background.map(Background::Color),
-        ..Encoding::default()
-    };
+pub fn write(path: &Path, picture: &Picture, background: Option<[f32; 3]>) -> Result<(), OutputError> {
+    let encoding = Encoding { background: background.map(Background::Color), ..Encoding::default() };
     write_encoded(path, picture, &encoding)
 }
 
@@ -214,39 +196,24 @@ pub fn write(
 ///
 /// # Errors
 /// See [`OutputError`].
-pub fn write_encoded(
-    path: &Path,
-    picture: &Picture,
-    encoding: &Encoding<'_>,
-) -> Result<(), OutputError> {
+pub fn write_encoded(path: &Path, picture: &Picture, encoding: &Encoding<'_>) -> Result<(), OutputError> {
     let format = PictureFormat::of(path)?;
-    let encoded = encode(format, picture, encoding).map_err(|reason| OutputError::Encode {
-        path: path.to_owned(),
-        reason,
-    })?;
-    write_atomically(path, &encoded).map_err(|source| OutputError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    let encoded =
+        encode(format, picture, encoding).map_err(|reason| OutputError::Encode { path: path.to_owned(), reason })?;
+    write_atomically(path, &encoded).map_err(|source| OutputError::Io { path: path.to_owned(), source })
 }
 
 /// The bytes of a file of `picture`.
 ///
 /// # Errors
 /// Returns the reason that the picture doesn't fit the format.
-pub fn encode(
-    format: PictureFormat,
-    picture: &Picture,
-    encoding: &Encoding<'_>,
-) -> Result<Vec<u8>, String> {
+pub fn encode(format: PictureFormat, picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, String> {
     let side = picture.width.max(picture.height);
     let transparent = encoding.background == Some(Background::Transparent);
     match format {
         PictureFormat::Png => png(picture, encoding).map_err(|error| error.to_string()),
         PictureFormat::Jpeg if transparent => Err("JPEG files cannot be transparent".to_owned()),
-        PictureFormat::Jpeg if side > MAX_JPEG_SIDE => {
-            Err(format!("JPEG files have sides of at most {MAX_JPEG_SIDE}"))
-        }
+        PictureFormat::Jpeg if side > MAX_JPEG_SIDE => Err(format!("JPEG files have sides of at most {MAX_JPEG_SIDE}")),
         PictureFormat::Jpeg => {
             let mut file = Vec::new();
             let mut encoder = jpeg_encoder::Encoder::new(&mut file, encoding.quality);
@@ -256,14 +223,10 @@ pub fn encode(
             }
             let [width, height] = [picture.width, picture.height].map(|side| side as u16);
             let bytes = rgb(picture, encoding);
-            encoder
-                .encode(&bytes, width, height, jpeg_encoder::ColorType::Rgb)
-                .map_err(|error| error.to_string())?;
+            encoder.encode(&bytes, width, height, jpeg_encoder::ColorType::Rgb).map_err(|error| error.to_string())?;
             Ok(file)
         }
-        PictureFormat::WebP if side > MAX_WEBP_SIDE => {
-            Err(format!("WebP files have sides of at most {MAX_WEBP_SIDE}"))
-        }
+        PictureFormat::WebP if side > MAX_WEBP_SIDE => Err(format!("WebP files have sides of at most {MAX_WEBP_SIDE}")),
         PictureFormat::WebP => {
             let mut file = Vec::new();
             let (bytes, color) = if transparent {
@@ -288,9 +251,7 @@ pub fn encode(
 
 /// Red, green and blue of each pixel in eight bits, over the background, which is black by default.
 pub fn rgb(picture: &Picture, encoding: &Encoding<'_>) -> Vec<u8> {
-    let Encoding {
-        background, colors, ..
-    } = *encoding;
+    let Encoding { background, colors, .. } = *encoding;
     let behind = colors.behind(background);
     let over = |pixel: &[f32; 4]| {
         let [r, g, b, _] = match background {
@@ -306,11 +267,7 @@ pub fn rgb(picture: &Picture, encoding: &Encoding<'_>) -> Vec<u8> {
 fn rgba(picture: &Picture, colors: Colors) -> Vec<u8> {
     let straight = |&[r, g, b, alpha]: &[f32; 4]| {
         let part = |colour: f32| {
-            if alpha > 0.0 {
-                to_byte(colors.shown(colour / alpha))
-            } else {
-                0
-            }
+            if alpha > 0.0 { to_byte(colors.shown(colour / alpha)) } else { 0 }
         };
         [part(r), part(g), part(b), to_byte(alpha)]
     };
@@ -322,18 +279,10 @@ fn png(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, png::Encod
     let transparent = encoding.background == Some(Background::Transparent);
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, picture.width, picture.height);
-    encoder.set_color(if transparent {
-        png::ColorType::Rgba
-    } else {
-        png::ColorType::Rgb
-    });
+    encoder.set_color(if transparent { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_compression(png::Compression::Fast);
     let mut writer = encoder.write_header()?;
-    let bytes = if transparent {
-        rgba(picture, encoding.colors)
-    } else {
-        rgb(picture, encoding)
-    };
+    let bytes = if transparent { rgba(picture, encoding.colors) } else { rgb(picture, encoding) };
     writer.write_image_data(&bytes)?;
     writer.finish()?;
     Ok(file)
@@ -368,10 +317,9 @@ fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error
     };
     let mut file = Cursor::new(Vec::new());
     let mut attributes = LayerAttributes::default();
-    attributes.other.insert(
-        Text::from("colorSpace"),
-        color_space(encoding.linear || encoding.colors == Colors::Linear),
-    );
+    attributes
+        .other
+        .insert(Text::from("colorSpace"), color_space(encoding.linear || encoding.colors == Colors::Linear));
     if let Some(depth) = encoding.depth {
         let plane = |name: &str, value: &dyn Fn(usize) -> f32| {
             let samples = (0..width * height).map(value).collect();
@@ -385,24 +333,14 @@ fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error
             plane("expected.Z", &|i| depth[i][0]),
             plane("Z", &|i| depth[i][1]),
         ]);
-        let layer = Layer::new(
-            (width, height),
-            attributes,
-            ExrEncoding::UNCOMPRESSED,
-            channels,
-        );
+        let layer = Layer::new((width, height), attributes, ExrEncoding::UNCOMPRESSED, channels);
         Image::from_layer(layer).write().to_buffered(&mut file)?;
     } else {
         let channels = SpecificChannels::rgba(|Vec2(x, y)| {
             let [r, g, b, a] = pixel(y * width + x);
             (r, g, b, a)
         });
-        let layer = Layer::new(
-            (width, height),
-            attributes,
-            ExrEncoding::UNCOMPRESSED,
-            channels,
-        );
+        let layer = Layer::new((width, height), attributes, ExrEncoding::UNCOMPRESSED, channels);
         Image::from_layer(layer).write().to_buffered(&mut file)?;
     }
     Ok(file.into_inner())
@@ -410,12 +348,7 @@ fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error
 
 fn over_pixel([r, g, b, alpha]: [f32; 4], behind: [f32; 3]) -> [f32; 4] {
     let transmittance = 1.0 - alpha;
-    [
-        r + transmittance * behind[0],
-        g + transmittance * behind[1],
-        b + transmittance * behind[2],
-        1.0,
-    ]
+    [r + transmittance * behind[0], g + transmittance * behind[1], b + transmittance * behind[2], 1.0]
 }
 
 /// A premultiplied sRGB colour, converted to premultiplied linear light.
@@ -424,11 +357,7 @@ fn to_linear(colour: f32, alpha: f32) -> f32 {
         return 0.0;
     }
     let straight = colour / alpha;
-    let linear = if straight > 0.04045 {
-        ((straight + 0.055) / 1.055).powf(2.4)
-    } else {
-        straight / 12.92
-    };
+    let linear = if straight > 0.04045 { ((straight + 0.055) / 1.055).powf(2.4) } else { straight / 12.92 };
     linear * alpha
 }
 
@@ -495,10 +424,7 @@ mod tests {
     #[test]
     fn a_transparent_picture_has_straight_colours() {
         let folder = tempfile::tempdir().expect("a folder");
-        let encoding = Encoding {
-            background: Some(Background::Transparent),
-            ..Encoding::default()
-        };
+        let encoding = Encoding { background: Some(Background::Transparent), ..Encoding::default() };
         for name in ["a.png", "a.webp"] {
             let path = folder.path().join(name);
             write_encoded(&path, &picture(), &encoding).expect("written");
@@ -508,35 +434,20 @@ mod tests {
             let alpha = 128.0 / 255.0;
             let expected = [255.0, 128.0, 64.0].map(|step: f32| step / 255.0 * alpha);
             for (value, expected) in read.pixels[1].iter().zip(expected) {
-                assert!(
-                    (value - expected).abs() < 1e-6,
-                    "{name}: {:?}",
-                    read.pixels[1]
-                );
+                assert!((value - expected).abs() < 1e-6, "{name}: {:?}", read.pixels[1]);
             }
             assert_eq!(read.pixels[0], [0.0; 4], "{name}");
             assert_eq!(read.pixels[1][3], alpha, "{name}");
         }
         let jpeg = write_encoded(&folder.path().join("a.jpg"), &picture(), &encoding);
         let refused = jpeg.expect_err("JPEG has no alpha").to_string();
-        assert!(
-            refused.ends_with("JPEG files cannot be transparent"),
-            "{refused}"
-        );
+        assert!(refused.ends_with("JPEG files cannot be transparent"), "{refused}");
     }
 
     #[test]
     fn linear_colours_are_shown_as_srgb() {
-        let half = Picture {
-            width: 1,
-            height: 1,
-            pixels: vec![[0.25, 0.0, 0.5, 0.5]],
-        };
-        let over = |background| Encoding {
-            background,
-            colors: Colors::Linear,
-            ..Encoding::default()
-        };
+        let half = Picture { width: 1, height: 1, pixels: vec![[0.25, 0.0, 0.5, 0.5]] };
+        let over = |background| Encoding { background, colors: Colors::Linear, ..Encoding::default() };
         // Half of linear light is 188 of 255 steps, a quarter 137.
         assert_eq!(rgb(&half, &over(None)), [137, 0, 188]);
         let white = Some(Background::Color([1.0; 3]));
@@ -550,18 +461,14 @@ mod tests {
         let ramp = Picture {
             width: 64,
             height: 64,
-            pixels: (0..64 * 64_u16)
-                .map(|i| [f32::from(i % 64) / 63.0, f32::from(i / 64) / 63.0, 0.5, 1.0])
-                .collect(),
+            pixels: (0..64 * 64_u16).map(|i| [f32::from(i % 64) / 63.0, f32::from(i / 64) / 63.0, 0.5, 1.0]).collect(),
         };
         for (name, error) in [("a.jpg", 0.03), ("b.webp", 0.002), ("c.png", 0.002)] {
             let path = folder.path().join(name);
             write(&path, &ramp, None).expect("written");
             let read = crate::read(&path).expect("readable");
             let differences = read.pixels.iter().zip(&ramp.pixels);
-            let worst = differences
-                .flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()))
-                .fold(0.0, f32::max);
+            let worst = differences.flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs())).fold(0.0, f32::max);
             assert!(worst <= error, "{name}: {worst}");
         }
     }
@@ -570,36 +477,22 @@ mod tests {
     fn exr_holds_depths_and_says_its_colour_space() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.exr");
-        let depth: Vec<[f32; 2]> = (0..6_u8)
-            .map(|i| [f32::from(i), 10.0 + f32::from(i)])
-            .collect();
-        let encoding = Encoding {
-            depth: Some(&depth),
-            ..Encoding::default()
-        };
+        let depth: Vec<[f32; 2]> = (0..6_u8).map(|i| [f32::from(i), 10.0 + f32::from(i)]).collect();
+        let encoding = Encoding { depth: Some(&depth), ..Encoding::default() };
         write_encoded(&path, &picture(), &encoding).expect("written");
         let read = exr::prelude::read_all_flat_layers_from_file(&path).expect("an EXR");
         let layer = &read.layer_data[0];
-        let names: Vec<String> = (layer.channel_data.list.iter())
-            .map(|channel| channel.name.to_string())
-            .collect();
+        let names: Vec<String> = (layer.channel_data.list.iter()).map(|channel| channel.name.to_string()).collect();
         assert_eq!(names, ["A", "B", "G", "R", "Z", "expected.Z"]);
-        let values = |index: usize| -> Vec<f32> {
-            layer.channel_data.list[index]
-                .sample_data
-                .values_as_f32()
-                .collect()
-        };
+        let values =
+            |index: usize| -> Vec<f32> { layer.channel_data.list[index].sample_data.values_as_f32().collect() };
         assert_eq!(values(4), [10.0, 11.0, 12.0, 13.0, 14.0, 15.0]);
         assert_eq!(values(5), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(values(3)[1], 0.5);
         let said = layer.attributes.other.get(&Text::from("colorSpace"));
         assert_eq!(said, Some(&color_space(false)));
         // A colour of 0.5 at half alpha is 1, which is 1 in linear light.
-        let encoding = Encoding {
-            linear: true,
-            ..Encoding::default()
-        };
+        let encoding = Encoding { linear: true, ..Encoding::default() };
         write_encoded(&path, &picture(), &encoding).expect("written");
         let read = crate::read(&path).expect("readable");
         assert!((read.pixels[1][0] - 0.5).abs() < 1e-6 && read.pixels[1][1] < 0.12);

@@ -30,12 +30,7 @@ const WHITE: [f64; 3] = [0.950428545, 1.0, 1.088900371];
 
 /// The FLIP error, 0 to 1, of each pixel of `test`. Both images are sRGB, clamped to 0 to 1 here,
 /// with `width` pixels a row.
-pub fn flip(
-    reference: &[[f32; 3]],
-    test: &[[f32; 3]],
-    width: u32,
-    pixels_per_degree: f64,
-) -> Vec<f64> {
+pub fn flip(reference: &[[f32; 3]], test: &[[f32; 3]], width: u32, pixels_per_degree: f64) -> Vec<f64> {
     assert_eq!(reference.len(), test.len(), "the sizes differ");
     let reference = Perceived::new(reference, width as usize, pixels_per_degree);
     let test = Perceived::new(test, width as usize, pixels_per_degree);
@@ -64,14 +59,9 @@ struct Perceived {
 
 impl Perceived {
     fn new(image: &[[f32; 3]], width: usize, ppd: f64) -> Self {
-        let opponent: Vec<[f64; 3]> = image
-            .iter()
-            .map(|rgb| xyz_to_ycxcz(linear_to_xyz(rgb.map(srgb_to_linear))))
-            .collect();
-        let plane = |channel: usize| Plane {
-            width,
-            values: opponent.iter().map(|color| color[channel]).collect(),
-        };
+        let opponent: Vec<[f64; 3]> =
+            image.iter().map(|rgb| xyz_to_ycxcz(linear_to_xyz(rgb.map(srgb_to_linear)))).collect();
+        let plane = |channel: usize| Plane { width, values: opponent.iter().map(|color| color[channel]).collect() };
         let [y, cx, cz] = [0, 1, 2].map(plane);
 
         // Contrast sensitivities of the achromatic, red-green and blue-yellow channels.
@@ -88,16 +78,11 @@ impl Perceived {
             })
             .collect();
 
-        let luminance = Plane {
-            width,
-            values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(),
-        };
+        let luminance = Plane { width, values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect() };
         let sigma = 0.5 * W * ppd;
         let smooth = normalised(sample((3.0 * sigma).ceil(), |x| gaussian(x, sigma)));
         let edge = sample((3.0 * sigma).ceil(), |x| -x * gaussian(x, sigma));
-        let point = sample((3.0 * sigma).ceil(), |x| {
-            (x * x / (sigma * sigma) - 1.0) * gaussian(x, sigma)
-        });
+        let point = sample((3.0 * sigma).ceil(), |x| (x * x / (sigma * sigma) - 1.0) * gaussian(x, sigma));
         Self {
             color,
             edges: luminance.gradient(&balanced(edge), &smooth),
@@ -147,18 +132,17 @@ impl Plane {
     /// Correlates rows with `horizontal`, then columns with `vertical`; both have odd lengths.
     fn separable(&self, horizontal: &[f64], vertical: &[f64]) -> Self {
         let (width, height) = (self.width, self.values.len() / self.width);
-        let correlate =
-            |kernel: &[f64], position: usize, count: usize, value: &dyn Fn(usize) -> f64| {
-                let radius = kernel.len() / 2;
-                kernel
-                    .iter()
-                    .enumerate()
-                    .map(|(i, weight)| {
-                        let at = (position + i).saturating_sub(radius).min(count - 1);
-                        weight * value(at)
-                    })
-                    .sum::<f64>()
-            };
+        let correlate = |kernel: &[f64], position: usize, count: usize, value: &dyn Fn(usize) -> f64| {
+            let radius = kernel.len() / 2;
+            kernel
+                .iter()
+                .enumerate()
+                .map(|(i, weight)| {
+                    let at = (position + i).saturating_sub(radius).min(count - 1);
+                    weight * value(at)
+                })
+                .sum::<f64>()
+        };
         let along_rows: Vec<f64> = (0..self.values.len())
             .into_par_iter()
             .map(|i| {
@@ -203,11 +187,7 @@ fn balanced(weights: Vec<f64>) -> Vec<f64> {
 
 fn srgb_to_linear(value: f32) -> f64 {
     let value = f64::from(value.clamp(0.0, 1.0));
-    if value > 0.04045 {
-        ((value + 0.055) / 1.055).powf(2.4)
-    } else {
-        value / 12.92
-    }
+    if value > 0.04045 { ((value + 0.055) / 1.055).powf(2.4) } else { value / 12.92 }
 }
 
 fn linear_to_xyz([r, g, b]: [f64; 3]) -> [f64; 3] {
@@ -242,11 +222,7 @@ fn xyz_to_lab(xyz: [f64; 3]) -> [f64; 3] {
     const DELTA: f64 = 6.0 / 29.0;
     let [x, y, z] = std::array::from_fn(|i| {
         let relative = xyz[i] / WHITE[i];
-        if relative > DELTA.powi(3) {
-            relative.cbrt()
-        } else {
-            relative / (3.0 * DELTA * DELTA) + 4.0 / 29.0
-        }
+        if relative > DELTA.powi(3) { relative.cbrt() } else { relative / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
     });
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
@@ -270,11 +246,7 @@ fn greatest_color_difference() -> f64 {
 /// Maps differences to 0 to 1, and most of the range to small ones.
 fn redistribute(difference: f64, greatest: f64) -> f64 {
     let knee = PC * greatest;
-    if difference < knee {
-        PT / knee * difference
-    } else {
-        PT + (difference - knee) / (greatest - knee) * (1.0 - PT)
-    }
+    if difference < knee { PT / knee * difference } else { PT + (difference - knee) / (greatest - knee) * (1.0 - PT) }
 }
 
 #[cfg(test)]
@@ -291,16 +263,8 @@ mod tests {
     fn patterns() -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         let pixels = || (0..32_u16).flat_map(|y| (0..48_u16).map(move |x| (x, y)));
         let reference = |(x, y): (u16, u16)| {
-            let [r, g, b] = [
-                (x * 7 + y * 3) % 32,
-                (x * x + y) % 17,
-                ((x * 5) ^ (y * 9)) % 64,
-            ];
-            [
-                f32::from(r) / 31.0,
-                f32::from(g) / 16.0,
-                f32::from(b) / 63.0,
-            ]
+            let [r, g, b] = [(x * 7 + y * 3) % 32, (x * x + y) % 17, ((x * 5) ^ (y * 9)) % 64];
+            [f32::from(r) / 31.0, f32::from(g) / 16.0, f32::from(b) / 63.0]
         };
         let test = |(x, y): (u16, u16)| {
             let inverted = (8..16).contains(&y) && (8..24).contains(&x);
@@ -309,10 +273,7 @@ mod tests {
                 if x >= 30 { 0.5 * c } else { c }
             })
         };
-        (
-            pixels().map(reference).collect(),
-            pixels().map(test).collect(),
-        )
+        (pixels().map(reference).collect(), pixels().map(test).collect())
     }
 
     #[test]
@@ -321,12 +282,7 @@ mod tests {
         let (reference, test) = patterns();
         assert!((mean(&reference, &test, 48) - 0.387766).abs() < 2e-5);
         let errors = flip(&reference, &test, 48, DEFAULT_PIXELS_PER_DEGREE);
-        for (x, y, expected) in [
-            (16, 12, 0.872548),
-            (47, 31, 0.831654),
-            (28, 12, 0.231202),
-            (10, 20, 0.040328),
-        ] {
+        for (x, y, expected) in [(16, 12, 0.872548), (47, 31, 0.831654), (28, 12, 0.231202), (10, 20, 0.040328)] {
             let error = errors[y * 48 + x];
             assert!((error - expected).abs() < 1e-4, "({x}, {y}): {error}");
         }
@@ -337,11 +293,9 @@ mod tests {
         // Values of the same implementation, except for the last, which holds by definition. On a flat image its
         // binary32 filters find features of about 1e-7, whose root, 3e-4, is in the exponent; hence the tolerance.
         let flat = |rgb| vec![rgb; 64];
-        for (reference, test, expected) in [
-            ([1.0; 3], [0.0; 3], 0.967388),
-            ([0.5; 3], [0.6; 3], 0.285063),
-            ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0], 1.0),
-        ] {
+        for (reference, test, expected) in
+            [([1.0; 3], [0.0; 3], 0.967388), ([0.5; 3], [0.6; 3], 0.285063), ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0], 1.0)]
+        {
             let error = mean(&flat(reference), &flat(test), 8);
             assert!((error - expected).abs() < 1e-4, "{error}");
         }

@@ -16,8 +16,8 @@ mod statistics;
 pub use atomic::{folder, write_atomically};
 pub use color::Background;
 pub use files::{
-    Colors, DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb,
-    write, write_encoded,
+    Colors, DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb, write,
+    write_encoded,
 };
 pub use picture::Picture;
 pub use read::read;

@@ -18,16 +18,8 @@ impl Picture {
         let over = |&[r, g, b, alpha]: &[f32; 4]| {
             let transmittance = 1.0 - alpha;
             let channel = |colour: f32, behind: f32| colour + transmittance * behind;
-            [
-                channel(r, background[0]),
-                channel(g, background[1]),
-                channel(b, background[2]),
-                1.0,
-            ]
+            [channel(r, background[0]), channel(g, background[1]), channel(b, background[2]), 1.0]
         };
-        Self {
-            pixels: self.pixels.iter().map(over).collect(),
-            ..*self
-        }
+        Self { pixels: self.pixels.iter().map(over).collect(), ..*self }
     }
 }

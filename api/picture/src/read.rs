@@ -19,14 +19,8 @@ const MAX_PIXELS: u64 = 1 << 29;
 /// [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
 pub fn read(path: &Path) -> Result<Picture, OutputError> {
     let format = PictureFormat::of(path)?;
-    let io = |source| OutputError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let damaged = |reason: String| OutputError::Encode {
-        path: path.to_owned(),
-        reason,
-    };
+    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let damaged = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
     let file = BufReader::new(File::open(path).map_err(io)?);
     let picture = match format {
         PictureFormat::Png => png(file),
@@ -59,11 +53,7 @@ fn picture(width: u32, height: u32, channels: usize, values: impl Iterator<Item 
         };
         [r * alpha, g * alpha, b * alpha, alpha]
     };
-    Picture {
-        width,
-        height,
-        pixels: values.chunks_exact(channels).map(pixel).collect(),
-    }
+    Picture { width, height, pixels: values.chunks_exact(channels).map(pixel).collect() }
 }
 
 fn of_bytes(bytes: &[u8]) -> impl Iterator<Item = f32> {
@@ -82,8 +72,7 @@ fn png(file: BufReader<File>) -> Result<Picture, String> {
     let bytes = &bytes[..info.buffer_size()];
     let channels = info.color_type.samples();
     Ok(if info.bit_depth == png::BitDepth::Sixteen {
-        let values = (bytes.chunks_exact(2))
-            .map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / 65_535.0);
+        let values = (bytes.chunks_exact(2)).map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / 65_535.0);
         picture(width, height, channels, values)
     } else {
         picture(width, height, channels, of_bytes(bytes))
@@ -95,8 +84,7 @@ fn jpeg(mut file: BufReader<File>) -> Result<Picture, String> {
     use zune_jpeg::zune_core::colorspace::ColorSpace;
     use zune_jpeg::zune_core::options::DecoderOptions;
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)
-        .map_err(|error| error.to_string())?;
+    file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     let options = DecoderOptions::default()
         .jpeg_set_out_colorspace(ColorSpace::RGB)
         .set_max_width(usize::from(u16::MAX))
@@ -112,17 +100,13 @@ fn ppm(mut file: BufReader<File>) -> Result<Picture, String> {
     use zune_ppm::zune_core::bytestream::ZCursor;
     use zune_ppm::zune_core::result::DecodingResult;
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)
-        .map_err(|error| error.to_string())?;
+    file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     let mut decoder = zune_ppm::PPMDecoder::new(ZCursor::new(&bytes));
     let text = |error| format!("{error:?}");
     decoder.decode_headers().map_err(text)?;
     let (width, height) = decoder.dimensions().ok_or("it has no size")?;
     sized(width as u64, height as u64)?;
-    let channels = decoder
-        .colorspace()
-        .ok_or("it has no channels")?
-        .num_components();
+    let channels = decoder.colorspace().ok_or("it has no channels")?.num_components();
     let (width, height) = (width as u32, height as u32);
     match decoder.decode().map_err(text)? {
         DecodingResult::U8(values) => Ok(picture(width, height, channels, of_bytes(&values))),
@@ -141,9 +125,7 @@ fn webp(file: BufReader<File>) -> Result<Picture, String> {
     let size = decoder.output_buffer_size().ok_or("it is too large")?;
     let channels = if decoder.has_alpha() { 4 } else { 3 };
     let mut bytes = vec![0; size];
-    decoder
-        .read_image(&mut bytes)
-        .map_err(|error| error.to_string())?;
+    decoder.read_image(&mut bytes).map_err(|error| error.to_string())?;
     Ok(picture(width, height, channels, of_bytes(&bytes)))
 }
 
@@ -153,9 +135,7 @@ fn exr(file: BufReader<File>) -> Result<Picture, String> {
         .largest_resolution_level()
         .rgba_channels(
             |size, _| (size.width(), vec![[0.0_f32; 4]; size.area()]),
-            |(width, pixels): &mut (usize, Vec<[f32; 4]>),
-             at,
-             (r, g, b, a): (f32, f32, f32, f32)| {
+            |(width, pixels): &mut (usize, Vec<[f32; 4]>), at, (r, g, b, a): (f32, f32, f32, f32)| {
                 pixels[at.y() * *width + at.x()] = [r, g, b, a];
             },
         )
@@ -184,10 +164,7 @@ mod tests {
             assert!(matches!(missing, OutputError::Io { .. }), "{missing}");
             std::fs::write(&path, "neither").expect("written");
             let damaged = read(&path).expect_err("it is no picture").to_string();
-            assert!(
-                damaged.starts_with(&path.display().to_string()),
-                "{damaged}"
-            );
+            assert!(damaged.starts_with(&path.display().to_string()), "{damaged}");
             assert_eq!(damaged.lines().count(), 1, "{damaged}");
         }
     }

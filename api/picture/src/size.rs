@@ -13,9 +13,7 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (width, height) = text
-            .split_once(['x', 'X'])
-            .ok_or("a width and a height are needed, such as 1280x720")?;
+        let (width, height) = text.split_once(['x', 'X']).ok_or("a width and a height are needed, such as 1280x720")?;
         let side = |word: &str| {
             word.parse()
                 .ok()

@@ -28,9 +28,8 @@ pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
     let sum: f64 = (0..3)
         .into_par_iter()
         .map(|channel| {
-            let plane = |pixels: &[[f32; 4]]| -> Vec<f64> {
-                pixels.iter().map(|pixel| pixel[channel].into()).collect()
-            };
+            let plane =
+                |pixels: &[[f32; 4]]| -> Vec<f64> { pixels.iter().map(|pixel| pixel[channel].into()).collect() };
             channel_sum(&plane(image), &plane(reference), width)
         })
         .sum();
@@ -39,8 +38,7 @@ pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
 
 fn channel_sum(a: &[f64], b: &[f64], width: usize) -> f64 {
     let window = window();
-    let product =
-        |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
     let smooth = |values: &[f64]| filtered(values, width, &window);
     let (mean_a, mean_b) = (smooth(a), smooth(b));
     let (square_a, square_b) = (smooth(&product(a, a)), smooth(&product(b, b)));
@@ -81,9 +79,7 @@ fn filtered(values: &[f64], width: usize, window: &[f64]) -> Vec<f64> {
             correlate(i % width, width, &|x| row[x])
         })
         .collect();
-    (0..values.len())
-        .map(|i| correlate(i / width, height, &|y| rows[y * width + i % width]))
-        .collect()
+    (0..values.len()).map(|i| correlate(i / width, height, &|y| rows[y * width + i % width])).collect()
 }
 
 #[cfg(test)]
@@ -91,9 +87,7 @@ mod tests {
     use super::*;
 
     fn grey(value: impl Fn(usize) -> f32, count: usize) -> Vec<[f32; 4]> {
-        (0..count)
-            .map(|i| [value(i), value(i), value(i), 1.0])
-            .collect()
+        (0..count).map(|i| [value(i), value(i), value(i), 1.0]).collect()
     }
 
     #[test]

@@ -23,25 +23,16 @@ impl Statistics {
     pub fn new(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> Self {
         assert_eq!(image.len(), reference.len(), "the sizes differ");
         let differences = || {
-            image.iter().zip(reference).map(|(a, b)| {
-                std::array::from_fn::<f64, 4, _>(|c| (f64::from(a[c]) - f64::from(b[c])).abs())
-            })
+            image
+                .iter()
+                .zip(reference)
+                .map(|(a, b)| std::array::from_fn::<f64, 4, _>(|c| (f64::from(a[c]) - f64::from(b[c])).abs()))
         };
-        let mut worst: Vec<f64> = differences()
-            .map(|d| d.into_iter().fold(0.0, f64::max))
-            .collect();
+        let mut worst: Vec<f64> = differences().map(|d| d.into_iter().fold(0.0, f64::max)).collect();
         worst.sort_by(f64::total_cmp);
-        let squares: f64 = differences()
-            .flat_map(|d| [d[0], d[1], d[2]])
-            .map(|d| d * d)
-            .sum();
+        let squares: f64 = differences().flat_map(|d| [d[0], d[1], d[2]]).map(|d| d * d).sum();
         let mean_square = squares / (3 * image.len()) as f64;
-        let errors = flip::flip(
-            &opaque(reference),
-            &opaque(image),
-            width,
-            flip::DEFAULT_PIXELS_PER_DEGREE,
-        );
+        let errors = flip::flip(&opaque(reference), &opaque(image), width, flip::DEFAULT_PIXELS_PER_DEGREE);
         Self {
             max: worst.last().copied().unwrap_or(0.0),
             p999: percentile(&worst, 0.999),
@@ -53,11 +44,7 @@ impl Statistics {
 
 impl fmt::Display for Statistics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "max {:.2e}, p99.9 {:.2e}, PSNR {:.1} dB, FLIP {:.5}",
-            self.max, self.p999, self.psnr, self.flip
-        )
+        write!(f, "max {:.2e}, p99.9 {:.2e}, PSNR {:.1} dB, FLIP {:.5}", self.max, self.p999, self.psnr, self.flip)
     }
 }
 
@@ -79,10 +66,7 @@ mod tests {
     fn equal_images_differ_by_nothing() {
         let image = vec![[0.1, 0.2, 0.3, 0.4]; 64];
         let statistics = Statistics::new(&image, &image, 8);
-        assert_eq!(
-            (statistics.max, statistics.p999, statistics.flip),
-            (0.0, 0.0, 0.0)
-        );
+        assert_eq!((statistics.max, statistics.p999, statistics.flip), (0.0, 0.0, 0.0));
         assert_eq!(statistics.psnr, f64::INFINITY);
     }
 

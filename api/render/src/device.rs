@@ -20,13 +20,10 @@ struct Instance {
 
 impl Instance {
     fn new(entry: ash::Entry) -> Result<Self, RenderError> {
-        let application = vk::ApplicationInfo::default()
-            .application_name(c"gaurast")
-            .api_version(vk::API_VERSION_1_3);
+        let application = vk::ApplicationInfo::default().application_name(c"gaurast").api_version(vk::API_VERSION_1_3);
         let create_info = vk::InstanceCreateInfo::default().application_info(&application);
         // SAFETY: the structures are valid, and `_entry` outlives the instance.
-        let raw =
-            unsafe { entry.create_instance(&create_info, None) }.during("vkCreateInstance")?;
+        let raw = unsafe { entry.create_instance(&create_info, None) }.during("vkCreateInstance")?;
         Ok(Self { raw, _entry: entry })
     }
 }
@@ -92,10 +89,9 @@ impl Device {
             (instance.raw).get_physical_device_features2(physical.handle, &mut features);
         }
         gaussian.p_next = std::ptr::null_mut();
-        let mut rendering =
-            vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
-        let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
-            .performance_counter_query_pools(true);
+        let mut rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+        let mut counting =
+            vk::PhysicalDevicePerformanceQueryFeaturesKHR::default().performance_counter_query_pools(true);
         if matches!(purpose, Purpose::Gaussians) {
             extensions.push(gaussian_primitive_topology::NAME.as_ptr());
         }
@@ -113,18 +109,12 @@ impl Device {
             create_info = create_info.push_next(&mut counting);
         }
         // SAFETY: the structures are valid, and the physical device has what is enabled.
-        let raw = unsafe {
-            instance
-                .raw
-                .create_device(physical.handle, &create_info, None)
-        }
-        .during("vkCreateDevice")?;
+        let raw =
+            unsafe { instance.raw.create_device(physical.handle, &create_info, None) }.during("vkCreateDevice")?;
         Ok(Self {
             // SAFETY: the queue was requested at creation.
             queue: unsafe { raw.get_device_queue(physical.queue_family, 0) },
-            performance: physical
-                .counts
-                .then(|| ash::khr::performance_query::Device::new(&instance.raw, &raw)),
+            performance: physical.counts.then(|| ash::khr::performance_query::Device::new(&instance.raw, &raw)),
             raw,
             physical,
             instance,
@@ -185,25 +175,19 @@ impl Device {
         wishes.iter().find_map(|(wanted, unwanted)| {
             (0..types.len() as u32).find(|index| {
                 let flags = types[*index as usize].property_flags;
-                type_bits & (1 << index) != 0
-                    && flags.contains(*wanted)
-                    && !flags.intersects(*unwanted)
+                type_bits & (1 << index) != 0 && flags.contains(*wanted) && !flags.intersects(*unwanted)
             })
         })
     }
 
     /// The queue's counters, with their descriptions.
     pub(super) fn counters(&self) -> Result<Vec<CounterDescription>, RenderError> {
-        let instance =
-            ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
+        let instance = ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
         let (device, family) = (self.physical.handle, self.physical.queue_family);
         // SAFETY: the physical device has the extension, and the family exists.
-        let count = unsafe {
-            instance.enumerate_physical_device_queue_family_performance_query_counters_len(
-                device, family,
-            )
-        }
-        .during("vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")?;
+        let count =
+            unsafe { instance.enumerate_physical_device_queue_family_performance_query_counters_len(device, family) }
+                .during("vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")?;
         let mut counters = vec![vk::PerformanceCounterKHR::default(); count];
         let mut descriptions = vec![vk::PerformanceCounterDescriptionKHR::default(); count];
         // SAFETY: as above; both arrays hold default structures.
@@ -217,10 +201,7 @@ impl Device {
         }
         .during("vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")?;
         let text = |array: &[std::ffi::c_char]| {
-            CStr::from_bytes_until_nul(bytemuck::cast_slice(array))
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
+            CStr::from_bytes_until_nul(bytemuck::cast_slice(array)).unwrap_or_default().to_string_lossy().into_owned()
         };
         Ok(counters
             .iter()
@@ -229,9 +210,7 @@ impl Device {
                 category: text(&description.category),
                 name: text(&description.name),
                 description: text(&description.description),
-                impacting: description
-                    .flags
-                    .contains(vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING),
+                impacting: description.flags.contains(vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING),
                 unit: counter.unit,
                 storage: counter.storage,
             })
@@ -239,19 +218,10 @@ impl Device {
     }
 
     /// The number of submissions that are needed to count what `create_info` names.
-    pub(super) fn counter_passes(
-        &self,
-        create_info: &vk::QueryPoolPerformanceCreateInfoKHR<'_>,
-    ) -> u32 {
-        let instance =
-            ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
+    pub(super) fn counter_passes(&self, create_info: &vk::QueryPoolPerformanceCreateInfoKHR<'_>) -> u32 {
+        let instance = ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
         // SAFETY: the physical device has the extension, and the structure names its counters.
-        unsafe {
-            instance.get_physical_device_queue_family_performance_query_passes(
-                self.physical.handle,
-                create_info,
-            )
-        }
+        unsafe { instance.get_physical_device_queue_family_performance_query_passes(self.physical.handle, create_info) }
     }
 }
 
@@ -279,33 +249,21 @@ impl PhysicalDevice {
     /// The first physical device that serves the purpose and has a graphics queue.
     fn choose(instance: &ash::Instance, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         // SAFETY: the instance is alive.
-        let handles = unsafe { instance.enumerate_physical_devices() }
-            .during("vkEnumeratePhysicalDevices")?;
+        let handles = unsafe { instance.enumerate_physical_devices() }.during("vkEnumeratePhysicalDevices")?;
         let mut found = Vec::new();
         for handle in handles {
             // SAFETY: the handle was just enumerated.
             let properties = unsafe { instance.get_physical_device_properties(handle) };
-            let name = properties
-                .device_name_as_c_str()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
+            let name = properties.device_name_as_c_str().unwrap_or_default().to_string_lossy().into_owned();
             if let Some(physical) = Self::suitable(instance, handle, &properties, &name, purpose)? {
                 return Ok(physical);
             }
             found.push(name);
         }
-        let found = if found.is_empty() {
-            "none at all".to_owned()
-        } else {
-            found.join(", ")
-        };
+        let found = if found.is_empty() { "none at all".to_owned() } else { found.join(", ") };
         Err(match purpose {
             Purpose::Gaussians => RenderError::NoDevice { found },
-            Purpose::Triangles(name) => RenderError::NoSuchDevice {
-                name: name.to_owned(),
-                found,
-            },
+            Purpose::Triangles(name) => RenderError::NoSuchDevice { name: name.to_owned(), found },
         })
     }
 
@@ -319,11 +277,7 @@ impl PhysicalDevice {
         // SAFETY: the handle is the instance's.
         let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }
             .during("vkEnumerateDeviceExtensionProperties")?;
-        let has = |name: &CStr| {
-            extensions
-                .iter()
-                .any(|extension| extension.extension_name_as_c_str() == Ok(name))
-        };
+        let has = |name: &CStr| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
         let serves = match purpose {
             Purpose::Gaussians => has(gaussian_primitive_topology::NAME),
             Purpose::Triangles(text) => name.contains(text),
@@ -333,9 +287,7 @@ impl PhysicalDevice {
         }
         // SAFETY: the handle is the instance's.
         let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
-        let graphics = families
-            .iter()
-            .position(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS));
+        let graphics = families.iter().position(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS));
         let Some(queue_family) = graphics else {
             return Ok(None);
         };

@@ -32,10 +32,8 @@ impl Recorder<'_> {
             vulkan = vulkan.depth_coefficients(mesh::depth_coefficients(camera));
         }
         let area = vk::Rect2D::default().extent(image.extent());
-        let viewport = vk::Viewport::default()
-            .width(area.extent.width as f32)
-            .height(area.extent.height as f32)
-            .max_depth(1.0);
+        let viewport =
+            vk::Viewport::default().width(area.extent.width as f32).height(area.extent.height as f32).max_depth(1.0);
         let attachment = |image: &Image| {
             vk::RenderingAttachmentInfo::default()
                 .image_view(image.view())
@@ -45,10 +43,8 @@ impl Recorder<'_> {
         };
         let depths = target.depths.as_ref().map(|(image, _)| image);
         let attachments: Vec<_> = [image].into_iter().chain(depths).map(attachment).collect();
-        let mut rendering = vk::RenderingInfo::default()
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&attachments);
+        let mut rendering =
+            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
         // Depth 0, of what is infinitely far, is what attachments are cleared to.
         let tested = target.tested.as_ref().map(|image| {
             attachment(image)
@@ -62,23 +58,13 @@ impl Recorder<'_> {
         use vk::PipelineStageFlags as Stage;
         for image in [image].into_iter().chain(depths) {
             let to_attachment = image
-                .barrier(
-                    vk::ImageLayout::UNDEFINED,
-                    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-                )
+                .barrier(vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
-            self.barrier(
-                Stage::TRANSFER,
-                Stage::COLOR_ATTACHMENT_OUTPUT,
-                to_attachment,
-            );
+            self.barrier(Stage::TRANSFER, Stage::COLOR_ATTACHMENT_OUTPUT, to_attachment);
         }
         if let Some(image) = &target.tested {
             let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
-            let (from, to) = (
-                vk::ImageLayout::UNDEFINED,
-                vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
-            );
+            let (from, to) = (vk::ImageLayout::UNDEFINED, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL);
             let writes = vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE;
             let to_attachment = image
                 .barrier(from, to)
@@ -101,13 +87,7 @@ impl Recorder<'_> {
                 let constants = bytemuck::bytes_of(&to_clip);
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, handle);
                 raw.cmd_bind_vertex_buffers(commands, 0, &[mesh.buffer.handle()], &[0]);
-                raw.cmd_push_constants(
-                    commands,
-                    layout,
-                    vk::ShaderStageFlags::VERTEX,
-                    0,
-                    constants,
-                );
+                raw.cmd_push_constants(commands, layout, vk::ShaderStageFlags::VERTEX, 0, constants);
                 raw.cmd_draw(commands, mesh.vertices, 1, 0, 0);
             }
             raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
@@ -157,10 +137,7 @@ impl DepthScale {
             // The reciprocal keeps its precision at every distance. The value 0 means that nothing is there.
             [0.0, near]
         };
-        Self {
-            coefficients: coefficients.map(|c| c as f32),
-            parallel,
-        }
+        Self { coefficients: coefficients.map(|c| c as f32), parallel }
     }
 
     /// The depth of `value`; infinite for 0, which means that nothing is there.
@@ -188,11 +165,7 @@ mod tests {
             let scale = DepthScale::of(&camera);
             let [constant, factor] = scale.coefficients;
             for depth in [0.3_f32, 1.0, 17.0, 99.0] {
-                let term = if inverse {
-                    factor / depth
-                } else {
-                    factor * depth
-                };
+                let term = if inverse { factor / depth } else { factor * depth };
                 let back = scale.depth(constant + term);
                 assert!((back / depth - 1.0).abs() < 1e-4, "{depth} {back}");
             }

@@ -1,8 +1,8 @@
 //! Modes of the pipeline that change the picture, not the cost.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST,
 };
 use serde::{Deserialize, Serialize};
 

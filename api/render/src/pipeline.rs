@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, GaussianResolveInputLocationsGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianResolveInputLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::device::Device;
@@ -43,31 +43,23 @@ impl GaussianPipeline {
     ) -> Result<Self, RenderError> {
         let raw = device.raw();
         // SAFETY: the structure is valid.
-        let layout = unsafe { raw.create_pipeline_layout(&Default::default(), None) }
-            .during("vkCreatePipelineLayout")?;
-        let mut pipeline = Self {
-            handle: vk::Pipeline::null(),
-            layout,
-            device: device.clone(),
-        };
+        let layout =
+            unsafe { raw.create_pipeline_layout(&Default::default(), None) }.during("vkCreatePipelineLayout")?;
+        let mut pipeline = Self { handle: vk::Pipeline::null(), layout, device: device.clone() };
 
         let bindings = [0, 1, 2].map(|binding| {
-            vk::VertexInputBindingDescription::default()
-                .binding(binding)
-                .stride(strides[binding as usize])
+            vk::VertexInputBindingDescription::default().binding(binding).stride(strides[binding as usize])
         });
         let attributes = attributes(settings.sh_degree);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
-        let input_assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(1)
-            .scissor_count(1);
+        let input_assembly =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let multisample =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         // Without blending, (C, 1 - T) is written to the attachment.
         let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
@@ -82,21 +74,17 @@ impl GaussianPipeline {
             .depth_compare_op(vk::CompareOp::GREATER);
         let formats = [format, DEPTHS_FORMAT];
         let count = if settings.depth { 2 } else { 1 };
-        let blend =
-            vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments[..count]);
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments[..count]);
         let module = if settings.depth {
             let words = shader_words(include_bytes!("shaders/depths.frag.spv"));
             Some(ShaderModule::new(device, &words)?)
         } else {
             None
         };
-        let stages: Vec<_> = (module.iter())
-            .map(|module| module.stage(vk::ShaderStageFlags::FRAGMENT))
-            .collect();
+        let stages: Vec<_> = (module.iter()).map(|module| module.stage(vk::ShaderStageFlags::FRAGMENT)).collect();
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..count]);
+        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..count]);
         if over_mesh {
             rendering = rendering.depth_attachment_format(DEPTH_FORMAT);
         }
@@ -119,11 +107,8 @@ impl GaussianPipeline {
                     .first_spherical_harmonics(FIRST_SH),
             );
         if settings.depth {
-            gaussian = gaussian.resolve_input_locations(
-                GaussianResolveInputLocationsGAURAST::default()
-                    .accumulated_color(0)
-                    .depth(1),
-            );
+            gaussian = gaussian
+                .resolve_input_locations(GaussianResolveInputLocationsGAURAST::default().accumulated_color(0).depth(1));
         }
         let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
             .exponential_error(settings.exponential_error)
@@ -150,12 +135,8 @@ impl GaussianPipeline {
             create_info = create_info.depth_stencil_state(&depth_test);
         }
         // SAFETY: the structures are valid and live until the call returns.
-        let created = unsafe {
-            raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None)
-        };
-        let handles = created
-            .map_err(|(_, result)| result)
-            .during("vkCreateGraphicsPipelines")?;
+        let created = unsafe { raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None) };
+        let handles = created.map_err(|(_, result)| result).during("vkCreateGraphicsPipelines")?;
         pipeline.handle = handles[0];
         Ok(pipeline)
     }
@@ -168,9 +149,7 @@ impl GaussianPipeline {
 /// The words of a SPIR-V module.
 pub(super) fn shader_words(bytes: &[u8]) -> Vec<u32> {
     let words = bytes.chunks_exact(4);
-    words
-        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-        .collect()
+    words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
 }
 
 /// A shader of one entry point, `main`.
@@ -184,23 +163,13 @@ impl ShaderModule {
     pub(super) fn new(device: &Arc<Device>, words: &[u32]) -> Result<Self, RenderError> {
         let create_info = vk::ShaderModuleCreateInfo::default().code(words);
         // SAFETY: the structure is valid, and the code is a shader of SPIR-V.
-        let handle = unsafe { device.raw().create_shader_module(&create_info, None) }
-            .during("vkCreateShaderModule")?;
-        Ok(Self {
-            handle,
-            device: device.clone(),
-        })
+        let handle = unsafe { device.raw().create_shader_module(&create_info, None) }.during("vkCreateShaderModule")?;
+        Ok(Self { handle, device: device.clone() })
     }
 
     /// The pipeline stage of the module.
-    pub(super) fn stage(
-        &self,
-        stage: vk::ShaderStageFlags,
-    ) -> vk::PipelineShaderStageCreateInfo<'static> {
-        vk::PipelineShaderStageCreateInfo::default()
-            .stage(stage)
-            .module(self.handle)
-            .name(c"main")
+    pub(super) fn stage(&self, stage: vk::ShaderStageFlags) -> vk::PipelineShaderStageCreateInfo<'static> {
+        vk::PipelineShaderStageCreateInfo::default().stage(stage).module(self.handle).name(c"main")
     }
 }
 
@@ -232,10 +201,7 @@ fn attributes(sh_degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
         attribute(3, 1, scalar, std::mem::offset_of!(GaussianShape, opacity)),
     ];
     let coefficients = (sh_degree + 1).pow(2);
-    attributes.extend(
-        (0..coefficients)
-            .map(|k| attribute(FIRST_SH + k, 2, vec3, k as usize * size_of::<[f32; 3]>())),
-    );
+    attributes.extend((0..coefficients).map(|k| attribute(FIRST_SH + k, 2, vec3, k as usize * size_of::<[f32; 3]>())));
     attributes
 }
 

@@ -42,9 +42,7 @@ impl CounterQuery {
             return Ok(None);
         };
         let counters: Vec<_> = device.counters()?.into_iter().zip(0u32..).collect();
-        let counted = counters
-            .into_iter()
-            .filter(|(counter, _)| impacting || !counter.impacting);
+        let counted = counters.into_iter().filter(|(counter, _)| impacting || !counter.impacting);
         let (counters, indices): (Vec<_>, Vec<u32>) = counted.unzip();
         let mut performance = vk::QueryPoolPerformanceCreateInfoKHR::default()
             .queue_family_index(device.queue_family())
@@ -57,18 +55,11 @@ impl CounterQuery {
             .query_count(1)
             .push_next(&mut performance);
         // SAFETY: the structures are valid, and the feature is enabled.
-        let pool = unsafe { device.raw().create_query_pool(&create_info, None) }
-            .during("vkCreateQueryPool")?;
-        let mut query = Self {
-            pool,
-            counters,
-            locked: false,
-            device: device.clone(),
-        };
+        let pool = unsafe { device.raw().create_query_pool(&create_info, None) }.during("vkCreateQueryPool")?;
+        let mut query = Self { pool, counters, locked: false, device: device.clone() };
         let info = vk::AcquireProfilingLockInfoKHR::default().timeout(LOCK_TIMEOUT);
         // SAFETY: the feature is enabled, and the one query of a device doesn't hold the lock yet.
-        unsafe { performance_query.acquire_profiling_lock(&info) }
-            .during("vkAcquireProfilingLockKHR")?;
+        unsafe { performance_query.acquire_profiling_lock(&info) }.during("vkAcquireProfilingLockKHR")?;
         query.locked = true;
         Ok(Some(query))
     }
@@ -77,9 +68,7 @@ impl CounterQuery {
     pub(super) fn reset(&self, commands: vk::CommandBuffer) {
         // SAFETY: the command buffer is recording, outside a render pass.
         unsafe {
-            self.device
-                .raw()
-                .cmd_reset_query_pool(commands, self.pool, 0, 1);
+            self.device.raw().cmd_reset_query_pool(commands, self.pool, 0, 1);
         };
     }
 
@@ -89,9 +78,7 @@ impl CounterQuery {
         // SAFETY: the command buffer is recording and holds nothing yet, the profiling lock is
         // held, and the query is reset before.
         unsafe {
-            self.device
-                .raw()
-                .cmd_begin_query(commands, self.pool, 0, flags);
+            self.device.raw().cmd_begin_query(commands, self.pool, 0, flags);
         };
     }
 
@@ -139,10 +126,7 @@ impl CounterQuery {
 }
 
 /// The number in a counter's result.
-fn value(
-    storage: vk::PerformanceCounterStorageKHR,
-    result: vk::PerformanceCounterResultKHR,
-) -> f64 {
+fn value(storage: vk::PerformanceCounterStorageKHR, result: vk::PerformanceCounterResultKHR) -> f64 {
     use vk::PerformanceCounterStorageKHR as Storage;
     // SAFETY: all eight bytes were initialised, and every pattern is a number of each type.
     unsafe {

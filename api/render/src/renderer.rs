@@ -88,34 +88,21 @@ impl Renderer {
     ///
     /// # Errors
     /// If the scene is too large for the device, or Vulkan fails.
-    pub fn upload(
-        &mut self,
-        scene: &Scene,
-        sh_degree: Option<u32>,
-    ) -> Result<DeviceScene, RenderError> {
-        let settings = Settings {
-            sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE),
-            ..Settings::default()
-        };
+    pub fn upload(&mut self, scene: &Scene, sh_degree: Option<u32>) -> Result<DeviceScene, RenderError> {
+        let settings = Settings { sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE), ..Settings::default() };
         let max = self.device.max_gaussians().min(u32::MAX.into());
         let count = scene.len() as u64;
         if count > max {
             return Err(RenderError::TooMany { count, max });
         }
-        let strides = [
-            size_of::<[f32; 3]>(),
-            size_of::<GaussianShape>(),
-            scene.sh_stride() * size_of::<[f32; 3]>(),
-        ]
-        .map(|stride| stride as u32);
+        let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), scene.sh_stride() * size_of::<[f32; 3]>()]
+            .map(|stride| stride as u32);
         let lit = mesh::lit(scene);
         let mesh = if lit.is_empty() {
             None
         } else {
-            let vertices = u32::try_from(lit.len()).map_err(|_| RenderError::TooMany {
-                count: lit.len() as u64,
-                max: u32::MAX.into(),
-            })?;
+            let vertices = u32::try_from(lit.len())
+                .map_err(|_| RenderError::TooMany { count: lit.len() as u64, max: u32::MAX.into() })?;
             Some(DeviceMesh {
                 vertices,
                 buffer: self.upload_bytes(bytemuck::cast_slice(&lit))?,
@@ -165,10 +152,7 @@ impl Renderer {
         mut settings: Settings,
         over_mesh: bool,
     ) -> Result<GaussianPipeline, RenderError> {
-        settings.sh_degree = settings
-            .sh_degree
-            .min(stored_degree)
-            .min(self.device.max_sh_degree());
+        settings.sh_degree = settings.sh_degree.min(stored_degree).min(self.device.max_sh_degree());
         GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over_mesh)
     }
 
@@ -180,18 +164,11 @@ impl Renderer {
         let size = (bytes.len() as u64).max(4);
         let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
         let staging_size = size.min(STAGING);
-        let staging = Buffer::new(
-            &self.device,
-            staging_size,
-            Usage::TRANSFER_SRC,
-            Memory::Host,
-        )?;
+        let staging = Buffer::new(&self.device, staging_size, Usage::TRANSFER_SRC, Memory::Host)?;
         let mut offset = 0;
         for chunk in bytes.chunks(staging_size as usize) {
             staging.write(chunk)?;
-            let region = vk::BufferCopy::default()
-                .dst_offset(offset)
-                .size(chunk.len() as u64);
+            let region = vk::BufferCopy::default().dst_offset(offset).size(chunk.len() as u64);
             self.commands.record(0, |device, commands| {
                 // SAFETY: the command buffer is recording, and the regions lie within both
                 // buffers, which live until the submission below has ended.
@@ -249,26 +226,20 @@ impl Renderer {
         // A query is not reset in the submission in which it begins, and it spans a whole command buffer, so that
         // counters of any scope can be used.
         if let Some(query) = &self.query {
-            self.commands
-                .record(0, |_, commands| query.reset(commands))?;
+            self.commands.record(0, |_, commands| query.reset(commands))?;
             self.commands.submit_and_wait(&[0])?;
         }
         self.commands.record(0, |_, commands| {
             if let Some(query) = &self.query {
                 query.begin(commands);
             }
-            let recorder = Recorder {
-                device: &self.device,
-                gaussian: &self.gaussian,
-                commands,
-            };
+            let recorder = Recorder { device: &self.device, gaussian: &self.gaussian, commands };
             recorder.record(target, scene, camera);
             if let Some(query) = &self.query {
                 query.end(commands);
             }
         })?;
-        self.commands
-            .record(1, |_, commands| record_copy(&self.device, commands, target))?;
+        self.commands.record(1, |_, commands| record_copy(&self.device, commands, target))?;
         let (start, processor) = (Instant::now(), processor_time());
         self.commands.submit_and_wait(&[0, 1])?;
         let time = start.elapsed();
@@ -290,11 +261,7 @@ impl Renderer {
         };
         let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
         Ok(Frame {
-            picture: Picture {
-                width,
-                height,
-                pixels,
-            },
+            picture: Picture { width, height, pixels },
             time,
             processor_time,
             counters: counters.unwrap_or_default(),

@@ -25,35 +25,24 @@ impl Memory {
     fn wishes(self) -> &'static [(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)] {
         use vk::MemoryPropertyFlags as Flags;
         const NONE: Flags = Flags::empty();
-        const COHERENT: Flags =
-            Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
+        const COHERENT: Flags = Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
         const CACHED: Flags = Flags::from_raw(COHERENT.as_raw() | Flags::HOST_CACHED.as_raw());
         match self {
-            Self::Device => &[
-                (Flags::DEVICE_LOCAL, Flags::HOST_VISIBLE),
-                (Flags::DEVICE_LOCAL, NONE),
-                (NONE, NONE),
-            ],
+            Self::Device => &[(Flags::DEVICE_LOCAL, Flags::HOST_VISIBLE), (Flags::DEVICE_LOCAL, NONE), (NONE, NONE)],
             Self::Host => &[(COHERENT, NONE)],
             Self::HostCached => &[(CACHED, NONE), (COHERENT, NONE)],
         }
     }
 
-    fn allocate(
-        self,
-        device: &Device,
-        requirements: vk::MemoryRequirements,
-    ) -> Result<vk::DeviceMemory, RenderError> {
+    fn allocate(self, device: &Device, requirements: vk::MemoryRequirements) -> Result<vk::DeviceMemory, RenderError> {
         let name = match self {
             Self::Device => "device",
             Self::Host | Self::HostCached => "host-visible",
         };
-        let memory_type = device
-            .memory_type(requirements.memory_type_bits, self.wishes())
-            .ok_or(RenderError::NoMemory(name))?;
-        let allocate_info = vk::MemoryAllocateInfo::default()
-            .allocation_size(requirements.size)
-            .memory_type_index(memory_type);
+        let memory_type =
+            device.memory_type(requirements.memory_type_bits, self.wishes()).ok_or(RenderError::NoMemory(name))?;
+        let allocate_info =
+            vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(memory_type);
         // SAFETY: the structure is valid.
         unsafe { device.raw().allocate_memory(&allocate_info, None) }.during("vkAllocateMemory")
     }
@@ -80,20 +69,13 @@ impl Buffer {
     ) -> Result<Self, RenderError> {
         let create_info = vk::BufferCreateInfo::default().size(size).usage(usage);
         // SAFETY: the structure is valid.
-        let handle =
-            unsafe { device.raw().create_buffer(&create_info, None) }.during("vkCreateBuffer")?;
-        let mut buffer = Self {
-            handle,
-            memory: vk::DeviceMemory::null(),
-            size,
-            device: device.clone(),
-        };
+        let handle = unsafe { device.raw().create_buffer(&create_info, None) }.during("vkCreateBuffer")?;
+        let mut buffer = Self { handle, memory: vk::DeviceMemory::null(), size, device: device.clone() };
         // SAFETY: the buffer is the device's.
         let requirements = unsafe { device.raw().get_buffer_memory_requirements(handle) };
         buffer.memory = kind.allocate(device, requirements)?;
         // SAFETY: the memory is new, and of the size and a type that the buffer requires.
-        unsafe { device.raw().bind_buffer_memory(handle, buffer.memory, 0) }
-            .during("vkBindBufferMemory")?;
+        unsafe { device.raw().bind_buffer_memory(handle, buffer.memory, 0) }.during("vkBindBufferMemory")?;
         Ok(buffer)
     }
 
@@ -111,10 +93,7 @@ impl Buffer {
     /// # Panics
     /// If the buffer is smaller.
     pub fn write(&self, bytes: &[u8]) -> Result<(), RenderError> {
-        assert!(
-            bytes.len() as u64 <= self.size,
-            "the buffer holds the bytes"
-        );
+        assert!(bytes.len() as u64 <= self.size, "the buffer holds the bytes");
         self.mapped(|mapped| {
             // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile.
             unsafe { mapped.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) }
@@ -130,10 +109,7 @@ impl Buffer {
     /// If the buffer is smaller.
     pub fn read<T: Pod>(&self, values: &mut [T]) -> Result<(), RenderError> {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(values);
-        assert!(
-            bytes.len() as u64 <= self.size,
-            "the buffer holds the bytes"
-        );
+        assert!(bytes.len() as u64 <= self.size, "the buffer holds the bytes");
         self.mapped(|mapped| {
             // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile.
             unsafe { mapped.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) }
@@ -170,15 +146,8 @@ impl Buffer {
     ///
     /// # Panics
     /// If the buffer is smaller.
-    pub fn fill<T: Pod>(
-        &self,
-        count: usize,
-        fill: impl FnOnce(&mut [MaybeUninit<T>]),
-    ) -> Result<(), RenderError> {
-        assert!(
-            (count * size_of::<T>()) as u64 <= self.size,
-            "the buffer holds the elements"
-        );
+    pub fn fill<T: Pod>(&self, count: usize, fill: impl FnOnce(&mut [MaybeUninit<T>])) -> Result<(), RenderError> {
+        assert!((count * size_of::<T>()) as u64 <= self.size, "the buffer holds the elements");
         self.mapped(|mapped| {
             assert!(mapped.cast::<T>().is_aligned(), "memory is mapped at 64");
             // SAFETY: `mapped` points to `size` bytes, aligned for `T`, which nothing else
@@ -196,9 +165,8 @@ impl Buffer {
         let raw = self.device.raw();
         // SAFETY: only buffers in coherent host memory are read and written; each has memory of
         // its own, mapped nowhere else; this call ends with the mapping.
-        let mapped =
-            unsafe { raw.map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()) }
-                .during("vkMapMemory")?;
+        let mapped = unsafe { raw.map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()) }
+            .during("vkMapMemory")?;
         access(mapped.cast());
         // SAFETY: the memory was mapped above.
         unsafe { raw.unmap_memory(self.memory) };
@@ -249,8 +217,7 @@ impl Image {
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(usage);
         // SAFETY: the structure is valid.
-        let handle =
-            unsafe { device.raw().create_image(&create_info, None) }.during("vkCreateImage")?;
+        let handle = unsafe { device.raw().create_image(&create_info, None) }.during("vkCreateImage")?;
         let mut image = Self {
             handle,
             memory: vk::DeviceMemory::null(),
@@ -263,16 +230,14 @@ impl Image {
         let requirements = unsafe { device.raw().get_image_memory_requirements(handle) };
         image.memory = Memory::Device.allocate(device, requirements)?;
         // SAFETY: the memory is new, and of the size and a type that the image requires.
-        unsafe { device.raw().bind_image_memory(handle, image.memory, 0) }
-            .during("vkBindImageMemory")?;
+        unsafe { device.raw().bind_image_memory(handle, image.memory, 0) }.during("vkBindImageMemory")?;
         let create_info = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
             .subresource_range(image.whole);
         // SAFETY: the structure is valid, and the image is bound to memory.
-        image.view = unsafe { device.raw().create_image_view(&create_info, None) }
-            .during("vkCreateImageView")?;
+        image.view = unsafe { device.raw().create_image_view(&create_info, None) }.during("vkCreateImageView")?;
         Ok(image)
     }
 
@@ -292,11 +257,7 @@ impl Image {
     }
 
     /// A barrier that changes the layout, still without accesses.
-    pub fn barrier(
-        &self,
-        from: vk::ImageLayout,
-        to: vk::ImageLayout,
-    ) -> vk::ImageMemoryBarrier<'static> {
+    pub fn barrier(&self, from: vk::ImageLayout, to: vk::ImageLayout) -> vk::ImageMemoryBarrier<'static> {
         vk::ImageMemoryBarrier::default()
             .image(self.handle)
             .old_layout(from)
@@ -309,15 +270,9 @@ impl Image {
 
 /// All of an image of `format`, of one level and one layer.
 fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
-    let aspect = if format == vk::Format::D32_SFLOAT {
-        vk::ImageAspectFlags::DEPTH
-    } else {
-        vk::ImageAspectFlags::COLOR
-    };
-    vk::ImageSubresourceRange::default()
-        .aspect_mask(aspect)
-        .level_count(1)
-        .layer_count(1)
+    let aspect =
+        if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+    vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1)
 }
 
 impl Drop for Image {
@@ -352,23 +307,14 @@ impl<const N: usize> CommandBuffers<N> {
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER)
             .queue_family_index(device.queue_family());
         // SAFETY: the structure is valid.
-        let pool =
-            unsafe { raw.create_command_pool(&create_info, None) }.during("vkCreateCommandPool")?;
-        let mut commands = Self {
-            pool,
-            fence: vk::Fence::null(),
-            handles: Vec::new(),
-            device: device.clone(),
-        };
+        let pool = unsafe { raw.create_command_pool(&create_info, None) }.during("vkCreateCommandPool")?;
+        let mut commands = Self { pool, fence: vk::Fence::null(), handles: Vec::new(), device: device.clone() };
         // SAFETY: the structure is valid.
-        commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
-            .during("vkCreateFence")?;
-        let allocate_info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .command_buffer_count(N as u32);
+        commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.during("vkCreateFence")?;
+        let allocate_info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(N as u32);
         // SAFETY: the structure is valid, and the pool is used by `self` alone.
-        commands.handles = unsafe { raw.allocate_command_buffers(&allocate_info) }
-            .during("vkAllocateCommandBuffers")?;
+        commands.handles =
+            unsafe { raw.allocate_command_buffers(&allocate_info) }.during("vkAllocateCommandBuffers")?;
         Ok(commands)
     }
 
@@ -382,8 +328,7 @@ impl<const N: usize> CommandBuffers<N> {
         record: impl FnOnce(&ash::Device, vk::CommandBuffer),
     ) -> Result<(), RenderError> {
         let (raw, handle) = (self.device.raw(), self.handles[index]);
-        let begin_info = vk::CommandBufferBeginInfo::default()
-            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        let begin_info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: no submission is pending, since each is waited for; beginning resets.
         unsafe { raw.begin_command_buffer(handle, &begin_info) }.during("vkBeginCommandBuffer")?;
         record(raw, handle);
@@ -401,8 +346,7 @@ impl<const N: usize> CommandBuffers<N> {
         let submit = vk::SubmitInfo::default().command_buffers(&handles);
         // SAFETY: the command buffers are recorded, `&mut self` and the one renderer per device
         // keep others from the queue, and the fence is unsignalled.
-        unsafe { raw.queue_submit(self.device.queue(), &[submit], self.fence) }
-            .during("vkQueueSubmit")?;
+        unsafe { raw.queue_submit(self.device.queue(), &[submit], self.fence) }.during("vkQueueSubmit")?;
         // SAFETY: the fence is the device's.
         unsafe { raw.wait_for_fences(&[self.fence], true, u64::MAX) }.during("vkWaitForFences")?;
         // SAFETY: no submission with the fence is pending.

@@ -97,10 +97,7 @@ impl Settings {
         let per_pixel = self.order == Order::PerPixel;
         let panorama = camera.model == Model::Equirectangular;
         let refused = [
-            (
-                surfels && half,
-                "flat Gaussians (2d) are not drawn in binary16 (fp16)",
-            ),
+            (surfels && half, "flat Gaussians (2d) are not drawn in binary16 (fp16)"),
             (
                 surfels && self.antialiasing == Antialiasing::Compensated,
                 "flat Gaussians (2d) are not drawn with compensated opacity",
@@ -109,23 +106,14 @@ impl Settings {
                 surfels && (panorama || camera.model == Model::Fisheye),
                 "flat Gaussians (2d) are drawn by pinhole and orthographic cameras alone",
             ),
-            (
-                half && per_pixel,
-                "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel",
-            ),
-            (
-                half && panorama,
-                "panoramas are not drawn in binary16 (fp16)",
-            ),
+            (half && per_pixel, "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel"),
+            (half && panorama, "panoramas are not drawn in binary16 (fp16)"),
             (
                 self.cut_off != CutOff::None && (surfels || half),
                 "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32)",
             ),
             (self.depth && half, "depths are not kept in binary16 (fp16)"),
-            (
-                self.depth && per_pixel,
-                "depths are not kept in the order per-pixel",
-            ),
+            (self.depth && per_pixel, "depths are not kept in the order per-pixel"),
             (
                 self.depth && camera.model == Model::Orthographic && camera.far.is_infinite(),
                 "depths of an orthographic camera need a far plane",

@@ -73,11 +73,7 @@ impl Target {
         Ok(Self {
             image: image(COLOR_FORMAT)?,
             readback: readback(size_of::<[f32; 4]>())?,
-            depths: if depth {
-                Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?))
-            } else {
-                None
-            },
+            depths: if depth { Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?)) } else { None },
             tested: if tested {
                 let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
                 Some(Image::new(device, extent, DEPTH_FORMAT, usage)?)
@@ -98,18 +94,11 @@ pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target
 
 fn copy_image(device: &Device, commands: vk::CommandBuffer, image: &Image, readback: &Buffer) {
     let to_source = image
-        .barrier(
-            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-        )
+        .barrier(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL)
         .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
         .dst_access_mask(vk::AccessFlags::TRANSFER_READ);
-    let layers = vk::ImageSubresourceLayers::default()
-        .aspect_mask(vk::ImageAspectFlags::COLOR)
-        .layer_count(1);
-    let region = vk::BufferImageCopy::default()
-        .image_subresource(layers)
-        .image_extent(image.extent().into());
+    let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+    let region = vk::BufferImageCopy::default().image_subresource(layers).image_extent(image.extent().into());
     let to_host = vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
         .dst_access_mask(vk::AccessFlags::HOST_READ);

@@ -14,12 +14,7 @@ fn angle(a: [f32; 4], b: [f32; 4]) -> f64 {
     let unit = |q: [f32; 4]| q.map(|c| f64::from(c) / norm(q));
     let (a, b) = (unit(a), unit(b));
     // The sign of a quaternion has no meaning. The chord is exact for small angles, where the arc cosine is not.
-    let chord = |sign: f64| {
-        (0..4)
-            .map(|i| (a[i] - sign * b[i]).powi(2))
-            .sum::<f64>()
-            .sqrt()
-    };
+    let chord = |sign: f64| (0..4).map(|i| (a[i] - sign * b[i]).powi(2)).sum::<f64>().sqrt();
     4.0 * (chord(1.0).min(chord(-1.0)) / 2.0).asin().to_degrees()
 }
 
@@ -35,12 +30,9 @@ fn difference(a: &[[f32; 3]], b: &[[f32; 3]], map: impl Fn(f64) -> f64) -> f64 {
 }
 
 fn line(a: &Scene, b: &Scene) -> String {
-    let scales =
-        |scene: &Scene| -> Vec<[f32; 3]> { scene.shapes().iter().map(|s| s.scale).collect() };
+    let scales = |scene: &Scene| -> Vec<[f32; 3]> { scene.shapes().iter().map(|s| s.scale).collect() };
     let pairs = || a.shapes().iter().zip(b.shapes());
-    let of = |each: &dyn Fn(&GaussianShape, &GaussianShape) -> f64| {
-        greatest(pairs().map(|(a, b)| each(a, b)))
-    };
+    let of = |each: &dyn Fn(&GaussianShape, &GaussianShape) -> f64| greatest(pairs().map(|(a, b)| each(a, b)));
     format!(
         "{} Gaussians of degree {}: position {:.2e}, ln scale {:.2e}, opacity {:.2e}, rotation {:.2e} degrees, \
          harmonics {:.2e}",
@@ -55,13 +47,9 @@ fn line(a: &Scene, b: &Scene) -> String {
 }
 
 fn compare(paths: &[std::path::PathBuf]) -> Result<String, SceneError> {
-    let (a, b) = (
-        gaurast_scene::open(&paths[0])?,
-        gaurast_scene::open(&paths[1])?,
-    );
+    let (a, b) = (gaurast_scene::open(&paths[0])?, gaurast_scene::open(&paths[1])?);
     if (a.len(), a.sh_degree()) != (b.len(), b.sh_degree()) {
-        let of =
-            |scene: &Scene| format!("{} Gaussians of degree {}", scene.len(), scene.sh_degree());
+        let of = |scene: &Scene| format!("{} Gaussians of degree {}", scene.len(), scene.sh_degree());
         return Ok(format!("{} are not {}", of(&a), of(&b)));
     }
     Ok(line(&a, &b))

@@ -115,9 +115,7 @@ impl Camera {
         if fov <= 0.0 || fov >= 180.0 {
             return Err(CameraError::FieldOfView);
         }
-        let forward = (target - position)
-            .try_normalize()
-            .ok_or(CameraError::NoDirection)?;
+        let forward = (target - position).try_normalize().ok_or(CameraError::NoDirection)?;
         let right = up
             .try_normalize()
             .map(|up| forward.cross(up))
@@ -125,12 +123,7 @@ impl Camera {
             .ok_or(CameraError::NoUp)?
             .normalize();
         let down = forward.cross(right);
-        Ok(Self::new(
-            [right, down, forward].map(<[f64; 3]>::from),
-            eye,
-            fov,
-            size,
-        ))
+        Ok(Self::new([right, down, forward].map(<[f64; 3]>::from), eye, fov, size))
     }
 
     /// A camera of vertical field of view `fov` in degrees, looking through its picture's centre.
@@ -157,16 +150,10 @@ impl Camera {
     pub fn check(&self) -> Result<(), CameraError> {
         let rotation = self.rotation.as_flattened();
         let binary32 = rotation.iter().chain(&self.principal);
-        if !binary32.copied().all(|x| (x as f32).is_finite())
-            || !self.eye.iter().all(|x| x.is_finite())
-        {
+        if !binary32.copied().all(|x| (x as f32).is_finite()) || !self.eye.iter().all(|x| x.is_finite()) {
             return Err(CameraError::NotFinite);
         }
-        if !self
-            .focal
-            .iter()
-            .all(|f| (*f as f32).is_finite() && *f as f32 > 0.0)
-        {
+        if !self.focal.iter().all(|f| (*f as f32).is_finite() && *f as f32 > 0.0) {
             return Err(CameraError::Focal);
         }
         let (near, far) = (self.near as f32, self.far as f32);
@@ -186,21 +173,14 @@ impl Camera {
     /// The camera with the picture magnified about the principal point.
     #[must_use]
     pub fn zoomed(&self, factor: f64) -> Self {
-        Self {
-            focal: self.focal.map(|focal| focal * factor),
-            ..*self
-        }
+        Self { focal: self.focal.map(|focal| focal * factor), ..*self }
     }
 
     /// An orthographic camera with the same axes, which shows objects `distance` ahead as large as a pinhole camera
     /// does.
     #[must_use]
     pub fn orthographic(&self, distance: f64) -> Self {
-        Self {
-            model: Model::Orthographic,
-            focal: self.focal.map(|focal| focal / distance),
-            ..*self
-        }
+        Self { model: Model::Orthographic, focal: self.focal.map(|focal| focal / distance), ..*self }
     }
 
     /// A fisheye with the same axes, whose vertical field of view is `fov` degrees.
@@ -230,18 +210,9 @@ impl Camera {
     /// The same view in a picture of another size: each axis is scaled on its own.
     #[must_use]
     pub fn resized(&self, [width, height]: [u32; 2]) -> Self {
-        let scale = [
-            f64::from(width) / f64::from(self.width),
-            f64::from(height) / f64::from(self.height),
-        ];
+        let scale = [f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height)];
         let scaled = |values: [f64; 2]| [values[0] * scale[0], values[1] * scale[1]];
-        Self {
-            focal: scaled(self.focal),
-            principal: scaled(self.principal),
-            width,
-            height,
-            ..*self
-        }
+        Self { focal: scaled(self.focal), principal: scaled(self.principal), width, height, ..*self }
     }
 
     /// The camera turned by `angle` radians about an axis through `pivot`.
@@ -251,9 +222,7 @@ impl Camera {
         let turn = DMat3::from_axis_angle(DVec3::from_array(axis).normalize(), angle);
         let eye = pivot + turn * (DVec3::from_array(self.eye) - pivot);
         Self {
-            rotation: self
-                .rotation
-                .map(|row| (turn * DVec3::from_array(row)).to_array()),
+            rotation: self.rotation.map(|row| (turn * DVec3::from_array(row)).to_array()),
             eye: eye.to_array(),
             ..*self
         }
@@ -278,12 +247,8 @@ impl Camera {
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
         let t = rotation * (DVec3::from_array(point) - DVec3::from_array(self.eye));
-        (t.z > 0.0).then(|| {
-            [
-                self.focal[0] * t.x / t.z + self.principal[0],
-                self.focal[1] * t.y / t.z + self.principal[1],
-            ]
-        })
+        (t.z > 0.0)
+            .then(|| [self.focal[0] * t.x / t.z + self.principal[0], self.focal[1] * t.y / t.z + self.principal[1]])
     }
 
     /// The camera as a Vulkan structure for draws.
@@ -313,17 +278,13 @@ mod tests {
     #[track_caller]
     fn close(a: Option<[f64; 2]>, b: [f64; 2]) {
         let a = a.expect("in front");
-        assert!(
-            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9),
-            "{a:?} {b:?}"
-        );
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{a:?} {b:?}");
     }
 
     #[test]
     fn look_at_puts_known_points_where_they_belong() {
         // From (0, 0, -4) along +z with -y upwards: x is right, y is down.
-        let camera = Camera::look_at([0., 0., -4.], [0.; 3], [0., -1., 0.], 90.0, [200, 100])
-            .expect("a camera");
+        let camera = Camera::look_at([0., 0., -4.], [0.; 3], [0., -1., 0.], 90.0, [200, 100]).expect("a camera");
         assert_eq!(camera.rotation, [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]);
         // A vertical field of view of 90 degrees: 4 ahead, 4 down is the lower edge.
         close(camera.project([0., 4., 0.]), [100., 100.]);
@@ -331,8 +292,7 @@ mod tests {
         assert_eq!(camera.project([0., 0., -5.]), None);
 
         // Y-up world, seen from +z: x is still right, and y is up.
-        let camera = Camera::look_at([1., 1., 5.], [1., 1., 0.], [0., 1., 0.], 90.0, [200, 100])
-            .expect("a camera");
+        let camera = Camera::look_at([1., 1., 5.], [1., 1., 0.], [0., 1., 0.], 90.0, [200, 100]).expect("a camera");
         close(camera.project([1., 1., 0.]), [100., 50.]);
         close(camera.project([2., 2., 0.]), [110., 40.]);
     }
@@ -359,17 +319,11 @@ mod tests {
         };
         assert_eq!(with(&|c| c.focal[0] = 1e308), Some(CameraError::Focal));
         assert_eq!(with(&|c| c.focal[1] = 1e-60), Some(CameraError::Focal));
-        assert_eq!(
-            with(&|c| c.principal[0] = 1e39),
-            Some(CameraError::NotFinite)
-        );
+        assert_eq!(with(&|c| c.principal[0] = 1e39), Some(CameraError::NotFinite));
         assert_eq!(with(&|c| c.eye[2] = f64::NAN), Some(CameraError::NotFinite));
         assert_eq!(with(&|c| c.near = 0.0), Some(CameraError::Planes));
         assert_eq!(with(&|c| c.far = 0.1), Some(CameraError::Planes));
-        let orthographic = Camera {
-            near: -1.0,
-            ..camera.orthographic(4.0)
-        };
+        let orthographic = Camera { near: -1.0, ..camera.orthographic(4.0) };
         assert_eq!(orthographic.check(), Ok(()));
         assert!((orthographic.focal[0] - camera.focal[0] / 4.0).abs() < 1e-12);
     }
@@ -381,16 +335,12 @@ mod tests {
         assert!(!text.contains("near") && !text.contains("far"), "{text}");
         let camera = camera.with_planes(0.01, 50.0);
         let text = serde_json::to_string(&camera).expect("text");
-        assert_eq!(
-            serde_json::from_str::<Camera>(&text).expect("a camera"),
-            camera
-        );
+        assert_eq!(serde_json::from_str::<Camera>(&text).expect("a camera"), camera);
     }
 
     #[test]
     fn resizing_scales_both_axes_separately() {
-        let camera = Camera::look_at([0.; 3], [0., 0., 1.], [0., -1., 0.], 60.0, [400, 300])
-            .expect("a camera");
+        let camera = Camera::look_at([0.; 3], [0., 0., 1.], [0., -1., 0.], 60.0, [400, 300]).expect("a camera");
         let resized = camera.resized([800, 900]);
         let point = [0.1, -0.2, 1.0];
         let [x, y] = camera.project(point).expect("in front");
@@ -417,26 +367,16 @@ mod tests {
         let pinhole = Camera::orbit(1, [200, 100]).remove(0);
         let panorama = pinhole.panorama();
         assert_eq!(panorama.rotation, pinhole.rotation);
-        let turn = [
-            panorama.focal[0] * std::f64::consts::TAU,
-            panorama.focal[1] * std::f64::consts::PI,
-        ];
+        let turn = [panorama.focal[0] * std::f64::consts::TAU, panorama.focal[1] * std::f64::consts::PI];
         close(Some(turn), [200.0, 100.0]);
         let fisheye = pinhole.fisheye(180.0);
-        close(
-            Some(fisheye.focal.map(|focal| focal * std::f64::consts::PI)),
-            [100.0; 2],
-        );
-        assert_eq!(
-            panorama.to_vulkan().model,
-            GaussianCameraModelGAURAST::EQUIRECTANGULAR
-        );
+        close(Some(fisheye.focal.map(|focal| focal * std::f64::consts::PI)), [100.0; 2]);
+        assert_eq!(panorama.to_vulkan().model, GaussianCameraModelGAURAST::EQUIRECTANGULAR);
     }
 
     #[test]
     fn vulkan_takes_the_same_camera() {
-        let camera =
-            Camera::look_at([3., 1., 2.], [0.; 3], [0., 0., 1.], 60.0, [64, 48]).expect("a camera");
+        let camera = Camera::look_at([3., 1., 2.], [0.; 3], [0., 0., 1.], 60.0, [64, 48]).expect("a camera");
         let vulkan = camera.to_vulkan();
         assert_eq!(vulkan.eye, [3., 1., 2.]);
         assert_eq!(vulkan.rotation[5], camera.rotation[1][2] as f32);

@@ -75,9 +75,7 @@ impl Keyframe {
                 let distance = DVec3::from_array(self.eye).distance(DVec3::from_array(self.target));
                 Ok(pinhole(self.fov)?.orthographic(distance))
             }
-            Model::Fisheye if self.fov > 0.0 && self.fov <= 360.0 => {
-                Ok(pinhole(DEFAULT_FOV)?.fisheye(self.fov))
-            }
+            Model::Fisheye if self.fov > 0.0 && self.fov <= 360.0 => Ok(pinhole(DEFAULT_FOV)?.fisheye(self.fov)),
             Model::Fisheye => Err(CameraError::FieldOfView),
             Model::Equirectangular => Ok(pinhole(DEFAULT_FOV)?.panorama()),
         }
@@ -91,17 +89,11 @@ impl Keyframe {
 ///
 /// # Errors
 /// See [`CameraError`]; [`CameraError::NotFinite`] where times don't ascend.
-pub fn along(
-    keyframes: &[Keyframe],
-    count: Option<usize>,
-    size: [u32; 2],
-) -> Result<Vec<Camera>, CameraError> {
+pub fn along(keyframes: &[Keyframe], count: Option<usize>, size: [u32; 2]) -> Result<Vec<Camera>, CameraError> {
     let (Some(count), true) = (count, keyframes.len() > 1) else {
         return keyframes.iter().map(|frame| frame.camera(size)).collect();
     };
-    let times: Vec<f64> = (keyframes.iter().enumerate())
-        .map(|(i, frame)| frame.time.unwrap_or(i as f64))
-        .collect();
+    let times: Vec<f64> = (keyframes.iter().enumerate()).map(|(i, frame)| frame.time.unwrap_or(i as f64)).collect();
     let ascending = times.windows(2).all(|pair| pair[0] < pair[1]);
     if !ascending || times.iter().any(|time| !time.is_finite()) {
         return Err(CameraError::NotFinite);
@@ -115,17 +107,10 @@ pub fn along(
 
 /// The keyframe at a time between the first and the last.
 fn at(keyframes: &[Keyframe], times: &[f64], time: f64) -> Keyframe {
-    let after = times
-        .partition_point(|t| *t <= time)
-        .clamp(1, times.len() - 1);
+    let after = times.partition_point(|t| *t <= time).clamp(1, times.len() - 1);
     let part = (time - times[after - 1]) / (times[after] - times[after - 1]);
     let frame = |index: usize| &keyframes[index.min(keyframes.len() - 1)];
-    let four = [
-        frame((after - 1).saturating_sub(1)),
-        frame(after - 1),
-        frame(after),
-        frame(after + 1),
-    ];
+    let four = [frame((after - 1).saturating_sub(1)), frame(after - 1), frame(after), frame(after + 1)];
     let vector = |value: &dyn Fn(&Keyframe) -> [f64; 3]| -> [f64; 3] {
         let values = four.map(value);
         std::array::from_fn(|axis| spline(values.map(|v| v[axis]), part))
@@ -143,10 +128,7 @@ fn at(keyframes: &[Keyframe], times: &[f64], time: f64) -> Keyframe {
 /// The Catmull-Rom spline through the middle two of four values, `t` from 0 to 1 between them.
 fn spline([a, b, c, d]: [f64; 4], t: f64) -> f64 {
     let (square, cube) = (t * t, t * t * t);
-    0.5 * (2.0 * b
-        + (c - a) * t
-        + (2.0 * a - 5.0 * b + 4.0 * c - d) * square
-        + (3.0 * b - a - 3.0 * c + d) * cube)
+    0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * square + (3.0 * b - a - 3.0 * c + d) * cube)
 }
 
 #[cfg(test)]
@@ -175,29 +157,17 @@ mod tests {
         assert!(eyes.windows(2).all(|pair| pair[0] < pair[1]), "{eyes:?}");
         assert_eq!(along(&keyframes, None, [64, 48]).expect("cameras").len(), 3);
         assert_eq!(along(&keyframes, Some(1), [64, 48]).expect("one").len(), 1);
-        let backwards = [
-            Keyframe {
-                time: Some(3.0),
-                ..keyframe(0.0)
-            },
-            keyframe(1.0),
-        ];
+        let backwards = [Keyframe { time: Some(3.0), ..keyframe(0.0) }, keyframe(1.0)];
         assert!(along(&backwards, Some(4), [64, 48]).is_err());
     }
 
     #[test]
     fn a_camera_is_its_keyframe_again() {
         let pinhole = keyframe(2.0).camera([64, 48]).expect("a camera");
-        for camera in [
-            pinhole.orthographic(3.0),
-            pinhole.fisheye(180.0),
-            pinhole.fisheye(90.0),
-            pinhole.panorama(),
-            pinhole,
-        ] {
-            let again = Keyframe::of(&camera, 4.0)
-                .camera([64, 48])
-                .expect("a camera");
+        for camera in
+            [pinhole.orthographic(3.0), pinhole.fisheye(180.0), pinhole.fisheye(90.0), pinhole.panorama(), pinhole]
+        {
+            let again = Keyframe::of(&camera, 4.0).camera([64, 48]).expect("a camera");
             assert_eq!(again.model, camera.model);
             for axis in 0..3 {
                 assert!((camera.eye[axis] - again.eye[axis]).abs() < 1e-12);
@@ -206,11 +176,7 @@ mod tests {
                 assert!((camera.focal[axis] - again.focal[axis]).abs() < 1e-9);
             }
         }
-        let wide = Keyframe {
-            fov: 361.0,
-            camera: Model::Fisheye,
-            ..keyframe(0.0)
-        };
+        let wide = Keyframe { fov: 361.0, camera: Model::Fisheye, ..keyframe(0.0) };
         assert_eq!(wide.camera([8, 8]), Err(CameraError::FieldOfView));
     }
 }

@@ -237,10 +237,7 @@ pub enum Reason {
 impl Reason {
     /// This reason, at `place`.
     pub(crate) fn at(self, place: Place) -> Fault {
-        Fault {
-            place,
-            reason: self,
-        }
+        Fault { place, reason: self }
     }
 }
 
@@ -259,11 +256,7 @@ impl Fault {
             Reason::UnknownFormat(known) => SceneError::UnknownFormat { path, known },
             Reason::NotRead(format) => SceneError::NotRead { path, format },
             Reason::Io(source) => SceneError::Io { path, source },
-            reason => SceneError::Malformed {
-                path,
-                place: self.place,
-                reason,
-            },
+            reason => SceneError::Malformed { path, place: self.place, reason },
         }
     }
 }

@@ -41,11 +41,7 @@ impl Extent {
         let (mut min, mut max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
         if let Some((least, greatest)) = scene.mesh().bounds() {
             let (least, greatest) = (DVec3::from_array(least), DVec3::from_array(greatest));
-            (min, max) = if sample.is_empty() {
-                (least, greatest)
-            } else {
-                (min.min(least), max.max(greatest))
-            };
+            (min, max) = if sample.is_empty() { (least, greatest) } else { (min.min(least), max.max(greatest)) };
         }
         let half = (max - min) / 2.0;
         // A scene of one point gets a box as large as its Gaussian.
@@ -57,10 +53,7 @@ impl Extent {
         } else {
             LEAST
         };
-        Self {
-            centre: ((min + max) / 2.0).into(),
-            half: half.max(DVec3::splat(least)).into(),
-        }
+        Self { centre: ((min + max) / 2.0).into(), half: half.max(DVec3::splat(least)).into() }
     }
 
     /// Half of the box's diagonal.
@@ -101,15 +94,7 @@ pub struct Framing {
 impl Framing {
     /// A framing with all values chosen for the scene.
     pub fn new(fov: f64, size: [u32; 2]) -> Self {
-        Self {
-            azimuth: None,
-            elevation: None,
-            distance: None,
-            zoom: 1.0,
-            up: DEFAULT_UP,
-            fov,
-            size,
-        }
+        Self { azimuth: None, elevation: None, distance: None, zoom: 1.0, up: DEFAULT_UP, fov, size }
     }
 
     /// The camera that looks at the middle of `extent`.
@@ -123,21 +108,15 @@ impl Framing {
         let looking = Camera::look_at(eye.into(), centre.into(), up.into(), self.fov, self.size);
         let mut camera = match looking {
             // The scene is so far from the origin that rounding loses the direction.
-            Err(CameraError::NoDirection | CameraError::NoUp) => Camera::new(
-                [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
-                eye.into(),
-                self.fov,
-                self.size,
-            ),
+            Err(CameraError::NoDirection | CameraError::NoUp) => {
+                Camera::new([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], eye.into(), self.fov, self.size)
+            }
             looking => looking?,
         };
         let [right, down, forward] = camera.rotation.map(DVec3::from_array);
         let half = DVec3::from_array(extent.half);
         // The distance at which every corner of the box is within the picture.
-        let tangents = [
-            camera.principal[0] / camera.focal[0] / MARGIN,
-            camera.principal[1] / camera.focal[1] / MARGIN,
-        ];
+        let tangents = [camera.principal[0] / camera.focal[0] / MARGIN, camera.principal[1] / camera.focal[1] / MARGIN];
         let framed = (0..8)
             .map(|corner| {
                 let sign = |bit: u32| if corner & (1 << bit) == 0 { -1.0 } else { 1.0 };
@@ -150,14 +129,8 @@ impl Framing {
         camera.eye = (centre - forward * distance).into();
         // The near plane is half of the way to the box, unless 3DGS's plane is nearer.
         let nearest = distance - extent.reach(forward);
-        let near = if nearest > 0.0 {
-            nearest / 2.0
-        } else {
-            extent.near()
-        };
-        Ok(camera
-            .with_planes(near.min(DEFAULT_NEAR), f64::INFINITY)
-            .zoomed(self.zoom))
+        let near = if nearest > 0.0 { nearest / 2.0 } else { extent.near() };
+        Ok(camera.with_planes(near.min(DEFAULT_NEAR), f64::INFINITY).zoomed(self.zoom))
     }
 
     /// The direction from the middle to the eye, and the direction upwards in the picture.
@@ -178,11 +151,7 @@ impl Framing {
         let level = azimuth.cos() * front + azimuth.sin() * side;
         let from = elevation.cos() * level + elevation.sin() * up;
         // Seen straight from above or below, the picture's upper edge is the far or the near one.
-        let upwards = if elevation.cos().abs() < 1e-6 {
-            -level * elevation.sin().signum()
-        } else {
-            up
-        };
+        let upwards = if elevation.cos().abs() < 1e-6 { -level * elevation.sin().signum() } else { up };
         Ok((from, upwards))
     }
 }
@@ -190,35 +159,23 @@ impl Framing {
 /// The default azimuth and elevation of a framing, in degrees.
 pub fn default_angles() -> (f64, f64) {
     let level = FROM.x.hypot(FROM.z);
-    (
-        FROM.x.atan2(-FROM.z).to_degrees(),
-        (-FROM.y).atan2(level).to_degrees(),
-    )
+    (FROM.x.atan2(-FROM.z).to_degrees(), (-FROM.y).atan2(level).to_degrees())
 }
 
 /// The direction of azimuth 0: the horizontal direction nearest to -z; or to +y, if -z is almost vertical.
 fn front(up: DVec3) -> DVec3 {
     let level = |direction: DVec3| direction - direction.dot(up) * up;
     let towards = level(DVec3::NEG_Z);
-    if towards.length() > 0.1 {
-        towards.normalize()
-    } else {
-        level(DVec3::Y).normalize()
-    }
+    if towards.length() > 0.1 { towards.normalize() } else { level(DVec3::Y).normalize() }
 }
 
 /// A camera that looks forward at `scene` from a little above, with its opaque parts in a picture of `size` pixels and
 /// a vertical field of view of `fov` degrees (more than 0, less than 180).
 pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
     let extent = Extent::of(scene);
-    Framing::new(fov, size).camera(&extent).unwrap_or_else(|_| {
-        Camera::new(
-            [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
-            extent.centre,
-            fov,
-            size,
-        )
-    })
+    Framing::new(fov, size)
+        .camera(&extent)
+        .unwrap_or_else(|_| Camera::new([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], extent.centre, fov, size))
 }
 
 /// A camera in the middle of the scene that looks horizontally along `azimuth` degrees (0 looks along +z, as from the
@@ -226,19 +183,8 @@ pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
 ///
 /// # Errors
 /// [`CameraError::NoUp`] if `up` is zero, and others for numbers that are not finite.
-pub fn inside(
-    extent: &Extent,
-    azimuth: f64,
-    up: [f64; 3],
-    fov: f64,
-    size: [u32; 2],
-) -> Result<Camera, CameraError> {
-    let framing = Framing {
-        azimuth: Some(azimuth),
-        elevation: Some(0.0),
-        up,
-        ..Framing::new(fov, size)
-    };
+pub fn inside(extent: &Extent, azimuth: f64, up: [f64; 3], fov: f64, size: [u32; 2]) -> Result<Camera, CameraError> {
+    let framing = Framing { azimuth: Some(azimuth), elevation: Some(0.0), up, ..Framing::new(fov, size) };
     let mut camera = framing.camera(extent)?;
     camera.eye = extent.centre;
     Ok(camera.with_planes(extent.near() / 4.0, f64::INFINITY))
@@ -270,9 +216,7 @@ fn sample(scene: &Scene) -> Vec<Sample> {
 
 /// The median of the finite sizes; 0 if there are none.
 fn typical_size(sample: &[Sample]) -> f64 {
-    let mut sizes: Vec<f64> = (sample.iter().map(|s| s.size))
-        .filter(|size| size.is_finite())
-        .collect();
+    let mut sizes: Vec<f64> = (sample.iter().map(|s| s.size)).filter(|size| size.is_finite()).collect();
     if sizes.is_empty() {
         return 0.0;
     }
@@ -311,11 +255,7 @@ mod tests {
     /// A scene of Gaussians of this size at `positions`.
     fn scene(scale: f32, positions: impl IntoIterator<Item = [f32; 3]>) -> Scene {
         let mut scene = Scene::with_capacity(0, 0);
-        let shape = GaussianShape {
-            scale: [scale; 3],
-            opacity: 0.9,
-            ..GaussianShape::default()
-        };
+        let shape = GaussianShape { scale: [scale; 3], opacity: 0.9, ..GaussianShape::default() };
         for position in positions {
             scene.push(position, shape, &[[0.0; 3]]);
         }
@@ -327,10 +267,7 @@ mod tests {
     fn framing_fits_the_bulk_and_ignores_outliers() {
         let mut scene = Scene::with_capacity(0, 0);
         let mut push = |position: [f32; 3], opacity: f32| {
-            let shape = GaussianShape {
-                opacity,
-                ..GaussianShape::default()
-            };
+            let shape = GaussianShape { opacity, ..GaussianShape::default() };
             scene.push(position, shape, &[[0.0; 3]]);
         };
         for i in 0..1000_u16 {
@@ -361,23 +298,10 @@ mod tests {
     #[test]
     fn framing_nothing_or_a_point_is_still_a_camera() {
         let mut scene = Scene::with_capacity(0, 0);
-        assert!(
-            frame(&scene, DEFAULT_FOV, [8, 8])
-                .eye
-                .iter()
-                .all(|c| c.is_finite())
-        );
-        let shape = GaussianShape {
-            opacity: 1.0,
-            ..GaussianShape::default()
-        };
+        assert!(frame(&scene, DEFAULT_FOV, [8, 8]).eye.iter().all(|c| c.is_finite()));
+        let shape = GaussianShape { opacity: 1.0, ..GaussianShape::default() };
         scene.push([1e30; 3], shape, &[[0.0; 3]]);
-        assert!(
-            frame(&scene, DEFAULT_FOV, [8, 8])
-                .eye
-                .iter()
-                .all(|c| c.is_finite())
-        );
+        assert!(frame(&scene, DEFAULT_FOV, [8, 8]).eye.iter().all(|c| c.is_finite()));
     }
 
     #[test]
@@ -390,8 +314,7 @@ mod tests {
             let mut spread = 0.0_f64;
             for position in scene.positions() {
                 let position = position.map(f64::from);
-                let depth =
-                    (DVec3::from_array(position) - DVec3::from_array(camera.eye)).dot(forward);
+                let depth = (DVec3::from_array(position) - DVec3::from_array(camera.eye)).dot(forward);
                 assert!(depth > camera.near, "{size}: {depth} {}", camera.near);
                 let at = camera.project(position).expect("in front");
                 spread = spread.max((at[0] - 320.0).abs());
@@ -411,10 +334,7 @@ mod tests {
 
     #[test]
     fn angles_go_around_the_scene() {
-        let extent = Extent {
-            centre: [1.0, 2.0, 3.0],
-            half: [1.0; 3],
-        };
+        let extent = Extent { centre: [1.0, 2.0, 3.0], half: [1.0; 3] };
         let at = |azimuth, elevation, up| {
             let framing = Framing {
                 azimuth: Some(azimuth),
@@ -436,23 +356,14 @@ mod tests {
         near(at(0.0, 0.0, [0.0, 0.0, 1.0]), [0.0, 10.0, 0.0]);
         near(at(0.0, 90.0, [0.0, 0.0, 2.0]), [0.0, 0.0, 10.0]);
         let (azimuth, elevation) = default_angles();
-        near(
-            at(azimuth, elevation, DEFAULT_UP),
-            (FROM.normalize() * 10.0).to_array(),
-        );
-        let no_up = Framing {
-            up: [0.0; 3],
-            ..Framing::new(DEFAULT_FOV, [64, 64])
-        };
+        near(at(azimuth, elevation, DEFAULT_UP), (FROM.normalize() * 10.0).to_array());
+        let no_up = Framing { up: [0.0; 3], ..Framing::new(DEFAULT_FOV, [64, 64]) };
         assert_eq!(no_up.camera(&extent), Err(CameraError::NoUp));
     }
 
     #[test]
     fn inside_is_in_the_middle_and_level() {
-        let extent = Extent {
-            centre: [1.0, 2.0, 3.0],
-            half: [1.0; 3],
-        };
+        let extent = Extent { centre: [1.0, 2.0, 3.0], half: [1.0; 3] };
         let camera = inside(&extent, 0.0, DEFAULT_UP, DEFAULT_FOV, [64, 32]).expect("a camera");
         assert_eq!(camera.eye, extent.centre);
         assert!((camera.rotation[2][2] - 1.0).abs() < 1e-12);

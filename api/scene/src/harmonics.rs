@@ -36,9 +36,7 @@ impl Turn {
         if degree == 0 || *map == DMat3::IDENTITY {
             return Self::Identity;
         }
-        let matrices: Vec<_> = (1..=degree as usize)
-            .map(|degree| matrix(map, degree))
-            .collect();
+        let matrices: Vec<_> = (1..=degree as usize).map(|degree| matrix(map, degree)).collect();
         let mut signs = [1.0; BASIS];
         for (l, matrix) in (1..).zip(&matrices) {
             let size = 2 * l + 1;
@@ -153,8 +151,7 @@ pub(crate) fn basis(d: DVec3) -> [f64; BASIS] {
             let middle = l * l + l;
             values[middle - m] = value * imaginary;
             values[middle + m] = value * real;
-            let next =
-                ((2 * l + 1) as f64 * d.z * legendre - (l + m) as f64 * below) / (l - m + 1) as f64;
+            let next = ((2 * l + 1) as f64 * d.z * legendre - (l + m) as f64 * below) / (l - m + 1) as f64;
             (below, legendre) = (legendre, next);
         }
         (real, imaginary) = (real * d.x - imaginary * d.y, real * d.y + imaginary * d.x);
@@ -199,14 +196,10 @@ mod tests {
             -0.669_046_543_557_289_2 * x * z * (7.0 * z * z - 3.0),
             0.473_087_347_878_780_05 * (x * x - y * y) * (7.0 * z * z - 1.0),
             -1.770_130_769_779_930_4 * x * z * (x * x - 3.0 * y * y),
-            0.625_835_735_449_176_1
-                * (x * x * (x * x - 3.0 * y * y) - y * y * (3.0 * x * x - y * y)),
+            0.625_835_735_449_176_1 * (x * x * (x * x - 3.0 * y * y) - y * y * (3.0 * x * x - y * y)),
         ];
         for (k, (found, expected)) in basis(d).into_iter().zip(expected).enumerate() {
-            assert!(
-                (found - expected).abs() < 1e-12,
-                "{k}: {found} is not {expected}"
-            );
+            assert!((found - expected).abs() < 1e-12, "{k}: {found} is not {expected}");
         }
     }
 
@@ -216,14 +209,7 @@ mod tests {
         let swap = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y);
         let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
         let half_turn = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
-        for map in [
-            turn,
-            swap,
-            mirror,
-            half_turn,
-            mirror * turn,
-            DMat3::IDENTITY,
-        ] {
+        for map in [turn, swap, mirror, half_turn, mirror * turn, DMat3::IDENTITY] {
             for degree in 0..=MAX_SH_DEGREE {
                 let old: Vec<[f32; 3]> = (0..sh_coefficients(degree))
                     .map(|k| [0.0, 1.0, 2.0].map(|c| ((k as f32 + 1.0) * 1.7 + c).sin()))
@@ -233,18 +219,10 @@ mod tests {
                 for step in 0..20 {
                     let d = DVec3::new(f64::from(step).sin(), f64::from(step * step).cos(), 0.3);
                     let d = d.normalize();
-                    let colour = |sh: &[[f32; 3]], d| -> f64 {
-                        basis(d)
-                            .iter()
-                            .zip(sh)
-                            .map(|(y, c)| y * f64::from(c[1]))
-                            .sum()
-                    };
+                    let colour =
+                        |sh: &[[f32; 3]], d| -> f64 { basis(d).iter().zip(sh).map(|(y, c)| y * f64::from(c[1])).sum() };
                     let difference = colour(&old, d) - colour(&new, map * d);
-                    assert!(
-                        difference.abs() < 1e-5,
-                        "{map}, degree {degree}: {difference}"
-                    );
+                    assert!(difference.abs() < 1e-5, "{map}, degree {degree}: {difference}");
                 }
             }
         }

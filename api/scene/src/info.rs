@@ -70,19 +70,12 @@ impl Info {
                 + size_of_val(scene.sh())) as u64,
             non_finite: 0,
             bounds: None,
-            opacities: (0..OPACITY_BARS)
-                .map(|step| bar(step as f32 / OPACITY_BARS as f32))
-                .collect(),
+            opacities: (0..OPACITY_BARS).map(|step| bar(step as f32 / OPACITY_BARS as f32)).collect(),
             scales: (first..last).map(|power| bar(10_f32.powi(power))).collect(),
             metadata: scene.metadata().clone(),
         };
         let coefficients = scene.sh().chunks_exact(scene.sh_stride());
-        for ((position, shape), sh) in scene
-            .positions()
-            .iter()
-            .zip(scene.shapes())
-            .zip(coefficients)
-        {
+        for ((position, shape), sh) in scene.positions().iter().zip(scene.shapes()).zip(coefficients) {
             info.add(position, shape, sh);
         }
         info
@@ -90,10 +83,7 @@ impl Info {
 
     fn add(&mut self, position: &[f32; 3], shape: &GaussianShape, sh: &[[f32; 3]]) {
         if position.iter().all(|c| c.is_finite()) {
-            let bounds = self.bounds.get_or_insert(Bounds {
-                min: *position,
-                max: *position,
-            });
+            let bounds = self.bounds.get_or_insert(Bounds { min: *position, max: *position });
             for (axis, &value) in position.iter().enumerate() {
                 bounds.min[axis] = bounds.min[axis].min(value);
                 bounds.max[axis] = bounds.max[axis].max(value);

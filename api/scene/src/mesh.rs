@@ -45,9 +45,7 @@ impl Indexed {
     /// If an index is out of range, or memory is short. Messages name the indices `place`.
     pub(crate) fn into_mesh(self, place: Place) -> Result<Mesh, Fault> {
         let count = self.positions.len();
-        if let Some(index) =
-            (self.triangles.as_flattened().iter()).find(|index| **index as usize >= count)
-        {
+        if let Some(index) = (self.triangles.as_flattened().iter()).find(|index| **index as usize >= count) {
             let text = format!("vertex {index} is not one of the {count}");
             return Err(Reason::Unsupported(text).at(place));
         }
@@ -61,26 +59,17 @@ impl Indexed {
                     sums[*index as usize] += normal;
                 }
             }
-            normals = sums
-                .into_iter()
-                .map(|sum| sum.normalize_or_zero().to_array())
-                .collect();
+            normals = sums.into_iter().map(|sum| sum.normalize_or_zero().to_array()).collect();
         }
         let mut vertices = Vec::new();
         let needed = 3 * self.triangles.len();
         let reserved = vertices.try_reserve_exact(needed);
-        reserved
-            .map_err(|_| Reason::Memory((needed * size_of::<MeshVertex>()) as u64).at(place))?;
-        vertices.extend(
-            self.triangles
-                .as_flattened()
-                .iter()
-                .map(|index| MeshVertex {
-                    position: self.positions[*index as usize],
-                    normal: normals[*index as usize],
-                    color: self.colors.get(*index as usize).copied().unwrap_or(PLAIN),
-                }),
-        );
+        reserved.map_err(|_| Reason::Memory((needed * size_of::<MeshVertex>()) as u64).at(place))?;
+        vertices.extend(self.triangles.as_flattened().iter().map(|index| MeshVertex {
+            position: self.positions[*index as usize],
+            normal: normals[*index as usize],
+            color: self.colors.get(*index as usize).copied().unwrap_or(PLAIN),
+        }));
         Ok(Mesh { vertices })
     }
 }
@@ -91,10 +80,7 @@ impl Mesh {
     /// # Panics
     /// If the last triangle lacks a vertex.
     pub fn new(vertices: Vec<MeshVertex>) -> Self {
-        assert!(
-            vertices.len().is_multiple_of(3),
-            "three vertices a triangle"
-        );
+        assert!(vertices.len().is_multiple_of(3), "three vertices a triangle");
         Self { vertices }
     }
 
@@ -115,10 +101,7 @@ impl Mesh {
 
     /// The least and the greatest finite coordinates; None if there are none.
     pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
-        let positions = self
-            .vertices
-            .iter()
-            .map(|v| DVec3::from_array(v.position.map(f64::from)));
+        let positions = self.vertices.iter().map(|v| DVec3::from_array(v.position.map(f64::from)));
         let finite = positions.filter(|position| position.is_finite());
         finite
             .map(|position| (position, position))
@@ -136,33 +119,21 @@ impl Mesh {
         let normals = linear.inverse().transpose();
         for vertex in &mut self.vertices {
             let double = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
-            vertex.position = (linear * double(vertex.position) + translation)
-                .as_vec3()
-                .to_array();
-            vertex.normal = (normals * double(vertex.normal))
-                .normalize_or_zero()
-                .as_vec3()
-                .to_array();
+            vertex.position = (linear * double(vertex.position) + translation).as_vec3().to_array();
+            vertex.normal = (normals * double(vertex.normal)).normalize_or_zero().as_vec3().to_array();
         }
     }
 }
 
 /// The triangles of a polygon, as a fan around its first vertex.
 pub(crate) fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
-    polygon
-        .windows(2)
-        .skip(1)
-        .map(|pair| [polygon[0], pair[0], pair[1]])
+    polygon.windows(2).skip(1).map(|pair| [polygon[0], pair[0], pair[1]])
 }
 
 /// The sRGB value of linear light, both from 0 to 1.
 pub(crate) fn srgb(linear: f32) -> f32 {
     let linear = linear.clamp(0.0, 1.0);
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]
@@ -179,11 +150,7 @@ mod tests {
         assert_eq!(quad.triangles, [[0, 1, 2], [0, 2, 3]]);
         let mut mesh = quad.into_mesh(Place::File).expect("a mesh");
         assert_eq!(mesh.triangles(), 2);
-        assert!(
-            mesh.vertices()
-                .iter()
-                .all(|v| v.normal == [0., 0., 1.] && v.color == PLAIN)
-        );
+        assert!(mesh.vertices().iter().all(|v| v.normal == [0., 0., 1.] && v.color == PLAIN));
         assert_eq!(mesh.bounds(), Some(([0.; 3], [2., 2., 0.])));
         // Squeezed along x and sheared, a normal is that of the surface's image.
         let shear = DMat3::from_cols(DVec3::new(0.5, 0., 1.), DVec3::Y, DVec3::Z);
@@ -195,18 +162,9 @@ mod tests {
 
     #[test]
     fn an_index_out_of_range_is_refused() {
-        let bad = Indexed {
-            positions: vec![[0.; 3]; 3],
-            triangles: vec![[0, 1, 3]],
-            ..Indexed::default()
-        };
+        let bad = Indexed { positions: vec![[0.; 3]; 3], triangles: vec![[0, 1, 3]], ..Indexed::default() };
         let fault = bad.into_mesh(Place::File).expect_err("vertex 3");
-        assert!(
-            fault
-                .reason
-                .to_string()
-                .contains("vertex 3 is not one of the 3")
-        );
+        assert!(fault.reason.to_string().contains("vertex 3 is not one of the 3"));
     }
 
     #[test]

@@ -80,9 +80,7 @@ impl Metadata {
         ];
         let what = ["antialiasing", "geometry", "colour space", "order"];
         for (what, _) in what.into_iter().zip(agreed).filter(|(_, agreed)| !agreed) {
-            self.note(format!(
-                "parts of the scene differ in {what}, and none is told"
-            ));
+            self.note(format!("parts of the scene differ in {what}, and none is told"));
         }
         for note in other.notes {
             self.note(note);

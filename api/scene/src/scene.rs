@@ -31,10 +31,7 @@ impl Scene {
     /// # Panics
     /// Panics if `sh_degree` exceeds [`MAX_SH_DEGREE`].
     pub fn with_capacity(sh_degree: u32, count: usize) -> Self {
-        assert!(
-            sh_degree <= MAX_SH_DEGREE,
-            "spherical harmonics degree {sh_degree} exceeds {MAX_SH_DEGREE}"
-        );
+        assert!(sh_degree <= MAX_SH_DEGREE, "spherical harmonics degree {sh_degree} exceeds {MAX_SH_DEGREE}");
         Self {
             positions: Vec::with_capacity(count),
             shapes: Vec::with_capacity(count),

@@ -20,11 +20,7 @@ pub struct Transform {
 impl Default for Transform {
     /// The identity.
     fn default() -> Self {
-        Self {
-            scale: 1.0,
-            rotation: DQuat::IDENTITY,
-            translation: DVec3::ZERO,
-        }
+        Self { scale: 1.0, rotation: DQuat::IDENTITY, translation: DVec3::ZERO }
     }
 }
 
@@ -62,24 +58,18 @@ impl Motion {
     /// are rotated by the orthogonal factor of `linear`'s polar decomposition.
     pub(crate) fn new(linear: DMat3, translation: DVec3, degree: u32) -> Self {
         let diagonal = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
-        let (shape, orthogonal) =
-            if diagonal.abs() == DVec3::ONE && linear == DMat3::from_diagonal(diagonal) {
-                let [x, y, z] = diagonal.to_array();
-                (ShapeMotion::Flip(DVec3::new(y * z, x * z, x * y)), linear)
-            } else if let Some((scale, orthogonal)) = similarity(linear) {
-                let proper = orthogonal * orthogonal.determinant().signum();
-                let rotation = DQuat::from_mat3(&proper).normalize();
-                let scale = scale as f32;
-                (ShapeMotion::Similarity { rotation, scale }, orthogonal)
-            } else {
-                (ShapeMotion::General, orthogonal_factor(linear))
-            };
-        Self {
-            linear,
-            translation,
-            shape,
-            turn: Turn::new(&orthogonal, degree),
-        }
+        let (shape, orthogonal) = if diagonal.abs() == DVec3::ONE && linear == DMat3::from_diagonal(diagonal) {
+            let [x, y, z] = diagonal.to_array();
+            (ShapeMotion::Flip(DVec3::new(y * z, x * z, x * y)), linear)
+        } else if let Some((scale, orthogonal)) = similarity(linear) {
+            let proper = orthogonal * orthogonal.determinant().signum();
+            let rotation = DQuat::from_mat3(&proper).normalize();
+            let scale = scale as f32;
+            (ShapeMotion::Similarity { rotation, scale }, orthogonal)
+        } else {
+            (ShapeMotion::General, orthogonal_factor(linear))
+        };
+        Self { linear, translation, shape, turn: Turn::new(&orthogonal, degree) }
     }
 
     /// Transforms triangles.
@@ -88,12 +78,7 @@ impl Motion {
     }
 
     /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first.
-    pub(crate) fn apply(
-        &self,
-        position: &mut [f32; 3],
-        shape: &mut GaussianShape,
-        sh: &mut [[f32; 3]],
-    ) {
+    pub(crate) fn apply(&self, position: &mut [f32; 3], shape: &mut GaussianShape, sh: &mut [[f32; 3]]) {
         let moved = self.linear * DVec3::from_array(position.map(f64::from)) + self.translation;
         *position = moved.as_vec3().to_array();
         match &self.shape {
@@ -136,10 +121,7 @@ fn similarity(linear: DMat3) -> Option<(f64, DMat3)> {
     let scale = linear.determinant().abs().cbrt();
     let orthogonal = linear * scale.recip();
     let error = orthogonal.transpose() * orthogonal - DMat3::IDENTITY;
-    let small = error
-        .to_cols_array()
-        .into_iter()
-        .all(|entry| entry.abs() < 1e-6);
+    let small = error.to_cols_array().into_iter().all(|entry| entry.abs() < 1e-6);
     (scale > 0.0 && small).then_some((scale, orthogonal))
 }
 
@@ -154,13 +136,8 @@ fn orthogonal_factor(linear: DMat3) -> DMat3 {
 /// An orthonormal basis of positive determinant along the orthogonal columns of `matrix`, some of which may be zero.
 fn frame(matrix: DMat3) -> DMat3 {
     let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-    let longest = (0..3).fold(0, |best, i| {
-        if axes[i].length_squared() > axes[best].length_squared() {
-            i
-        } else {
-            best
-        }
-    });
+    let longest =
+        (0..3).fold(0, |best, i| if axes[i].length_squared() > axes[best].length_squared() { i } else { best });
     let first = axes[longest].try_normalize().unwrap_or(DVec3::X);
     let [next, last] = [(longest + 1) % 3, (longest + 2) % 3];
     let second = axes[next]
@@ -208,8 +185,7 @@ mod tests {
     fn covariance(shape: &GaussianShape) -> DMat3 {
         let [w, x, y, z] = shape.rotation.map(f64::from);
         let scale = DVec3::from_array(shape.scale.map(f64::from));
-        let axes = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
-            * DMat3::from_diagonal(scale);
+        let axes = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize()) * DMat3::from_diagonal(scale);
         axes * axes.transpose()
     }
 
@@ -234,12 +210,11 @@ mod tests {
 
     #[test]
     fn covariances_become_those_of_the_map() {
-        let shapes =
-            [[0.1, 0.2, 0.7], [0.3, 0.3, 0.3], [0.5, 0.25, 0.0]].map(|scale| GaussianShape {
-                scale,
-                rotation: [0.9, 0.3, -0.2, 0.1],
-                opacity: 0.5,
-            });
+        let shapes = [[0.1, 0.2, 0.7], [0.3, 0.3, 0.3], [0.5, 0.25, 0.0]].map(|scale| GaussianShape {
+            scale,
+            rotation: [0.9, 0.3, -0.2, 0.1],
+            opacity: 0.5,
+        });
         let translation = DVec3::new(1.0, -2.0, 3.0);
         for linear in maps() {
             let motion = Motion::new(linear, translation, 0);
@@ -250,10 +225,7 @@ mod tests {
                 assert!(expected.abs_diff_eq(DVec3::from_array(position.map(f64::from)), 1e-5));
                 let expected = linear * covariance(shape) * linear.transpose();
                 let found = covariance(&moved);
-                assert!(
-                    expected.abs_diff_eq(found, 1e-5),
-                    "{linear}: {found} is not {expected}"
-                );
+                assert!(expected.abs_diff_eq(found, 1e-5), "{linear}: {found} is not {expected}");
                 assert_eq!(moved.opacity, 0.5);
             }
         }
@@ -261,11 +233,7 @@ mod tests {
 
     #[test]
     fn a_flat_gaussian_keeps_its_third_axis() {
-        let mut shape = GaussianShape {
-            scale: [0.5, 0.25, 0.0],
-            rotation: [0.9, 0.3, -0.2, 0.1],
-            opacity: 1.0,
-        };
+        let mut shape = GaussianShape { scale: [0.5, 0.25, 0.0], rotation: [0.9, 0.3, -0.2, 0.1], opacity: 1.0 };
         let stretch = DMat3::from_diagonal(DVec3::new(0.5, 2.0, 3.0));
         Motion::new(stretch, DVec3::ZERO, 0).apply(&mut [0.0; 3], &mut shape, &mut [[0.0; 3]]);
         assert_eq!(shape.scale[2], 0.0);
@@ -277,11 +245,7 @@ mod tests {
         for linear in maps() {
             let motion = Motion::new(linear, DVec3::ZERO, 4);
             for bad in [f32::NAN, f32::INFINITY, 0.0] {
-                let mut shape = GaussianShape {
-                    scale: [bad; 3],
-                    rotation: [bad; 4],
-                    opacity: bad,
-                };
+                let mut shape = GaussianShape { scale: [bad; 3], rotation: [bad; 4], opacity: bad };
                 motion.apply(&mut [bad; 3], &mut shape, &mut [[bad; 3]; 25]);
             }
         }

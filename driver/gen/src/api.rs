@@ -33,26 +33,11 @@ pub(crate) fn generate(root: &Path, fragment: &Path) -> Result<Vec<File>, Error>
     let extension = Extension::read(fragment)?;
     let defaults = defaults(&root.join(SOURCES))?;
     Ok(vec![
-        File {
-            path: DEFINITIONS,
-            text: rust::definitions(&extension, &defaults)?,
-        },
-        File {
-            path: "api/gaurast/src/gaussian_primitive_topology.rs",
-            text: rust::functions(&extension)?,
-        },
-        File {
-            path: "api/gaurast/tests/extension/names.rs",
-            text: names::write(&extension)?,
-        },
-        File {
-            path: "api/include/vulkan_gaurast.h",
-            text: header::write(&extension),
-        },
-        File {
-            path: "api/spec/implicit_valid_usage.adoc",
-            text: implicit::write(&extension),
-        },
+        File { path: DEFINITIONS, text: rust::definitions(&extension, &defaults)? },
+        File { path: "api/gaurast/src/gaussian_primitive_topology.rs", text: rust::functions(&extension)? },
+        File { path: "api/gaurast/tests/extension/names.rs", text: names::write(&extension)? },
+        File { path: "api/include/vulkan_gaurast.h", text: header::write(&extension) },
+        File { path: "api/spec/implicit_valid_usage.adoc", text: implicit::write(&extension) },
     ])
 }
 

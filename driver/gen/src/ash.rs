@@ -57,12 +57,8 @@ impl Declarations {
         for name in ["definitions.rs", "features.rs", "extensions.rs"] {
             declarations.add(rust::parse(&ash.join(name))?);
         }
-        declarations.add(
-            syn::parse_file(&gaurast.text).map_err(|source| Error::Rust {
-                path: gaurast.path.into(),
-                source,
-            })?,
-        );
+        declarations
+            .add(syn::parse_file(&gaurast.text).map_err(|source| Error::Rust { path: gaurast.path.into(), source })?);
         Ok(declarations)
     }
 
@@ -74,11 +70,7 @@ impl Declarations {
         match item {
             syn::Item::Struct(item) => {
                 let name = item.ident.to_string();
-                let lifetime = if item.generics.params.is_empty() {
-                    ""
-                } else {
-                    "<'_>"
-                };
+                let lifetime = if item.generics.params.is_empty() { "" } else { "<'_>" };
                 let structure = Structure {
                     ty: format!("{}{lifetime}", with_path(&name)),
                     members: item.fields.into_iter().filter_map(member).collect(),
@@ -87,14 +79,8 @@ impl Declarations {
             }
             syn::Item::Type(item) => {
                 let name = item.ident.to_string();
-                if let (Some(command), syn::Type::BareFn(function)) =
-                    (name.strip_prefix("PFN_"), *item.ty)
-                {
-                    let path = if name.ends_with("GAURAST") {
-                        "gaurast::vk"
-                    } else {
-                        "vk"
-                    };
+                if let (Some(command), syn::Type::BareFn(function)) = (name.strip_prefix("PFN_"), *item.ty) {
+                    let path = if name.ends_with("GAURAST") { "gaurast::vk" } else { "vk" };
                     let function = signature(format!("{path}::{name}"), function);
                     self.functions.insert(command.to_owned(), function);
                 }
@@ -130,10 +116,7 @@ impl Declarations {
 
 /// The folder of ash's sources.
 fn ash_folder(root: &Path) -> Result<PathBuf, Error> {
-    let failed = |reason: String| Error::Program {
-        program: "cargo metadata",
-        reason,
-    };
+    let failed = |reason: String| Error::Program { program: "cargo metadata", reason };
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = std::process::Command::new(cargo)
         .args(["metadata", "--format-version", "1"])
@@ -154,10 +137,7 @@ fn ash_folder(root: &Path) -> Result<PathBuf, Error> {
 
 fn member(field: syn::Field) -> Option<Member> {
     let name = field.ident?.to_string();
-    (!matches!(name.as_str(), "s_type" | "p_next" | "_marker")).then(|| Member {
-        name,
-        ty: type_text(&field.ty),
-    })
+    (!matches!(name.as_str(), "s_type" | "p_next" | "_marker")).then(|| Member { name, ty: type_text(&field.ty) })
 }
 
 fn signature(ty: String, function: syn::TypeBareFn) -> Function {
@@ -167,10 +147,7 @@ fn signature(ty: String, function: syn::TypeBareFn) -> Function {
             .inputs
             .into_iter()
             .map(|argument| Member {
-                name: argument
-                    .name
-                    .map(|(name, _)| name.to_string())
-                    .unwrap_or_default(),
+                name: argument.name.map(|(name, _)| name.to_string()).unwrap_or_default(),
                 ty: type_text(&argument.ty),
             })
             .collect(),
@@ -183,9 +160,7 @@ fn signature(ty: String, function: syn::TypeBareFn) -> Function {
 
 /// A type's text, with paths and without the names of lifetimes.
 pub(crate) fn type_text(ty: &syn::Type) -> String {
-    with_paths(ty.to_token_stream())
-        .to_string()
-        .replace("'a", "'_")
+    with_paths(ty.to_token_stream()).to_string().replace("'a", "'_")
 }
 
 fn with_paths(tokens: TokenStream) -> TokenStream {
@@ -202,8 +177,7 @@ fn with_paths(tokens: TokenStream) -> TokenStream {
             }
             continue;
         };
-        let is_colon =
-            |token: &TokenTree| matches!(token, TokenTree::Punct(p) if p.as_char() == ':');
+        let is_colon = |token: &TokenTree| matches!(token, TokenTree::Punct(p) if p.as_char() == ':');
         if tokens.next_if(is_colon).is_some() {
             // The name of a module is skipped: a new path replaces it.
             tokens.next_if(is_colon);

@@ -36,12 +36,7 @@ impl<'a> Chained<'a> {
         if structure.members.len() != declared.members.len() {
             return Err(Error::Undeclared(format!("{name} with all its members")));
         }
-        Ok(Self {
-            name,
-            structure,
-            declared,
-            extension,
-        })
+        Ok(Self { name, structure, declared, extension })
     }
 
     /// The structures that extend `base`: those of the core version, beginning with those that hold all of a version's,
@@ -79,12 +74,8 @@ impl<'a> Chained<'a> {
                 chained.push(Self::new(registry, declarations, name, extension)?);
             }
         }
-        chained.sort_by_key(|chained| {
-            (
-                chained.extension.is_some(),
-                !chained.name.starts_with("VkPhysicalDeviceVulkan1"),
-            )
-        });
+        chained
+            .sort_by_key(|chained| (chained.extension.is_some(), !chained.name.starts_with("VkPhysicalDeviceVulkan1")));
         Ok(chained)
     }
 

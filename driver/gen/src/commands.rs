@@ -67,13 +67,7 @@ pub(crate) fn write(
     entry_points: &BTreeMap<String, EntryPoint>,
     dynamic_states: &BTreeMap<String, dynamic_states::Row>,
 ) -> Result<String, Error> {
-    let writer = Writer {
-        registry,
-        declarations,
-        support,
-        entry_points,
-        dynamic_states,
-    };
+    let writer = Writer { registry, declarations, support, entry_points, dynamic_states };
     let rows = rows(registry, support)?;
     for command in entry_points.keys() {
         if !rows.iter().any(|row| row.name == command) {
@@ -121,25 +115,14 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
         let (major, minor) = requirement.by;
         for name in &requirement.commands {
             if seen.insert(name) {
-                rows.push(Row {
-                    name,
-                    gate: format!("Core(vk::API_VERSION_{major}_{minor})"),
-                });
+                rows.push(Row { name, gate: format!("Core(vk::API_VERSION_{major}_{minor})") });
             }
         }
     }
     // A command may come with several extensions; one of them is enough.
     let mut extensions: Vec<(&'a str, &str, Vec<String>)> = Vec::new();
-    for extension in support
-        .extension
-        .keys()
-        .filter_map(|name| registry.extension(name))
-    {
-        let kind = if extension.is_of_instance {
-            "InstanceExtension"
-        } else {
-            "DeviceExtension"
-        };
+    for extension in support.extension.keys().filter_map(|name| registry.extension(name)) {
+        let kind = if extension.is_of_instance { "InstanceExtension" } else { "DeviceExtension" };
         let names = extension
             .requirements
             .iter()
@@ -159,10 +142,9 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
             }
         }
     }
-    rows.extend(extensions.into_iter().map(|(name, kind, by)| Row {
-        name,
-        gate: format!("{kind}(&[{}])", by.join(", ")),
-    }));
+    rows.extend(
+        extensions.into_iter().map(|(name, kind, by)| Row { name, gate: format!("{kind}(&[{}])", by.join(", ")) }),
+    );
     Ok(rows)
 }
 
@@ -170,18 +152,15 @@ impl Writer<'_> {
     /// Adds a command's row, and its function unless another of its names did.
     fn add(&self, output: &mut Output, row: &Row<'_>) -> Result<(), Error> {
         let names = self.registry.command_names(row.name);
-        let definition =
-            self.registry.commands.get(names[0]).ok_or_else(|| {
-                Error::Support(format!("the registry has no command {}", row.name))
-            })?;
+        let definition = self
+            .registry
+            .commands
+            .get(names[0])
+            .ok_or_else(|| Error::Support(format!("the registry has no command {}", row.name)))?;
         let function = self.declarations.function(self.registry, row.name)?;
         let entry_point = names.iter().find_map(|name| self.entry_points.get(*name));
         // The name of the command whose function has been written already, if any.
-        let known = output
-            .defined
-            .iter()
-            .find(|defined| names.contains(&defined.as_str()))
-            .cloned();
+        let known = output.defined.iter().find(|defined| names.contains(&defined.as_str())).cloned();
         let implementation = match known {
             Some(name) => name,
             None => {
@@ -225,16 +204,9 @@ impl Writer<'_> {
             let shown = if is_used { &parameter.name } else { "_" };
             let _ = write!(parameters, "{shown}: {}, ", parameter.ty);
         }
-        let output = function
-            .output
-            .as_ref()
-            .map_or_else(String::new, |output| format!("-> {output}"));
+        let output = function.output.as_ref().map_or_else(String::new, |output| format!("-> {output}"));
         let first = &function.parameters[0].name;
-        let visibility = if name == "vkGetInstanceProcAddr" {
-            "pub(crate) "
-        } else {
-            ""
-        };
+        let visibility = if name == "vkGetInstanceProcAddr" { "pub(crate) " } else { "" };
         Ok(format!(
             "{visibility}unsafe extern \"system\" fn {name}({parameters}) {output} {{
                 guard({first}, \"{name}\", || {{ {body} }})
@@ -253,10 +225,8 @@ impl Writer<'_> {
         used: &mut BTreeSet<String>,
     ) -> Result<Option<String>, Error> {
         let second = format!("{name}2");
-        let (Some(entry_point), Some(taken)) = (
-            self.entry_points.get(&second),
-            self.registry.commands.get(&second),
-        ) else {
+        let (Some(entry_point), Some(taken)) = (self.entry_points.get(&second), self.registry.commands.get(&second))
+        else {
             return Ok(None);
         };
         let [_, info] = &taken.parameters[..] else {
@@ -266,11 +236,7 @@ impl Writer<'_> {
         let mut lists = String::new();
         let mut members = String::new();
         for member in &structure.members {
-            let Some(index) = function
-                .parameters
-                .iter()
-                .position(|p| p.name == member.name)
-            else {
+            let Some(index) = function.parameters.iter().position(|p| p.name == member.name) else {
                 return Ok(None);
             };
             let parameter = &function.parameters[index];
@@ -280,10 +246,9 @@ impl Writer<'_> {
                 let _ = writeln!(members, "{name},");
                 continue;
             }
-            let (Some(element), Some(count)) = (
-                member.ty.strip_prefix("* const "),
-                count_of(definition, function, index),
-            ) else {
+            let (Some(element), Some(count)) =
+                (member.ty.strip_prefix("* const "), count_of(definition, function, index))
+            else {
                 return Ok(None);
             };
             let list = without_prefix(name);
@@ -310,9 +275,7 @@ impl Writer<'_> {
         for parameter in &entry_point.parameters {
             arguments.push(match parameter.name.as_str() {
                 "recorder" | "_recorder" => "recorder".to_owned(),
-                _ if plain(&parameter.ty) == format!("&{}", plain(&structure.ty)) => {
-                    "&info".to_owned()
-                }
+                _ if plain(&parameter.ty) == format!("&{}", plain(&structure.ty)) => "&info".to_owned(),
                 _ => match info.argument(self, parameter) {
                     Some((argument, _)) => argument,
                     None => return Ok(None),
@@ -336,12 +299,7 @@ impl Writer<'_> {
     }
 
     /// The body of a command that sets a dynamic state whose value is its parameter.
-    fn dynamic_state(
-        &self,
-        name: &str,
-        function: &Function,
-        used: &mut BTreeSet<String>,
-    ) -> Option<String> {
+    fn dynamic_state(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Option<String> {
         let untagged = name.trim_end_matches(|letter: char| letter.is_ascii_uppercase());
         let row = self.dynamic_states.get(untagged)?;
         let (first, parameters) = function.parameters.split_first()?;
@@ -371,12 +329,7 @@ impl Writer<'_> {
     }
 
     /// The body of a command for which the driver has no function.
-    fn without_function(
-        &self,
-        name: &str,
-        function: &Function,
-        used: &mut BTreeSet<String>,
-    ) -> Result<String, Error> {
+    fn without_function(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Result<String, Error> {
         let output = function.output.as_deref().unwrap_or("()");
         if self.support.commands.no_op.contains_key(name) {
             let value = match output {
@@ -398,15 +351,8 @@ impl Writer<'_> {
                 format!("Err::<{output}, _>({refusal})")
             });
         }
-        let last = function
-            .parameters
-            .iter()
-            .rev()
-            .find(|parameter| !parameter.ty.contains("AllocationCallbacks"));
-        if let (Some(handle), true) = (
-            last,
-            name.starts_with("vkDestroy") || name == "vkFreeMemory",
-        ) {
+        let last = function.parameters.iter().rev().find(|parameter| !parameter.ty.contains("AllocationCallbacks"));
+        if let (Some(handle), true) = (last, name.starts_with("vkDestroy") || name == "vkFreeMemory") {
             used.insert(handle.name.clone());
             return Ok(format!(
                 "// SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
@@ -444,14 +390,13 @@ impl Writer<'_> {
                 arguments.push("&COMMANDS".to_owned());
                 continue;
             }
-            let index = function.parameters.iter().position(|declared| {
-                without_prefix(&declared.name) == parameter.name.trim_start_matches('_')
-            });
+            let index = function
+                .parameters
+                .iter()
+                .position(|declared| without_prefix(&declared.name) == parameter.name.trim_start_matches('_'));
             let Some(index) = index else {
                 let found = self.info(definition, function);
-                let argument = found
-                    .as_ref()
-                    .and_then(|(_, info)| info.argument(self, parameter));
+                let argument = found.as_ref().and_then(|(_, info)| info.argument(self, parameter));
                 let (Some((pointer, _)), Some((argument, converts))) = (found, argument) else {
                     return Err(wrong(format!(
                         "{name} has no parameter {}, but {}",
@@ -466,13 +411,9 @@ impl Writer<'_> {
             };
             let declared = &function.parameters[index];
             let count = count(definition, function, index);
-            let (argument, converts) = convert(&parameter.ty, declared, count.as_ref())
-                .ok_or_else(|| {
-                    wrong(format!(
-                        "{} of type {} is not made of {}",
-                        parameter.name, parameter.ty, declared.ty
-                    ))
-                })?;
+            let (argument, converts) = convert(&parameter.ty, declared, count.as_ref()).ok_or_else(|| {
+                wrong(format!("{} of type {} is not made of {}", parameter.name, parameter.ty, declared.ty))
+            })?;
             is_unsafe |= converts;
             used.insert(declared.name.clone());
             if let Some(count) = count.filter(|count| argument.contains(&count.expression)) {
@@ -488,15 +429,8 @@ impl Writer<'_> {
         });
         let body = if records {
             is_unsafe = true;
-            let call = if input.is_empty() {
-                call
-            } else {
-                format!("{{ {input} {call} }}")
-            };
-            format!(
-                "record({}, \"{name}\", |recorder| {call})",
-                function.parameters[0].name
-            )
+            let call = if input.is_empty() { call } else { format!("{{ {input} {call} }}") };
+            format!("record({}, \"{name}\", |recorder| {call})", function.parameters[0].name)
         } else {
             let (body, writes) = write_output(&entry_point.output, function, used, call)
                 .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
@@ -514,20 +448,14 @@ impl Writer<'_> {
     }
 
     /// The structure with a command's parameters, and the parameter that points at it.
-    fn info<'s>(
-        &'s self,
-        definition: &'s registry::Command,
-        function: &Function,
-    ) -> Option<(String, Info<'s>)> {
+    fn info<'s>(&'s self, definition: &'s registry::Command, function: &Function) -> Option<(String, Info<'s>)> {
         let parameters = std::iter::zip(&definition.parameters, &function.parameters);
-        parameters
-            .filter(|(defined, declared)| {
-                defined.len.is_none() && declared.ty.starts_with("* const")
-            })
-            .find_map(|(defined, declared)| {
+        parameters.filter(|(defined, declared)| defined.len.is_none() && declared.ty.starts_with("* const")).find_map(
+            |(defined, declared)| {
                 let info = Info::new(self, "info", &defined.ty).ok()?;
                 Some((declared.name.clone(), info))
-            })
+            },
+        )
     }
 }
 
@@ -544,11 +472,7 @@ struct Info<'a> {
 
 impl<'a> Info<'a> {
     fn new(writer: &'a Writer<'_>, variable: &'static str, name: &'a str) -> Result<Self, Error> {
-        let Writer {
-            registry,
-            declarations,
-            ..
-        } = writer;
+        let Writer { registry, declarations, .. } = writer;
         let undeclared = || Error::Undeclared(name.to_owned());
         let last = registry.type_name(name);
         let structure = registry.structures.get(last).ok_or_else(undeclared)?;
@@ -556,12 +480,7 @@ impl<'a> Info<'a> {
         if structure.members.len() != declared.members.len() {
             return Err(undeclared());
         }
-        Ok(Self {
-            variable,
-            name: last,
-            structure,
-            declared,
-        })
+        Ok(Self { variable, name: last, structure, declared })
     }
 
     /// A member, or a structure of the chain, converted to the form of a parameter of the driver's function; and true
@@ -573,40 +492,24 @@ impl<'a> Info<'a> {
         let members = &self.declared.members;
         if let Some(index) = members.iter().position(|m| without_prefix(&m.name) == name) {
             let len = self.structure.members[index].len.as_deref();
-            let count = self
-                .structure
-                .members
-                .iter()
-                .position(|m| Some(&*m.name) == len);
+            let count = self.structure.members.iter().position(|m| Some(&*m.name) == len);
             let count = count.map(|count| Count {
                 parameter: variable.to_owned(),
                 expression: place(count),
                 ty: plain(&members[count].ty),
             });
-            let member = Member {
-                name: place(index),
-                ty: members[index].ty.clone(),
-            };
+            let member = Member { name: place(index), ty: members[index].ty.clone() };
             return convert(&wanted.ty, &member, count.as_ref());
         }
         let ty = plain(&wanted.ty);
         let chained = ty.strip_prefix("Option<&")?.strip_suffix('>')?;
         let chained = format!("Vk{chained}");
-        let structure = writer
-            .registry
-            .structures
-            .get(writer.registry.type_name(&chained))?;
+        let structure = writer.registry.structures.get(writer.registry.type_name(&chained))?;
         let extends = structure.extends.iter().any(|base| base == self.name);
-        let declared = writer
-            .declarations
-            .structure(writer.registry, &chained)
-            .ok()?;
+        let declared = writer.declarations.structure(writer.registry, &chained).ok()?;
         extends.then(|| {
             let ty = &declared.ty;
-            (
-                format!("valid::find_in_chain::<{ty}>({variable}.p_next)"),
-                true,
-            )
+            (format!("valid::find_in_chain::<{ty}>({variable}.p_next)"), true)
         })
     }
 }
@@ -637,9 +540,7 @@ fn plain(ty: &str) -> String {
 }
 
 fn without_prefix(name: &str) -> &str {
-    name.strip_prefix("pp_")
-        .or_else(|| name.strip_prefix("p_"))
-        .unwrap_or(name)
+    name.strip_prefix("pp_").or_else(|| name.strip_prefix("p_")).unwrap_or(name)
 }
 
 fn list_names(parameters: &[Member]) -> String {
@@ -648,11 +549,7 @@ fn list_names(parameters: &[Member]) -> String {
 }
 
 /// The parameter with the number of elements of another.
-fn count_of<'a>(
-    definition: &registry::Command,
-    function: &'a Function,
-    index: usize,
-) -> Option<&'a Member> {
+fn count_of<'a>(definition: &registry::Command, function: &'a Function, index: usize) -> Option<&'a Member> {
     let len = definition.parameters.get(index)?.len.as_deref()?;
     let index = definition.parameters.iter().position(|p| p.name == len)?;
     function.parameters.get(index)
@@ -671,18 +568,11 @@ struct Count {
 /// The number of elements of a parameter: another parameter, or a member of the structure that one points at.
 fn count(definition: &registry::Command, function: &Function, index: usize) -> Option<Count> {
     if let Some(count) = count_of(definition, function, index) {
-        return Some(Count {
-            parameter: count.name.clone(),
-            expression: count.name.clone(),
-            ty: plain(&count.ty),
-        });
+        return Some(Count { parameter: count.name.clone(), expression: count.name.clone(), ty: plain(&count.ty) });
     }
     let len = definition.parameters.get(index)?.len.as_deref()?;
     let (parameter, member) = len.split_once("->")?;
-    let index = definition
-        .parameters
-        .iter()
-        .position(|p| p.name == parameter)?;
+    let index = definition.parameters.iter().position(|p| p.name == parameter)?;
     let parameter = function.parameters.get(index)?.name.clone();
     Some(Count {
         expression: format!("valid::input({parameter})?.{}", rust::snake_case(member)),

@@ -38,8 +38,7 @@ pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, Row>, Error> {
         };
         if item.mac.path.is_ident(TABLE) {
             let tokens: Vec<TokenTree> = item.mac.tokens.into_iter().collect();
-            let ends =
-                |token: &TokenTree| matches!(token, TokenTree::Punct(p) if p.as_char() == ';');
+            let ends = |token: &TokenTree| matches!(token, TokenTree::Punct(p) if p.as_char() == ';');
             let parsed = tokens.split(ends).filter_map(row);
             rows.extend(parsed.map(|row| (format!("vkCmdSet{}", row.variant), row)));
         }
@@ -62,10 +61,5 @@ fn row(tokens: &[TokenTree]) -> Option<Row> {
     let name = tokens.next()?;
     tokens.next()?;
     let ty: syn::Type = syn::parse2(tokens.collect::<TokenStream>()).ok()?;
-    Some(Row {
-        variant: variant.to_string(),
-        is_of_face,
-        value: name.to_string(),
-        ty: type_text(&ty),
-    })
+    Some(Row { variant: variant.to_string(), is_of_face, value: name.to_string(), ty: type_text(&ty) })
 }

@@ -39,10 +39,7 @@ pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
             for command in commands(&function) {
                 let entry_point = entry_point(&module, &function);
                 if let Some(other) = found.insert(command.clone(), entry_point) {
-                    return Err(Error::EntryPoint(format!(
-                        "{command} has two functions, one of them {}",
-                        other.path
-                    )));
+                    return Err(Error::EntryPoint(format!("{command} has two functions, one of them {}", other.path)));
                 }
             }
         }
@@ -84,10 +81,7 @@ fn entry_point(module: &str, function: &syn::ItemFn) -> EntryPoint {
         .iter()
         .filter_map(|input| match input {
             syn::FnArg::Typed(argument) => match &*argument.pat {
-                syn::Pat::Ident(name) => Some(Member {
-                    name: name.ident.to_string(),
-                    ty: type_text(&argument.ty),
-                }),
+                syn::Pat::Ident(name) => Some(Member { name: name.ident.to_string(), ty: type_text(&argument.ty) }),
                 _ => None,
             },
             syn::FnArg::Receiver(_) => None,

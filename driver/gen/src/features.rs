@@ -18,18 +18,8 @@ pub(crate) fn structures<'a>(
     declarations: &'a Declarations,
     support: &'a Support,
 ) -> Result<Vec<Chained<'a>>, Error> {
-    let mut structures = vec![Chained::new(
-        registry,
-        declarations,
-        "VkPhysicalDeviceFeatures",
-        None,
-    )?];
-    structures.extend(Chained::all(
-        registry,
-        declarations,
-        support,
-        "VkPhysicalDeviceFeatures2",
-    )?);
+    let mut structures = vec![Chained::new(registry, declarations, "VkPhysicalDeviceFeatures", None)?];
+    structures.extend(Chained::all(registry, declarations, support, "VkPhysicalDeviceFeatures2")?);
     Ok(structures)
 }
 
@@ -45,10 +35,7 @@ pub(crate) fn all<'a>(structures: &[Chained<'a>]) -> Vec<Feature<'a>> {
 }
 
 /// The features that work, by their names in the registry.
-fn supported<'a>(
-    support: &'a Support,
-    structures: &[Chained<'a>],
-) -> Result<BTreeSet<&'a str>, Error> {
+fn supported<'a>(support: &'a Support, structures: &[Chained<'a>]) -> Result<BTreeSet<&'a str>, Error> {
     let mut supported = BTreeSet::new();
     let mut add = |owner: Option<&'a str>, names: Vec<&'a str>| {
         let known: Vec<&str> = structures
@@ -57,11 +44,7 @@ fn supported<'a>(
             .flat_map(|chained| &chained.structure.members)
             .map(|member| member.name.as_str())
             .collect();
-        let names = if names == ["all"] {
-            known.clone()
-        } else {
-            names
-        };
+        let names = if names == ["all"] { known.clone() } else { names };
         for name in names {
             if !known.contains(&name) {
                 let owner = owner.unwrap_or("core");
@@ -73,10 +56,7 @@ fn supported<'a>(
         }
         Ok(())
     };
-    add(
-        None,
-        support.core.features.iter().map(String::as_str).collect(),
-    )?;
+    add(None, support.core.features.iter().map(String::as_str).collect())?;
     for (name, listed) in &support.extension {
         let names = match &listed.features {
             Features::Some(names) => names.iter().map(String::as_str).collect(),
@@ -87,11 +67,7 @@ fn supported<'a>(
     Ok(supported)
 }
 
-pub(crate) fn write(
-    registry: &Registry,
-    declarations: &Declarations,
-    support: &Support,
-) -> Result<String, Error> {
+pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &Support) -> Result<String, Error> {
     let structures = structures(registry, declarations, support)?;
     let features = all(&structures);
     let supported = supported(support, &structures)?;
@@ -122,20 +98,11 @@ pub(crate) fn write(
         if chained.name == "VkPhysicalDeviceFeatures" {
             continue;
         }
-        let _ = writeln!(
-            writes,
-            "if let Some(out) = structure.cast::<{ty}>() {{ {write} }}"
-        );
-        let _ = writeln!(
-            reads,
-            "if let Some(requested) = valid::cast::<{ty}>(structure) {{ {read} }}"
-        );
+        let _ = writeln!(writes, "if let Some(out) = structure.cast::<{ty}>() {{ {write} }}");
+        let _ = writeln!(reads, "if let Some(requested) = valid::cast::<{ty}>(structure) {{ {read} }}");
         if let Some(extension) = chained.extension {
             let ty = ty.trim_end_matches("<'_>");
-            let _ = writeln!(
-                extensions,
-                "{ty}::STRUCTURE_TYPE => Some(c\"{extension}\"),"
-            );
+            let _ = writeln!(extensions, "{ty}::STRUCTURE_TYPE => Some(c\"{extension}\"),");
         }
     }
     let core = &structures[0];
@@ -197,28 +164,22 @@ pub(crate) fn write(
 }
 
 /// The features that core versions make mandatory.
-fn mandatory(
-    registry: &Registry,
-    support: &Support,
-    features: &[Feature<'_>],
-) -> Result<String, Error> {
+fn mandatory(registry: &Registry, support: &Support, features: &[Feature<'_>]) -> Result<String, Error> {
     let known: BTreeSet<&str> = features.iter().map(|(name, _)| *name).collect();
     let mut text = String::new();
     let newest = support.version()?;
-    let conditional = |requirement: &crate::registry::Requirement<_>| {
-        !support.meets(requirement.depends.as_deref())
-    };
-    for ((major, minor), required) in by_version(&registry.versions, newest, |requirement| {
-        if conditional(requirement) {
-            &[]
-        } else {
-            &requirement.features
-        }
-    }) {
-        let names: BTreeSet<&str> = required
-            .into_iter()
-            .filter_map(|(_, name)| known.get(name.as_str()).copied())
-            .collect();
+    let conditional = |requirement: &crate::registry::Requirement<_>| !support.meets(requirement.depends.as_deref());
+    for ((major, minor), required) in
+        by_version(
+            &registry.versions,
+            newest,
+            |requirement| {
+                if conditional(requirement) { &[] } else { &requirement.features }
+            },
+        )
+    {
+        let names: BTreeSet<&str> =
+            required.into_iter().filter_map(|(_, name)| known.get(name.as_str()).copied()).collect();
         let names: String = names.iter().map(|name| format!("\"{name}\",")).collect();
         let _ = writeln!(text, "(vk::API_VERSION_{major}_{minor}, &[{names}]),");
     }

@@ -56,9 +56,7 @@ struct Enumerant {
 impl Enumerant {
     fn value(&self) -> Option<u32> {
         match &self.value {
-            serde_json::Value::String(text) => {
-                u32::from_str_radix(text.strip_prefix("0x")?, 16).ok()
-            }
+            serde_json::Value::String(text) => u32::from_str_radix(text.strip_prefix("0x")?, 16).ok(),
             number => number.as_u64()?.try_into().ok(),
         }
     }
@@ -70,10 +68,8 @@ impl Enumerant {
 /// [`Error::OtherRegistry`], and the errors of reading and parsing.
 pub fn generate(json: &Path) -> Result<File, Error> {
     let text = registry::read_version(json, VERSION, SHA256)?;
-    let grammar: Grammar = serde_json::from_str(&text).map_err(|error| Error::Registry {
-        path: json.to_owned(),
-        reason: error.to_string(),
-    })?;
+    let grammar: Grammar = serde_json::from_str(&text)
+        .map_err(|error| Error::Registry { path: json.to_owned(), reason: error.to_string() })?;
     let used = used_kinds(&grammar);
     let enumerations: Vec<&OperandKind> = grammar
         .operand_kinds
@@ -176,10 +172,7 @@ fn used_kinds(grammar: &Grammar) -> BTreeSet<&str> {
     let operands = grammar.instructions.iter().flat_map(|it| &it.operands);
     let enumerants = grammar.operand_kinds.iter().flat_map(|it| &it.enumerants);
     let parameters = enumerants.flat_map(|it| &it.parameters);
-    operands
-        .chain(parameters)
-        .map(|it| it.kind.as_str())
-        .collect()
+    operands.chain(parameters).map(|it| it.kind.as_str()).collect()
 }
 
 fn kinds(enumerations: &[&OperandKind]) -> String {
@@ -222,11 +215,10 @@ fn operations(instructions: &[Instruction]) -> String {
     }
     let mut arms: Vec<(String, Vec<Op>)> = arms.into_iter().collect();
     arms.sort_by_key(|(_, operations)| operations.first().map(|op| *op as u32));
-    arms.iter()
-        .fold(String::new(), |mut text, (operands, operations)| {
-            text += &arm(operations, operands);
-            text
-        })
+    arms.iter().fold(String::new(), |mut text, (operands, operations)| {
+        text += &arm(operations, operands);
+        text
+    })
 }
 
 /// A match arm in lines of limited length: rustfmt would give each pattern a line.
@@ -283,18 +275,11 @@ fn parameters(enumerations: &[&OperandKind]) -> String {
         }
         let (value, open, close) = match is_mask(enumeration) {
             true => ("value".to_owned(), "", ""),
-            false => (
-                format!("{}::from_u32(value)", enumeration.kind),
-                "Some(",
-                ")",
-            ),
+            false => (format!("{}::from_u32(value)", enumeration.kind), "Some(", ")"),
         };
         let _ = writeln!(text, "Self::{} => match {value} {{", enumeration.kind);
         for (kinds, values) in arms {
-            let values: Vec<String> = values
-                .iter()
-                .map(|value| pattern(&enumeration.kind, *value))
-                .collect();
+            let values: Vec<String> = values.iter().map(|value| pattern(&enumeration.kind, *value)).collect();
             let kinds: Vec<String> = kinds.iter().map(|kind| format!("K::{kind}")).collect();
             let (values, kinds) = (values.join(" | "), kinds.join(", "));
             let _ = writeln!(text, "{open}{values}{close} => &[{kinds}],");
@@ -308,9 +293,7 @@ fn parameters(enumerations: &[&OperandKind]) -> String {
 fn pattern(enumeration: &str, value: u32) -> String {
     match enumeration {
         "Decoration" => Decoration::from_u32(value).map(|it| format!("Decoration::{it:?}")),
-        "ExecutionMode" => {
-            ExecutionMode::from_u32(value).map(|it| format!("ExecutionMode::{it:?}"))
-        }
+        "ExecutionMode" => ExecutionMode::from_u32(value).map(|it| format!("ExecutionMode::{it:?}")),
         _ => None,
     }
     .unwrap_or_else(|| format!("{value:#x}"))

@@ -45,14 +45,8 @@ pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
     support.check(&registry)?;
     let declarations = Declarations::read(root, &files[0])?;
     files.extend([
-        File {
-            path: "driver/src/registry/extensions.rs",
-            text: extensions::write(&registry, &support)?,
-        },
-        File {
-            path: "driver/src/registry/features.rs",
-            text: features::write(&registry, &declarations, &support)?,
-        },
+        File { path: "driver/src/registry/extensions.rs", text: extensions::write(&registry, &support)? },
+        File { path: "driver/src/registry/features.rs", text: features::write(&registry, &declarations, &support)? },
         File {
             path: "driver/src/registry/properties.rs",
             text: properties::write(&registry, &declarations, &support)?,
@@ -67,10 +61,7 @@ pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
                 &dynamic_states::find(root)?,
             )?,
         },
-        File {
-            path: "driver/src/registry/spirv.rs",
-            text: spirv::write(&registry, &declarations, &support)?,
-        },
+        File { path: "driver/src/registry/spirv.rs", text: spirv::write(&registry, &declarations, &support)? },
     ]);
     Ok(files)
 }

@@ -7,9 +7,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
     let [vk_xml, grammar] = arguments.as_slice() else {
-        eprintln!(
-            "usage: registry-gen PATH/vk.xml PATH/spirv.core.grammar.json, which driver/gen/fetch.sh gets"
-        );
+        eprintln!("usage: registry-gen PATH/vk.xml PATH/spirv.core.grammar.json, which driver/gen/fetch.sh gets");
         return ExitCode::FAILURE;
     };
     match write(Path::new(vk_xml), Path::new(grammar)) {

@@ -13,28 +13,14 @@ use std::fmt::Write;
 const CORE: &str = "VkPhysicalDeviceProperties";
 
 /// The members of the core structure that are themselves structures of properties.
-const NESTED: [(&str, &str); 2] = [
-    ("limits", "VkPhysicalDeviceLimits"),
-    ("sparse_properties", "VkPhysicalDeviceSparseProperties"),
-];
+const NESTED: [(&str, &str); 2] =
+    [("limits", "VkPhysicalDeviceLimits"), ("sparse_properties", "VkPhysicalDeviceSparseProperties")];
 
 /// Members that have another name in the structure that holds all properties of a version.
 const RENAMED: [(&str, &str, &str); 3] = [
-    (
-        "VkPhysicalDeviceSubgroupProperties",
-        "supported_stages",
-        "subgroup_supported_stages",
-    ),
-    (
-        "VkPhysicalDeviceSubgroupProperties",
-        "supported_operations",
-        "subgroup_supported_operations",
-    ),
-    (
-        "VkPhysicalDeviceSubgroupProperties",
-        "quad_operations_in_all_stages",
-        "subgroup_quad_operations_in_all_stages",
-    ),
+    ("VkPhysicalDeviceSubgroupProperties", "supported_stages", "subgroup_supported_stages"),
+    ("VkPhysicalDeviceSubgroupProperties", "supported_operations", "subgroup_supported_operations"),
+    ("VkPhysicalDeviceSubgroupProperties", "quad_operations_in_all_stages", "subgroup_quad_operations_in_all_stages"),
 ];
 
 /// A property: its name in the registry, its name in Rust and its type.
@@ -51,20 +37,12 @@ pub(crate) fn structures<'a>(
     declarations: &'a Declarations,
     support: &'a Support,
 ) -> Result<Vec<Chained<'a>>, Error> {
-    Chained::all(
-        registry,
-        declarations,
-        support,
-        "VkPhysicalDeviceProperties2",
-    )
+    Chained::all(registry, declarations, support, "VkPhysicalDeviceProperties2")
 }
 
 /// The name of a structure's member among all properties.
 pub(crate) fn field<'a>(structure: &str, member: &'a str) -> &'a str {
-    RENAMED
-        .iter()
-        .find(|(of, from, _)| *of == structure && *from == member)
-        .map_or(member, |(_, _, to)| to)
+    RENAMED.iter().find(|(of, from, _)| *of == structure && *from == member).map_or(member, |(_, _, to)| to)
 }
 
 /// Adds a structure's properties, each name once.
@@ -76,17 +54,10 @@ fn add<'a>(all: &mut Vec<Property<'a>>, chained: &Chained<'a>) -> Result<(), Err
         }
         match all.iter().find(|property| property.field == field) {
             Some(known) if known.ty != declared.ty => {
-                return Err(Error::Support(format!(
-                    "{field} is of two types: {} and {}",
-                    known.ty, declared.ty
-                )));
+                return Err(Error::Support(format!("{field} is of two types: {} and {}", known.ty, declared.ty)));
             }
             Some(_) => {}
-            None => all.push(Property {
-                name: &member.name,
-                field,
-                ty: &declared.ty,
-            }),
+            None => all.push(Property { name: &member.name, field, ty: &declared.ty }),
         }
     }
     Ok(())
@@ -94,18 +65,10 @@ fn add<'a>(all: &mut Vec<Property<'a>>, chained: &Chained<'a>) -> Result<(), Err
 
 /// An expression for a property as a member of a structure.
 fn value(field: &str, ty: &str) -> String {
-    if ty == "vk :: Bool32" {
-        format!("self.{field}.into()")
-    } else {
-        format!("self.{field}")
-    }
+    if ty == "vk :: Bool32" { format!("self.{field}.into()") } else { format!("self.{field}") }
 }
 
-pub(crate) fn write(
-    registry: &Registry,
-    declarations: &Declarations,
-    support: &Support,
-) -> Result<String, Error> {
+pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &Support) -> Result<String, Error> {
     let chained = structures(registry, declarations, support)?;
     let core = Chained::new(registry, declarations, CORE, None)?;
     let nested: BTreeMap<&str, Chained<'_>> = NESTED
@@ -132,10 +95,7 @@ pub(crate) fn write(
             let value = match nested.get(declared.name.as_str()) {
                 Some(nested) => {
                     let name = nested.name.trim_start_matches("VkPhysicalDevice");
-                    format!(
-                        "self.{}()",
-                        name.to_lowercase().replace("sparsep", "sparse_p")
-                    )
+                    format!("self.{}()", name.to_lowercase().replace("sparsep", "sparse_p"))
                 }
                 None => value(field(structure.name, &declared.name), &declared.ty),
             };
@@ -151,10 +111,7 @@ pub(crate) fn write(
             let _ = writeln!(members, "out.{} = {value};", declared.name);
         }
         let ty = &structure.declared.ty;
-        let _ = writeln!(
-            writes,
-            "if let Some(out) = structure.cast::<{ty}>() {{ {members} }}"
-        );
+        let _ = writeln!(writes, "if let Some(out) = structure.cast::<{ty}>() {{ {members} }}");
     }
     rust::file(
         "//! Properties and limits, and the structures in which Vulkan asks for them.",

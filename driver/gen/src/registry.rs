@@ -5,8 +5,7 @@ use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use vk_parse::{
-    CommandDefinition, ExtensionChild, InterfaceItem, RegistryChild, TypeMember, TypeMemberMarkup,
-    TypeSpec, TypesChild,
+    CommandDefinition, ExtensionChild, InterfaceItem, RegistryChild, TypeMember, TypeMemberMarkup, TypeSpec, TypesChild,
 };
 
 /// The version of the registry that is read.
@@ -129,22 +128,14 @@ impl Registry {
                         path: path.to_owned(),
                         reason: format!("{} is no version of Vulkan's", feature.name),
                     })?;
-                    self.versions.extend(
-                        feature
-                            .children
-                            .into_iter()
-                            .filter_map(|c| requirement(by, c)),
-                    );
+                    self.versions.extend(feature.children.into_iter().filter_map(|c| requirement(by, c)));
                 }
-                RegistryChild::Extensions(extensions) => self
-                    .extensions
-                    .extend(extensions.children.into_iter().filter_map(extension)),
-                RegistryChild::SpirvCapabilities(capabilities) => self.capabilities.extend(
-                    capabilities
-                        .children
-                        .into_iter()
-                        .map(|c| (c.name, c.enables)),
-                ),
+                RegistryChild::Extensions(extensions) => {
+                    self.extensions.extend(extensions.children.into_iter().filter_map(extension))
+                }
+                RegistryChild::SpirvCapabilities(capabilities) => {
+                    self.capabilities.extend(capabilities.children.into_iter().map(|c| (c.name, c.enables)))
+                }
                 _ => {}
             }
         }
@@ -175,9 +166,7 @@ impl Registry {
                 vk_parse::Command::Alias { name, alias } => {
                     self.command_aliases.insert(name, alias);
                 }
-                vk_parse::Command::Definition(definition)
-                    if is_of_vulkan(definition.api.as_deref()) =>
-                {
+                vk_parse::Command::Definition(definition) if is_of_vulkan(definition.api.as_deref()) => {
                     let (name, command) = command_definition(definition);
                     self.commands.insert(name, command);
                 }
@@ -188,27 +177,19 @@ impl Registry {
 
     /// The newest name of a type, under which it is defined.
     pub fn type_name<'a>(&'a self, name: &'a str) -> &'a str {
-        self.type_aliases
-            .get(name)
-            .map_or(name, |alias| self.type_name(alias))
+        self.type_aliases.get(name).map_or(name, |alias| self.type_name(alias))
     }
 
     /// The newest name of a command, under which it is defined.
     pub fn command_name<'a>(&'a self, name: &'a str) -> &'a str {
-        self.command_aliases
-            .get(name)
-            .map_or(name, |alias| self.command_name(alias))
+        self.command_aliases.get(name).map_or(name, |alias| self.command_name(alias))
     }
 
     /// All names of a type, given one of them.
     pub fn type_names<'a>(&'a self, name: &'a str) -> Vec<&'a str> {
         let last = self.type_name(name);
-        let mut names: Vec<&str> = self
-            .type_aliases
-            .keys()
-            .map(String::as_str)
-            .filter(|alias| self.type_name(alias) == last)
-            .collect();
+        let mut names: Vec<&str> =
+            self.type_aliases.keys().map(String::as_str).filter(|alias| self.type_name(alias) == last).collect();
         names.sort_unstable();
         names.insert(0, last);
         names
@@ -217,12 +198,8 @@ impl Registry {
     /// All names of a command, given one of them.
     pub fn command_names<'a>(&'a self, name: &'a str) -> Vec<&'a str> {
         let last = self.command_name(name);
-        let mut names: Vec<&str> = self
-            .command_aliases
-            .keys()
-            .map(String::as_str)
-            .filter(|alias| self.command_name(alias) == last)
-            .collect();
+        let mut names: Vec<&str> =
+            self.command_aliases.keys().map(String::as_str).filter(|alias| self.command_name(alias) == last).collect();
         names.sort_unstable();
         names.insert(0, last);
         names
@@ -239,12 +216,8 @@ impl Registry {
 /// # Errors
 /// [`Error::Registry`].
 pub(crate) fn parse(path: &Path) -> Result<Vec<RegistryChild>, Error> {
-    let invalid = |reason: String| Error::Registry {
-        path: path.to_owned(),
-        reason,
-    };
-    let (registry, errors) =
-        vk_parse::parse_file(path).map_err(|error| invalid(format!("{error:?}")))?;
+    let invalid = |reason: String| Error::Registry { path: path.to_owned(), reason };
+    let (registry, errors) = vk_parse::parse_file(path).map_err(|error| invalid(format!("{error:?}")))?;
     match errors.first() {
         Some(error) => Err(invalid(format!("{error:?}"))),
         None => Ok(registry.0),
@@ -258,11 +231,7 @@ pub(crate) fn read_version(path: &Path, version: &str, sha256: &str) -> Result<S
     if found == sha256 {
         return Ok(text);
     }
-    Err(Error::OtherRegistry {
-        path: path.to_owned(),
-        found,
-        expected: format!("{version} with {sha256}"),
-    })
+    Err(Error::OtherRegistry { path: path.to_owned(), found, expected: format!("{version} with {sha256}") })
 }
 
 /// Reads a file.
@@ -270,10 +239,7 @@ pub(crate) fn read_version(path: &Path, version: &str, sha256: &str) -> Result<S
 /// # Errors
 /// [`Error::File`].
 pub(crate) fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::File {
-        path: path.to_owned(),
-        source,
-    })
+    std::fs::read_to_string(path).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
 /// Reports whether a list of APIs contains Vulkan. Without a list, an element belongs to all APIs.
@@ -282,18 +248,12 @@ fn is_of_vulkan(apis: Option<&str>) -> bool {
 }
 
 fn list(text: Option<&str>) -> Vec<String> {
-    text.into_iter()
-        .flat_map(|text| text.split(','))
-        .map(str::to_owned)
-        .collect()
+    text.into_iter().flat_map(|text| text.split(',')).map(str::to_owned).collect()
 }
 
 /// A version from its number (`1.3`) or its name (`VK_VERSION_1_3`).
 pub fn version(text: &str) -> Option<Version> {
-    let (major, minor) = text
-        .strip_prefix("VK_VERSION_")
-        .unwrap_or(text)
-        .split_once(['.', '_'])?;
+    let (major, minor) = text.strip_prefix("VK_VERSION_").unwrap_or(text).split_once(['.', '_'])?;
     Some((major.parse().ok()?, minor.parse().ok()?))
 }
 
@@ -305,13 +265,10 @@ fn member(member: TypeMember) -> Option<Member> {
         return None;
     }
     let len = definition.len;
-    let name = definition
-        .markup
-        .into_iter()
-        .find_map(|markup| match markup {
-            TypeMemberMarkup::Name(text) => Some(text),
-            _ => None,
-        })?;
+    let name = definition.markup.into_iter().find_map(|markup| match markup {
+        TypeMemberMarkup::Name(text) => Some(text),
+        _ => None,
+    })?;
     (name != "sType" && name != "pNext").then_some(Member { name, len })
 }
 
@@ -330,25 +287,13 @@ fn command_definition(definition: CommandDefinition) -> (String, Command) {
 }
 
 fn requirement<T>(by: T, child: ExtensionChild) -> Option<Requirement<T>> {
-    let ExtensionChild::Require {
-        api,
-        depends,
-        items,
-        ..
-    } = child
-    else {
+    let ExtensionChild::Require { api, depends, items, .. } = child else {
         return None;
     };
     if !is_of_vulkan(api.as_deref()) {
         return None;
     }
-    let mut requirement = Requirement {
-        by,
-        depends,
-        types: Vec::new(),
-        commands: Vec::new(),
-        features: Vec::new(),
-    };
+    let mut requirement = Requirement { by, depends, types: Vec::new(), commands: Vec::new(), features: Vec::new() };
     for item in items {
         match item {
             InterfaceItem::Type { name, .. } => requirement.types.push(name),
@@ -356,9 +301,7 @@ fn requirement<T>(by: T, child: ExtensionChild) -> Option<Requirement<T>> {
             InterfaceItem::Feature { name, struct_, .. } => {
                 // One row may name several members.
                 for name in name.split(',') {
-                    requirement
-                        .features
-                        .push((struct_.clone(), name.to_owned()));
+                    requirement.features.push((struct_.clone(), name.to_owned()));
                 }
             }
             _ => {}
@@ -376,11 +319,7 @@ fn extension(extension: vk_parse::Extension) -> Option<Extension> {
         is_of_instance: extension.ext_type.as_deref() == Some("instance"),
         promoted_to: extension.promotedto,
         depends: extension.depends,
-        requirements: extension
-            .children
-            .into_iter()
-            .filter_map(|child| requirement((), child))
-            .collect(),
+        requirements: extension.children.into_iter().filter_map(|child| requirement((), child)).collect(),
         name: extension.name,
     })
 }
@@ -391,12 +330,10 @@ fn spec_version(extension: &vk_parse::Extension) -> Option<u32> {
             return None;
         };
         items.iter().find_map(|item| match item {
-            InterfaceItem::Enum(constant) if constant.name.ends_with("_SPEC_VERSION") => {
-                match &constant.spec {
-                    vk_parse::EnumSpec::Value { value, .. } => value.parse().ok(),
-                    _ => None,
-                }
-            }
+            InterfaceItem::Enum(constant) if constant.name.ends_with("_SPEC_VERSION") => match &constant.spec {
+                vk_parse::EnumSpec::Value { value, .. } => value.parse().ok(),
+                _ => None,
+            },
             _ => None,
         })
     })
@@ -413,11 +350,7 @@ fn evaluate(rest: &mut &str, is_there: &dyn Fn(&str) -> bool) -> bool {
     while let Some(operator) = rest.chars().next().filter(|c| matches!(c, ',' | '+')) {
         *rest = &rest[1..];
         let next = operand(rest, is_there);
-        value = if operator == ',' {
-            value || next
-        } else {
-            value && next
-        };
+        value = if operator == ',' { value || next } else { value && next };
     }
     value
 }
@@ -443,10 +376,7 @@ pub fn by_version<T>(
 ) -> BTreeMap<Version, Vec<&T>> {
     let mut sorted: BTreeMap<Version, Vec<&T>> = BTreeMap::new();
     for requirement in requirements.iter().filter(|r| r.by <= newest) {
-        sorted
-            .entry(requirement.by)
-            .or_default()
-            .extend(items(requirement));
+        sorted.entry(requirement.by).or_default().extend(items(requirement));
     }
     sorted
 }

@@ -12,18 +12,12 @@ use std::process::{Command, Stdio};
 /// [`Error::File`] and [`Error::Rust`].
 pub(crate) fn parse(path: &Path) -> Result<syn::File, Error> {
     let text = registry::read(path)?;
-    syn::parse_file(&text).map_err(|source| Error::Rust {
-        path: path.to_owned(),
-        source,
-    })
+    syn::parse_file(&text).map_err(|source| Error::Rust { path: path.to_owned(), source })
 }
 
 /// The files of a folder and its subfolders, in order.
 pub(crate) fn source_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let failed = |source| Error::File {
-        path: folder.to_owned(),
-        source,
-    };
+    let failed = |source| Error::File { path: folder.to_owned(), source };
     let mut entries = std::fs::read_dir(folder)
         .map_err(failed)?
         .map(|entry| entry.map(|entry| entry.path()))
@@ -56,14 +50,12 @@ pub(crate) fn file_of(source: &str, documentation: &str, code: &str) -> Result<S
     ))
 }
 
-/// Formats source as `cargo fmt` does.
+/// Formats source as `cargo fmt` does, by the project's `rustfmt.toml`.
 pub(crate) fn format(source: &str) -> Result<String, Error> {
-    let failed = |reason: String| Error::Program {
-        program: "rustfmt",
-        reason,
-    };
+    let failed = |reason: String| Error::Program { program: "rustfmt", reason };
     let mut rustfmt = Command::new("rustfmt")
-        .args(["--edition", "2024"])
+        .args(["--edition", "2024", "--config-path"])
+        .arg(crate::repository())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -71,13 +63,9 @@ pub(crate) fn format(source: &str) -> Result<String, Error> {
         .map_err(|error| failed(error.to_string()))?;
     // rustfmt reads all of its input before it writes.
     if let Some(mut input) = rustfmt.stdin.take() {
-        input
-            .write_all(source.as_bytes())
-            .map_err(|error| failed(error.to_string()))?;
+        input.write_all(source.as_bytes()).map_err(|error| failed(error.to_string()))?;
     }
-    let output = rustfmt
-        .wait_with_output()
-        .map_err(|error| failed(error.to_string()))?;
+    let output = rustfmt.wait_with_output().map_err(|error| failed(error.to_string()))?;
     if !output.status.success() {
         return Err(failed(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
@@ -91,9 +79,7 @@ pub(crate) fn snake_case(name: &str) -> String {
     let mut text = String::new();
     for (index, letter) in letters.iter().enumerate() {
         let before = index.checked_sub(1).map_or(' ', |before| letters[before]);
-        let after = letters[index..]
-            .iter()
-            .find(|letter| !letter.is_ascii_digit());
+        let after = letters[index..].iter().find(|letter| !letter.is_ascii_digit());
         // Digits belong to the next letter if that is a capital.
         let begins = if letter.is_ascii_digit() {
             !before.is_ascii_digit() && after.is_some_and(char::is_ascii_uppercase)

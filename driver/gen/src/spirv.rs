@@ -20,11 +20,7 @@ struct Known<'a> {
     properties: Vec<Chained<'a>>,
 }
 
-pub(crate) fn write(
-    registry: &Registry,
-    declarations: &Declarations,
-    support: &Support,
-) -> Result<String, Error> {
+pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &Support) -> Result<String, Error> {
     let known = Known {
         registry,
         support,
@@ -55,11 +51,7 @@ pub(crate) fn write(
         let mut distinct = BTreeSet::new();
         rows.retain(|row| distinct.insert(row.clone()));
         if !rows.is_empty() && !support.spirv.accepted.contains(name) {
-            let _ = writeln!(
-                arms,
-                "Capability::{capability:?} => &[{}],",
-                rows.join(", ")
-            );
+            let _ = writeln!(arms, "Capability::{capability:?} => &[{}],", rows.join(", "));
         }
     }
     rust::file(
@@ -99,9 +91,7 @@ impl Known<'_> {
     fn enable(&self, enable: &Enable) -> Result<Option<String>, Error> {
         Ok(match enable {
             Enable::Version(name) if self.support.has(name) => None,
-            Enable::Extension(name) if self.support.has(name) => {
-                Some(format!("Enable::Extension(c\"{name}\")"))
-            }
+            Enable::Extension(name) if self.support.has(name) => Some(format!("Enable::Extension(c\"{name}\")")),
             Enable::Version(name) | Enable::Extension(name) => Some(absent(name)),
             Enable::Feature(feature) => Some(self.feature(feature)),
             Enable::Property(property) => Some(self.property(property)?),
@@ -129,10 +119,7 @@ impl Known<'_> {
             return Ok(absent(&enable.member));
         };
         let Some(field) = member(chained, &enable.member) else {
-            return Err(Error::Support(format!(
-                "{structure} has no member {}",
-                enable.member
-            )));
+            return Err(Error::Support(format!("{structure} has no member {}", enable.member)));
         };
         let field = properties::field(structure, field);
         let condition = match enable.value.as_str() {
@@ -160,8 +147,5 @@ fn absent(name: &str) -> String {
 
 /// The Rust name of a structure's member.
 fn member<'a>(chained: &Chained<'a>, name: &str) -> Option<&'a str> {
-    chained
-        .members()
-        .find(|(member, _)| member.name == name)
-        .map(|(_, declared)| declared.name.as_str())
+    chained.members().find(|(member, _)| member.name == name).map(|(_, declared)| declared.name.as_str())
 }

@@ -132,14 +132,8 @@ impl Support {
         }
         for extension in &registry.extensions {
             let name = &extension.name;
-            let is_promoted = extension
-                .promoted_to
-                .as_deref()
-                .is_some_and(|to| registry::version(to).is_some());
-            match (
-                self.extension.contains_key(name),
-                self.absent.contains_key(name),
-            ) {
+            let is_promoted = extension.promoted_to.as_deref().is_some_and(|to| registry::version(to).is_some());
+            match (self.extension.contains_key(name), self.absent.contains_key(name)) {
                 (false, false) if is_promoted => {
                     return wrong(format!(
                         "{name} was promoted to core, and is neither listed nor absent with a reason"

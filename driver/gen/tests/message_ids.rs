@@ -63,11 +63,8 @@ fn messages_name_rules_that_there_are() {
     let named = ids_of_folder(&repository().join("driver/src"));
     // A command's name is inserted into these ids; the next test checks them.
     let is_whole = |id: &&String| !matches!(id.as_str(), "VUID-" | "VUID--");
-    let unknown: Vec<_> = named
-        .iter()
-        .filter(is_whole)
-        .filter(|id| !known.contains(*id) && !NEWER.contains(&id.as_str()))
-        .collect();
+    let unknown: Vec<_> =
+        named.iter().filter(is_whole).filter(|id| !known.contains(*id) && !NEWER.contains(&id.as_str())).collect();
     assert!(unknown.is_empty(), "{unknown:#?}");
     for newer in NEWER {
         assert!(named.contains(newer), "{newer} is named no more");

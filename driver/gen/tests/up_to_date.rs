@@ -14,9 +14,7 @@ const VK_XML: &str = "GAURAST_VK_XML";
 const SPIRV_GRAMMAR: &str = "GAURAST_SPIRV_GRAMMAR";
 
 fn path_in(variable: &str) -> PathBuf {
-    std::env::var_os(variable)
-        .expect("a variable that was just looked at")
-        .into()
+    std::env::var_os(variable).expect("a variable that was just looked at").into()
 }
 
 fn assert_up_to_date(file: &File) {

@@ -15,9 +15,7 @@ use driver::loader;
 /// `version` points at the newest version that the loader knows.
 #[unsafe(no_mangle)]
 #[allow(non_snake_case, reason = "the loader's name")]
-pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(
-    version: *mut u32,
-) -> vk::Result {
+pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(version: *mut u32) -> vk::Result {
     // A process usually has no other logger; if it has one, that one stays.
     let environment = env_logger::Env::new().filter_or("GAURAST_LOG", "warn");
     let _ = env_logger::Builder::from_env(environment).try_init();
@@ -65,19 +63,13 @@ pub unsafe extern "system" fn vk_icdGetPhysicalDeviceProcAddr(
 fn interface_function(name: &CStr) -> vk::PFN_vkVoidFunction {
     type Negotiate = unsafe extern "system" fn(*mut u32) -> vk::Result;
     type GetProcAddr = vk::PFN_vkGetInstanceProcAddr;
-    let (negotiate, get_physical): (Negotiate, GetProcAddr) = (
-        vk_icdNegotiateLoaderICDInterfaceVersion,
-        vk_icdGetPhysicalDeviceProcAddr,
-    );
+    let (negotiate, get_physical): (Negotiate, GetProcAddr) =
+        (vk_icdNegotiateLoaderICDInterfaceVersion, vk_icdGetPhysicalDeviceProcAddr);
     // SAFETY: function pointers have one size, and the loader casts them back before it calls them.
     unsafe {
         match name.to_bytes() {
-            b"vk_icdNegotiateLoaderICDInterfaceVersion" => {
-                transmute::<Negotiate, vk::PFN_vkVoidFunction>(negotiate)
-            }
-            b"vk_icdGetPhysicalDeviceProcAddr" => {
-                transmute::<GetProcAddr, vk::PFN_vkVoidFunction>(get_physical)
-            }
+            b"vk_icdNegotiateLoaderICDInterfaceVersion" => transmute::<Negotiate, vk::PFN_vkVoidFunction>(negotiate),
+            b"vk_icdGetPhysicalDeviceProcAddr" => transmute::<GetProcAddr, vk::PFN_vkVoidFunction>(get_physical),
             _ => None,
         }
     }

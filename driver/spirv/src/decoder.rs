@@ -15,10 +15,7 @@ pub(crate) const HEADER_WORDS: usize = 5;
 ///
 /// # Errors
 /// [`Error::Binary`] names the first word that violates the grammar. An error of `each` is returned.
-pub(crate) fn decode(
-    words: &[u32],
-    mut each: impl FnMut(Instruction) -> Result<(), Error>,
-) -> Result<(), Error> {
+pub(crate) fn decode(words: &[u32], mut each: impl FnMut(Instruction) -> Result<(), Error>) -> Result<(), Error> {
     let mut literal_widths = HashMap::new();
     let mut at = HEADER_WORDS;
     while let Some(first) = words.get(at) {
@@ -26,21 +23,14 @@ pub(crate) fn decode(
         if count == 0 || count > words.len() - at {
             return invalid(at, format!("the instruction has a word count of {count}"));
         }
-        let Some((opcode, layout)) =
-            Op::from_u32(opcode).and_then(|op| Some((op, grammar::operands(op)?)))
-        else {
+        let Some((opcode, layout)) = Op::from_u32(opcode).and_then(|op| Some((op, grammar::operands(op)?))) else {
             return invalid(at, format!("there is no opcode {opcode}"));
         };
         let mut decoder = Decoder {
             words: &words[..at + count],
             at: at + 1,
             literal_widths: &literal_widths,
-            it: Instruction {
-                opcode,
-                result_type: None,
-                result_id: None,
-                operands: Vec::new(),
-            },
+            it: Instruction { opcode, result_type: None, result_id: None, operands: Vec::new() },
         };
         decoder.operands(layout)?;
         let it = decoder.it;
@@ -54,9 +44,7 @@ pub(crate) fn decode(
 }
 
 fn invalid<T>(word: usize, reason: impl std::fmt::Display) -> Result<T, Error> {
-    Err(Error::Binary {
-        reason: format!("word {word}: {reason}"),
-    })
+    Err(Error::Binary { reason: format!("word {word}: {reason}") })
 }
 
 /// The number of bits of a literal of a type, or of a value's type.
@@ -244,11 +232,7 @@ mod tests {
         .unwrap();
         assert_eq!(all[1].operands, [Operand::Literal64(2 << 32 | 1)]);
         assert_eq!((all[1].result_type, all[1].result_id), (Some(7), Some(8)));
-        let built_in = [
-            Operand::Id(8),
-            Operand::Enumerant(11),
-            Operand::Enumerant(6),
-        ];
+        let built_in = [Operand::Id(8), Operand::Enumerant(11), Operand::Enumerant(6)];
         assert_eq!(all[2].operands, built_in);
         // The alignment that a bit of the mask requires.
         let aligned = [Operand::Id(8), Operand::Enumerant(2), Operand::Literal(16)];
@@ -261,22 +245,10 @@ mod tests {
         let name = Op::Name as u32;
         for (found, expected) in [
             (refused(0xffff, &[]), "word 5: there is no opcode 65535"),
-            (
-                refused(Op::MemoryModel as u32, &[0]),
-                "word 7: OpMemoryModel: an operand is missing",
-            ),
-            (
-                refused(Op::Nop as u32, &[1]),
-                "word 6: OpNop: there are more operands than the instruction takes",
-            ),
-            (
-                refused(Op::Capability as u32, &[9999]),
-                "word 6: OpCapability: Capability has no 9999",
-            ),
-            (
-                refused(name, &[1, 0x6161_6161]),
-                "word 8: OpName: an operand is missing",
-            ),
+            (refused(Op::MemoryModel as u32, &[0]), "word 7: OpMemoryModel: an operand is missing"),
+            (refused(Op::Nop as u32, &[1]), "word 6: OpNop: there are more operands than the instruction takes"),
+            (refused(Op::Capability as u32, &[9999]), "word 6: OpCapability: Capability has no 9999"),
+            (refused(name, &[1, 0x6161_6161]), "word 8: OpName: an operand is missing"),
         ] {
             assert_eq!(found, format!("not SPIR-V: {expected}"));
         }

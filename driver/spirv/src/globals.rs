@@ -32,11 +32,7 @@ impl Specialization {
             return Ok(None);
         };
         if bytes.len() != expected {
-            return Err(Error::Specialization {
-                id,
-                expected,
-                given: bytes.len(),
-            });
+            return Err(Error::Specialization { id, expected, given: bytes.len() });
         }
         let mut bits = [0; 8];
         bits[..expected].copy_from_slice(bytes);
@@ -99,33 +95,19 @@ impl Globals {
         }
         self.scalars += bits.len();
         if self.scalars > MAX_CONSTANT_SCALARS {
-            return Err(Error::TooLarge {
-                what: "scalars of constants",
-                limit: MAX_CONSTANT_SCALARS as u64,
-            }
-            .into());
+            return Err(Error::TooLarge { what: "scalars of constants", limit: MAX_CONSTANT_SCALARS as u64 }.into());
         }
         let bits = bits.into();
         self.constants.insert(id, Constant { ty, bits });
         Ok(())
     }
 
-    fn instruction(
-        &mut self,
-        module: &Module,
-        specialization: &Specialization,
-        it: &Instruction,
-    ) -> Result<()> {
+    fn instruction(&mut self, module: &Module, specialization: &Specialization, it: &Instruction) -> Result<()> {
         if it.opcode == Op::Variable {
             let ty = it.ty()?;
             let (class, pointee) = self.types.pointer(ty)?;
             let initializer = it.id(1).ok();
-            let variable = GlobalVariable {
-                ty,
-                class,
-                pointee,
-                initializer,
-            };
+            let variable = GlobalVariable { ty, class, pointee, initializer };
             self.variables.insert(it.result()?, variable);
             return Ok(());
         }
@@ -163,8 +145,7 @@ impl Globals {
             }
             Op::TypeVector => {
                 let (element, count) = (it.id(0)?, it.number(1)?);
-                if !matches!(self.types.get(element)?, Type::Scalar(_)) || !(2..=4).contains(&count)
-                {
+                if !matches!(self.types.get(element)?, Type::Scalar(_)) || !(2..=4).contains(&count) {
                     return malformed("vectors have two to four scalars");
                 }
                 Type::Vector { element, count }
@@ -188,16 +169,10 @@ impl Globals {
                 },
                 stride: stride(it.result()?),
             },
-            Op::TypeRuntimeArray => Type::RuntimeArray {
-                element: it.id(0)?,
-                stride: stride(it.result()?),
-            },
+            Op::TypeRuntimeArray => Type::RuntimeArray { element: it.id(0)?, stride: stride(it.result()?) },
             Op::TypeStruct => Type::Struct(self.members(module, it)?),
             Op::TypePointer => match it.enumerant(0, StorageClass::from_u32) {
-                Some(class) => Type::Pointer {
-                    class,
-                    pointee: it.id(1)?,
-                },
+                Some(class) => Type::Pointer { class, pointee: it.id(1)? },
                 None => return malformed("there is no storage class"),
             },
             Op::TypeImage => Type::Image(image_type(it)?),
@@ -222,19 +197,12 @@ impl Globals {
                 row_major: module.member_has(id, index, Decoration::RowMajor),
                 built_in: module.member_built_in(id, index),
             });
-            start = start
-                .zip(self.types.scalars(ty).ok())
-                .and_then(|(start, scalars)| start.checked_add(scalars));
+            start = start.zip(self.types.scalars(ty).ok()).and_then(|(start, scalars)| start.checked_add(scalars));
         }
         Ok(members.into())
     }
 
-    fn constant(
-        &mut self,
-        module: &Module,
-        specialization: &Specialization,
-        it: &Instruction,
-    ) -> Result<()> {
+    fn constant(&mut self, module: &Module, specialization: &Specialization, it: &Instruction) -> Result<()> {
         let (id, ty) = (it.result()?, it.ty()?);
         if it.opcode == Op::Undef && self.types.is_opaque(ty) {
             self.undefined.insert(id, ty);
@@ -294,10 +262,7 @@ impl Globals {
 }
 
 fn image_type(it: &Instruction) -> Result<ImageType> {
-    let (Some(dim), Some(format)) = (
-        it.enumerant(1, Dim::from_u32),
-        it.enumerant(6, ImageFormat::from_u32),
-    ) else {
+    let (Some(dim), Some(format)) = (it.enumerant(1, Dim::from_u32), it.enumerant(6, ImageFormat::from_u32)) else {
         return malformed("the image type isn't complete");
     };
     Ok(ImageType {
@@ -322,15 +287,9 @@ fn from_memory(scalar: Scalar, bits: u64) -> u64 {
 /// Truncates an integer to its width and extends it by its own signedness to a register.
 fn wrap_to_width(scalar: Scalar, bits: u64) -> u64 {
     match scalar {
-        Scalar::Int {
-            width: 8,
-            signed: true,
-        } => u64::from(i32::from(bits as i8).cast_unsigned()),
+        Scalar::Int { width: 8, signed: true } => u64::from(i32::from(bits as i8).cast_unsigned()),
         Scalar::Int { width: 8, .. } => bits & 0xff,
-        Scalar::Int {
-            width: 16,
-            signed: true,
-        } => u64::from(i32::from(bits as i16).cast_unsigned()),
+        Scalar::Int { width: 16, signed: true } => u64::from(i32::from(bits as i16).cast_unsigned()),
         Scalar::Int { width: 16, .. } => bits & 0xffff,
         _ if scalar.is_wide() => bits,
         _ => bits & 0xffff_ffff,
@@ -340,18 +299,10 @@ fn wrap_to_width(scalar: Scalar, bits: u64) -> u64 {
 /// An integer's value from its register form.
 fn number(scalar: Scalar, bits: u64) -> Number {
     let Scalar::Int { width, .. } = scalar else {
-        return Number {
-            width: 32,
-            unsigned: bits,
-            signed: bits.cast_signed(),
-        };
+        return Number { width: 32, unsigned: bits, signed: bits.cast_signed() };
     };
     let shift = 64 - width.min(64);
-    Number {
-        width,
-        unsigned: bits << shift >> shift,
-        signed: (bits << shift).cast_signed() >> shift,
-    }
+    Number { width, unsigned: bits << shift >> shift, signed: (bits << shift).cast_signed() >> shift }
 }
 
 /// An integer, as signed and as unsigned.
@@ -413,11 +364,7 @@ fn evaluate(globals: &Globals, ty: u32, words: &[u32]) -> Result<Vec<u64>> {
             }
             let pick = |index: usize| {
                 let condition = condition.bits[index.min(condition.bits.len() - 1)];
-                if condition != 0 {
-                    a.bits[index]
-                } else {
-                    b.bits[index]
-                }
+                if condition != 0 { a.bits[index] } else { b.bits[index] }
             };
             return Ok((0..a.bits.len()).map(pick).collect());
         }
@@ -506,11 +453,7 @@ fn integer(op: Op, a: Number, b: Number) -> Result<u64> {
         Op::SMod => {
             let remainder = sa.wrapping_rem(sb);
             let differs = remainder != 0 && (remainder < 0) != (sb < 0);
-            signed(if differs {
-                remainder.wrapping_add(sb)
-            } else {
-                remainder
-            })
+            signed(if differs { remainder.wrapping_add(sb) } else { remainder })
         }
         Op::ShiftRightLogical => ua >> shift,
         Op::ShiftRightArithmetic => signed(sa >> shift),

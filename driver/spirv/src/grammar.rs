@@ -79,16 +79,8 @@ pub(crate) struct Operands {
     pub repeated: Option<Kind>,
 }
 
-const fn operands_of(
-    required: &'static [Kind],
-    optional: &'static [Kind],
-    repeated: Option<Kind>,
-) -> Operands {
-    Operands {
-        required,
-        optional,
-        repeated,
-    }
+const fn operands_of(required: &'static [Kind], optional: &'static [Kind], repeated: Option<Kind>) -> Operands {
+    Operands { required, optional, repeated }
 }
 
 /// The operands of an operation; `None` where the grammar doesn't have it.
@@ -562,30 +554,20 @@ impl Kind {
             Self::LinkageType => LinkageType::from_u32(value).is_some(),
             Self::AccessQualifier => AccessQualifier::from_u32(value).is_some(),
             Self::HostAccessQualifier => HostAccessQualifier::from_u32(value).is_some(),
-            Self::FunctionParameterAttribute => {
-                FunctionParameterAttribute::from_u32(value).is_some()
-            }
+            Self::FunctionParameterAttribute => FunctionParameterAttribute::from_u32(value).is_some(),
             Self::Decoration => Decoration::from_u32(value).is_some(),
             Self::BuiltIn => BuiltIn::from_u32(value).is_some(),
             Self::GroupOperation => GroupOperation::from_u32(value).is_some(),
             Self::Capability => Capability::from_u32(value).is_some(),
             Self::PackedVectorFormat => PackedVectorFormat::from_u32(value).is_some(),
-            Self::CooperativeMatrixOperands => {
-                CooperativeMatrixOperands::from_bits(value).is_some()
-            }
+            Self::CooperativeMatrixOperands => CooperativeMatrixOperands::from_bits(value).is_some(),
             Self::CooperativeMatrixReduce => CooperativeMatrixReduce::from_bits(value).is_some(),
             Self::TensorAddressingOperands => TensorAddressingOperands::from_bits(value).is_some(),
-            Self::InitializationModeQualifier => {
-                InitializationModeQualifier::from_u32(value).is_some()
-            }
+            Self::InitializationModeQualifier => InitializationModeQualifier::from_u32(value).is_some(),
             Self::LoadCacheControl => LoadCacheControl::from_u32(value).is_some(),
             Self::StoreCacheControl => StoreCacheControl::from_u32(value).is_some(),
-            Self::NamedMaximumNumberOfRegisters => {
-                NamedMaximumNumberOfRegisters::from_u32(value).is_some()
-            }
-            Self::MatrixMultiplyAccumulateOperands => {
-                MatrixMultiplyAccumulateOperands::from_bits(value).is_some()
-            }
+            Self::NamedMaximumNumberOfRegisters => NamedMaximumNumberOfRegisters::from_u32(value).is_some(),
+            Self::MatrixMultiplyAccumulateOperands => MatrixMultiplyAccumulateOperands::from_bits(value).is_some(),
             Self::FPEncoding => FPEncoding::from_u32(value).is_some(),
             Self::TensorOperands => TensorOperands::from_bits(value).is_some(),
             _ => false,
@@ -602,8 +584,8 @@ impl Kind {
                 _ => &[],
             },
             Self::LoopControl => match value {
-                0x8 | 0x10 | 0x20 | 0x40 | 0x80 | 0x100 | 0x10000 | 0x20000 | 0x40000 | 0x80000
-                | 0x100000 | 0x200000 | 0x400000 | 0x1000000 | 0x2000000 => &[K::Literal],
+                0x8 | 0x10 | 0x20 | 0x40 | 0x80 | 0x100 | 0x10000 | 0x20000 | 0x40000 | 0x80000 | 0x100000
+                | 0x200000 | 0x400000 | 0x1000000 | 0x2000000 => &[K::Literal],
                 _ => &[],
             },
             Self::MemoryAccess => match value {
@@ -619,9 +601,7 @@ impl Kind {
                     | ExecutionMode::ShaderIndexAMDX
                     | ExecutionMode::MaximumRegistersIdINTEL,
                 ) => &[K::Id],
-                Some(ExecutionMode::SharesInputWithAMDX | ExecutionMode::FPFastMathDefault) => {
-                    &[K::Id, K::Id]
-                }
+                Some(ExecutionMode::SharesInputWithAMDX | ExecutionMode::FPFastMathDefault) => &[K::Id, K::Id],
                 Some(
                     ExecutionMode::LocalSizeId
                     | ExecutionMode::LocalSizeHintId
@@ -659,9 +639,7 @@ impl Kind {
                     | ExecutionMode::TileShadingRateQCOM
                     | ExecutionMode::MaxWorkgroupSizeINTEL,
                 ) => &[K::Literal, K::Literal, K::Literal],
-                Some(ExecutionMode::NamedMaximumRegistersINTEL) => {
-                    &[K::NamedMaximumNumberOfRegisters]
-                }
+                Some(ExecutionMode::NamedMaximumRegistersINTEL) => &[K::NamedMaximumNumberOfRegisters],
                 _ => &[],
             },
             Self::Decoration => match Decoration::from_u32(value) {
@@ -731,14 +709,10 @@ impl Kind {
                     | Decoration::ImplementInRegisterMapALTERA,
                 ) => &[K::Literal],
                 Some(Decoration::FunctionDenormModeINTEL) => &[K::Literal, K::FPDenormMode],
-                Some(Decoration::FunctionFloatingPointModeINTEL) => {
-                    &[K::Literal, K::FPOperationMode]
-                }
+                Some(Decoration::FunctionFloatingPointModeINTEL) => &[K::Literal, K::FPOperationMode],
                 Some(Decoration::FunctionRoundingModeINTEL) => &[K::Literal, K::FPRoundingMode],
                 Some(Decoration::MathOpDSPModeALTERA) => &[K::Literal, K::Literal],
-                Some(Decoration::LatencyControlConstraintALTERA) => {
-                    &[K::Literal, K::Literal, K::Literal]
-                }
+                Some(Decoration::LatencyControlConstraintALTERA) => &[K::Literal, K::Literal, K::Literal],
                 Some(Decoration::CacheControlLoadINTEL) => &[K::Literal, K::LoadCacheControl],
                 Some(Decoration::CacheControlStoreINTEL) => &[K::Literal, K::StoreCacheControl],
                 Some(

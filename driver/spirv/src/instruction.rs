@@ -58,9 +58,7 @@ impl Instruction {
 
     /// All literals from a position on.
     pub fn numbers(&self, from: usize) -> Vec<u32> {
-        (from..self.operands.len())
-            .map_while(|index| self.number(index).ok())
-            .collect()
+        (from..self.operands.len()).map_while(|index| self.number(index).ok()).collect()
     }
 
     /// All ids from a position on.
@@ -104,10 +102,7 @@ impl Instruction {
     /// The reference by which errors name the instruction.
     pub fn reference(&self) -> InstructionRef {
         let named = || self.operands.iter().find_map(Operand::id);
-        InstructionRef {
-            opcode: self.opcode,
-            id: self.result_id.or_else(named),
-        }
+        InstructionRef { opcode: self.opcode, id: self.result_id.or_else(named) }
     }
 }
 
@@ -117,12 +112,8 @@ mod tests {
 
     #[test]
     fn errors_name_the_instruction() {
-        let instruction = Instruction {
-            opcode: Op::FAdd,
-            result_type: Some(1),
-            result_id: Some(12),
-            operands: vec![Operand::Id(7)],
-        };
+        let instruction =
+            Instruction { opcode: Op::FAdd, result_type: Some(1), result_id: Some(12), operands: vec![Operand::Id(7)] };
         let diagnostic = malformed::<()>("operand %7 isn't defined").unwrap_err();
         assert_eq!(
             diagnostic.locate(instruction.reference()).to_string(),

@@ -417,20 +417,13 @@ impl Interface {
             .inputs
             .iter()
             .filter_map(|input| match input.source {
-                InputSource::Location {
-                    location,
-                    component,
-                    ..
-                } => Some((location, component, input.numeric)),
+                InputSource::Location { location, component, .. } => Some((location, component, input.numeric)),
                 InputSource::BuiltIn { .. } | InputSource::Patch => None,
             })
             .collect();
         found.sort_by_key(|(location, component, _)| (*location, *component));
         found.dedup_by_key(|(location, ..)| *location);
-        found
-            .into_iter()
-            .map(|(location, _, numeric)| (location, numeric))
-            .collect()
+        found.into_iter().map(|(location, _, numeric)| (location, numeric)).collect()
     }
 }
 

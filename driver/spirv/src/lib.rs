@@ -20,10 +20,9 @@ mod types;
 pub use error::{Error, InstructionRef};
 pub use globals::Specialization;
 pub use interface::{
-    BuiltIn, CapturedScalar, DepthMode, DescriptorKind, Domain, ImageUse, Input, InputPrimitive,
-    InputSource, Interface, Interpolation, MemoryScalar, Output, OutputPrimitive, OutputTarget,
-    PrimitiveModes, Sampling, ScalarType, Shader, ShaderBinding, Spacing, Stage, TransformFeedback,
-    VertexExchange, VertexMemory,
+    BuiltIn, CapturedScalar, DepthMode, DescriptorKind, Domain, ImageUse, Input, InputPrimitive, InputSource,
+    Interface, Interpolation, MemoryScalar, Output, OutputPrimitive, OutputTarget, PrimitiveModes, Sampling,
+    ScalarType, Shader, ShaderBinding, Spacing, Stage, TransformFeedback, VertexExchange, VertexMemory,
 };
 pub use module::Module;
 pub use translate::{Options, is_supported, translate};

@@ -94,11 +94,7 @@ impl Loader {
             op if op.is_type() || op.is_constant() => sections.globals.push(it),
             Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(it),
             Op::Function => {
-                let function = Function {
-                    definition: it,
-                    parameters: Vec::new(),
-                    blocks: Vec::new(),
-                };
+                let function = Function { definition: it, parameters: Vec::new(), blocks: Vec::new() };
                 if self.function.replace(function).is_some() {
                     return invalid("a function begins within another");
                 }
@@ -108,10 +104,7 @@ impl Loader {
                 None => return invalid("a parameter outside functions"),
             },
             Op::Label => {
-                let block = Block {
-                    label: it.result_id,
-                    instructions: Vec::new(),
-                };
+                let block = Block { label: it.result_id, instructions: Vec::new() };
                 if self.function.is_none() {
                     return invalid("a block outside functions");
                 }
@@ -173,9 +166,7 @@ fn is_terminator(op: Op) -> bool {
 }
 
 fn invalid<T>(reason: impl Into<String>) -> Result<T, Error> {
-    Err(Error::Binary {
-        reason: reason.into(),
-    })
+    Err(Error::Binary { reason: reason.into() })
 }
 
 /// A shader module: decoded and indexed, but not checked beyond that.
@@ -247,9 +238,7 @@ impl Module {
 
     /// Reports whether an id has a decoration.
     pub(crate) fn has(&self, id: u32, decoration: Decoration) -> bool {
-        self.decorations
-            .get(&id)
-            .is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
+        self.decorations.get(&id).is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
     }
 
     /// The number that an id is decorated with.
@@ -264,27 +253,17 @@ impl Module {
 
     /// Reports whether a result is decorated to be rounded towards zero.
     pub(crate) fn rounds_towards_zero(&self, id: u32) -> bool {
-        let mode = self
-            .decorations
-            .get(&id)
-            .and_then(|all| enumerant(all, Decoration::FPRoundingMode));
+        let mode = self.decorations.get(&id).and_then(|all| enumerant(all, Decoration::FPRoundingMode));
         mode.and_then(FPRoundingMode::from_u32) == Some(FPRoundingMode::RTZ)
     }
 
     /// Reports whether a struct's member has a decoration.
     pub(crate) fn member_has(&self, id: u32, member: u32, decoration: Decoration) -> bool {
-        self.member_decorations
-            .get(&(id, member))
-            .is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
+        self.member_decorations.get(&(id, member)).is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
     }
 
     /// The number that a struct's member is decorated with.
-    pub(crate) fn member_literal(
-        &self,
-        id: u32,
-        member: u32,
-        decoration: Decoration,
-    ) -> Option<u32> {
+    pub(crate) fn member_literal(&self, id: u32, member: u32, decoration: Decoration) -> Option<u32> {
         literal(self.member_decorations.get(&(id, member))?, decoration)
     }
 
@@ -304,29 +283,19 @@ impl Module {
                         (operands, annotation.enumerant(1, Decoration::from_u32))
                     {
                         count += 1;
-                        self.decorations.entry(*id).or_default().push(Decorated {
-                            decoration,
-                            parameters: parameters.to_vec(),
-                        });
+                        self.decorations
+                            .entry(*id)
+                            .or_default()
+                            .push(Decorated { decoration, parameters: parameters.to_vec() });
                     }
                 }
                 Op::MemberDecorate => {
-                    if let (
-                        [
-                            Operand::Id(id),
-                            Operand::Literal(member),
-                            _,
-                            parameters @ ..,
-                        ],
-                        Some(decoration),
-                    ) = (operands, annotation.enumerant(2, Decoration::from_u32))
+                    if let ([Operand::Id(id), Operand::Literal(member), _, parameters @ ..], Some(decoration)) =
+                        (operands, annotation.enumerant(2, Decoration::from_u32))
                     {
                         count += 1;
                         let entry = self.member_decorations.entry((*id, *member)).or_default();
-                        entry.push(Decorated {
-                            decoration,
-                            parameters: parameters.to_vec(),
-                        });
+                        entry.push(Decorated { decoration, parameters: parameters.to_vec() });
                     }
                 }
                 Op::GroupDecorate => count += self.apply_group(operands, MAX_DECORATIONS - count),
@@ -336,10 +305,7 @@ impl Module {
                 _ => {}
             }
             if count >= MAX_DECORATIONS {
-                return Err(Error::TooLarge {
-                    what: "decorations",
-                    limit: MAX_DECORATIONS as u64,
-                });
+                return Err(Error::TooLarge { what: "decorations", limit: MAX_DECORATIONS as u64 });
             }
         }
         self.sections.annotations = annotations;
@@ -407,16 +373,10 @@ fn enumerant(all: &[Decorated], decoration: Decoration) -> Option<u32> {
 fn extended_sets(sections: &Sections) -> HashMap<u32, ExtendedSet> {
     let set = |import: &Instruction| match import.string(0) {
         Some("GLSL.std.450") => ExtendedSet::Glsl,
-        Some(name) if name.starts_with("NonSemantic.") || name == "OpenCL.DebugInfo.100" => {
-            ExtendedSet::NonSemantic
-        }
+        Some(name) if name.starts_with("NonSemantic.") || name == "OpenCL.DebugInfo.100" => ExtendedSet::NonSemantic,
         _ => ExtendedSet::Unknown,
     };
-    sections
-        .imports
-        .iter()
-        .filter_map(|import| Some((import.result_id?, set(import))))
-        .collect()
+    sections.imports.iter().filter_map(|import| Some((import.result_id?, set(import)))).collect()
 }
 
 fn names(sections: &Sections) -> HashMap<u32, String> {
@@ -432,10 +392,7 @@ fn names(sections: &Sections) -> HashMap<u32, String> {
 
 fn check_header(words: &[u32]) -> Result<(u8, u8), Error> {
     if words.len() > MAX_WORDS {
-        return Err(Error::TooLarge {
-            what: "words of a module",
-            limit: MAX_WORDS as u64,
-        });
+        return Err(Error::TooLarge { what: "words of a module", limit: MAX_WORDS as u64 });
     }
     let [magic, version, ..] = words else {
         return invalid("there is no header");
@@ -474,15 +431,7 @@ mod tests {
     #[test]
     fn operations_on_constants_keep_all_words() {
         let mut words = vec![spirv::MAGIC_NUMBER, 0x0001_0300, 0, 8, 0];
-        words.extend([
-            7 << 16 | Op::SpecConstantOp as u32,
-            1,
-            2,
-            Op::CompositeExtract as u32,
-            3,
-            0,
-            1,
-        ]);
+        words.extend([7 << 16 | Op::SpecConstantOp as u32, 1, 2, Op::CompositeExtract as u32, 3, 0, 1]);
         let module = Module::parse(&words).unwrap();
         let it = &module.sections.globals[0];
         assert_eq!(it.numbers(0), [Op::CompositeExtract as u32, 3, 0, 1]);

@@ -55,10 +55,7 @@ impl Scalar {
     pub fn at_interface(self) -> ScalarType {
         match self {
             Self::Bool => ScalarType::Bool,
-            Self::Int {
-                width,
-                signed: true,
-            } => ScalarType::Int { width },
+            Self::Int { width, signed: true } => ScalarType::Int { width },
             Self::Int { width, .. } => ScalarType::Uint { width },
             Self::Float { width } => ScalarType::Float { width },
             Self::Address => ScalarType::Uint { width: 64 },
@@ -67,24 +64,15 @@ impl Scalar {
 
     /// Reports whether it takes 64 bits.
     pub fn is_wide(self) -> bool {
-        matches!(
-            self,
-            Self::Int { width: 64, .. } | Self::Float { width: 64 } | Self::Address
-        )
+        matches!(self, Self::Int { width: 64, .. } | Self::Float { width: 64 } | Self::Address)
     }
 
     /// The format in memory that the application sees.
     pub fn format(self) -> ir::Format {
         match self {
-            Self::Int {
-                width: 8,
-                signed: true,
-            } => ir::Format::S8,
+            Self::Int { width: 8, signed: true } => ir::Format::S8,
             Self::Int { width: 8, .. } => ir::Format::U8,
-            Self::Int {
-                width: 16,
-                signed: true,
-            } => ir::Format::S16,
+            Self::Int { width: 16, signed: true } => ir::Format::S16,
             Self::Int { width: 16, .. } | Self::Float { width: 16 } => ir::Format::U16,
             _ if self.is_wide() => ir::Format::B64,
             _ => ir::Format::B32,
@@ -93,11 +81,7 @@ impl Scalar {
 
     /// The format in workgroup and private memory, where narrow scalars take a word.
     pub fn tight_format(self) -> ir::Format {
-        if self.is_wide() {
-            ir::Format::B64
-        } else {
-            ir::Format::B32
-        }
+        if self.is_wide() { ir::Format::B64 } else { ir::Format::B32 }
     }
 }
 
@@ -157,42 +141,21 @@ impl ImageType {
 pub(crate) enum Type {
     Void,
     Scalar(Scalar),
-    Vector {
-        element: u32,
-        count: u32,
-    },
-    Matrix {
-        column: u32,
-        count: u32,
-    },
-    Array {
-        element: u32,
-        count: u32,
-        stride: Option<u32>,
-    },
-    RuntimeArray {
-        element: u32,
-        stride: Option<u32>,
-    },
+    Vector { element: u32, count: u32 },
+    Matrix { column: u32, count: u32 },
+    Array { element: u32, count: u32, stride: Option<u32> },
+    RuntimeArray { element: u32, stride: Option<u32> },
     Struct(Rc<[Member]>),
-    Pointer {
-        class: StorageClass,
-        pointee: u32,
-    },
+    Pointer { class: StorageClass, pointee: u32 },
     Image(ImageType),
     Sampler,
-    SampledImage {
-        image: u32,
-    },
+    SampledImage { image: u32 },
     Function,
 }
 
 /// The scalars of a pointer as a value; empty if pointers of the storage class are not values.
 pub(crate) fn pointer_scalars(class: StorageClass) -> &'static [Scalar] {
-    const WORD: Scalar = Scalar::Int {
-        width: 32,
-        signed: false,
-    };
+    const WORD: Scalar = Scalar::Int { width: 32, signed: false };
     match class {
         StorageClass::PhysicalStorageBuffer => &[Scalar::Address],
         // The slot of a descriptor and the bytes from its start. Slots are counted from 1; 0 means the null pointer.
@@ -245,9 +208,9 @@ impl Types {
             return malformed("the type is declared twice");
         }
         let parts: Vec<u32> = match &ty {
-            Type::Vector { element, .. }
-            | Type::Array { element, .. }
-            | Type::RuntimeArray { element, .. } => vec![*element],
+            Type::Vector { element, .. } | Type::Array { element, .. } | Type::RuntimeArray { element, .. } => {
+                vec![*element]
+            }
             Type::Matrix { column, .. } => vec![*column],
             Type::Struct(members) => members.iter().map(|member| member.ty).collect(),
             _ => Vec::new(),
@@ -262,9 +225,7 @@ impl Types {
                 return malformed(format!("type %{part} isn't defined"));
             };
             depth = depth.max(entry.depth + 1);
-            all = all
-                .zip(entry.scalars)
-                .and_then(|(sum, scalars)| sum.checked_add(scalars));
+            all = all.zip(entry.scalars).and_then(|(sum, scalars)| sum.checked_add(scalars));
         }
         if depth > MAX_DEPTH {
             return unsupported("types are nested too deeply");
@@ -281,21 +242,13 @@ impl Types {
             },
             _ => None,
         };
-        self.entries.insert(
-            id,
-            Entry {
-                ty,
-                scalars: scalars.filter(|scalars| *scalars <= MAX_SCALARS),
-                depth,
-            },
-        );
+        self.entries.insert(id, Entry { ty, scalars: scalars.filter(|scalars| *scalars <= MAX_SCALARS), depth });
         Ok(())
     }
 
     fn note_matrix_layouts(&mut self, members: &[Member]) {
         for member in members {
-            if let (Some(stride), Some(matrix)) = (member.matrix_stride, self.matrix_in(member.ty))
-            {
+            if let (Some(stride), Some(matrix)) = (member.matrix_stride, self.matrix_in(member.ty)) {
                 let layout = Some((stride, member.row_major));
                 let noted = self.matrix_layouts.entry(matrix).or_insert(layout);
                 if *noted != layout {
@@ -324,14 +277,7 @@ impl Types {
     /// The bytes between elements of a type in all arrays of them; None if these differ, or none has a stride.
     pub fn stride_of_arrays(&self, of: u32) -> Option<u32> {
         let mut strides = self.entries.values().filter_map(|entry| match entry.ty {
-            Type::Array {
-                element, stride, ..
-            }
-            | Type::RuntimeArray { element, stride }
-                if element == of =>
-            {
-                stride
-            }
+            Type::Array { element, stride, .. } | Type::RuntimeArray { element, stride } if element == of => stride,
             _ => None,
         });
         let first = strides.next()?;
@@ -381,10 +327,7 @@ impl Types {
             Type::Scalar(scalar) => into.push(*scalar),
             Type::Pointer { class, .. } => into.extend_from_slice(pointer_scalars(*class)),
             Type::Vector { element, count }
-            | Type::Matrix {
-                column: element,
-                count,
-            }
+            | Type::Matrix { column: element, count }
             | Type::Array { element, count, .. } => {
                 let begin = into.len();
                 if *count > 0 {
@@ -410,10 +353,7 @@ impl Types {
         match self.get(id)? {
             Type::Scalar(scalar) => Ok((*scalar, 1)),
             Type::Vector { element, count } => Ok((self.vector(*element)?.0, *count)),
-            Type::Pointer {
-                class: StorageClass::PhysicalStorageBuffer,
-                ..
-            } => Ok((Scalar::Address, 1)),
+            Type::Pointer { class: StorageClass::PhysicalStorageBuffer, .. } => Ok((Scalar::Address, 1)),
             _ => malformed(format!("%{id} is neither a scalar nor a vector")),
         }
     }
@@ -433,10 +373,7 @@ impl Types {
     pub fn part(&self, id: u32, index: u32) -> Result<(u32, u32)> {
         let (element, count) = match self.get(id)? {
             Type::Vector { element, count }
-            | Type::Matrix {
-                column: element,
-                count,
-            }
+            | Type::Matrix { column: element, count }
             | Type::Array { element, count, .. } => (*element, *count),
             Type::Struct(members) => {
                 return match members.get(index as usize) {
@@ -473,13 +410,8 @@ impl Types {
                 scalars.map(|it| u64::from(it.tight_format().bytes())).sum()
             }
             Type::Vector { element, count }
-            | Type::Matrix {
-                column: element,
-                count,
-            }
-            | Type::Array { element, count, .. } => {
-                self.tight_size(*element)?.saturating_mul(u64::from(*count))
-            }
+            | Type::Matrix { column: element, count }
+            | Type::Array { element, count, .. } => self.tight_size(*element)?.saturating_mul(u64::from(*count)),
             Type::Struct(members) => {
                 let mut size = 0_u64;
                 for member in members.iter() {
@@ -498,11 +430,7 @@ impl Types {
             Type::Pointer { .. } => 8,
             Type::Vector { element, count } => self.explicit_size(*element)? * u64::from(*count),
             Type::Matrix { .. } => return malformed(format!("matrix %{id} has no stride")),
-            Type::Array {
-                element,
-                count,
-                stride,
-            } => {
+            Type::Array { element, count, stride } => {
                 let each = self.explicit_size(*element)?;
                 let stride = stride.map_or(each, u64::from);
                 each + stride.saturating_mul(u64::from(*count).saturating_sub(1))
@@ -511,8 +439,7 @@ impl Types {
             Type::Struct(members) => {
                 let mut end = 0;
                 for member in members.iter() {
-                    end =
-                        end.max(u64::from(member.offset.unwrap_or(0)) + self.member_size(member)?);
+                    end = end.max(u64::from(member.offset.unwrap_or(0)) + self.member_size(member)?);
                 }
                 end
             }
@@ -524,12 +451,7 @@ impl Types {
     fn member_size(&self, member: &Member) -> Result<u64> {
         let mut ty = member.ty;
         let mut before = 0_u64;
-        while let Type::Array {
-            element,
-            count,
-            stride,
-        } = self.get(ty)?
-        {
+        while let Type::Array { element, count, stride } = self.get(ty)? {
             let last = u64::from(*count).saturating_sub(1);
             before = before.saturating_add(u64::from(stride.unwrap_or(0)).saturating_mul(last));
             ty = *element;
@@ -540,11 +462,7 @@ impl Types {
                 let Some(stride) = member.matrix_stride else {
                     return malformed(format!("matrix %{ty} has no stride"));
                 };
-                let (vectors, each) = if member.row_major {
-                    (rows, columns)
-                } else {
-                    (columns, rows)
-                };
+                let (vectors, each) = if member.row_major { (rows, columns) } else { (columns, rows) };
                 u64::from(stride) * u64::from(vectors.saturating_sub(1))
                     + u64::from(each) * u64::from(scalar.format().bytes())
             }

@@ -91,19 +91,16 @@ pub(crate) enum Error {
 impl Error {
     /// The error of a rule that the application breaks.
     pub(crate) fn usage(vuid: impl Into<Cow<'static, str>>, message: impl Into<String>) -> Self {
-        Self::InvalidUsage {
-            vuid: vuid.into(),
-            message: message.into(),
-        }
+        Self::InvalidUsage { vuid: vuid.into(), message: message.into() }
     }
 
     /// The result that the application receives.
     pub(crate) fn result(&self) -> vk::Result {
         match self {
             Self::InvalidHandle { .. } | Self::Panic(_) => vk::Result::ERROR_UNKNOWN,
-            Self::Unsupported { .. }
-            | Self::FeatureNotPresent(_)
-            | Self::FeatureNotEnabled { .. } => vk::Result::ERROR_FEATURE_NOT_PRESENT,
+            Self::Unsupported { .. } | Self::FeatureNotPresent(_) | Self::FeatureNotEnabled { .. } => {
+                vk::Result::ERROR_FEATURE_NOT_PRESENT
+            }
             Self::OutOfHostMemory(_) => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
             Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
             Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
@@ -116,9 +113,7 @@ impl Error {
             Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
             Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
             Self::FormatNotSupported(_) => vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
-            Self::InvalidUsage { .. } | Self::NullPointer { .. } => {
-                vk::Result::ERROR_VALIDATION_FAILED_EXT
-            }
+            Self::InvalidUsage { .. } | Self::NullPointer { .. } => vk::Result::ERROR_VALIDATION_FAILED_EXT,
         }
     }
 
@@ -165,18 +160,12 @@ mod tests {
     #[test]
     fn a_null_pointer_is_named_as_vulkan_names_it() {
         for (what, name) in [
-            (
-                std::any::type_name::<GaussianCameraGAURAST<'_>>(),
-                "VkGaussianCameraGAURAST",
-            ),
+            (std::any::type_name::<GaussianCameraGAURAST<'_>>(), "VkGaussianCameraGAURAST"),
             (std::any::type_name::<vk::BufferCopy>(), "VkBufferCopy"),
             ("pName", "pName"),
         ] {
             let error = Error::NullPointer { what };
-            assert_eq!(
-                error.to_string(),
-                format!("a required pointer to {name} is null")
-            );
+            assert_eq!(error.to_string(), format!("a required pointer to {name} is null"));
             assert_eq!(error.result(), vk::Result::ERROR_VALIDATION_FAILED_EXT);
         }
     }

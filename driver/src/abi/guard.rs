@@ -78,11 +78,7 @@ impl<T> Caller for *mut T {
 
 /// Runs a command. No panic leaves it, every error is reported, and the rounding mode of the application's thread does
 /// not matter.
-pub(crate) fn guard<C: Caller, R: ReturnCode>(
-    caller: C,
-    command: &str,
-    body: impl FnOnce() -> Result<R, Error>,
-) -> R {
+pub(crate) fn guard<C: Caller, R: ReturnCode>(caller: C, command: &str, body: impl FnOnce() -> Result<R, Error>) -> R {
     let _environment = FloatEnvironment::set_default();
     match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(value)) => value,

@@ -80,10 +80,7 @@ fn tag<H: vk::Handle>() -> u64 {
 }
 
 fn invalid<H: vk::Handle>(raw: u64) -> Error {
-    Error::InvalidHandle {
-        expected: H::TYPE,
-        raw,
-    }
+    Error::InvalidHandle { expected: H::TYPE, raw }
 }
 
 /// Creates a handle that owns `object`.
@@ -111,11 +108,7 @@ unsafe fn allocation<H: Handle>(handle: H) -> Result<*mut HandleAllocation<H::Ob
     // SAFETY: the caller promises a handle made by `create` for some object type; `tag` lies at the same offset in
     // every `HandleAllocation` and is atomic.
     let found = unsafe { (*pointer).tag.load(Ordering::Relaxed) };
-    if found == tag::<H>() {
-        Ok(pointer)
-    } else {
-        Err(invalid::<H>(raw))
-    }
+    if found == tag::<H>() { Ok(pointer) } else { Err(invalid::<H>(raw)) }
 }
 
 /// The object of a handle.
@@ -139,9 +132,7 @@ pub(crate) unsafe fn get<'a, H: Handle>(handle: H) -> Result<&'a Arc<H::Object>,
 ///
 /// # Safety
 /// As [`get`].
-pub(crate) unsafe fn get_optional<'a, H: Handle>(
-    handle: H,
-) -> Result<Option<&'a Arc<H::Object>>, Error> {
+pub(crate) unsafe fn get_optional<'a, H: Handle>(handle: H) -> Result<Option<&'a Arc<H::Object>>, Error> {
     if vk::Handle::as_raw(handle) == 0 {
         return Ok(None);
     }
@@ -196,9 +187,7 @@ impl<'a, H: Handle> Handles<'a, H> {
 ///
 /// # Safety
 /// As [`get`], for the time of the call.
-pub(crate) unsafe fn get_all_optional<H: Handle>(
-    handles: &[H],
-) -> Result<Vec<Option<Arc<H::Object>>>, Error> {
+pub(crate) unsafe fn get_all_optional<H: Handle>(handles: &[H]) -> Result<Vec<Option<Arc<H::Object>>>, Error> {
     handles
         .iter()
         // SAFETY: the caller's promise is `get_optional`'s.
@@ -235,21 +224,14 @@ pub(crate) unsafe fn destroy<H: Handle>(handle: H) -> Result<Option<Arc<H::Objec
 /// As [`get`], for a handle given as its type and bits.
 pub(crate) unsafe fn serial(object_type: vk::ObjectType, raw: u64) -> Result<u64, Error> {
     let pointer = raw as usize as *const HandleAllocation<()>;
-    let invalid = Error::InvalidHandle {
-        expected: object_type,
-        raw,
-    };
+    let invalid = Error::InvalidHandle { expected: object_type, raw };
     if pointer.is_null() || !pointer.is_aligned() {
         return Err(invalid);
     }
     // SAFETY: the caller promises a handle made by `create` for some object type; what precedes the object, which
     // isn't touched, lies at the same offsets in every `HandleAllocation`.
     let (tag, serial) = unsafe { ((*pointer).tag.load(Ordering::Relaxed), (*pointer).serial) };
-    if tag == TAG_MAGIC | u64::from(object_type.as_raw() as u32) {
-        Ok(serial)
-    } else {
-        Err(invalid)
-    }
+    if tag == TAG_MAGIC | u64::from(object_type.as_raw() as u32) { Ok(serial) } else { Err(invalid) }
 }
 
 /// The number of Vulkan objects that this process has handles of, over all instances. Tests find leaks with it.
@@ -264,9 +246,7 @@ mod tests {
     use crate::listeners::DebugMessenger;
 
     fn messenger() -> Arc<DebugMessenger> {
-        Arc::new(DebugMessenger::new(
-            &vk::DebugUtilsMessengerCreateInfoEXT::default(),
-        ))
+        Arc::new(DebugMessenger::new(&vk::DebugUtilsMessengerCreateInfoEXT::default()))
     }
 
     fn is_invalid<T>(result: Result<T, Error>) -> bool {
@@ -303,13 +283,9 @@ mod tests {
         // SAFETY: the handle is live, though its type is another; null and odd addresses aren't followed.
         unsafe {
             assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw))));
-            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(
-                raw
-            ))));
+            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(raw))));
             assert!(is_invalid(get(vk::Device::null())));
-            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(
-                raw + 1
-            ))));
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw + 1))));
             assert!(is_invalid(get_all(&[vk::Device::null()])));
             assert!(is_invalid(serial(vk::ObjectType::DEVICE, raw)));
             assert!(is_invalid(serial(vk::ObjectType::DEVICE, 0)));

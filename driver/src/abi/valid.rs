@@ -12,9 +12,7 @@ use std::mem::MaybeUninit;
 use std::ops::{Deref, DerefMut};
 
 fn null<T>() -> Error {
-    Error::NullPointer {
-        what: type_name::<T>(),
-    }
+    Error::NullPointer { what: type_name::<T>() }
 }
 
 /// The value that a required pointer points at.
@@ -75,17 +73,9 @@ pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
 ///
 /// # Safety
 /// See the module; the strings end with a zero byte.
-pub(crate) unsafe fn strings<'a>(
-    pointer: *const *const c_char,
-    count: u32,
-) -> Result<Vec<&'a CStr>, Error> {
+pub(crate) unsafe fn strings<'a>(pointer: *const *const c_char, count: u32) -> Result<Vec<&'a CStr>, Error> {
     // SAFETY: the caller's promise, for the array and each string.
-    unsafe {
-        Ok(slice(pointer, count)?
-            .iter()
-            .filter_map(|&text| string(text))
-            .collect())
-    }
+    unsafe { Ok(slice(pointer, count)?.iter().filter_map(|&text| string(text)).collect()) }
 }
 
 /// Writes a result through a required pointer, without reading what was there.
@@ -123,10 +113,7 @@ pub(crate) unsafe fn output_structure<'a, T>(pointer: *mut T) -> Result<&'a mut 
 ///
 /// # Safety
 /// See the module.
-pub(crate) unsafe fn output_slice<'a, T>(
-    pointer: *mut T,
-    count: usize,
-) -> Result<&'a mut [MaybeUninit<T>], Error> {
+pub(crate) unsafe fn output_slice<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut [MaybeUninit<T>], Error> {
     if count == 0 {
         return Ok(&mut []);
     }
@@ -145,11 +132,7 @@ pub(crate) unsafe fn output_slice<'a, T>(
 ///
 /// # Safety
 /// See the module; `out` is null or has space for `*count` values.
-pub(crate) unsafe fn enumerate<T: Copy>(
-    count: *mut u32,
-    out: *mut T,
-    values: &[T],
-) -> Result<vk::Result, Error> {
+pub(crate) unsafe fn enumerate<T: Copy>(count: *mut u32, out: *mut T, values: &[T]) -> Result<vk::Result, Error> {
     // SAFETY: the caller's promise; writing through the place does not read it.
     unsafe {
         enumerate_into(count, out, values.len(), |index, place: *mut T| {
@@ -184,11 +167,7 @@ impl<'a, T> Structures<'a, T> {
     ///
     /// # Errors
     /// None; the result is for the application.
-    pub(crate) fn fill(
-        self,
-        available: usize,
-        mut fill: impl FnMut(usize, &mut T),
-    ) -> Result<vk::Result, Error> {
+    pub(crate) fn fill(self, available: usize, mut fill: impl FnMut(usize, &mut T)) -> Result<vk::Result, Error> {
         // SAFETY: the promise of `new`; each place is an initialised structure.
         unsafe {
             enumerate_into(self.count, self.out, available, |index, place: *mut T| {
@@ -220,20 +199,14 @@ unsafe fn enumerate_into<T>(
         fill(index, unsafe { out.add(index) });
     }
     *count = written as u32;
-    Ok(if written < available {
-        vk::Result::INCOMPLETE
-    } else {
-        vk::Result::SUCCESS
-    })
+    Ok(if written < available { vk::Result::INCOMPLETE } else { vk::Result::SUCCESS })
 }
 
 /// The structures of an input chain, in order.
 ///
 /// # Safety
 /// `first` is null or begins a valid chain that outlives `'a`.
-pub(crate) unsafe fn chain<'a>(
-    first: *const c_void,
-) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
+pub(crate) unsafe fn chain<'a>(first: *const c_void) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
     let mut next = first.cast::<vk::BaseInStructure<'a>>();
     std::iter::from_fn(move || {
         // SAFETY: the caller's promise; every structure of a chain begins like `VkBaseInStructure`.
@@ -247,17 +220,13 @@ pub(crate) unsafe fn chain<'a>(
 ///
 /// # Safety
 /// As [`chain`].
-pub(crate) unsafe fn find_in_chain<'a, T: vk::TaggedStructure>(
-    first: *const c_void,
-) -> Option<&'a T> {
+pub(crate) unsafe fn find_in_chain<'a, T: vk::TaggedStructure>(first: *const c_void) -> Option<&'a T> {
     // SAFETY: the caller's promise.
     unsafe { chain(first) }.find_map(cast)
 }
 
 /// The structure as a `T`, if its `sType` says that it is one.
-pub(crate) fn cast<'a, T: vk::TaggedStructure>(
-    structure: &'a vk::BaseInStructure<'a>,
-) -> Option<&'a T> {
+pub(crate) fn cast<'a, T: vk::TaggedStructure>(structure: &'a vk::BaseInStructure<'a>) -> Option<&'a T> {
     (structure.s_type == T::STRUCTURE_TYPE)
         // SAFETY: structures in a valid chain are what their sType says.
         .then(|| unsafe { &*std::ptr::from_ref(structure).cast::<T>() })
@@ -370,21 +339,17 @@ mod tests {
     fn structures_are_found_by_their_type() {
         let mut unknown = vk::PhysicalDeviceDriverProperties::default();
         let mut wanted = vk::PhysicalDeviceMaintenance3Properties::default();
-        let mut head = vk::PhysicalDeviceProperties2::default()
-            .push_next(&mut wanted)
-            .push_next(&mut unknown);
+        let mut head = vk::PhysicalDeviceProperties2::default().push_next(&mut wanted).push_next(&mut unknown);
         // SAFETY: ash built the chain of live structures.
         unsafe {
             for_each_output(head.p_next, |mut structure| {
-                if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>()
-                {
+                if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>() {
                     out.max_per_set_descriptors = 7;
                 }
             });
             let first = (&raw mut head).cast_const().cast();
             assert_eq!(chain(first).count(), 3);
-            let found =
-                find_in_chain::<vk::PhysicalDeviceMaintenance3Properties<'_>>(first).unwrap();
+            let found = find_in_chain::<vk::PhysicalDeviceMaintenance3Properties<'_>>(first).unwrap();
             assert_eq!(found.max_per_set_descriptors, 7);
             assert!(find_in_chain::<vk::PhysicalDeviceIDProperties<'_>>(first).is_none());
             assert_eq!(chain(ptr::null()).count(), 0);

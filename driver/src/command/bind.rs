@@ -24,17 +24,12 @@ pub(crate) fn cmd_bind_pipeline(
     pipeline: &Pipeline,
 ) -> Result<(), Error> {
     let command = match (pipeline, pipeline_bind_point) {
-        (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => {
-            Command::BindPipeline(Arc::clone(pipeline))
-        }
+        (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => Command::BindPipeline(Arc::clone(pipeline)),
         (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
             Command::BindComputePipeline(Arc::clone(pipeline))
         }
         (Pipeline::Library(_), _) => {
-            return Err(Error::usage(
-                "VUID-vkCmdBindPipeline-pipeline-03382",
-                "the pipeline is a library",
-            ));
+            return Err(Error::usage("VUID-vkCmdBindPipeline-pipeline-03382", "the pipeline is a library"));
         }
         (_, other) => {
             return Err(Error::usage(
@@ -72,20 +67,13 @@ pub(crate) fn cmd_bind_vertex_buffers2(
 
 /// The empty range of a null buffer.
 fn nothing() -> Result<BufferRange, Error> {
-    let memory =
-        Allocation::new_zeroed(1).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
-    Ok(BufferRange {
-        memory,
-        offset: 0,
-        size: 0,
-    })
+    let memory = Allocation::new_zeroed(1).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
+    Ok(BufferRange { memory, offset: 0, size: 0 })
 }
 
 /// The rules on the buffer of `vkCmdBindIndexBuffer`.
-const INDEX_BUFFER: BufferRules = BufferRules {
-    memory: "VUID-vkCmdBindIndexBuffer-buffer-00434",
-    range: "VUID-vkCmdBindIndexBuffer-offset-00431",
-};
+const INDEX_BUFFER: BufferRules =
+    BufferRules { memory: "VUID-vkCmdBindIndexBuffer-buffer-00434", range: "VUID-vkCmdBindIndexBuffer-offset-00431" };
 
 /// The rules on the buffers of `vkCmdBindVertexBuffers`, and of its second version.
 const VERTEX_BUFFERS: BufferRules = BufferRules {
@@ -110,10 +98,7 @@ pub(crate) fn cmd_set_vertex_input(
             })
             .collect(),
         divisors: bindings
-            .map(|given| vk::VertexInputBindingDivisorDescriptionKHR {
-                binding: given.binding,
-                divisor: given.divisor,
-            })
+            .map(|given| vk::VertexInputBindingDivisorDescriptionKHR { binding: given.binding, divisor: given.divisor })
             .collect(),
         attributes: vertex_attribute_descriptions
             .iter()
@@ -175,10 +160,8 @@ fn bind_vertex_buffers(
             None => nothing()?,
         };
         let stride = strides.get(index).map(|&stride| stride as u32);
-        recorder.push(Command::BindVertexBuffer {
-            binding: first + index as u32,
-            buffer: VertexBuffer { range, stride },
-        });
+        recorder
+            .push(Command::BindVertexBuffer { binding: first + index as u32, buffer: VertexBuffer { range, stride } });
     }
     Ok(())
 }
@@ -205,24 +188,17 @@ pub(crate) fn cmd_bind_descriptor_sets(
             return Err(dynamic_offset_count_error());
         };
         rest = others;
-        bound.push(Some(BoundSet {
-            set: Arc::clone(set),
-            dynamic_offsets: own.to_vec(),
-        }));
+        bound.push(Some(BoundSet { set: Arc::clone(set), dynamic_offsets: own.to_vec() }));
     }
     if !rest.is_empty() {
         return Err(dynamic_offset_count_error());
     }
-    if let Some(offset) = dynamic_offsets
-        .iter()
-        .find(|&&offset| u64::from(offset) % limits::MIN_BUFFER_OFFSET_ALIGNMENT != 0)
+    if let Some(offset) =
+        dynamic_offsets.iter().find(|&&offset| u64::from(offset) % limits::MIN_BUFFER_OFFSET_ALIGNMENT != 0)
     {
         return Err(Error::usage(
             "VUID-vkCmdBindDescriptorSets-pDynamicOffsets-01971",
-            format!(
-                "the dynamic offset {offset} is not a multiple of {}",
-                limits::MIN_BUFFER_OFFSET_ALIGNMENT
-            ),
+            format!("the dynamic offset {offset} is not a multiple of {}", limits::MIN_BUFFER_OFFSET_ALIGNMENT),
         ));
     }
     recorder.push(Command::BindSets(Box::new(BindSets {
@@ -245,10 +221,7 @@ pub(crate) fn cmd_push_constants(
     if end.is_none_or(|end| end > limits::MAX_PUSH_CONSTANTS_SIZE) {
         return Err(Error::usage(
             "VUID-vkCmdPushConstants-offset-00370",
-            format!(
-                "{size} bytes of push constants at offset {offset} of {}",
-                limits::MAX_PUSH_CONSTANTS_SIZE
-            ),
+            format!("{size} bytes of push constants at offset {offset} of {}", limits::MAX_PUSH_CONSTANTS_SIZE),
         ));
     }
     let bytes = values.into();

@@ -142,9 +142,7 @@ impl CommandBuffer {
         self.recorder.clear_poison();
         let mut recorder = self.recorder();
         if panicked {
-            recorder.fail(Error::Panic(
-                "a command panicked while it was recorded".into(),
-            ));
+            recorder.fail(Error::Panic("a command panicked while it was recorded".into()));
         }
         recorder.end()
     }
@@ -266,10 +264,7 @@ impl Recorder {
     /// [`Error::InvalidUsage`] if it is pending.
     pub(crate) fn reset(&mut self) -> Result<(), Error> {
         if self.pending.load(Ordering::Acquire) > 0 {
-            return Err(Error::usage(
-                "VUID-vkResetCommandBuffer-commandBuffer-00045",
-                "the command buffer is pending",
-            ));
+            return Err(Error::usage("VUID-vkResetCommandBuffer-commandBuffer-00045", "the command buffer is pending"));
         }
         *self = Self::new();
         Ok(())
@@ -288,10 +283,7 @@ impl Recorder {
         }
         self.reset()?;
         self.status = Status::Recording;
-        self.pass = usage
-            .inherited_pass
-            .clone()
-            .map(|formats| RenderScope::Inherited { formats });
+        self.pass = usage.inherited_pass.clone().map(|formats| RenderScope::Inherited { formats });
         self.usage = usage;
         Ok(())
     }
@@ -324,10 +316,7 @@ impl Recorder {
         }
         self.require_no_gaussian_set()?;
         if !matches!(self.pass, None | Some(RenderScope::Inherited { .. })) {
-            return Err(Error::usage(
-                "VUID-vkEndCommandBuffer-commandBuffer-00060",
-                "a render pass has not ended",
-            ));
+            return Err(Error::usage("VUID-vkEndCommandBuffer-commandBuffer-00060", "a render pass has not ended"));
         }
         self.finished = Some(Arc::new(std::mem::take(&mut self.commands)));
         self.status = Status::Executable;
@@ -346,11 +335,7 @@ impl Recorder {
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not executable, or pending and not for simultaneous use.
     pub(crate) fn submit(&mut self) -> Result<(Arc<Vec<Command>>, PendingUse), Error> {
-        let Some(commands) = self
-            .finished
-            .as_ref()
-            .filter(|_| self.status == Status::Executable)
-        else {
+        let Some(commands) = self.finished.as_ref().filter(|_| self.status == Status::Executable) else {
             return Err(Error::usage(
                 "VUID-vkQueueSubmit-pCommandBuffers-00070",
                 format!("a command buffer is {:?}, not executable", self.status),
@@ -376,10 +361,7 @@ impl Recorder {
         self.finished.clone().ok_or_else(|| {
             Error::usage(
                 "VUID-vkCmdExecuteCommands-pCommandBuffers-00089",
-                format!(
-                    "a secondary command buffer is {:?}, not executable",
-                    self.status
-                ),
+                format!("a secondary command buffer is {:?}, not executable", self.status),
             )
         })
     }
@@ -406,10 +388,7 @@ impl Recorder {
     pub(crate) fn require_outside_pass(&self) -> Result<(), Error> {
         match self.pass {
             None => Ok(()),
-            Some(_) => Err(Error::usage(
-                self.rule("renderpass"),
-                "the command must not be inside a render pass",
-            )),
+            Some(_) => Err(Error::usage(self.rule("renderpass"), "the command must not be inside a render pass")),
         }
     }
 
@@ -422,12 +401,9 @@ impl Recorder {
     }
 
     fn pass(&self) -> Result<&RenderScope, Error> {
-        self.pass.as_ref().ok_or_else(|| {
-            Error::usage(
-                self.rule("renderpass"),
-                "the command must be inside a render pass",
-            )
-        })
+        self.pass
+            .as_ref()
+            .ok_or_else(|| Error::usage(self.rule("renderpass"), "the command must be inside a render pass"))
     }
 
     /// The format of the current pass's colour attachment number `index`; `None` if it is unused.
@@ -456,30 +432,23 @@ pub(crate) unsafe fn record(
 ///
 /// # Safety
 /// The inheritance info and its chain are valid.
-unsafe fn inherited_formats(
-    info: &vk::CommandBufferInheritanceInfo<'_>,
-) -> Result<Vec<Option<Format>>, Error> {
+unsafe fn inherited_formats(info: &vk::CommandBufferInheritanceInfo<'_>) -> Result<Vec<Option<Format>>, Error> {
     // SAFETY: the caller's promise.
     let formats = unsafe {
         if let Some(render_pass) = handle::get_optional(info.render_pass)? {
-            render_pass
-                .color_formats(info.subpass as usize)
-                .ok_or_else(|| {
-                    Error::usage(
-                        "VUID-VkCommandBufferBeginInfo-flags-06001",
-                        format!("the render pass has no subpass {}", info.subpass),
-                    )
-                })?
+            render_pass.color_formats(info.subpass as usize).ok_or_else(|| {
+                Error::usage(
+                    "VUID-VkCommandBufferBeginInfo-flags-06001",
+                    format!("the render pass has no subpass {}", info.subpass),
+                )
+            })?
         } else {
-            let rendering =
-                valid::find_in_chain::<vk::CommandBufferInheritanceRenderingInfo>(info.p_next);
+            let rendering = valid::find_in_chain::<vk::CommandBufferInheritanceRenderingInfo>(info.p_next);
             match rendering {
                 None => Vec::new(),
-                Some(rendering) => valid::slice(
-                    rendering.p_color_attachment_formats,
-                    rendering.color_attachment_count,
-                )?
-                .to_vec(),
+                Some(rendering) => {
+                    valid::slice(rendering.p_color_attachment_formats, rendering.color_attachment_count)?.to_vec()
+                }
             }
         }
     };
@@ -498,9 +467,7 @@ pub(crate) fn create_command_pool(
 /// # Safety
 /// Nothing uses the pool's command buffers any more.
 #[doc(alias = "vkDestroyCommandPool")]
-pub(crate) unsafe fn destroy_command_pool(
-    command_pool: Option<Arc<CommandPool>>,
-) -> Result<(), Error> {
+pub(crate) unsafe fn destroy_command_pool(command_pool: Option<Arc<CommandPool>>) -> Result<(), Error> {
     match command_pool {
         // SAFETY: the caller's promise.
         Some(pool) => unsafe { pool.free_all() },
@@ -551,11 +518,7 @@ pub(crate) unsafe fn begin_command_buffer(
         simultaneous: given.contains(Usage::SIMULTANEOUS_USE),
         inherited_pass: if inherits {
             // SAFETY: the caller's promise.
-            unsafe {
-                Some(inherited_formats(valid::input(
-                    begin_info.p_inheritance_info,
-                )?)?)
-            }
+            unsafe { Some(inherited_formats(valid::input(begin_info.p_inheritance_info)?)?) }
         } else {
             None
         },
@@ -645,10 +608,7 @@ mod tests {
 
     #[test]
     fn a_one_time_recording_is_submitted_once() {
-        let mut recorder = record(BeginFlags {
-            one_time: true,
-            ..BeginFlags::default()
-        });
+        let mut recorder = record(BeginFlags { one_time: true, ..BeginFlags::default() });
         drop(recorder.submit().unwrap());
         assert!(recorder.submit().is_err());
         recorder.begin(BeginFlags::default()).unwrap();
@@ -656,10 +616,7 @@ mod tests {
 
     #[test]
     fn simultaneous_use_allows_several_submissions() {
-        let mut recorder = record(BeginFlags {
-            simultaneous: true,
-            ..BeginFlags::default()
-        });
+        let mut recorder = record(BeginFlags { simultaneous: true, ..BeginFlags::default() });
         let _first = recorder.submit().unwrap();
         recorder.submit().unwrap();
     }

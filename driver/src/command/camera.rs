@@ -75,15 +75,11 @@ pub(super) fn read(range: &BufferRange, number: usize) -> Result<Camera, Error> 
     if !inside || range.memory.read(place, &mut words).is_err() {
         return Err(Error::usage(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025",
-            format!(
-                "it has {} bytes, and camera {number} begins at byte {start} and takes {DATA_BYTES}",
-                range.size
-            ),
+            format!("it has {} bytes, and camera {number} begins at byte {start} and takes {DATA_BYTES}", range.size),
         ));
     }
     let float = |word: usize| f32::from_bits(words[word]);
-    let double =
-        |word: usize| f64::from_bits(u64::from(words[word]) | u64::from(words[word + 1]) << 32);
+    let double = |word: usize| f64::from_bits(u64::from(words[word]) | u64::from(words[word + 1]) << 32);
     let pair = |word: usize| [float(word), float(word + 1)];
     // Rows of the rotation have four words each, of which the last is padding.
     let rotation = std::array::from_fn(|element| float(8 + element / 3 * 4 + element % 3));
@@ -104,12 +100,7 @@ fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Er
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
     let c = camera;
     let rules: [(bool, &str, &str, &dyn Debug); 7] = [
-        (
-            finite(&c.rotation),
-            "VUID-VkGaussianCameraGAURAST-rotation-90064",
-            "rotation must be finite",
-            &c.rotation,
-        ),
+        (finite(&c.rotation), "VUID-VkGaussianCameraGAURAST-rotation-90064", "rotation must be finite", &c.rotation),
         (
             c.eye.iter().all(|value| value.is_finite()),
             "VUID-VkGaussianCameraGAURAST-eye-90065",
@@ -149,9 +140,7 @@ fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Er
     ];
     match rules.iter().find(|(holds, ..)| !holds) {
         None => Ok(()),
-        Some((_, vuid, rule, value)) => {
-            Err(Error::usage(*vuid, format!("{rule}, but is {value:?}")))
-        }
+        Some((_, vuid, rule, value)) => Err(Error::usage(*vuid, format!("{rule}, but is {value:?}"))),
     }
 }
 
@@ -161,9 +150,7 @@ mod tests {
     use simdevice::Allocation;
 
     fn good() -> GaussianCameraGAURAST<'static> {
-        GaussianCameraGAURAST::default()
-            .focal_length([500.0, 510.0])
-            .principal_point([320.0, 240.0])
+        GaussianCameraGAURAST::default().focal_length([500.0, 510.0]).principal_point([320.0, 240.0])
     }
 
     #[test]
@@ -171,10 +158,7 @@ mod tests {
         let converted = camera(&good()).unwrap();
         assert_eq!(converted.focal_length, [500.0, 510.0]);
         assert_eq!(converted.principal_point, [320.0, 240.0]);
-        assert_eq!(
-            (converted.near_plane, converted.far_plane),
-            (0.2, f32::INFINITY)
-        );
+        assert_eq!((converted.near_plane, converted.far_plane), (0.2, f32::INFINITY));
     }
 
     #[test]
@@ -205,29 +189,13 @@ mod tests {
             3 => f32::NAN.to_le_bytes(),
             _ => value.to_le_bytes(),
         }));
-        let rest = [
-            data.focal_length,
-            data.principal_point,
-            data.depth_coefficients,
-        ];
-        bytes.extend(
-            rest.as_flattened()
-                .iter()
-                .flat_map(|value| value.to_le_bytes()),
-        );
-        bytes.extend(
-            [data.near_plane, data.far_plane]
-                .map(f32::to_le_bytes)
-                .concat(),
-        );
+        let rest = [data.focal_length, data.principal_point, data.depth_coefficients];
+        bytes.extend(rest.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend([data.near_plane, data.far_plane].map(f32::to_le_bytes).concat());
         bytes.extend([0xFF; 16]);
         assert_eq!(bytes.len(), DATA_BYTES);
         let memory = Allocation::new_zeroed(4096).unwrap();
-        let range = |size| BufferRange {
-            memory: memory.clone(),
-            offset: 64,
-            size,
-        };
+        let range = |size| BufferRange { memory: memory.clone(), offset: 64, size };
         for number in [0, 1, 5] {
             memory.write(64 + 128 * number, &bytes).unwrap();
             let end = 128 * (number + 1);

@@ -30,13 +30,8 @@ pub(crate) unsafe fn cmd_begin_conditional_rendering(
             format!("the offset {} is not a multiple of 4", info.offset),
         ));
     }
-    let is_inverted = info
-        .flags
-        .contains(vk::ConditionalRenderingFlagsEXT::INVERTED);
-    recorder.push(Command::BeginConditional {
-        predicate,
-        is_inverted,
-    });
+    let is_inverted = info.flags.contains(vk::ConditionalRenderingFlagsEXT::INVERTED);
+    recorder.push(Command::BeginConditional { predicate, is_inverted });
     Ok(())
 }
 

@@ -9,10 +9,8 @@ use ash::vk;
 use std::sync::Arc;
 
 /// The rules on the parameters of `vkCmdDrawIndirect` and similar commands.
-const DRAW_INDIRECT: BufferRules = BufferRules {
-    memory: "VUID-vkCmdDrawIndirect-buffer-02708",
-    range: "VUID-vkCmdDrawIndirect-drawCount-00488",
-};
+const DRAW_INDIRECT: BufferRules =
+    BufferRules { memory: "VUID-vkCmdDrawIndirect-buffer-02708", range: "VUID-vkCmdDrawIndirect-drawCount-00488" };
 
 /// The rules on the count of `vkCmdDrawIndirectCount` and similar commands.
 const DRAW_COUNT: BufferRules = BufferRules {
@@ -21,10 +19,8 @@ const DRAW_COUNT: BufferRules = BufferRules {
 };
 
 /// The rules on the parameters of `vkCmdDispatchIndirect`.
-const DISPATCH_INDIRECT: BufferRules = BufferRules {
-    memory: "VUID-vkCmdDispatchIndirect-buffer-02708",
-    range: "VUID-vkCmdDispatchIndirect-offset-00407",
-};
+const DISPATCH_INDIRECT: BufferRules =
+    BufferRules { memory: "VUID-vkCmdDispatchIndirect-buffer-02708", range: "VUID-vkCmdDispatchIndirect-offset-00407" };
 
 #[doc(alias = "vkCmdDraw")]
 pub(crate) fn cmd_draw(
@@ -71,17 +67,11 @@ pub(crate) fn cmd_draw_indexed(
 /// The pointer has `count` elements, `stride` bytes apart.
 unsafe fn strided<T: Copy>(first: *const T, count: u32, stride: u32) -> Result<Vec<T>, Error> {
     if first.is_null() && count > 0 {
-        return Err(Error::NullPointer {
-            what: std::any::type_name::<T>(),
-        });
+        return Err(Error::NullPointer { what: std::any::type_name::<T>() });
     }
     let element = |index: u32| {
         // SAFETY: the caller's promise.
-        unsafe {
-            first
-                .byte_add(index as usize * stride as usize)
-                .read_unaligned()
-        }
+        unsafe { first.byte_add(index as usize * stride as usize).read_unaligned() }
     };
     Ok(simdevice::host::collect((0..count).map(element)))
 }
@@ -129,12 +119,7 @@ pub(crate) unsafe fn cmd_draw_multi_indexed(
     vertex_offset: *const i32,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
-    let (infos, offset) = unsafe {
-        (
-            strided(index_info, draw_count, stride)?,
-            valid::optional(vertex_offset),
-        )
-    };
+    let (infos, offset) = unsafe { (strided(index_info, draw_count, stride)?, valid::optional(vertex_offset)) };
     let draws = infos.into_iter().map(|info| DrawParameters {
         // One offset for all takes precedence over those of each draw.
         vertex_offset: Some(offset.copied().unwrap_or(info.vertex_offset)),
@@ -167,13 +152,7 @@ pub(crate) fn cmd_draw_indexed_indirect(
     stride: u32,
 ) -> Result<(), Error> {
     let draws = draws(buffer, offset, draw_count, stride)?;
-    draw_indirect(
-        recorder,
-        DrawIndirect {
-            indexed: true,
-            ..draws
-        },
-    )
+    draw_indirect(recorder, DrawIndirect { indexed: true, ..draws })
 }
 
 #[doc(alias = "vkCmdDrawIndirectCount")]
@@ -218,11 +197,7 @@ pub(crate) fn cmd_dispatch(
     group_count_y: u32,
     group_count_z: u32,
 ) -> Result<(), Error> {
-    dispatch(
-        recorder,
-        [0; 3],
-        [group_count_x, group_count_y, group_count_z],
-    )
+    dispatch(recorder, [0; 3], [group_count_x, group_count_y, group_count_z])
 }
 
 #[doc(alias = "vkCmdDispatchBase")]
@@ -236,11 +211,7 @@ pub(crate) fn cmd_dispatch_base(
     group_count_z: u32,
 ) -> Result<(), Error> {
     let base = [base_group_x, base_group_y, base_group_z];
-    dispatch(
-        recorder,
-        base,
-        [group_count_x, group_count_y, group_count_z],
-    )
+    dispatch(recorder, base, [group_count_x, group_count_y, group_count_z])
 }
 
 #[doc(alias = "vkCmdDispatchIndirect")]
@@ -264,12 +235,7 @@ fn dispatch(recorder: &mut Recorder, base: [u32; 3], count: [u32; 3]) -> Result<
 }
 
 /// Draws without indices, `draw_count` of them, whose parameters are in a buffer.
-fn draws(
-    buffer: &Buffer,
-    offset: vk::DeviceSize,
-    draw_count: u32,
-    stride: u32,
-) -> Result<DrawIndirect, Error> {
+fn draws(buffer: &Buffer, offset: vk::DeviceSize, draw_count: u32, stride: u32) -> Result<DrawIndirect, Error> {
     Ok(DrawIndirect {
         parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
         draw_count,

@@ -40,11 +40,8 @@ pub(crate) fn cmd_set_depth_bias(
     depth_bias_clamp: f32,
     depth_bias_slope_factor: f32,
 ) -> Result<(), Error> {
-    let bias = DepthBias {
-        constant: depth_bias_constant_factor,
-        clamp: depth_bias_clamp,
-        slope: depth_bias_slope_factor,
-    };
+    let bias =
+        DepthBias { constant: depth_bias_constant_factor, clamp: depth_bias_clamp, slope: depth_bias_slope_factor };
     set(recorder, DynamicState::DepthBias { bias })
 }
 
@@ -54,12 +51,7 @@ pub(crate) fn cmd_set_depth_bounds(
     min_depth_bounds: f32,
     max_depth_bounds: f32,
 ) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::DepthBounds {
-            bounds: (min_depth_bounds, max_depth_bounds),
-        },
-    )
+    set(recorder, DynamicState::DepthBounds { bounds: (min_depth_bounds, max_depth_bounds) })
 }
 
 /// The ids of the rules on the operations of `vkCmdSetStencilOp`.
@@ -80,10 +72,7 @@ pub(crate) fn cmd_set_stencil_op(
     compare_op: vk::CompareOp,
 ) -> Result<(), Error> {
     let ops = StencilOps::from_vk(fail_op, pass_op, depth_fail_op, compare_op, &STENCIL_OP)?;
-    set_faces(recorder, face_mask, |face| DynamicState::StencilOp {
-        face,
-        ops,
-    })
+    set_faces(recorder, face_mask, |face| DynamicState::StencilOp { face, ops })
 }
 
 #[doc(alias = "vkCmdSetPrimitiveTopology")]
@@ -100,41 +89,26 @@ pub(crate) fn cmd_set_primitive_topology(
 }
 
 #[doc(alias = "vkCmdSetDepthCompareOp")]
-pub(crate) fn cmd_set_depth_compare_op(
-    recorder: &mut Recorder,
-    depth_compare_op: vk::CompareOp,
-) -> Result<(), Error> {
-    let op = convert::compare_op(
-        depth_compare_op,
-        "VUID-vkCmdSetDepthCompareOp-depthCompareOp-parameter",
-    )?;
+pub(crate) fn cmd_set_depth_compare_op(recorder: &mut Recorder, depth_compare_op: vk::CompareOp) -> Result<(), Error> {
+    let op = convert::compare_op(depth_compare_op, "VUID-vkCmdSetDepthCompareOp-depthCompareOp-parameter")?;
     set(recorder, DynamicState::DepthCompareOp { op })
 }
 
 #[doc(alias = "vkCmdSetPolygonModeEXT")]
-pub(crate) fn cmd_set_polygon_mode(
-    recorder: &mut Recorder,
-    polygon_mode: vk::PolygonMode,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_polygon_mode(recorder: &mut Recorder, polygon_mode: vk::PolygonMode) -> Result<(), Error> {
     let mode = convert::polygon_mode(polygon_mode)?;
     set(recorder, DynamicState::PolygonMode { mode })
 }
 
 #[doc(alias = "vkCmdSetLogicOpEXT")]
-pub(crate) fn cmd_set_logic_op(
-    recorder: &mut Recorder,
-    logic_op: vk::LogicOp,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_logic_op(recorder: &mut Recorder, logic_op: vk::LogicOp) -> Result<(), Error> {
     let op = convert::logic_op(logic_op)?;
     set(recorder, DynamicState::LogicOp { op })
 }
 
 /// Sets the sample mask. Only its first word matters, because no pixel has more samples than a word has bits.
 #[doc(alias = "vkCmdSetSampleMaskEXT")]
-pub(crate) fn cmd_set_sample_mask(
-    recorder: &mut Recorder,
-    sample_mask: Option<&vk::SampleMask>,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_sample_mask(recorder: &mut Recorder, sample_mask: Option<&vk::SampleMask>) -> Result<(), Error> {
     let mask = sample_mask.copied().unwrap_or(u32::MAX);
     set(recorder, DynamicState::SampleMask { mask })
 }
@@ -151,15 +125,10 @@ pub(crate) fn cmd_set_color_blend_enable(
     first_attachment: u32,
     color_blend_enables: &[vk::Bool32],
 ) -> Result<(), Error> {
-    set_attachments(
-        recorder,
-        first_attachment,
-        color_blend_enables,
-        |attachment, &enable| {
-            let enable = enable != vk::FALSE;
-            Ok(DynamicState::ColorBlendEnable { attachment, enable })
-        },
-    )
+    set_attachments(recorder, first_attachment, color_blend_enables, |attachment, &enable| {
+        let enable = enable != vk::FALSE;
+        Ok(DynamicState::ColorBlendEnable { attachment, enable })
+    })
 }
 
 #[doc(alias = "vkCmdSetColorBlendEquationEXT")]
@@ -168,27 +137,19 @@ pub(crate) fn cmd_set_color_blend_equation(
     first_attachment: u32,
     color_blend_equations: &[vk::ColorBlendEquationEXT],
 ) -> Result<(), Error> {
-    set_attachments(
-        recorder,
-        first_attachment,
-        color_blend_equations,
-        |attachment, given| {
-            let state = vk::PipelineColorBlendAttachmentState {
-                src_color_blend_factor: given.src_color_blend_factor,
-                dst_color_blend_factor: given.dst_color_blend_factor,
-                color_blend_op: given.color_blend_op,
-                src_alpha_blend_factor: given.src_alpha_blend_factor,
-                dst_alpha_blend_factor: given.dst_alpha_blend_factor,
-                alpha_blend_op: given.alpha_blend_op,
-                ..Default::default()
-            };
-            let equations = convert::blend_equations(&state)?;
-            Ok(DynamicState::ColorBlendEquation {
-                attachment,
-                equations,
-            })
-        },
-    )
+    set_attachments(recorder, first_attachment, color_blend_equations, |attachment, given| {
+        let state = vk::PipelineColorBlendAttachmentState {
+            src_color_blend_factor: given.src_color_blend_factor,
+            dst_color_blend_factor: given.dst_color_blend_factor,
+            color_blend_op: given.color_blend_op,
+            src_alpha_blend_factor: given.src_alpha_blend_factor,
+            dst_alpha_blend_factor: given.dst_alpha_blend_factor,
+            alpha_blend_op: given.alpha_blend_op,
+            ..Default::default()
+        };
+        let equations = convert::blend_equations(&state)?;
+        Ok(DynamicState::ColorBlendEquation { attachment, equations })
+    })
 }
 
 #[doc(alias = "vkCmdSetColorWriteMaskEXT")]
@@ -197,15 +158,10 @@ pub(crate) fn cmd_set_color_write_mask(
     first_attachment: u32,
     color_write_masks: &[vk::ColorComponentFlags],
 ) -> Result<(), Error> {
-    set_attachments(
-        recorder,
-        first_attachment,
-        color_write_masks,
-        |attachment, &mask| {
-            let mask = convert::write_mask(mask);
-            Ok(DynamicState::ColorWriteMask { attachment, mask })
-        },
-    )
+    set_attachments(recorder, first_attachment, color_write_masks, |attachment, &mask| {
+        let mask = convert::write_mask(mask);
+        Ok(DynamicState::ColorWriteMask { attachment, mask })
+    })
 }
 
 #[doc(alias = "vkCmdSetColorWriteEnableEXT")]
@@ -242,10 +198,7 @@ pub(crate) fn cmd_set_viewport(
 }
 
 #[doc(alias = "vkCmdSetViewportWithCount")]
-pub(crate) fn cmd_set_viewport_with_count(
-    recorder: &mut Recorder,
-    viewports: &[vk::Viewport],
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_viewport_with_count(recorder: &mut Recorder, viewports: &[vk::Viewport]) -> Result<(), Error> {
     set_viewports(recorder, 0, viewports)?;
     recorder.push(Command::SetViewportCount(viewports.len() as u32));
     Ok(())
@@ -261,10 +214,7 @@ pub(crate) fn cmd_set_scissor(
 }
 
 #[doc(alias = "vkCmdSetScissorWithCount")]
-pub(crate) fn cmd_set_scissor_with_count(
-    recorder: &mut Recorder,
-    scissors: &[vk::Rect2D],
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_scissor_with_count(recorder: &mut Recorder, scissors: &[vk::Rect2D]) -> Result<(), Error> {
     set_scissors(recorder, 0, scissors)?;
     recorder.push(Command::SetScissorCount(scissors.len() as u32));
     Ok(())
@@ -276,18 +226,11 @@ fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
     if u64::from(first) + u64::from(count) <= u64::from(available) {
         return Ok(());
     }
-    Err(Error::usage(
-        "VUID-vkCmdSetViewport-firstViewport-01223",
-        format!("there are {available} viewports"),
-    ))
+    Err(Error::usage("VUID-vkCmdSetViewport-firstViewport-01223", format!("there are {available} viewports")))
 }
 
 /// Records viewports.
-fn set_viewports(
-    recorder: &mut Recorder,
-    first: u32,
-    viewports: &[vk::Viewport],
-) -> Result<(), Error> {
+fn set_viewports(recorder: &mut Recorder, first: u32, viewports: &[vk::Viewport]) -> Result<(), Error> {
     require_viewports(first, viewports.len() as u32)?;
     for (index, &viewport) in (first..).zip(viewports) {
         let viewport = convert::viewport(viewport);

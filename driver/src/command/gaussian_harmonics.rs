@@ -30,10 +30,7 @@ pub(crate) fn cmd_bind_gaussian_spherical_harmonics(
 }
 
 /// The bytes at an address and of a size.
-fn range(
-    addresses: &Addresses,
-    buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>,
-) -> Result<BufferRange, Error> {
+fn range(addresses: &Addresses, buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>) -> Result<BufferRange, Error> {
     let (address, size) = (buffer.device_address, buffer.size);
     let table = addresses.table();
     let found = table.find(address).and_then(|(range, start)| {
@@ -55,16 +52,12 @@ fn range(
 fn format(format: vk::Format) -> Result<Format, Error> {
     let features = formats::properties(format).buffer_features;
     let found = formats::device_format(format).filter(|found| {
-        features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
-            && !found.is_integer()
-            && found.components().len() >= 3
+        features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER) && !found.is_integer() && found.components().len() >= 3
     });
     found.ok_or_else(|| {
         Error::usage(
             "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-90017",
-            format!(
-                "{format:?} is no format of vertex attributes that are no integers and have 3 components or more"
-            ),
+            format!("{format:?} is no format of vertex attributes that are no integers and have 3 components or more"),
         )
     })
 }

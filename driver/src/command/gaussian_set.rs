@@ -11,8 +11,7 @@ pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(
         if !is_enabled {
             return Err(Error::FeatureNotEnabled {
                 vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
-                message: "a set of draws is begun, but the feature mergedDraws is not enabled"
-                    .into(),
+                message: "a set of draws is begun, but the feature mergedDraws is not enabled".into(),
             });
         }
         recorder.require_pass()?;

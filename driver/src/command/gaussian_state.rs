@@ -9,10 +9,7 @@ use crate::pipeline::gaussian::values;
 use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianOrderGAURAST};
 
 #[doc(alias = "vkCmdSetGaussianOrderGAURAST")]
-pub(crate) fn cmd_set_gaussian_order(
-    recorder: &mut Recorder,
-    order: GaussianOrderGAURAST,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_gaussian_order(recorder: &mut Recorder, order: GaussianOrderGAURAST) -> Result<(), Error> {
     let order = values::order(order).ok_or_else(|| {
         Error::usage(
             "VUID-vkCmdSetGaussianOrderGAURAST-order-parameter",
@@ -37,10 +34,7 @@ pub(crate) fn cmd_set_gaussian_antialiasing(
 }
 
 #[doc(alias = "vkCmdSetGaussianLowPassVarianceGAURAST")]
-pub(crate) fn cmd_set_gaussian_low_pass_variance(
-    recorder: &mut Recorder,
-    low_pass_variance: f32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_gaussian_low_pass_variance(recorder: &mut Recorder, low_pass_variance: f32) -> Result<(), Error> {
     let vuid = "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053";
     values::LOW_PASS_VARIANCE.check(low_pass_variance, vuid)?;
     let variance = low_pass_variance;
@@ -48,23 +42,14 @@ pub(crate) fn cmd_set_gaussian_low_pass_variance(
 }
 
 #[doc(alias = "vkCmdSetGaussianAlphaFloorGAURAST")]
-pub(crate) fn cmd_set_gaussian_alpha_floor(
-    recorder: &mut Recorder,
-    alpha_floor: f32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_gaussian_alpha_floor(recorder: &mut Recorder, alpha_floor: f32) -> Result<(), Error> {
     let vuid = "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054";
     values::ALPHA_FLOOR.check(alpha_floor, vuid)?;
-    set(
-        recorder,
-        DynamicState::GaussianAlphaFloor { floor: alpha_floor },
-    )
+    set(recorder, DynamicState::GaussianAlphaFloor { floor: alpha_floor })
 }
 
 #[doc(alias = "vkCmdSetGaussianAlphaCeilingGAURAST")]
-pub(crate) fn cmd_set_gaussian_alpha_ceiling(
-    recorder: &mut Recorder,
-    alpha_ceiling: f32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_gaussian_alpha_ceiling(recorder: &mut Recorder, alpha_ceiling: f32) -> Result<(), Error> {
     let vuid = "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055";
     values::ALPHA_CEILING.check(alpha_ceiling, vuid)?;
     let ceiling = alpha_ceiling;
@@ -97,17 +82,11 @@ pub(crate) fn cmd_set_gaussian_spherical_harmonics_degree(
             ),
         ));
     }
-    set(
-        recorder,
-        DynamicState::GaussianSphericalHarmonicsDegree { degree },
-    )
+    set(recorder, DynamicState::GaussianSphericalHarmonicsDegree { degree })
 }
 
 #[doc(alias = "vkCmdSetGaussianExponentialErrorGAURAST")]
-pub(crate) fn cmd_set_gaussian_exponential_error(
-    recorder: &mut Recorder,
-    exponential_error: f32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_set_gaussian_exponential_error(recorder: &mut Recorder, exponential_error: f32) -> Result<(), Error> {
     let vuid = "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058";
     values::EXPONENTIAL_ERROR.check(exponential_error, vuid)?;
     let error = exponential_error;
@@ -122,8 +101,5 @@ pub(crate) fn cmd_set_gaussian_contribution_budget(
     let vuid = "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059";
     values::CONTRIBUTION_BUDGET.check(contribution_budget, vuid)?;
     let budget = contribution_budget;
-    set(
-        recorder,
-        DynamicState::GaussianContributionBudget { budget },
-    )
+    set(recorder, DynamicState::GaussianContributionBudget { budget })
 }

@@ -314,9 +314,7 @@ impl BoundSet {
         let Descriptor::Buffer(descriptor) = held.get(binding.first)? else {
             return None;
         };
-        let offset = binding
-            .first_dynamic
-            .and_then(|index| self.dynamic_offsets.get(index));
+        let offset = binding.first_dynamic.and_then(|index| self.dynamic_offsets.get(index));
         Some(descriptor.range(offset.copied().unwrap_or(0)))
     }
 }

@@ -12,11 +12,7 @@ use simdevice::packet::BufferRange;
 use std::sync::Arc;
 
 #[doc(alias = "vkCmdBeginQuery")]
-pub(crate) fn cmd_begin_query(
-    recorder: &mut Recorder,
-    query_pool: &Arc<QueryPool>,
-    query: u32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_begin_query(recorder: &mut Recorder, query_pool: &Arc<QueryPool>, query: u32) -> Result<(), Error> {
     require_queries(query_pool, query, 1, "VUID-vkCmdBeginQuery-query-00802")?;
     begin_query(recorder, query_pool, query, 0)
 }
@@ -45,31 +41,17 @@ pub(super) fn begin_query(
         ));
     }
     if query_pool.is_of_streams() {
-        recorder.push(Command::BeginStreamQuery {
-            pool: Arc::clone(query_pool),
-            query,
-            stream,
-        });
+        recorder.push(Command::BeginStreamQuery { pool: Arc::clone(query_pool), query, stream });
     } else {
-        recorder.packet(Packet::BeginQuery {
-            pool: Arc::clone(&query_pool.queries),
-            index: query,
-        });
+        recorder.packet(Packet::BeginQuery { pool: Arc::clone(&query_pool.queries), index: query });
     }
     Ok(())
 }
 
 #[doc(alias = "vkCmdEndQuery")]
-pub(crate) fn cmd_end_query(
-    recorder: &mut Recorder,
-    query_pool: &Arc<QueryPool>,
-    query: u32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_end_query(recorder: &mut Recorder, query_pool: &Arc<QueryPool>, query: u32) -> Result<(), Error> {
     require_queries(query_pool, query, 1, "VUID-vkCmdEndQuery-query-00810")?;
-    recorder.packet(Packet::EndQuery {
-        pool: Arc::clone(&query_pool.queries),
-        index: query,
-    });
+    recorder.packet(Packet::EndQuery { pool: Arc::clone(&query_pool.queries), index: query });
     Ok(())
 }
 
@@ -81,12 +63,7 @@ pub(crate) fn cmd_reset_query_pool(
     query_count: u32,
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    require_queries(
-        query_pool,
-        first_query,
-        query_count,
-        "VUID-vkCmdResetQueryPool-firstQuery-00797",
-    )?;
+    require_queries(query_pool, first_query, query_count, "VUID-vkCmdResetQueryPool-firstQuery-00797")?;
     recorder.packet(Packet::ResetQueries {
         pool: Arc::clone(&query_pool.queries),
         first: first_query,
@@ -97,16 +74,9 @@ pub(crate) fn cmd_reset_query_pool(
 
 #[doc(alias = "vkCmdWriteTimestamp")]
 #[doc(alias = "vkCmdWriteTimestamp2")]
-pub(crate) fn cmd_write_timestamp(
-    recorder: &mut Recorder,
-    query_pool: &QueryPool,
-    query: u32,
-) -> Result<(), Error> {
+pub(crate) fn cmd_write_timestamp(recorder: &mut Recorder, query_pool: &QueryPool, query: u32) -> Result<(), Error> {
     require_queries(query_pool, query, 1, "VUID-vkCmdWriteTimestamp-query-04904")?;
-    recorder.packet(Packet::WriteTimestamp {
-        pool: Arc::clone(&query_pool.queries),
-        index: query,
-    });
+    recorder.packet(Packet::WriteTimestamp { pool: Arc::clone(&query_pool.queries), index: query });
     Ok(())
 }
 
@@ -123,12 +93,7 @@ pub(crate) fn cmd_copy_query_pool_results(
     flags: vk::QueryResultFlags,
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    require_queries(
-        query_pool,
-        first_query,
-        query_count,
-        "VUID-vkCmdCopyQueryPoolResults-firstQuery-00821",
-    )?;
+    require_queries(query_pool, first_query, query_count, "VUID-vkCmdCopyQueryPoolResults-firstQuery-00821")?;
     recorder.push(Command::CopyQueryResults(CopyQueryResults {
         pool: Arc::clone(query_pool),
         first: first_query,
@@ -158,11 +123,7 @@ pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {
             let size = bytes.len() as u64;
             if offset.saturating_add(size) <= copy.target.size {
                 packets.push(Packet::UpdateBuffer {
-                    target: BufferRange {
-                        offset: copy.target.offset + offset,
-                        size,
-                        ..copy.target.clone()
-                    },
+                    target: BufferRange { offset: copy.target.offset + offset, size, ..copy.target.clone() },
                     data: bytes.into(),
                 });
             }

@@ -1,9 +1,7 @@
 //! Commands that begin and end render passes and dynamic rendering.
 
 use super::buffer::Recorder;
-use super::render_scope::{
-    DynamicAttachment, DynamicRendering, RenderPassInstance, RenderScope, color_formats,
-};
+use super::render_scope::{DynamicAttachment, DynamicRendering, RenderPassInstance, RenderScope, color_formats};
 use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
@@ -43,27 +41,18 @@ pub(crate) unsafe fn cmd_begin_rendering(
 ///
 /// # Safety
 /// The info, its chain and its handles are valid.
-unsafe fn render_pass_instance(
-    info: &vk::RenderPassBeginInfo<'_>,
-) -> Result<RenderPassInstance, Error> {
+unsafe fn render_pass_instance(info: &vk::RenderPassBeginInfo<'_>) -> Result<RenderPassInstance, Error> {
     // SAFETY: the caller's promise.
     unsafe {
         let framebuffer = handle::get(info.framebuffer)?;
         let views = match &framebuffer.views {
             Some(views) => views.clone(),
             None => match valid::find_in_chain::<vk::RenderPassAttachmentBeginInfo>(info.p_next) {
-                Some(info) => {
-                    handle::get_all(valid::slice(info.p_attachments, info.attachment_count)?)?
-                }
+                Some(info) => handle::get_all(valid::slice(info.p_attachments, info.attachment_count)?)?,
                 None => Vec::new(),
             },
         };
-        let whole = Rect {
-            x: 0,
-            y: 0,
-            width: framebuffer.extent.width,
-            height: framebuffer.extent.height,
-        };
+        let whole = Rect { x: 0, y: 0, width: framebuffer.extent.width, height: framebuffer.extent.height };
         Ok(RenderPassInstance {
             render_pass: Arc::clone(handle::get(info.render_pass)?),
             views,
@@ -91,10 +80,7 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
             area: info.render_area,
             layers: info.layer_count,
             view_mask: info.view_mask,
-            color: color
-                .iter()
-                .map(|info| attachment(info))
-                .collect::<Result<_, _>>()?,
+            color: color.iter().map(|info| attachment(info)).collect::<Result<_, _>>()?,
             depth: depth_stencil(info.p_depth_attachment)?,
             stencil: depth_stencil(info.p_stencil_attachment)?,
         })
@@ -105,9 +91,7 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
 ///
 /// # Safety
 /// The info's handles are live.
-unsafe fn attachment(
-    info: &vk::RenderingAttachmentInfo<'_>,
-) -> Result<Option<DynamicAttachment>, Error> {
+unsafe fn attachment(info: &vk::RenderingAttachmentInfo<'_>) -> Result<Option<DynamicAttachment>, Error> {
     let mode = convert::resolve_mode(info.resolve_mode)?;
     // SAFETY: the caller's promise. Without a resolve mode the view may be invalid, and is not followed.
     let (view, resolve_view) = unsafe {
@@ -131,9 +115,7 @@ unsafe fn attachment(
 pub(crate) fn cmd_next_subpass(recorder: &mut Recorder) -> Result<(), Error> {
     recorder.require_no_gaussian_set()?;
     match recorder.pass.take() {
-        Some(RenderScope::RenderPass {
-            instance, subpass, ..
-        }) => {
+        Some(RenderScope::RenderPass { instance, subpass, .. }) => {
             recorder.packet(Packet::EndRendering);
             enter_subpass(recorder, instance, subpass + 1)
         }
@@ -144,22 +126,14 @@ pub(crate) fn cmd_next_subpass(recorder: &mut Recorder) -> Result<(), Error> {
     }
 }
 
-fn enter_subpass(
-    recorder: &mut Recorder,
-    instance: Box<RenderPassInstance>,
-    subpass: usize,
-) -> Result<(), Error> {
+fn enter_subpass(recorder: &mut Recorder, instance: Box<RenderPassInstance>, subpass: usize) -> Result<(), Error> {
     let packet = instance.subpass(subpass)?;
     for clear in instance.clears_before_reads(subpass)? {
         recorder.packet(clear);
     }
     let formats = color_formats(&packet);
     recorder.packet(packet);
-    recorder.pass = Some(RenderScope::RenderPass {
-        instance,
-        subpass,
-        formats,
-    });
+    recorder.pass = Some(RenderScope::RenderPass { instance, subpass, formats });
     Ok(())
 }
 
@@ -182,9 +156,7 @@ pub(crate) fn cmd_end_render_pass(recorder: &mut Recorder) -> Result<(), Error> 
 /// Begins dynamic rendering by its packet.
 fn begin_rendering(recorder: &mut Recorder, packet: Packet) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    recorder.pass = Some(RenderScope::Dynamic {
-        formats: color_formats(&packet),
-    });
+    recorder.pass = Some(RenderScope::Dynamic { formats: color_formats(&packet) });
     recorder.packet(packet);
     Ok(())
 }
@@ -205,10 +177,7 @@ pub(crate) fn cmd_end_rendering(recorder: &mut Recorder) -> Result<(), Error> {
 }
 
 fn not_begun(what: &str) -> Error {
-    Error::usage(
-        "VUID-vkCmdEndRendering-None-06161",
-        format!("{what} has not begun in this command buffer"),
-    )
+    Error::usage("VUID-vkCmdEndRendering-None-06161", format!("{what} has not begun in this command buffer"))
 }
 
 #[cfg(test)]

@@ -126,22 +126,15 @@ impl RenderPassInstance {
                 format!("the render pass has no subpass {index}"),
             ));
         };
-        let resolved = subpass
-            .resolve
-            .iter()
-            .copied()
-            .chain(std::iter::repeat(None));
+        let resolved = subpass.resolve.iter().copied().chain(std::iter::repeat(None));
         let color = subpass.color.iter().zip(resolved).map(|(used, resolved)| {
             let ops = main_ops;
             let resolve = resolved.map(|number| (number, ResolveMode::Average));
-            used.map(|number| self.attachment(index, number, Aspect::Color, ops, resolve))
-                .transpose()
+            used.map(|number| self.attachment(index, number, Aspect::Color, ops, resolve)).transpose()
         });
         let depth_stencil = |aspect, ops| {
             let has_aspect = |format: Format| format.aspects().contains(&aspect);
-            let number = subpass
-                .depth_stencil
-                .filter(|&number| self.format(number).is_some_and(has_aspect));
+            let number = subpass.depth_stencil.filter(|&number| self.format(number).is_some_and(has_aspect));
             let resolve = subpass.depth_stencil_resolve.and_then(|resolve| {
                 let mode = match aspect {
                     Aspect::Stencil => resolve.stencil,
@@ -149,9 +142,7 @@ impl RenderPassInstance {
                 };
                 mode.map(|mode| (resolve.attachment, mode))
             });
-            number
-                .map(|number| self.attachment(index, number, aspect, ops, resolve))
-                .transpose()
+            number.map(|number| self.attachment(index, number, aspect, ops, resolve)).transpose()
         };
         begin(Rendering {
             area: self.area,
@@ -179,11 +170,8 @@ impl RenderPassInstance {
             };
             let cleared = |aspect, ops: fn(&AttachmentDescription) -> Ops| {
                 let (load, _) = ops(&self.render_pass.attachments[number]);
-                let is_cleared =
-                    format.aspects().contains(&aspect) && load == vk::AttachmentLoadOp::CLEAR;
-                is_cleared
-                    .then(|| self.attachment(index, number, aspect, ops, None))
-                    .transpose()
+                let is_cleared = format.aspects().contains(&aspect) && load == vk::AttachmentLoadOp::CLEAR;
+                is_cleared.then(|| self.attachment(index, number, aspect, ops, None)).transpose()
             };
             let color = cleared(Aspect::Color, main_ops)?;
             let depth = cleared(Aspect::Depth, main_ops)?;
@@ -256,16 +244,8 @@ impl RenderPassInstance {
         let clear = || self.clear_value(view, number);
         Ok(Attachment {
             view: view.view.clone(),
-            load: if self.render_pass.is_first_use(subpass, number) {
-                load(load_op, clear)?
-            } else {
-                LoadOp::Load
-            },
-            store: if self.render_pass.is_last_use(subpass, number) {
-                store(store_op)?
-            } else {
-                StoreOp::Store
-            },
+            load: if self.render_pass.is_first_use(subpass, number) { load(load_op, clear)? } else { LoadOp::Load },
+            store: if self.render_pass.is_last_use(subpass, number) { store(store_op)? } else { StoreOp::Store },
             resolve: resolve.transpose()?,
         })
     }
@@ -325,31 +305,20 @@ impl DynamicRendering {
     /// together.
     pub(crate) fn packet(&self) -> Result<Packet, Error> {
         let optional = |attachment: &Option<DynamicAttachment>, aspect| {
-            attachment
-                .as_ref()
-                .map(|attachment| self.attachment(attachment, aspect))
-                .transpose()
+            attachment.as_ref().map(|attachment| self.attachment(attachment, aspect)).transpose()
         };
         begin(Rendering {
             area: rect(self.area),
             layer_count: layers(self.view_mask, self.layers),
             view_mask: self.view_mask,
-            color: self
-                .color
-                .iter()
-                .map(|attachment| optional(attachment, Aspect::Color))
-                .collect::<Result<_, _>>()?,
+            color: self.color.iter().map(|attachment| optional(attachment, Aspect::Color)).collect::<Result<_, _>>()?,
             depth: optional(&self.depth, Aspect::Depth)?,
             stencil: optional(&self.stencil, Aspect::Stencil)?,
         })
     }
 
     /// An attachment. Between suspension and resumption attachments are in memory.
-    fn attachment(
-        &self,
-        attachment: &DynamicAttachment,
-        aspect: Aspect,
-    ) -> Result<Attachment, Error> {
+    fn attachment(&self, attachment: &DynamicAttachment, aspect: Aspect) -> Result<Attachment, Error> {
         let layers = layers(self.view_mask, self.layers);
         check_attachment(&attachment.view, aspect, layers)?;
         // Rendering that is suspended is resolved where it ends.
@@ -366,15 +335,9 @@ impl DynamicRendering {
             load: if self.flags.contains(vk::RenderingFlags::RESUMING) {
                 LoadOp::Load
             } else {
-                load(attachment.load, || {
-                    clear_value(format, attachment.clear_value)
-                })?
+                load(attachment.load, || clear_value(format, attachment.clear_value))?
             },
-            store: if suspends {
-                StoreOp::Store
-            } else {
-                store(attachment.store)?
-            },
+            store: if suspends { StoreOp::Store } else { store(attachment.store)? },
             resolve: resolve.transpose()?,
         })
     }
@@ -383,11 +346,7 @@ impl DynamicRendering {
 /// The render pass, or dynamic rendering, within which commands are recorded.
 pub(crate) enum RenderScope {
     /// A render pass, in one of its subpasses.
-    RenderPass {
-        instance: Box<RenderPassInstance>,
-        subpass: usize,
-        formats: Vec<Option<Format>>,
-    },
+    RenderPass { instance: Box<RenderPassInstance>, subpass: usize, formats: Vec<Option<Format>> },
     /// Dynamic rendering.
     Dynamic { formats: Vec<Option<Format>> },
     /// The pass of the primary command buffer.
@@ -397,9 +356,7 @@ pub(crate) enum RenderScope {
 impl RenderScope {
     /// The formats of colour attachments; `None` for an unused one.
     pub(crate) fn color_formats(&self) -> &[Option<Format>] {
-        let (Self::RenderPass { formats, .. }
-        | Self::Dynamic { formats }
-        | Self::Inherited { formats }) = self;
+        let (Self::RenderPass { formats, .. } | Self::Dynamic { formats } | Self::Inherited { formats }) = self;
         formats
     }
 }
@@ -409,8 +366,6 @@ pub(super) fn color_formats(packet: &Packet) -> Vec<Option<Format>> {
     let Packet::BeginRendering(rendering) = packet else {
         return Vec::new();
     };
-    let format = |attachment: &Option<Attachment>| {
-        attachment.as_ref().map(|attachment| attachment.view.format)
-    };
+    let format = |attachment: &Option<Attachment>| attachment.as_ref().map(|attachment| attachment.view.format);
     rendering.color.iter().map(format).collect()
 }

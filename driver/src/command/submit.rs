@@ -43,11 +43,7 @@ pub(crate) struct Submission {
 impl Submission {
     /// Executes the submission on a queue's thread. If the device is lost, all waiters are woken.
     pub(crate) fn execute(self, processor: &mut CommandProcessor) {
-        let mut execution = Execution {
-            processor,
-            sync: &self.sync,
-            instance: &self.instance,
-        };
+        let mut execution = Execution { processor, sync: &self.sync, instance: &self.instance };
         for batch in self.batches {
             if let Err(error) = execute_batch(batch, &mut execution) {
                 let reason = match &error {
@@ -89,18 +85,10 @@ fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Erro
 ///
 /// # Errors
 /// [`Error::DeviceLost`].
-pub(crate) fn enqueue(
-    queue: &Queue,
-    batches: Vec<Batch>,
-    fence: Option<&Arc<Fence>>,
-) -> Result<(), Error> {
+pub(crate) fn enqueue(queue: &Queue, batches: Vec<Batch>, fence: Option<&Arc<Fence>>) -> Result<(), Error> {
     let fence = fence.cloned();
-    let submission = Submission {
-        batches,
-        fence,
-        sync: Arc::clone(queue.sync()),
-        instance: Arc::clone(queue.instance()),
-    };
+    let submission =
+        Submission { batches, fence, sync: Arc::clone(queue.sync()), instance: Arc::clone(queue.instance()) };
     queue.submit(Box::new(move |processor| submission.execute(processor)))
 }
 
@@ -115,14 +103,8 @@ unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch, Error> {
         let (wait_values, signal_values) = match values {
             None => (&[][..], &[][..]),
             Some(values) => (
-                valid::slice(
-                    values.p_wait_semaphore_values,
-                    values.wait_semaphore_value_count,
-                )?,
-                valid::slice(
-                    values.p_signal_semaphore_values,
-                    values.signal_semaphore_value_count,
-                )?,
+                valid::slice(values.p_wait_semaphore_values, values.wait_semaphore_value_count)?,
+                valid::slice(values.p_signal_semaphore_values, values.signal_semaphore_value_count)?,
             ),
         };
         let waits = valid::slice(info.p_wait_semaphores, info.wait_semaphore_count)?;
@@ -150,12 +132,8 @@ unsafe fn batch2(info: &vk::SubmitInfo2<'_>) -> Result<Batch, Error> {
     // SAFETY: the caller's promise.
     unsafe {
         let waits = valid::slice(info.p_wait_semaphore_infos, info.wait_semaphore_info_count)?;
-        let signals = valid::slice(
-            info.p_signal_semaphore_infos,
-            info.signal_semaphore_info_count,
-        )?;
-        let command_buffers =
-            valid::slice(info.p_command_buffer_infos, info.command_buffer_info_count)?;
+        let signals = valid::slice(info.p_signal_semaphore_infos, info.signal_semaphore_info_count)?;
+        let command_buffers = valid::slice(info.p_command_buffer_infos, info.command_buffer_info_count)?;
         Ok(Batch {
             waits: semaphores(waits)?,
             commands: commands(command_buffers.iter().map(|info| info.command_buffer))?,
@@ -168,9 +146,7 @@ unsafe fn batch2(info: &vk::SubmitInfo2<'_>) -> Result<Batch, Error> {
 ///
 /// # Safety
 /// The handles are live.
-unsafe fn semaphores(
-    infos: &[vk::SemaphoreSubmitInfo<'_>],
-) -> Result<Vec<(Arc<Semaphore>, u64)>, Error> {
+unsafe fn semaphores(infos: &[vk::SemaphoreSubmitInfo<'_>]) -> Result<Vec<(Arc<Semaphore>, u64)>, Error> {
     infos
         .iter()
         .map(|info| {
@@ -185,9 +161,7 @@ unsafe fn semaphores(
 ///
 /// # Safety
 /// The handles are live.
-unsafe fn commands(
-    command_buffers: impl Iterator<Item = vk::CommandBuffer>,
-) -> Result<Vec<Commands>, Error> {
+unsafe fn commands(command_buffers: impl Iterator<Item = vk::CommandBuffer>) -> Result<Vec<Commands>, Error> {
     command_buffers
         .map(|command_buffer| {
             // SAFETY: the caller's promise.
@@ -257,11 +231,7 @@ mod tests {
             let simulated = Arc::new(Device::new(&simdevice::Config::default()).unwrap());
             let sync = Arc::<DeviceSync>::default();
             let processor = CommandProcessor::new(simulated);
-            Self {
-                queue: Queue::start(Arc::clone(&instance), Arc::clone(&sync), processor).unwrap(),
-                instance,
-                sync,
-            }
+            Self { queue: Queue::start(Arc::clone(&instance), Arc::clone(&sync), processor).unwrap(), instance, sync }
         }
 
         /// Submits packets with a fence that a thread waits for. Returns the end of that wait.
@@ -276,17 +246,12 @@ mod tests {
             commands.into_iter().for_each(|c| recorder.push(c));
             recorder.end().unwrap();
             let submission = Submission {
-                batches: vec![Batch {
-                    commands: vec![recorder.submit().unwrap()],
-                    ..Batch::default()
-                }],
+                batches: vec![Batch { commands: vec![recorder.submit().unwrap()], ..Batch::default() }],
                 fence: Some(fence),
                 sync: Arc::clone(&self.sync),
                 instance: Arc::clone(&self.instance),
             };
-            let submitted = self
-                .queue
-                .submit(Box::new(move |processor| submission.execute(processor)));
+            let submitted = self.queue.submit(Box::new(move |processor| submission.execute(processor)));
             if let Err(error) = submitted {
                 assert!(matches!(error, Error::DeviceLost(_)));
             }
@@ -296,11 +261,7 @@ mod tests {
 
     fn fill(memory: &Arc<Allocation>) -> Command {
         Command::Packet(Packet::FillBuffer {
-            target: BufferRange {
-                memory: Arc::clone(memory),
-                offset: 0,
-                size: 4,
-            },
+            target: BufferRange { memory: Arc::clone(memory), offset: 0, size: 4 },
             word: 7,
         })
     }

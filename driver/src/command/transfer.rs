@@ -10,9 +10,9 @@ use crate::resource::image::{Image, count};
 use ash::vk;
 use simdevice::format::{Aspect, ClearValue, Numeric};
 use simdevice::packet::{
-    AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments,
-    ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion,
-    ResolveImage, SubresourceLayers, SubresourceRange,
+    AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments, ClearImage,
+    CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers,
+    SubresourceRange,
 };
 use simdevice::state::ResolveMode;
 use simdevice::{Format, Packet};
@@ -190,16 +190,11 @@ pub(crate) fn cmd_clear_attachments(
         if attachment.aspect_mask.contains(vk::ImageAspectFlags::DEPTH) {
             clears.push(AttachmentClear::Depth(value.depth));
         }
-        if attachment
-            .aspect_mask
-            .contains(vk::ImageAspectFlags::STENCIL)
-        {
+        if attachment.aspect_mask.contains(vk::ImageAspectFlags::STENCIL) {
             clears.push(AttachmentClear::Stencil(value.stencil));
         }
     }
-    let rects = rects
-        .iter()
-        .map(|r| (convert::rect(r.rect), r.base_array_layer, r.layer_count));
+    let rects = rects.iter().map(|r| (convert::rect(r.rect), r.base_array_layer, r.layer_count));
     let rects = simdevice::host::collect(rects);
     recorder.packet(Packet::ClearAttachments(ClearAttachments { clears, rects }));
     Ok(())
@@ -218,28 +213,20 @@ struct ImageRules {
 }
 
 /// The rules on the source of `vkCmdCopyBuffer`.
-const COPY_BUFFER_SOURCE: BufferRules = BufferRules {
-    memory: "VUID-vkCmdCopyBuffer-srcBuffer-00119",
-    range: "VUID-vkCmdCopyBuffer-size-00115",
-};
+const COPY_BUFFER_SOURCE: BufferRules =
+    BufferRules { memory: "VUID-vkCmdCopyBuffer-srcBuffer-00119", range: "VUID-vkCmdCopyBuffer-size-00115" };
 
 /// The rules on the target of `vkCmdCopyBuffer`.
-const COPY_BUFFER_TARGET: BufferRules = BufferRules {
-    memory: "VUID-vkCmdCopyBuffer-dstBuffer-00121",
-    range: "VUID-vkCmdCopyBuffer-size-00116",
-};
+const COPY_BUFFER_TARGET: BufferRules =
+    BufferRules { memory: "VUID-vkCmdCopyBuffer-dstBuffer-00121", range: "VUID-vkCmdCopyBuffer-size-00116" };
 
 /// The rules on the target of `vkCmdFillBuffer`.
-const FILL_TARGET: BufferRules = BufferRules {
-    memory: "VUID-vkCmdFillBuffer-dstBuffer-00031",
-    range: "VUID-vkCmdFillBuffer-size-00027",
-};
+const FILL_TARGET: BufferRules =
+    BufferRules { memory: "VUID-vkCmdFillBuffer-dstBuffer-00031", range: "VUID-vkCmdFillBuffer-size-00027" };
 
 /// The rules on the target of `vkCmdUpdateBuffer`.
-const UPDATE_TARGET: BufferRules = BufferRules {
-    memory: "VUID-vkCmdUpdateBuffer-dstBuffer-00035",
-    range: "VUID-vkCmdUpdateBuffer-dataSize-00033",
-};
+const UPDATE_TARGET: BufferRules =
+    BufferRules { memory: "VUID-vkCmdUpdateBuffer-dstBuffer-00035", range: "VUID-vkCmdUpdateBuffer-dataSize-00033" };
 
 /// The rules on the buffer of `vkCmdCopyBufferToImage`.
 const COPY_TO_IMAGE_BUFFER: BufferRules = BufferRules {
@@ -337,11 +324,7 @@ const CLEAR_DEPTH_STENCIL: ImageRules = ImageRules {
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] if a buffer is not bound or a region lies outside.
-fn copy_buffer(
-    source: &Buffer,
-    target: &Buffer,
-    regions: &[vk::BufferCopy2],
-) -> Result<Packet, Error> {
+fn copy_buffer(source: &Buffer, target: &Buffer, regions: &[vk::BufferCopy2]) -> Result<Packet, Error> {
     for region in regions {
         source.range(region.src_offset, Some(region.size), &COPY_BUFFER_SOURCE)?;
         target.range(region.dst_offset, Some(region.size), &COPY_BUFFER_TARGET)?;
@@ -432,12 +415,7 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
 /// # Errors
 /// [`Error::InvalidUsage`] if an image is not bound, has no such subresource or several samples, or if the formats
 /// don't convert to each other; [`Error::FeatureNotPresent`] for filters of extensions.
-fn blit_image(
-    source: &Image,
-    target: &Image,
-    filter: vk::Filter,
-    regions: &[vk::ImageBlit2],
-) -> Result<Packet, Error> {
+fn blit_image(source: &Image, target: &Image, filter: vk::Filter, regions: &[vk::ImageBlit2]) -> Result<Packet, Error> {
     require_one_sample("VUID-vkCmdBlitImage-srcImage-00233", source)?;
     require_one_sample("VUID-vkCmdBlitImage-dstImage-00234", target)?;
     let (from, to) = (source.desc.format, target.desc.format);
@@ -474,11 +452,7 @@ fn blit_image(
 /// # Errors
 /// [`Error::InvalidUsage`] if an image is not bound or has no such subresource, if the target has several samples, or
 /// if the formats differ.
-fn resolve_image(
-    source: &Image,
-    target: &Image,
-    regions: &[vk::ImageResolve2],
-) -> Result<Packet, Error> {
+fn resolve_image(source: &Image, target: &Image, regions: &[vk::ImageResolve2]) -> Result<Packet, Error> {
     require_one_sample("VUID-vkCmdResolveImage-dstImage-00259", target)?;
     let (from, to) = (source.desc.format, target.desc.format);
     if from != to || from.aspects() != [Aspect::Color] {
@@ -489,19 +463,9 @@ fn resolve_image(
     }
     let region = |region: &vk::ImageResolve2| {
         Ok(ImageCopyRegion {
-            source: layers(
-                source,
-                &region.src_subresource,
-                &RESOLVE_SOURCE,
-                RESOLVE_SOURCE.aspect,
-            )?,
+            source: layers(source, &region.src_subresource, &RESOLVE_SOURCE, RESOLVE_SOURCE.aspect)?,
             source_offset: convert::offset(region.src_offset),
-            target: layers(
-                target,
-                &region.dst_subresource,
-                &RESOLVE_TARGET,
-                RESOLVE_TARGET.aspect,
-            )?,
+            target: layers(target, &region.dst_subresource, &RESOLVE_TARGET, RESOLVE_TARGET.aspect)?,
             target_offset: convert::offset(region.dst_offset),
             extent: convert::extent(region.extent),
         })
@@ -517,10 +481,7 @@ fn resolve_image(
 fn require_one_sample(vuid: &'static str, image: &Image) -> Result<(), Error> {
     match image.desc.samples {
         1 => Ok(()),
-        samples => Err(Error::usage(
-            vuid,
-            format!("the image has {samples} samples"),
-        )),
+        samples => Err(Error::usage(vuid, format!("the image has {samples} samples"))),
     }
 }
 
@@ -540,27 +501,16 @@ fn converts(from: Format, to: Format) -> bool {
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] if the buffer is not bound or the range is outside or not of whole words.
-fn fill_buffer(
-    target: &Buffer,
-    offset: u64,
-    size: Option<u64>,
-    word: u32,
-) -> Result<Packet, Error> {
+fn fill_buffer(target: &Buffer, offset: u64, size: Option<u64>, word: u32) -> Result<Packet, Error> {
     let range = target.range(offset, size, &FILL_TARGET)?;
-    let whole_words = BufferRange {
-        size: range.size / 4 * 4,
-        ..range
-    };
+    let whole_words = BufferRange { size: range.size / 4 * 4, ..range };
     if !offset.is_multiple_of(4) || size.is_some_and(|size| !size.is_multiple_of(4)) {
         return Err(Error::usage(
             "VUID-vkCmdFillBuffer-dstOffset-00025",
             format!("offset {offset} and size {size:?} are not multiples of 4"),
         ));
     }
-    Ok(Packet::FillBuffer {
-        target: whole_words,
-        word,
-    })
+    Ok(Packet::FillBuffer { target: whole_words, word })
 }
 
 /// `vkCmdUpdateBuffer`.
@@ -583,12 +533,7 @@ fn clear_color_image(
     value: vk::ClearColorValue,
     ranges: &[vk::ImageSubresourceRange],
 ) -> Result<Packet, Error> {
-    clear_image(
-        image,
-        convert::clear_color(image.desc.format, value),
-        ranges,
-        &CLEAR_COLOR,
-    )
+    clear_image(image, convert::clear_color(image.desc.format, value), ranges, &CLEAR_COLOR)
 }
 
 /// `vkCmdClearDepthStencilImage`.
@@ -600,12 +545,7 @@ fn clear_depth_stencil_image(
     value: vk::ClearDepthStencilValue,
     ranges: &[vk::ImageSubresourceRange],
 ) -> Result<Packet, Error> {
-    clear_image(
-        image,
-        convert::clear_depth_stencil(value),
-        ranges,
-        &CLEAR_DEPTH_STENCIL,
-    )
+    clear_image(image, convert::clear_depth_stencil(value), ranges, &CLEAR_DEPTH_STENCIL)
 }
 
 fn clear_image(
@@ -620,11 +560,7 @@ fn clear_image(
             converted.push(subresource_range(image, aspect, range, rules)?);
         }
     }
-    Ok(Packet::ClearImage(ClearImage {
-        image: Arc::clone(image.bound(rules.memory)?),
-        value,
-        ranges: converted,
-    }))
+    Ok(Packet::ClearImage(ClearImage { image: Arc::clone(image.bound(rules.memory)?), value, ranges: converted }))
 }
 
 fn subresource_range(
@@ -634,18 +570,8 @@ fn subresource_range(
     rules: &ImageRules,
 ) -> Result<SubresourceRange, Error> {
     let desc = &image.desc;
-    let levels = count(
-        range.base_mip_level,
-        range.level_count,
-        vk::REMAINING_MIP_LEVELS,
-        desc.mip_levels,
-    );
-    let layers = count(
-        range.base_array_layer,
-        range.layer_count,
-        vk::REMAINING_ARRAY_LAYERS,
-        desc.array_layers,
-    );
+    let levels = count(range.base_mip_level, range.level_count, vk::REMAINING_MIP_LEVELS, desc.mip_levels);
+    let layers = count(range.base_array_layer, range.layer_count, vk::REMAINING_ARRAY_LAYERS, desc.array_layers);
     match (levels, layers) {
         (Some(level_count), Some(layer_count)) => Ok(SubresourceRange {
             aspect,
@@ -677,10 +603,7 @@ fn layer_pairs(
     (source, from, source_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
     (target, to, target_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
 ) -> Result<Vec<(SubresourceLayers, SubresourceLayers)>, Error> {
-    let (sources, targets) = (
-        aspect_layers(source, from, source_rules)?,
-        aspect_layers(target, to, target_rules)?,
-    );
+    let (sources, targets) = (aspect_layers(source, from, source_rules)?, aspect_layers(target, to, target_rules)?);
     if sources.len() != targets.len() {
         return Err(Error::usage(
             "VUID-vkCmdCopyImage-srcImage-01551",
@@ -696,12 +619,8 @@ fn aspect_layers(
     layers: &vk::ImageSubresourceLayers,
     rules: &ImageRules,
 ) -> Result<Vec<SubresourceLayers>, Error> {
-    let layer_count = count(
-        layers.base_array_layer,
-        layers.layer_count,
-        vk::REMAINING_ARRAY_LAYERS,
-        image.desc.array_layers,
-    );
+    let layer_count =
+        count(layers.base_array_layer, layers.layer_count, vk::REMAINING_ARRAY_LAYERS, image.desc.array_layers);
     if layers.mip_level >= image.desc.mip_levels {
         return Err(no_subresource(rules.level, layers));
     }
@@ -718,19 +637,12 @@ fn aspect_layers(
 }
 
 /// The aspects of a mask, all of which the image has.
-fn aspects(
-    image: &Image,
-    mask: vk::ImageAspectFlags,
-    rules: &ImageRules,
-) -> Result<Vec<Aspect>, Error> {
+fn aspects(image: &Image, mask: vk::ImageAspectFlags, rules: &ImageRules) -> Result<Vec<Aspect>, Error> {
     convert::aspects(image.desc.format, mask).ok_or_else(|| no_subresource(rules.aspect, &mask))
 }
 
 fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
-    Error::usage(
-        vuid,
-        format!("an image does not have the subresource {what:?} that a command names"),
-    )
+    Error::usage(vuid, format!("an image does not have the subresource {what:?} that a command names"))
 }
 
 /// Converts an offset from texels to the blocks in which an image is stored.
@@ -743,9 +655,5 @@ fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
 /// Converts an extent from texels to the blocks in which an image is stored.
 fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
     let side = image.desc.format.block_side();
-    [
-        extent.width.div_ceil(side),
-        extent.height.div_ceil(side),
-        extent.depth,
-    ]
+    [extent.width.div_ceil(side), extent.height.div_ceil(side), extent.depth]
 }

@@ -72,10 +72,7 @@ fn require_bindings(first: u32, count: usize, vuid: &'static str) -> Result<(), 
     if first as usize + count <= MAX_TRANSFORM_FEEDBACK_BUFFERS {
         return Ok(());
     }
-    Err(Error::usage(
-        vuid,
-        format!("there are {MAX_TRANSFORM_FEEDBACK_BUFFERS} buffers of transform feedback"),
-    ))
+    Err(Error::usage(vuid, format!("there are {MAX_TRANSFORM_FEEDBACK_BUFFERS} buffers of transform feedback")))
 }
 
 #[doc(alias = "vkCmdBindTransformFeedbackBuffersEXT")]
@@ -86,16 +83,8 @@ pub(crate) fn cmd_bind_transform_feedback_buffers(
     offsets: &[vk::DeviceSize],
     sizes: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
-    require_active(
-        recorder,
-        false,
-        "VUID-vkCmdBindTransformFeedbackBuffersEXT-None-02365",
-    )?;
-    require_bindings(
-        first_binding,
-        buffers.len(),
-        "VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357",
-    )?;
+    require_active(recorder, false, "VUID-vkCmdBindTransformFeedbackBuffersEXT-None-02365")?;
+    require_bindings(first_binding, buffers.len(), "VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357")?;
     for (number, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         if !offset.is_multiple_of(4) {
             return Err(Error::usage(
@@ -134,10 +123,7 @@ fn set_active(
         let offset = offsets.map_or(0, |offsets| offsets[number]);
         if let Some(buffer) = buffer? {
             if !offset.is_multiple_of(4) {
-                return Err(Error::usage(
-                    rules.alignment,
-                    format!("the offset {offset} is not a multiple of 4"),
-                ));
+                return Err(Error::usage(rules.alignment, format!("the offset {offset} is not a multiple of 4")));
             }
             let word = buffer.range(offset, Some(4), &rules.counters)?;
             words[first as usize + number] = Some(word);
@@ -153,11 +139,7 @@ pub(crate) fn cmd_begin_transform_feedback(
     counter_buffers: Option<Handles<'_, vk::Buffer>>,
     counter_buffer_offsets: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
-    let (first, buffers, offsets) = (
-        first_counter_buffer,
-        counter_buffers,
-        counter_buffer_offsets,
-    );
+    let (first, buffers, offsets) = (first_counter_buffer, counter_buffers, counter_buffer_offsets);
     let counters = set_active(recorder, true, first, buffers, offsets, &BEGIN_COUNTERS)?;
     recorder.push(Command::BeginTransformFeedback(counters));
     Ok(())
@@ -170,11 +152,7 @@ pub(crate) fn cmd_end_transform_feedback(
     counter_buffers: Option<Handles<'_, vk::Buffer>>,
     counter_buffer_offsets: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
-    let (first, buffers, offsets) = (
-        first_counter_buffer,
-        counter_buffers,
-        counter_buffer_offsets,
-    );
+    let (first, buffers, offsets) = (first_counter_buffer, counter_buffers, counter_buffer_offsets);
     let counters = set_active(recorder, false, first, buffers, offsets, &END_COUNTERS)?;
     recorder.push(Command::EndTransformFeedback(counters));
     Ok(())
@@ -221,12 +199,7 @@ pub(crate) fn cmd_begin_query_indexed(
     query: u32,
     index: u32,
 ) -> Result<(), Error> {
-    require_queries(
-        query_pool,
-        query,
-        1,
-        "VUID-vkCmdBeginQueryIndexedEXT-query-00802",
-    )?;
+    require_queries(query_pool, query, 1, "VUID-vkCmdBeginQueryIndexedEXT-query-00802")?;
     super::query::begin_query(recorder, query_pool, query, index)
 }
 

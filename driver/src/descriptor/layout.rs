@@ -63,10 +63,7 @@ objects! { vk::DescriptorSetLayout => DescriptorSetLayout; }
 
 /// Reports whether descriptors of this kind have dynamic offsets.
 pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
-    matches!(
-        kind,
-        vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
-    )
+    matches!(kind, vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC)
 }
 
 /// Reports whether the driver supports descriptors of this kind.
@@ -94,18 +91,12 @@ impl DescriptorSetLayout {
     /// # Errors
     /// [`Error::FeatureNotPresent`] for an unsupported kind of descriptor, or too many of them; [`Error::InvalidUsage`]
     /// if two bindings have the same number, or bindings contradict their flags.
-    pub(crate) fn new(
-        infos: Vec<BindingInfo>,
-        flags: vk::DescriptorSetLayoutCreateFlags,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(infos: Vec<BindingInfo>, flags: vk::DescriptorSetLayoutCreateFlags) -> Result<Self, Error> {
         let mut sorted = BTreeMap::new();
         check_flags(&infos, flags)?;
         for info in infos {
             if !is_supported(info.kind) && info.count > 0 {
-                return Err(Error::FeatureNotPresent(format!(
-                    "a descriptor of type {:?}",
-                    info.kind
-                )));
+                return Err(Error::FeatureNotPresent(format!("a descriptor of type {:?}", info.kind)));
             }
             let number = info.number;
             if sorted.insert(number, info).is_some() {
@@ -120,10 +111,7 @@ impl DescriptorSetLayout {
             _ => info.count,
         };
         let variable = vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
-        let has_variable_count = sorted
-            .values()
-            .next_back()
-            .is_some_and(|info| info.flags.contains(variable));
+        let has_variable_count = sorted.values().next_back().is_some_and(|info| info.flags.contains(variable));
         let total: u64 = sorted.values().map(|info| u64::from(slots(info))).sum();
         if total > u64::from(MAX_DESCRIPTORS) {
             return Err(Error::FeatureNotPresent(format!(
@@ -152,13 +140,7 @@ impl DescriptorSetLayout {
             (number, binding)
         };
         let bindings = sorted.into_iter().map(place).collect();
-        Ok(Self {
-            bindings,
-            count,
-            dynamic_count,
-            flags,
-            has_variable_count,
-        })
+        Ok(Self { bindings, count, dynamic_count, flags, has_variable_count })
     }
 
     /// The binding with a variable number of descriptors, or of bytes: the last one, if any.
@@ -169,10 +151,7 @@ impl DescriptorSetLayout {
 
     /// The kinds of a set's descriptors, each with the number that it takes from its pool (bytes, for inline uniform
     /// blocks). The variable binding has `variable_count`.
-    pub(crate) fn kinds(
-        &self,
-        variable_count: u32,
-    ) -> impl Iterator<Item = (vk::DescriptorType, u64)> {
+    pub(crate) fn kinds(&self, variable_count: u32) -> impl Iterator<Item = (vk::DescriptorType, u64)> {
         let last = self.variable_binding().map(|binding| binding.first);
         self.bindings.values().map(move |binding| {
             let most = binding.count.max(binding.inline_bytes);
@@ -186,9 +165,7 @@ impl DescriptorSetLayout {
 
     /// The binding of that number, unless it has no descriptors.
     pub(crate) fn binding(&self, number: u32) -> Option<&LayoutBinding> {
-        self.bindings
-            .get(&number)
-            .filter(|binding| binding.count > 0)
+        self.bindings.get(&number).filter(|binding| binding.count > 0)
     }
 
     /// The bindings in order of their descriptors.
@@ -208,14 +185,12 @@ impl DescriptorSetLayout {
 
     /// Reports whether its sets are pushed rather than allocated.
     pub(crate) fn is_push(&self) -> bool {
-        self.flags
-            .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
+        self.flags.contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
     }
 
     /// Reports whether its sets may be updated after they are bound.
     pub(crate) fn is_updated_after_bind(&self) -> bool {
-        self.flags
-            .contains(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
+        self.flags.contains(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
     }
 
     /// The index in the set of element `element` of binding `number`, which may be beyond the binding.
@@ -223,22 +198,17 @@ impl DescriptorSetLayout {
     /// # Errors
     /// [`Error::InvalidUsage`] if there is no such binding.
     pub(crate) fn index(&self, number: u32, element: u32) -> Result<usize, Error> {
-        self.binding(number)
-            .map(|binding| binding.first + element as usize)
-            .ok_or_else(|| {
-                Error::usage(
-                    "VUID-VkWriteDescriptorSet-dstBinding-00315",
-                    format!("the descriptor set has no binding {number}"),
-                )
-            })
+        self.binding(number).map(|binding| binding.first + element as usize).ok_or_else(|| {
+            Error::usage(
+                "VUID-VkWriteDescriptorSet-dstBinding-00315",
+                format!("the descriptor set has no binding {number}"),
+            )
+        })
     }
 }
 
 /// Checks that bindings agree with their flags and with those of their layout.
-fn check_flags(
-    infos: &[BindingInfo],
-    flags: vk::DescriptorSetLayoutCreateFlags,
-) -> Result<(), Error> {
+fn check_flags(infos: &[BindingInfo], flags: vk::DescriptorSetLayoutCreateFlags) -> Result<(), Error> {
     let is_push = flags.contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
     let after_bind = vk::DescriptorBindingFlags::UPDATE_AFTER_BIND;
     let updates_after_bind = infos.iter().any(|info| info.flags.contains(after_bind));
@@ -279,11 +249,7 @@ fn check_flags(
                 ),
             ));
         }
-        if info
-            .flags
-            .contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT)
-            && is_dynamic(info.kind)
-        {
+        if info.flags.contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT) && is_dynamic(info.kind) {
             return Err(Error::usage(
                 "VUID-VkDescriptorSetLayoutBindingFlagsCreateInfo-pBindingFlags-03015",
                 "a binding of dynamic offsets has a variable count",
@@ -292,17 +258,12 @@ fn check_flags(
     }
     let last = infos.iter().map(|info| info.number).max();
     let is_elsewhere = |info: &BindingInfo| {
-        info.flags
-            .contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT)
-            && Some(info.number) != last
+        info.flags.contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT) && Some(info.number) != last
     };
     if let Some(info) = infos.iter().find(|info| is_elsewhere(info)) {
         return Err(Error::usage(
             "VUID-VkDescriptorSetLayoutBindingFlagsCreateInfo-pBindingFlags-03004",
-            format!(
-                "binding {} has a variable count and is not the last",
-                info.number
-            ),
+            format!("binding {} has a variable count and is not the last", info.number),
         ));
     }
     Ok(())
@@ -312,26 +273,17 @@ fn check_flags(
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn new_layout(
-    info: &vk::DescriptorSetLayoutCreateInfo<'_>,
-) -> Result<DescriptorSetLayout, Error> {
-    let is_push = info
-        .flags
-        .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
+unsafe fn new_layout(info: &vk::DescriptorSetLayoutCreateInfo<'_>) -> Result<DescriptorSetLayout, Error> {
+    let is_push = info.flags.contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
     let known = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR
         | vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL;
     if !known.contains(info.flags) {
-        return Err(Error::FeatureNotPresent(format!(
-            "a descriptor set layout with flags {:?}",
-            info.flags
-        )));
+        return Err(Error::FeatureNotPresent(format!("a descriptor set layout with flags {:?}", info.flags)));
     }
     // SAFETY: the caller's promise.
     unsafe {
         let mut binding_flags: &[vk::DescriptorBindingFlags] = &[];
-        if let Some(flags) =
-            valid::find_in_chain::<vk::DescriptorSetLayoutBindingFlagsCreateInfo<'_>>(info.p_next)
-        {
+        if let Some(flags) = valid::find_in_chain::<vk::DescriptorSetLayoutBindingFlagsCreateInfo<'_>>(info.p_next) {
             let flags = valid::slice(flags.p_binding_flags, flags.binding_count)?;
             let known = vk::DescriptorBindingFlags::PARTIALLY_BOUND
                 | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING
@@ -339,9 +291,7 @@ unsafe fn new_layout(
                 | vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
             binding_flags = flags;
             if let Some(flags) = flags.iter().find(|&&flags| !known.contains(flags)) {
-                return Err(Error::FeatureNotPresent(format!(
-                    "a descriptor binding with flags {flags:?}"
-                )));
+                return Err(Error::FeatureNotPresent(format!("a descriptor binding with flags {flags:?}")));
             }
         }
         let bindings = valid::slice(info.p_bindings, info.binding_count)?;
@@ -353,11 +303,7 @@ unsafe fn new_layout(
         if is_push && layout.count() > limits::MAX_PUSH_DESCRIPTORS as usize {
             return Err(Error::usage(
                 "VUID-VkDescriptorSetLayoutCreateInfo-flags-00281",
-                format!(
-                    "{} descriptors are pushed; there may be {}",
-                    layout.count(),
-                    limits::MAX_PUSH_DESCRIPTORS
-                ),
+                format!("{} descriptors are pushed; there may be {}", layout.count(), limits::MAX_PUSH_DESCRIPTORS),
             ));
         }
         Ok(layout)
@@ -372,10 +318,8 @@ unsafe fn binding_info(
     binding: &vk::DescriptorSetLayoutBinding<'_>,
     flags: vk::DescriptorBindingFlags,
 ) -> Result<BindingInfo, Error> {
-    let has_samplers = matches!(
-        binding.descriptor_type,
-        vk::DescriptorType::SAMPLER | vk::DescriptorType::COMBINED_IMAGE_SAMPLER
-    );
+    let has_samplers =
+        matches!(binding.descriptor_type, vk::DescriptorType::SAMPLER | vk::DescriptorType::COMBINED_IMAGE_SAMPLER);
     let immutable_samplers = if has_samplers && !binding.p_immutable_samplers.is_null() {
         // SAFETY: the caller's promise; kinds without samplers may have any pointer, which isn't followed.
         unsafe {
@@ -422,9 +366,7 @@ pub(crate) unsafe fn get_descriptor_set_layout_support(
     let variable = layout.as_ref().and_then(|layout| layout.variable_binding());
     let max_variable_count = variable.map_or(0, |binding| binding.count.max(binding.inline_bytes));
     support.for_each_chained(|mut structure| {
-        if let Some(variable) =
-            structure.cast::<vk::DescriptorSetVariableDescriptorCountLayoutSupport<'_>>()
-        {
+        if let Some(variable) = structure.cast::<vk::DescriptorSetVariableDescriptorCountLayoutSupport<'_>>() {
             variable.max_variable_descriptor_count = max_variable_count;
         }
     });

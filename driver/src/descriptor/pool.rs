@@ -75,21 +75,12 @@ impl DescriptorPool {
         pool_sizes: &[vk::DescriptorPoolSize],
         flags: vk::DescriptorPoolCreateFlags,
     ) -> Self {
-        let sizes = pool_sizes
-            .iter()
-            .map(|size| (size.ty, u64::from(size.descriptor_count)));
-        Self {
-            max_sets: max_sets as usize,
-            size: Room::of(sizes),
-            flags,
-            allocated: Mutex::default(),
-        }
+        let sizes = pool_sizes.iter().map(|size| (size.ty, u64::from(size.descriptor_count)));
+        Self { max_sets: max_sets as usize, size: Room::of(sizes), flags, allocated: Mutex::default() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Allocated> {
-        self.allocated
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.allocated.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Allocates a set of each layout, with the number of descriptors of its variable binding from `variable_counts`,
@@ -118,23 +109,14 @@ impl DescriptorPool {
         }
         let sets = allocated.sets.len() + layouts.len();
         if sets > self.max_sets {
-            return Err(Error::OutOfPoolMemory(format!(
-                "{sets} sets are wanted of a pool of {}",
-                self.max_sets
-            )));
+            return Err(Error::OutOfPoolMemory(format!("{sets} sets are wanted of a pool of {}", self.max_sets)));
         }
         for (what, wanted, size) in [
             ("descriptors", wanted.descriptors, self.size.descriptors),
-            (
-                "bytes of inline uniform blocks",
-                wanted.inline_bytes,
-                self.size.inline_bytes,
-            ),
+            ("bytes of inline uniform blocks", wanted.inline_bytes, self.size.inline_bytes),
         ] {
             if wanted > size {
-                return Err(Error::OutOfPoolMemory(format!(
-                    "{wanted} {what} are wanted of a pool of {size}"
-                )));
+                return Err(Error::OutOfPoolMemory(format!("{wanted} {what} are wanted of a pool of {size}")));
             }
         }
         let sets = layouts.into_iter().enumerate().map(|(index, layout)| {
@@ -211,9 +193,7 @@ pub(crate) fn create_descriptor_pool(
 /// # Safety
 /// Nothing uses the pool's sets any more.
 #[doc(alias = "vkDestroyDescriptorPool")]
-pub(crate) unsafe fn destroy_descriptor_pool(
-    descriptor_pool: Option<Arc<DescriptorPool>>,
-) -> Result<(), Error> {
+pub(crate) unsafe fn destroy_descriptor_pool(descriptor_pool: Option<Arc<DescriptorPool>>) -> Result<(), Error> {
     match descriptor_pool {
         // SAFETY: the caller's promise.
         Some(pool) => unsafe { pool.reset() },
@@ -243,18 +223,12 @@ pub(crate) unsafe fn allocate_descriptor_sets(
     // SAFETY: the caller's promise.
     let (pool, layouts, variable_counts) = unsafe {
         let layouts = valid::slice(info.p_set_layouts, info.descriptor_set_count)?;
-        let variable = valid::find_in_chain::<
-            vk::DescriptorSetVariableDescriptorCountAllocateInfo<'_>,
-        >(info.p_next);
+        let variable = valid::find_in_chain::<vk::DescriptorSetVariableDescriptorCountAllocateInfo<'_>>(info.p_next);
         let counts = match variable {
             Some(info) => valid::slice(info.p_descriptor_counts, info.descriptor_set_count)?,
             None => &[],
         };
-        (
-            handle::get(info.descriptor_pool)?,
-            handle::get_all(layouts)?,
-            counts,
-        )
+        (handle::get(info.descriptor_pool)?, handle::get_all(layouts)?, counts)
     };
     if layouts.iter().any(|layout| layout.is_push()) {
         return Err(Error::usage(
@@ -262,10 +236,7 @@ pub(crate) unsafe fn allocate_descriptor_sets(
             "a set is allocated whose layout is for pushed descriptors",
         ));
     }
-    for (place, set) in descriptor_sets
-        .iter_mut()
-        .zip(pool.allocate(layouts, variable_counts)?)
-    {
+    for (place, set) in descriptor_sets.iter_mut().zip(pool.allocate(layouts, variable_counts)?) {
         place.write(set);
     }
     Ok(())

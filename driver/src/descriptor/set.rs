@@ -89,10 +89,7 @@ impl DescriptorSet {
     ///
     /// # Errors
     /// [`Error::OutOfDeviceMemory`] if there is no memory for inline uniform blocks.
-    pub(crate) fn new(
-        layout: Arc<DescriptorSetLayout>,
-        variable_count: u32,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(layout: Arc<DescriptorSetLayout>, variable_count: u32) -> Result<Self, Error> {
         let mut descriptors = host::with_capacity(layout.count());
         let variable = layout.variable_binding().map(|binding| binding.first);
         for binding in layout.bindings() {
@@ -108,10 +105,7 @@ impl DescriptorSet {
             let samplers = binding
                 .immutable_samplers
                 .iter()
-                .map(|sampler| Descriptor::Image {
-                    view: None,
-                    sampler: Some(Arc::clone(sampler)),
-                });
+                .map(|sampler| Descriptor::Image { view: None, sampler: Some(Arc::clone(sampler)) });
             descriptors.extend(samplers);
             let count = match is_variable {
                 true => variable_count.min(binding.count),
@@ -119,11 +113,7 @@ impl DescriptorSet {
             };
             descriptors.resize(binding.first + count as usize, Descriptor::Empty);
         }
-        Ok(Self {
-            layout,
-            variable_count,
-            descriptors: Mutex::new(descriptors),
-        })
+        Ok(Self { layout, variable_count, descriptors: Mutex::new(descriptors) })
     }
 
     /// The number of descriptors, or of bytes, of its variable binding.
@@ -138,9 +128,7 @@ impl DescriptorSet {
 
     /// The descriptors, by index.
     pub(crate) fn lock(&self) -> MutexGuard<'_, Vec<Descriptor>> {
-        self.descriptors
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.descriptors.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Replaces descriptors.
@@ -151,12 +139,9 @@ impl DescriptorSet {
     pub(crate) fn write(&self, write: &Write) -> Result<(), Error> {
         if write.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
             let block = self.inline_block(write.binding)?;
-            return in_block(
-                &block,
-                write.element,
-                write.bytes.len(),
-                |memory, offset| memory.write(offset, &write.bytes),
-            );
+            return in_block(&block, write.element, write.bytes.len(), |memory, offset| {
+                memory.write(offset, &write.bytes)
+            });
         }
         let first = self.layout.index(write.binding, write.element)?;
         let end = first + write.descriptors.len();
@@ -205,9 +190,7 @@ impl DescriptorSet {
             let mut bytes = host::with_capacity(count as usize);
             bytes.resize(count as usize, 0u8);
             let block = source.inline_block(source_binding)?;
-            in_block(&block, source_element, bytes.len(), |memory, offset| {
-                memory.read(offset, &mut bytes)
-            })?;
+            in_block(&block, source_element, bytes.len(), |memory, offset| memory.read(offset, &mut bytes))?;
             return self.write(&Write {
                 binding,
                 element,
@@ -217,10 +200,7 @@ impl DescriptorSet {
             });
         }
         let start = source.layout.index(source_binding, source_element)?;
-        let found = source
-            .lock()
-            .get(start..start + count as usize)
-            .map(host::copied);
+        let found = source.lock().get(start..start + count as usize).map(host::copied);
         let Some(descriptors) = found else {
             return Err(Error::usage(
                 "VUID-VkCopyDescriptorSet-srcArrayElement-00346",
@@ -230,13 +210,7 @@ impl DescriptorSet {
                 ),
             ));
         };
-        self.write(&Write {
-            binding,
-            element,
-            kind: kind.unwrap_or_default(),
-            descriptors,
-            bytes: Vec::new(),
-        })
+        self.write(&Write { binding, element, kind: kind.unwrap_or_default(), descriptors, bytes: Vec::new() })
     }
 
     /// The bytes of the inline uniform block of a binding.
@@ -257,9 +231,7 @@ impl DescriptorSet {
 
     /// The bindings that descriptors `first..end` belong to.
     fn overlapping(&self, first: usize, end: usize) -> Vec<&LayoutBinding> {
-        let overlaps = |binding: &&LayoutBinding| {
-            binding.first < end && first < binding.first + binding.count as usize
-        };
+        let overlaps = |binding: &&LayoutBinding| binding.first < end && first < binding.first + binding.count as usize;
         self.layout.bindings().filter(overlaps).collect()
     }
 }
@@ -267,16 +239,8 @@ impl DescriptorSet {
 /// The descriptor of an inline uniform block of `bytes` bytes, in memory of its own.
 fn inline_block(bytes: u32) -> Result<Descriptor, Error> {
     let size = u64::from(bytes);
-    let memory = Allocation::new_zeroed(size.max(1))
-        .map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
-    Ok(Descriptor::Buffer(BufferDescriptor {
-        rest: BufferRange {
-            memory,
-            offset: 0,
-            size,
-        },
-        size: None,
-    }))
+    let memory = Allocation::new_zeroed(size.max(1)).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
+    Ok(Descriptor::Buffer(BufferDescriptor { rest: BufferRange { memory, offset: 0, size }, size: None }))
 }
 
 /// Reads or writes `count` bytes of an inline uniform block from byte `start` on.
@@ -296,10 +260,7 @@ fn in_block<E>(
     }
     Err(Error::usage(
         "VUID-VkWriteDescriptorSet-dstArrayElement-00321",
-        format!(
-            "{count} bytes from byte {start} on of an inline uniform block of {}",
-            block.size
-        ),
+        format!("{count} bytes from byte {start} on of an inline uniform block of {}", block.size),
     ))
 }
 
@@ -335,19 +296,13 @@ fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(
 ///
 /// # Safety
 /// The write is valid.
-pub(crate) unsafe fn write(
-    info: &vk::WriteDescriptorSet<'_>,
-    layout: &DescriptorSetLayout,
-) -> Result<Write, Error> {
+pub(crate) unsafe fn write(info: &vk::WriteDescriptorSet<'_>, layout: &DescriptorSetLayout) -> Result<Write, Error> {
     let kind = info.descriptor_type;
     if kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
         // SAFETY: the caller's promise.
         let bytes = unsafe {
-            let block =
-                valid::find_in_chain::<vk::WriteDescriptorSetInlineUniformBlock<'_>>(info.p_next)
-                    .ok_or(Error::NullPointer {
-                    what: "the bytes of an inline uniform block",
-                })?;
+            let block = valid::find_in_chain::<vk::WriteDescriptorSetInlineUniformBlock<'_>>(info.p_next)
+                .ok_or(Error::NullPointer { what: "the bytes of an inline uniform block" })?;
             valid::slice(block.p_data.cast::<u8>(), block.data_size)?
         };
         return Ok(Write {
@@ -360,27 +315,13 @@ pub(crate) unsafe fn write(
     }
     let contents = DescriptorSource::of(kind, layout, info.dst_binding)?;
     let (data, stride) = match contents {
-        DescriptorSource::Image { .. } => (
-            info.p_image_info.cast(),
-            size_of::<vk::DescriptorImageInfo>(),
-        ),
-        DescriptorSource::Buffer => (
-            info.p_buffer_info.cast(),
-            size_of::<vk::DescriptorBufferInfo>(),
-        ),
-        DescriptorSource::TexelBuffer => {
-            (info.p_texel_buffer_view.cast(), size_of::<vk::BufferView>())
-        }
+        DescriptorSource::Image { .. } => (info.p_image_info.cast(), size_of::<vk::DescriptorImageInfo>()),
+        DescriptorSource::Buffer => (info.p_buffer_info.cast(), size_of::<vk::DescriptorBufferInfo>()),
+        DescriptorSource::TexelBuffer => (info.p_texel_buffer_view.cast(), size_of::<vk::BufferView>()),
     };
     // SAFETY: the caller's promise: the array that belongs to the kind has as many elements.
     let descriptors = unsafe { descriptors(contents, info.descriptor_count, data, stride)? };
-    Ok(Write {
-        binding: info.dst_binding,
-        element: info.dst_array_element,
-        kind,
-        descriptors,
-        bytes: Vec::new(),
-    })
+    Ok(Write { binding: info.dst_binding, element: info.dst_array_element, kind, descriptors, bytes: Vec::new() })
 }
 
 /// The writes to a set of a layout by a template with the application's data.
@@ -393,9 +334,7 @@ pub(crate) unsafe fn template_writes(
     data: *const c_void,
 ) -> Result<Vec<Write>, Error> {
     if data.is_null() {
-        return Err(Error::NullPointer {
-            what: "an update template's data",
-        });
+        return Err(Error::NullPointer { what: "an update template's data" });
     }
     let write = |entry: &vk::DescriptorUpdateTemplateEntry| {
         if entry.descriptor_type == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
@@ -414,14 +353,8 @@ pub(crate) unsafe fn template_writes(
         }
         let contents = DescriptorSource::of(entry.descriptor_type, layout, entry.dst_binding)?;
         // SAFETY: the caller's promise: the entry's offset and stride lead to valid contents.
-        let descriptors = unsafe {
-            descriptors(
-                contents,
-                entry.descriptor_count,
-                data.byte_add(entry.offset),
-                entry.stride,
-            )?
-        };
+        let descriptors =
+            unsafe { descriptors(contents, entry.descriptor_count, data.byte_add(entry.offset), entry.stride)? };
         Ok(Write {
             binding: entry.dst_binding,
             element: entry.dst_array_element,
@@ -447,29 +380,14 @@ enum DescriptorSource {
 
 impl DescriptorSource {
     /// The source of a descriptor of this kind in a binding of a layout.
-    fn of(
-        kind: vk::DescriptorType,
-        layout: &DescriptorSetLayout,
-        binding: u32,
-    ) -> Result<Self, Error> {
-        let immutable = layout
-            .binding(binding)
-            .is_some_and(|binding| !binding.immutable_samplers.is_empty());
+    fn of(kind: vk::DescriptorType, layout: &DescriptorSetLayout, binding: u32) -> Result<Self, Error> {
+        let immutable = layout.binding(binding).is_some_and(|binding| !binding.immutable_samplers.is_empty());
         match kind {
-            vk::DescriptorType::SAMPLER => Ok(Self::Image {
-                view: false,
-                sampler: !immutable,
-            }),
-            vk::DescriptorType::COMBINED_IMAGE_SAMPLER => Ok(Self::Image {
-                view: true,
-                sampler: !immutable,
-            }),
+            vk::DescriptorType::SAMPLER => Ok(Self::Image { view: false, sampler: !immutable }),
+            vk::DescriptorType::COMBINED_IMAGE_SAMPLER => Ok(Self::Image { view: true, sampler: !immutable }),
             vk::DescriptorType::SAMPLED_IMAGE
             | vk::DescriptorType::STORAGE_IMAGE
-            | vk::DescriptorType::INPUT_ATTACHMENT => Ok(Self::Image {
-                view: true,
-                sampler: false,
-            }),
+            | vk::DescriptorType::INPUT_ATTACHMENT => Ok(Self::Image { view: true, sampler: false }),
             vk::DescriptorType::UNIFORM_BUFFER
             | vk::DescriptorType::STORAGE_BUFFER
             | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
@@ -477,9 +395,7 @@ impl DescriptorSource {
             vk::DescriptorType::UNIFORM_TEXEL_BUFFER | vk::DescriptorType::STORAGE_TEXEL_BUFFER => {
                 Ok(Self::TexelBuffer)
             }
-            other => Err(Error::FeatureNotPresent(format!(
-                "a descriptor of type {other:?}"
-            ))),
+            other => Err(Error::FeatureNotPresent(format!("a descriptor of type {other:?}"))),
         }
     }
 }
@@ -495,22 +411,16 @@ unsafe fn descriptors(
     stride: usize,
 ) -> Result<Vec<Descriptor>, Error> {
     if count > 0 && data.is_null() {
-        return Err(Error::NullPointer {
-            what: "the contents of descriptors",
-        });
+        return Err(Error::NullPointer { what: "the contents of descriptors" });
     }
     // SAFETY: the caller's promise, for each element.
     let one = |index: u32| unsafe {
         let data = data.byte_add(index as usize * stride);
         match contents {
-            DescriptorSource::Image { view, sampler } => image(
-                view,
-                sampler,
-                &data.cast::<vk::DescriptorImageInfo>().read_unaligned(),
-            ),
-            DescriptorSource::Buffer => {
-                buffer(&data.cast::<vk::DescriptorBufferInfo>().read_unaligned())
+            DescriptorSource::Image { view, sampler } => {
+                image(view, sampler, &data.cast::<vk::DescriptorImageInfo>().read_unaligned())
             }
+            DescriptorSource::Buffer => buffer(&data.cast::<vk::DescriptorBufferInfo>().read_unaligned()),
             DescriptorSource::TexelBuffer => {
                 let view = data.cast::<vk::BufferView>().read_unaligned();
                 let view = handle::get_optional(view)?.cloned();
@@ -529,21 +439,9 @@ unsafe fn descriptors(
 ///
 /// # Safety
 /// The handles that are used are live.
-unsafe fn image(
-    view: bool,
-    sampler: bool,
-    info: &vk::DescriptorImageInfo,
-) -> Result<Descriptor, Error> {
-    let view = if view {
-        info.image_view
-    } else {
-        vk::ImageView::null()
-    };
-    let sampler = if sampler {
-        info.sampler
-    } else {
-        vk::Sampler::null()
-    };
+unsafe fn image(view: bool, sampler: bool, info: &vk::DescriptorImageInfo) -> Result<Descriptor, Error> {
+    let view = if view { info.image_view } else { vk::ImageView::null() };
+    let sampler = if sampler { info.sampler } else { vk::Sampler::null() };
     // SAFETY: the caller's promise.
     unsafe {
         Ok(Descriptor::Image {
@@ -590,8 +488,7 @@ pub(crate) unsafe fn update_descriptor_sets(
         }
         for copy in descriptor_copies {
             // SAFETY: the caller's promise.
-            let (target, source) =
-                unsafe { (handle::get(copy.dst_set)?, handle::get(copy.src_set)?) };
+            let (target, source) = unsafe { (handle::get(copy.dst_set)?, handle::get(copy.src_set)?) };
             target.copy(
                 (copy.dst_binding, copy.dst_array_element),
                 source,
@@ -611,12 +508,7 @@ pub(crate) unsafe fn create_descriptor_update_template(
 ) -> Result<Arc<UpdateTemplate>, Error> {
     let info = create_info;
     // SAFETY: the caller's promise.
-    let entries = unsafe {
-        valid::slice(
-            info.p_descriptor_update_entries,
-            info.descriptor_update_entry_count,
-        )?
-    };
+    let entries = unsafe { valid::slice(info.p_descriptor_update_entries, info.descriptor_update_entry_count)? };
     let pushes = info.template_type == vk::DescriptorUpdateTemplateType::PUSH_DESCRIPTORS_KHR;
     Ok(Arc::new(UpdateTemplate {
         entries: host::copied(entries),
@@ -637,9 +529,7 @@ pub(crate) unsafe fn update_descriptor_set_with_template(
         let layout = descriptor_set.layout();
         // SAFETY: the caller's promise.
         let writes = unsafe { template_writes(descriptor_update_template, layout, data)? };
-        writes
-            .iter()
-            .try_for_each(|write| descriptor_set.write(write))
+        writes.iter().try_for_each(|write| descriptor_set.write(write))
     })
 }
 
@@ -650,11 +540,7 @@ mod tests {
     #[test]
     fn dynamic_offsets_stay_inside_the_buffer() {
         let mut buffer = BufferDescriptor {
-            rest: BufferRange {
-                memory: Allocation::new_zeroed(4096).unwrap(),
-                offset: 256,
-                size: 100,
-            },
+            rest: BufferRange { memory: Allocation::new_zeroed(4096).unwrap(), offset: 256, size: 100 },
             size: Some(64),
         };
         let range = |buffer: &BufferDescriptor, offset| {

@@ -5,14 +5,8 @@
 
 #![allow(non_snake_case, reason = "Vulkan's names")]
 #![allow(clippy::too_many_arguments, reason = "Vulkan's signatures")]
-#![allow(
-    clippy::semicolon_if_nothing_returned,
-    reason = "functions return what their guards do"
-)]
-#![allow(
-    clippy::redundant_closure,
-    reason = "all commands are recorded in closures"
-)]
+#![allow(clippy::semicolon_if_nothing_returned, reason = "functions return what their guards do")]
+#![allow(clippy::redundant_closure, reason = "all commands are recorded in closures")]
 
 use super::lookup::Availability::{Core, DeviceExtension, InstanceExtension};
 use super::lookup::{Command, Commands, Scope, rows};
@@ -555,21 +549,13 @@ unsafe extern "system" fn vkCreateInstance(
     guard(p_create_info, "vkCreateInstance", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_instance,
-                handle::create(crate::instance::create_instance(valid::input(
-                    p_create_info,
-                )?)?),
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_instance, handle::create(crate::instance::create_instance(valid::input(p_create_info)?)?))
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
 
-unsafe extern "system" fn vkDestroyInstance(
-    instance: vk::Instance,
-    _: *const vk::AllocationCallbacks<'_>,
-) {
+unsafe extern "system" fn vkDestroyInstance(instance: vk::Instance, _: *const vk::AllocationCallbacks<'_>) {
     guard(instance, "vkDestroyInstance", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(instance) }.map(drop)
@@ -599,12 +585,7 @@ unsafe extern "system" fn vkGetPhysicalDeviceFeatures(
 ) {
     guard(physical_device, "vkGetPhysicalDeviceFeatures", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            valid::output(
-                p_features,
-                crate::physical_device::get_physical_device_features()?,
-            )
-        }
+        unsafe { valid::output(p_features, crate::physical_device::get_physical_device_features()?) }
     })
 }
 
@@ -613,19 +594,12 @@ unsafe extern "system" fn vkGetPhysicalDeviceFormatProperties(
     format: vk::Format,
     p_format_properties: *mut vk::FormatProperties,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceFormatProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::output(
-                    p_format_properties,
-                    crate::physical_device::get_physical_device_format_properties(format)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceFormatProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(p_format_properties, crate::physical_device::get_physical_device_format_properties(format)?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties(
@@ -637,23 +611,19 @@ unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties(
     flags: vk::ImageCreateFlags,
     p_image_format_properties: *mut vk::ImageFormatProperties,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceImageFormatProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_image_format_properties(
-                    format,
-                    ty,
-                    tiling,
-                    usage,
-                    flags,
-                    valid::output_structure(p_image_format_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceImageFormatProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_image_format_properties(
+                format,
+                ty,
+                tiling,
+                usage,
+                flags,
+                valid::output_structure(p_image_format_properties)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceProperties(
@@ -662,12 +632,7 @@ unsafe extern "system" fn vkGetPhysicalDeviceProperties(
 ) {
     guard(physical_device, "vkGetPhysicalDeviceProperties", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            valid::output(
-                p_properties,
-                crate::physical_device::get_physical_device_properties()?,
-            )
-        }
+        unsafe { valid::output(p_properties, crate::physical_device::get_physical_device_properties()?) }
     })
 }
 
@@ -676,40 +641,27 @@ unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties(
     p_queue_family_property_count: *mut u32,
     p_queue_family_properties: *mut vk::QueueFamilyProperties,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceQueueFamilyProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_queue_family_property_count,
-                    p_queue_family_properties,
-                    &crate::physical_device::get_physical_device_queue_family_properties()?,
-                )
-                .map(drop)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceQueueFamilyProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_queue_family_property_count,
+                p_queue_family_properties,
+                &crate::physical_device::get_physical_device_queue_family_properties()?,
+            )
+            .map(drop)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceMemoryProperties(
     physical_device: vk::PhysicalDevice,
     p_memory_properties: *mut vk::PhysicalDeviceMemoryProperties,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceMemoryProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::output(
-                    p_memory_properties,
-                    crate::physical_device::get_physical_device_memory_properties()?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceMemoryProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { valid::output(p_memory_properties, crate::physical_device::get_physical_device_memory_properties()?) }
+    })
 }
 
 pub(crate) unsafe extern "system" fn vkGetInstanceProcAddr(
@@ -765,10 +717,7 @@ unsafe extern "system" fn vkCreateDevice(
     })
 }
 
-unsafe extern "system" fn vkDestroyDevice(
-    device: vk::Device,
-    _: *const vk::AllocationCallbacks<'_>,
-) {
+unsafe extern "system" fn vkDestroyDevice(device: vk::Device, _: *const vk::AllocationCallbacks<'_>) {
     guard(device, "vkDestroyDevice", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe { crate::device::destroy_device(handle::destroy(device)?) }
@@ -780,22 +729,16 @@ unsafe extern "system" fn vkEnumerateInstanceExtensionProperties(
     p_property_count: *mut u32,
     p_properties: *mut vk::ExtensionProperties,
 ) -> vk::Result {
-    guard(
-        p_layer_name,
-        "vkEnumerateInstanceExtensionProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_property_count,
-                    p_properties,
-                    &crate::instance::enumerate_instance_extension_properties(valid::string(
-                        p_layer_name,
-                    ))?,
-                )
-            }
-        },
-    )
+    guard(p_layer_name, "vkEnumerateInstanceExtensionProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_property_count,
+                p_properties,
+                &crate::instance::enumerate_instance_extension_properties(valid::string(p_layer_name))?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkEnumerateDeviceExtensionProperties(
@@ -804,42 +747,28 @@ unsafe extern "system" fn vkEnumerateDeviceExtensionProperties(
     p_property_count: *mut u32,
     p_properties: *mut vk::ExtensionProperties,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkEnumerateDeviceExtensionProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_property_count,
-                    p_properties,
-                    &crate::physical_device::enumerate_device_extension_properties(valid::string(
-                        p_layer_name,
-                    ))?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkEnumerateDeviceExtensionProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_property_count,
+                p_properties,
+                &crate::physical_device::enumerate_device_extension_properties(valid::string(p_layer_name))?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkEnumerateInstanceLayerProperties(
     p_property_count: *mut u32,
     p_properties: *mut vk::LayerProperties,
 ) -> vk::Result {
-    guard(
-        p_property_count,
-        "vkEnumerateInstanceLayerProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_property_count,
-                    p_properties,
-                    &crate::instance::enumerate_instance_layer_properties()?,
-                )
-            }
-        },
-    )
+    guard(p_property_count, "vkEnumerateInstanceLayerProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(p_property_count, p_properties, &crate::instance::enumerate_instance_layer_properties()?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkEnumerateDeviceLayerProperties(
@@ -870,11 +799,7 @@ unsafe extern "system" fn vkGetDeviceQueue(
         unsafe {
             valid::output(
                 p_queue,
-                crate::device::get_device_queue(
-                    handle::get(device)?,
-                    queue_family_index,
-                    queue_index,
-                )?,
+                crate::device::get_device_queue(handle::get(device)?, queue_family_index, queue_index)?,
             )
         }
     })
@@ -909,9 +834,7 @@ unsafe extern "system" fn vkQueueWaitIdle(queue: vk::Queue) -> vk::Result {
 unsafe extern "system" fn vkDeviceWaitIdle(device: vk::Device) -> vk::Result {
     guard(device, "vkDeviceWaitIdle", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::device::device_wait_idle(handle::get(device)?).map(|()| vk::Result::SUCCESS)
-        }
+        unsafe { crate::device::device_wait_idle(handle::get(device)?).map(|()| vk::Result::SUCCESS) }
     })
 }
 
@@ -960,11 +883,8 @@ unsafe extern "system" fn vkMapMemory(
     guard(device, "vkMapMemory", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                pp_data,
-                crate::resource::memory::map_memory(handle::get(memory)?, offset, size)?,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(pp_data, crate::resource::memory::map_memory(handle::get(memory)?, offset, size)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -984,11 +904,8 @@ unsafe extern "system" fn vkFlushMappedMemoryRanges(
     guard(device, "vkFlushMappedMemoryRanges", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(
-                p_memory_ranges,
-                memory_range_count,
-            )?)
-            .map(|()| vk::Result::SUCCESS)
+            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(p_memory_ranges, memory_range_count)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1001,11 +918,8 @@ unsafe extern "system" fn vkInvalidateMappedMemoryRanges(
     guard(device, "vkInvalidateMappedMemoryRanges", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(
-                p_memory_ranges,
-                memory_range_count,
-            )?)
-            .map(|()| vk::Result::SUCCESS)
+            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(p_memory_ranges, memory_range_count)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1035,12 +949,8 @@ unsafe extern "system" fn vkBindBufferMemory(
     guard(device, "vkBindBufferMemory", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::buffer::bind_buffer_memory(
-                handle::get(buffer)?,
-                handle::get(memory)?,
-                memory_offset,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            crate::resource::buffer::bind_buffer_memory(handle::get(buffer)?, handle::get(memory)?, memory_offset)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1054,12 +964,8 @@ unsafe extern "system" fn vkBindImageMemory(
     guard(device, "vkBindImageMemory", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::image::bind_image_memory(
-                handle::get(image)?,
-                handle::get(memory)?,
-                memory_offset,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            crate::resource::image::bind_image_memory(handle::get(image)?, handle::get(memory)?, memory_offset)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1125,21 +1031,17 @@ unsafe extern "system" fn vkGetPhysicalDeviceSparseImageFormatProperties(
     p_property_count: *mut u32,
     p_properties: *mut vk::SparseImageFormatProperties,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSparseImageFormatProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_property_count,
-                    p_properties,
-                    &crate::physical_device::get_physical_device_sparse_image_format_properties()?,
-                )
-                .map(drop)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSparseImageFormatProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_property_count,
+                p_properties,
+                &crate::physical_device::get_physical_device_sparse_image_format_properties()?,
+            )
+            .map(drop)
+        }
+    })
 }
 
 unsafe extern "system" fn vkQueueBindSparse(
@@ -1149,9 +1051,7 @@ unsafe extern "system" fn vkQueueBindSparse(
     _: vk::Fence,
 ) -> vk::Result {
     guard(queue, "vkQueueBindSparse", || {
-        Err::<vk::Result, _>(Error::Unsupported {
-            command: "vkQueueBindSparse".to_owned(),
-        })
+        Err::<vk::Result, _>(Error::Unsupported { command: "vkQueueBindSparse".to_owned() })
     })
 }
 
@@ -1166,21 +1066,14 @@ unsafe extern "system" fn vkCreateFence(
         unsafe {
             valid::output(
                 p_fence,
-                handle::create(crate::sync::create_fence(
-                    handle::get(device)?,
-                    valid::input(p_create_info)?,
-                )?),
+                handle::create(crate::sync::create_fence(handle::get(device)?, valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
     })
 }
 
-unsafe extern "system" fn vkDestroyFence(
-    device: vk::Device,
-    fence: vk::Fence,
-    _: *const vk::AllocationCallbacks<'_>,
-) {
+unsafe extern "system" fn vkDestroyFence(device: vk::Device, fence: vk::Fence, _: *const vk::AllocationCallbacks<'_>) {
     guard(device, "vkDestroyFence", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(fence) }.map(drop)
@@ -1273,9 +1166,7 @@ unsafe extern "system" fn vkCreateQueryPool(
         unsafe {
             valid::output(
                 p_query_pool,
-                handle::create(crate::query_pool::create_query_pool(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::query_pool::create_query_pool(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1376,11 +1267,7 @@ unsafe extern "system" fn vkCreateImage(
     })
 }
 
-unsafe extern "system" fn vkDestroyImage(
-    device: vk::Device,
-    image: vk::Image,
-    _: *const vk::AllocationCallbacks<'_>,
-) {
+unsafe extern "system" fn vkDestroyImage(device: vk::Device, image: vk::Image, _: *const vk::AllocationCallbacks<'_>) {
     guard(device, "vkDestroyImage", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(image) }.map(drop)
@@ -1479,10 +1366,7 @@ unsafe extern "system" fn vkResetCommandPool(
 ) -> vk::Result {
     guard(device, "vkResetCommandPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::command::buffer::reset_command_pool(handle::get(command_pool)?)
-                .map(|()| vk::Result::SUCCESS)
-        }
+        unsafe { crate::command::buffer::reset_command_pool(handle::get(command_pool)?).map(|()| vk::Result::SUCCESS) }
     })
 }
 
@@ -1498,10 +1382,7 @@ unsafe extern "system" fn vkAllocateCommandBuffers(
             crate::command::buffer::allocate_command_buffers(
                 handle::get(info.command_pool)?,
                 info.level,
-                valid::output_slice(
-                    p_command_buffers,
-                    valid::input(p_allocate_info)?.command_buffer_count as usize,
-                )?,
+                valid::output_slice(p_command_buffers, valid::input(p_allocate_info)?.command_buffer_count as usize)?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1532,11 +1413,8 @@ unsafe extern "system" fn vkBeginCommandBuffer(
     guard(command_buffer, "vkBeginCommandBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::command::buffer::begin_command_buffer(
-                handle::get(command_buffer)?,
-                valid::input(p_begin_info)?,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            crate::command::buffer::begin_command_buffer(handle::get(command_buffer)?, valid::input(p_begin_info)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1545,8 +1423,7 @@ unsafe extern "system" fn vkEndCommandBuffer(command_buffer: vk::CommandBuffer) 
     guard(command_buffer, "vkEndCommandBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::command::buffer::end_command_buffer(handle::get(command_buffer)?)
-                .map(|()| vk::Result::SUCCESS)
+            crate::command::buffer::end_command_buffer(handle::get(command_buffer)?).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1558,8 +1435,7 @@ unsafe extern "system" fn vkResetCommandBuffer(
     guard(command_buffer, "vkResetCommandBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::command::buffer::reset_command_buffer(handle::get(command_buffer)?)
-                .map(|()| vk::Result::SUCCESS)
+            crate::command::buffer::reset_command_buffer(handle::get(command_buffer)?).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1575,15 +1451,12 @@ unsafe extern "system" fn vkCmdCopyBuffer(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBuffer", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::BufferCopy2 {
-                            src_offset: of.src_offset,
-                            dst_offset: of.dst_offset,
-                            size: of.size,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::BufferCopy2 {
+                    src_offset: of.src_offset,
+                    dst_offset: of.dst_offset,
+                    size: of.size,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyBufferInfo2 {
@@ -1617,17 +1490,14 @@ unsafe extern "system" fn vkCmdCopyImage(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImage", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::ImageCopy2 {
-                            src_subresource: of.src_subresource,
-                            src_offset: of.src_offset,
-                            dst_subresource: of.dst_subresource,
-                            dst_offset: of.dst_offset,
-                            extent: of.extent,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::ImageCopy2 {
+                    src_subresource: of.src_subresource,
+                    src_offset: of.src_offset,
+                    dst_subresource: of.dst_subresource,
+                    dst_offset: of.dst_offset,
+                    extent: of.extent,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyImageInfo2 {
@@ -1662,18 +1532,15 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBufferToImage", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::BufferImageCopy2 {
-                            buffer_offset: of.buffer_offset,
-                            buffer_row_length: of.buffer_row_length,
-                            buffer_image_height: of.buffer_image_height,
-                            image_subresource: of.image_subresource,
-                            image_offset: of.image_offset,
-                            image_extent: of.image_extent,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::BufferImageCopy2 {
+                    buffer_offset: of.buffer_offset,
+                    buffer_row_length: of.buffer_row_length,
+                    buffer_image_height: of.buffer_image_height,
+                    image_subresource: of.image_subresource,
+                    image_offset: of.image_offset,
+                    image_extent: of.image_extent,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyBufferToImageInfo2 {
@@ -1707,18 +1574,15 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImageToBuffer", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::BufferImageCopy2 {
-                            buffer_offset: of.buffer_offset,
-                            buffer_row_length: of.buffer_row_length,
-                            buffer_image_height: of.buffer_image_height,
-                            image_subresource: of.image_subresource,
-                            image_offset: of.image_offset,
-                            image_extent: of.image_extent,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::BufferImageCopy2 {
+                    buffer_offset: of.buffer_offset,
+                    buffer_row_length: of.buffer_row_length,
+                    buffer_image_height: of.buffer_image_height,
+                    image_subresource: of.image_subresource,
+                    image_offset: of.image_offset,
+                    image_extent: of.image_extent,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyImageToBufferInfo2 {
@@ -1774,13 +1638,7 @@ unsafe extern "system" fn vkCmdFillBuffer(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdFillBuffer", |recorder| {
-                crate::command::transfer::cmd_fill_buffer(
-                    recorder,
-                    handle::get(dst_buffer)?,
-                    dst_offset,
-                    size,
-                    data,
-                )
+                crate::command::transfer::cmd_fill_buffer(recorder, handle::get(dst_buffer)?, dst_offset, size, data)
             })
         }
     })
@@ -1824,11 +1682,7 @@ unsafe extern "system" fn vkCmdBeginQuery(
     })
 }
 
-unsafe extern "system" fn vkCmdEndQuery(
-    command_buffer: vk::CommandBuffer,
-    query_pool: vk::QueryPool,
-    query: u32,
-) {
+unsafe extern "system" fn vkCmdEndQuery(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
     guard(command_buffer, "vkCmdEndQuery", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -1870,11 +1724,7 @@ unsafe extern "system" fn vkCmdWriteTimestamp(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdWriteTimestamp", |recorder| {
-                crate::command::query::cmd_write_timestamp(
-                    recorder,
-                    handle::get(query_pool)?,
-                    query,
-                )
+                crate::command::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
             })
         }
     })
@@ -1936,21 +1786,14 @@ unsafe extern "system" fn vkCreateEvent(
         unsafe {
             valid::output(
                 p_event,
-                handle::create(crate::sync::create_event(
-                    handle::get(device)?,
-                    valid::input(p_create_info)?,
-                )?),
+                handle::create(crate::sync::create_event(handle::get(device)?, valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
     })
 }
 
-unsafe extern "system" fn vkDestroyEvent(
-    device: vk::Device,
-    event: vk::Event,
-    _: *const vk::AllocationCallbacks<'_>,
-) {
+unsafe extern "system" fn vkDestroyEvent(device: vk::Device, event: vk::Event, _: *const vk::AllocationCallbacks<'_>) {
     guard(device, "vkDestroyEvent", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(event) }.map(drop)
@@ -2054,9 +1897,7 @@ unsafe extern "system" fn vkCreatePipelineCache(
         unsafe {
             valid::output(
                 p_pipeline_cache,
-                handle::create(crate::pipeline::create_pipeline_cache(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::pipeline::create_pipeline_cache(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2082,9 +1923,7 @@ unsafe extern "system" fn vkGetPipelineCacheData(
 ) -> vk::Result {
     guard(device, "vkGetPipelineCacheData", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::pipeline::get_pipeline_cache_data(valid::output_structure(p_data_size)?, p_data)
-        }
+        unsafe { crate::pipeline::get_pipeline_cache_data(valid::output_structure(p_data_size)?, p_data) }
     })
 }
 
@@ -2141,10 +1980,7 @@ unsafe extern "system" fn vkCreatePipelineLayout(
             valid::output(
                 p_pipeline_layout,
                 handle::create(crate::pipeline::layout::create_pipeline_layout(
-                    &handle::get_all_optional(valid::slice(
-                        info.p_set_layouts,
-                        info.set_layout_count,
-                    )?)?,
+                    &handle::get_all_optional(valid::slice(info.p_set_layouts, info.set_layout_count)?)?,
                     valid::slice(info.p_push_constant_ranges, info.push_constant_range_count)?,
                 )?),
             )
@@ -2175,9 +2011,7 @@ unsafe extern "system" fn vkCreateSampler(
         unsafe {
             valid::output(
                 p_sampler,
-                handle::create(crate::resource::sampler::create_sampler(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::sampler::create_sampler(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2206,9 +2040,7 @@ unsafe extern "system" fn vkCreateDescriptorSetLayout(
         unsafe {
             valid::output(
                 p_set_layout,
-                handle::create(crate::descriptor::layout::create_descriptor_set_layout(
-                    valid::input(p_create_info)?,
-                )?),
+                handle::create(crate::descriptor::layout::create_descriptor_set_layout(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2256,9 +2088,7 @@ unsafe extern "system" fn vkDestroyDescriptorPool(
 ) {
     guard(device, "vkDestroyDescriptorPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::descriptor::pool::destroy_descriptor_pool(handle::destroy(descriptor_pool)?)
-        }
+        unsafe { crate::descriptor::pool::destroy_descriptor_pool(handle::destroy(descriptor_pool)?) }
     })
 }
 
@@ -2270,8 +2100,7 @@ unsafe extern "system" fn vkResetDescriptorPool(
     guard(device, "vkResetDescriptorPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::descriptor::pool::reset_descriptor_pool(handle::get(descriptor_pool)?)
-                .map(|()| vk::Result::SUCCESS)
+            crate::descriptor::pool::reset_descriptor_pool(handle::get(descriptor_pool)?).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -2286,10 +2115,7 @@ unsafe extern "system" fn vkAllocateDescriptorSets(
         unsafe {
             crate::descriptor::pool::allocate_descriptor_sets(
                 valid::input(p_allocate_info)?,
-                valid::output_slice(
-                    p_descriptor_sets,
-                    valid::input(p_allocate_info)?.descriptor_set_count as usize,
-                )?,
+                valid::output_slice(p_descriptor_sets, valid::input(p_allocate_info)?.descriptor_set_count as usize)?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2342,11 +2168,7 @@ unsafe extern "system" fn vkCmdBindPipeline(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBindPipeline", |recorder| {
-                crate::command::bind::cmd_bind_pipeline(
-                    recorder,
-                    pipeline_bind_point,
-                    handle::get(pipeline)?,
-                )
+                crate::command::bind::cmd_bind_pipeline(recorder, pipeline_bind_point, handle::get(pipeline)?)
             })
         }
     })
@@ -2412,12 +2234,7 @@ unsafe extern "system" fn vkCmdDispatch(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdDispatch", |recorder| {
-                crate::command::draw::cmd_dispatch(
-                    recorder,
-                    group_count_x,
-                    group_count_y,
-                    group_count_z,
-                )
+                crate::command::draw::cmd_dispatch(recorder, group_count_x, group_count_y, group_count_z)
             })
         }
     })
@@ -2485,10 +2302,7 @@ unsafe extern "system" fn vkCmdWaitEvents(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdWaitEvents", |recorder| {
-                crate::command::sync::cmd_wait_events(
-                    recorder,
-                    &handle::get_all(valid::slice(p_events, event_count)?)?,
-                )
+                crate::command::sync::cmd_wait_events(recorder, &handle::get_all(valid::slice(p_events, event_count)?)?)
             })
         }
     })
@@ -2548,9 +2362,7 @@ unsafe extern "system" fn vkCreateFramebuffer(
         unsafe {
             valid::output(
                 p_framebuffer,
-                handle::create(crate::render_pass::create_framebuffer(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::render_pass::create_framebuffer(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2608,12 +2420,7 @@ unsafe extern "system" fn vkGetRenderAreaGranularity(
 ) {
     guard(device, "vkGetRenderAreaGranularity", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            valid::output(
-                p_granularity,
-                crate::render_pass::get_render_area_granularity()?,
-            )
-        }
+        unsafe { valid::output(p_granularity, crate::render_pass::get_render_area_granularity()?) }
     })
 }
 
@@ -2699,10 +2506,7 @@ unsafe extern "system" fn vkCmdSetBlendConstants(
         unsafe {
             record(command_buffer, "vkCmdSetBlendConstants", |recorder| {
                 let constants = *valid::input(blend_constants)?;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::BlendConstants { constants },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::BlendConstants { constants })
             })
         }
     })
@@ -2717,11 +2521,7 @@ unsafe extern "system" fn vkCmdSetDepthBounds(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthBounds", |recorder| {
-                crate::command::dynamic_state::cmd_set_depth_bounds(
-                    recorder,
-                    min_depth_bounds,
-                    max_depth_bounds,
-                )
+                crate::command::dynamic_state::cmd_set_depth_bounds(recorder, min_depth_bounds, max_depth_bounds)
             })
         }
     })
@@ -2737,8 +2537,9 @@ unsafe extern "system" fn vkCmdSetStencilCompareMask(
         unsafe {
             record(command_buffer, "vkCmdSetStencilCompareMask", |recorder| {
                 let mask = compare_mask as u8;
-                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
-                    DynamicState::StencilCompareMask { face, mask }
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| DynamicState::StencilCompareMask {
+                    face,
+                    mask,
                 })
             })
         }
@@ -2755,8 +2556,9 @@ unsafe extern "system" fn vkCmdSetStencilWriteMask(
         unsafe {
             record(command_buffer, "vkCmdSetStencilWriteMask", |recorder| {
                 let mask = write_mask as u8;
-                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
-                    DynamicState::StencilWriteMask { face, mask }
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| DynamicState::StencilWriteMask {
+                    face,
+                    mask,
                 })
             })
         }
@@ -2773,8 +2575,9 @@ unsafe extern "system" fn vkCmdSetStencilReference(
         unsafe {
             record(command_buffer, "vkCmdSetStencilReference", |recorder| {
                 let reference = reference as u8;
-                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
-                    DynamicState::StencilReference { face, reference }
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| DynamicState::StencilReference {
+                    face,
+                    reference,
                 })
             })
         }
@@ -2791,12 +2594,7 @@ unsafe extern "system" fn vkCmdBindIndexBuffer(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBindIndexBuffer", |recorder| {
-                crate::command::bind::cmd_bind_index_buffer(
-                    recorder,
-                    handle::get(buffer)?,
-                    offset,
-                    index_type,
-                )
+                crate::command::bind::cmd_bind_index_buffer(recorder, handle::get(buffer)?, offset, index_type)
             })
         }
     })
@@ -2835,13 +2633,7 @@ unsafe extern "system" fn vkCmdDraw(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdDraw", |recorder| {
-                crate::command::draw::cmd_draw(
-                    recorder,
-                    vertex_count,
-                    instance_count,
-                    first_vertex,
-                    first_instance,
-                )
+                crate::command::draw::cmd_draw(recorder, vertex_count, instance_count, first_vertex, first_instance)
             })
         }
     })
@@ -2883,13 +2675,7 @@ unsafe extern "system" fn vkCmdDrawIndirect(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdDrawIndirect", |recorder| {
-                crate::command::draw::cmd_draw_indirect(
-                    recorder,
-                    handle::get(buffer)?,
-                    offset,
-                    draw_count,
-                    stride,
-                )
+                crate::command::draw::cmd_draw_indirect(recorder, handle::get(buffer)?, offset, draw_count, stride)
             })
         }
     })
@@ -2932,16 +2718,13 @@ unsafe extern "system" fn vkCmdBlitImage(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBlitImage", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::ImageBlit2 {
-                            src_subresource: of.src_subresource,
-                            src_offsets: of.src_offsets,
-                            dst_subresource: of.dst_subresource,
-                            dst_offsets: of.dst_offsets,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::ImageBlit2 {
+                    src_subresource: of.src_subresource,
+                    src_offsets: of.src_offsets,
+                    dst_subresource: of.dst_subresource,
+                    dst_offsets: of.dst_offsets,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::BlitImageInfo2 {
@@ -3023,17 +2806,14 @@ unsafe extern "system" fn vkCmdResolveImage(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdResolveImage", |recorder| {
-                let regions =
-                    valid::slice(p_regions, region_count)?
-                        .iter()
-                        .map(|of| vk::ImageResolve2 {
-                            src_subresource: of.src_subresource,
-                            src_offset: of.src_offset,
-                            dst_subresource: of.dst_subresource,
-                            dst_offset: of.dst_offset,
-                            extent: of.extent,
-                            ..Default::default()
-                        });
+                let regions = valid::slice(p_regions, region_count)?.iter().map(|of| vk::ImageResolve2 {
+                    src_subresource: of.src_subresource,
+                    src_offset: of.src_offset,
+                    dst_subresource: of.dst_subresource,
+                    dst_offset: of.dst_offset,
+                    extent: of.extent,
+                    ..Default::default()
+                });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::ResolveImageInfo2 {
@@ -3065,19 +2845,13 @@ unsafe extern "system" fn vkCmdBeginRenderPass(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBeginRenderPass", |recorder| {
-                crate::command::render_pass::cmd_begin_render_pass(
-                    recorder,
-                    valid::input(p_render_pass_begin)?,
-                )
+                crate::command::render_pass::cmd_begin_render_pass(recorder, valid::input(p_render_pass_begin)?)
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdNextSubpass(
-    command_buffer: vk::CommandBuffer,
-    _: vk::SubpassContents,
-) {
+unsafe extern "system" fn vkCmdNextSubpass(command_buffer: vk::CommandBuffer, _: vk::SubpassContents) {
     guard(command_buffer, "vkCmdNextSubpass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -3103,11 +2877,7 @@ unsafe extern "system" fn vkEnumerateInstanceVersion(p_api_version: *mut u32) ->
     guard(p_api_version, "vkEnumerateInstanceVersion", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_api_version,
-                crate::instance::enumerate_instance_version()?,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_api_version, crate::instance::enumerate_instance_version()?).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -3120,11 +2890,8 @@ unsafe extern "system" fn vkBindBufferMemory2(
     guard(device, "vkBindBufferMemory2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::buffer::bind_buffer_memory2(valid::slice(
-                p_bind_infos,
-                bind_info_count,
-            )?)
-            .map(|()| vk::Result::SUCCESS)
+            crate::resource::buffer::bind_buffer_memory2(valid::slice(p_bind_infos, bind_info_count)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -3152,12 +2919,7 @@ unsafe extern "system" fn vkGetDeviceGroupPeerMemoryFeatures(
 ) {
     guard(device, "vkGetDeviceGroupPeerMemoryFeatures", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            valid::output(
-                p_peer_memory_features,
-                crate::device::get_device_group_peer_memory_features()?,
-            )
-        }
+        unsafe { valid::output(p_peer_memory_features, crate::device::get_device_group_peer_memory_features()?) }
     })
 }
 
@@ -3165,9 +2927,7 @@ unsafe extern "system" fn vkCmdSetDeviceMask(command_buffer: vk::CommandBuffer, 
     guard(command_buffer, "vkCmdSetDeviceMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, "vkCmdSetDeviceMask", |recorder| {
-                crate::command::sync::cmd_set_device_mask(recorder)
-            })
+            record(command_buffer, "vkCmdSetDeviceMask", |recorder| crate::command::sync::cmd_set_device_mask(recorder))
         }
     })
 }
@@ -3182,10 +2942,7 @@ unsafe extern "system" fn vkEnumeratePhysicalDeviceGroups(
         unsafe {
             crate::instance::enumerate_physical_device_groups(
                 handle::get(instance)?,
-                Structures::new(
-                    p_physical_device_group_count,
-                    p_physical_device_group_properties,
-                )?,
+                Structures::new(p_physical_device_group_count, p_physical_device_group_properties)?,
             )
         }
     })
@@ -3248,9 +3005,7 @@ unsafe extern "system" fn vkGetPhysicalDeviceFeatures2(
 ) {
     guard(physical_device, "vkGetPhysicalDeviceFeatures2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::physical_device::get_physical_device_features2(OutputChain::new(p_features)?)
-        }
+        unsafe { crate::physical_device::get_physical_device_features2(OutputChain::new(p_features)?) }
     })
 }
 
@@ -3260,9 +3015,7 @@ unsafe extern "system" fn vkGetPhysicalDeviceProperties2(
 ) {
     guard(physical_device, "vkGetPhysicalDeviceProperties2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::physical_device::get_physical_device_properties2(OutputChain::new(p_properties)?)
-        }
+        unsafe { crate::physical_device::get_physical_device_properties2(OutputChain::new(p_properties)?) }
     })
 }
 
@@ -3271,19 +3024,15 @@ unsafe extern "system" fn vkGetPhysicalDeviceFormatProperties2(
     format: vk::Format,
     p_format_properties: *mut vk::FormatProperties2<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceFormatProperties2",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_format_properties2(
-                    format,
-                    OutputChain::new(p_format_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceFormatProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_format_properties2(
+                format,
+                OutputChain::new(p_format_properties)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties2(
@@ -3291,19 +3040,15 @@ unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties2(
     p_image_format_info: *const vk::PhysicalDeviceImageFormatInfo2<'_>,
     p_image_format_properties: *mut vk::ImageFormatProperties2<'_>,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceImageFormatProperties2",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_image_format_properties2(
-                    valid::input(p_image_format_info)?,
-                    OutputChain::new(p_image_format_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceImageFormatProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_image_format_properties2(
+                valid::input(p_image_format_info)?,
+                OutputChain::new(p_image_format_properties)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties2(
@@ -3311,36 +3056,27 @@ unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties2(
     p_queue_family_property_count: *mut u32,
     p_queue_family_properties: *mut vk::QueueFamilyProperties2<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceQueueFamilyProperties2",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_queue_family_properties2(
-                    Structures::new(p_queue_family_property_count, p_queue_family_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceQueueFamilyProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_queue_family_properties2(Structures::new(
+                p_queue_family_property_count,
+                p_queue_family_properties,
+            )?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceMemoryProperties2(
     physical_device: vk::PhysicalDevice,
     p_memory_properties: *mut vk::PhysicalDeviceMemoryProperties2<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceMemoryProperties2",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_memory_properties2(OutputChain::new(
-                    p_memory_properties,
-                )?)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceMemoryProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_memory_properties2(OutputChain::new(p_memory_properties)?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSparseImageFormatProperties2(
@@ -3349,25 +3085,18 @@ unsafe extern "system" fn vkGetPhysicalDeviceSparseImageFormatProperties2(
     p_property_count: *mut u32,
     p_properties: *mut vk::SparseImageFormatProperties2<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSparseImageFormatProperties2",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_sparse_image_format_properties2(
-                    Structures::new(p_property_count, p_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSparseImageFormatProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_sparse_image_format_properties2(Structures::new(
+                p_property_count,
+                p_properties,
+            )?)
+        }
+    })
 }
 
-unsafe extern "system" fn vkTrimCommandPool(
-    device: vk::Device,
-    _: vk::CommandPool,
-    _: vk::CommandPoolTrimFlags,
-) {
+unsafe extern "system" fn vkTrimCommandPool(device: vk::Device, _: vk::CommandPool, _: vk::CommandPoolTrimFlags) {
     guard(device, "vkTrimCommandPool", || Ok(()))
 }
 
@@ -3379,13 +3108,7 @@ unsafe extern "system" fn vkGetDeviceQueue2(
     guard(device, "vkGetDeviceQueue2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_queue,
-                crate::device::get_device_queue2(
-                    handle::get(device)?,
-                    valid::input(p_queue_info)?,
-                )?,
-            )
+            valid::output(p_queue, crate::device::get_device_queue2(handle::get(device)?, valid::input(p_queue_info)?)?)
         }
     })
 }
@@ -3395,18 +3118,14 @@ unsafe extern "system" fn vkGetPhysicalDeviceExternalBufferProperties(
     _: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
     p_external_buffer_properties: *mut vk::ExternalBufferProperties<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceExternalBufferProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_external_buffer_properties(
-                    valid::output_structure(p_external_buffer_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceExternalBufferProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_external_buffer_properties(valid::output_structure(
+                p_external_buffer_properties,
+            )?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceExternalFenceProperties(
@@ -3414,18 +3133,14 @@ unsafe extern "system" fn vkGetPhysicalDeviceExternalFenceProperties(
     _: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
     p_external_fence_properties: *mut vk::ExternalFenceProperties<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceExternalFenceProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_external_fence_properties(
-                    valid::output_structure(p_external_fence_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceExternalFenceProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_external_fence_properties(valid::output_structure(
+                p_external_fence_properties,
+            )?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceExternalSemaphoreProperties(
@@ -3433,18 +3148,14 @@ unsafe extern "system" fn vkGetPhysicalDeviceExternalSemaphoreProperties(
     _: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
     p_external_semaphore_properties: *mut vk::ExternalSemaphoreProperties<'_>,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceExternalSemaphoreProperties",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::get_physical_device_external_semaphore_properties(
-                    valid::output_structure(p_external_semaphore_properties)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceExternalSemaphoreProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_external_semaphore_properties(valid::output_structure(
+                p_external_semaphore_properties,
+            )?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdDispatchBase(
@@ -3485,9 +3196,9 @@ unsafe extern "system" fn vkCreateDescriptorUpdateTemplate(
         unsafe {
             valid::output(
                 p_descriptor_update_template,
-                handle::create(crate::descriptor::set::create_descriptor_update_template(
-                    valid::input(p_create_info)?,
-                )?),
+                handle::create(crate::descriptor::set::create_descriptor_update_template(valid::input(
+                    p_create_info,
+                )?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -3547,9 +3258,7 @@ unsafe extern "system" fn vkCreateSamplerYcbcrConversion(
     _: *mut vk::SamplerYcbcrConversion,
 ) -> vk::Result {
     guard(device, "vkCreateSamplerYcbcrConversion", || {
-        Err::<vk::Result, _>(Error::Unsupported {
-            command: "vkCreateSamplerYcbcrConversion".to_owned(),
-        })
+        Err::<vk::Result, _>(Error::Unsupported { command: "vkCreateSamplerYcbcrConversion".to_owned() })
     })
 }
 
@@ -3559,9 +3268,7 @@ unsafe extern "system" fn vkDestroySamplerYcbcrConversion(
     _: *const vk::AllocationCallbacks<'_>,
 ) {
     guard(device, "vkDestroySamplerYcbcrConversion", || {
-        Err::<(), _>(Error::Unsupported {
-            command: "vkDestroySamplerYcbcrConversion".to_owned(),
-        })
+        Err::<(), _>(Error::Unsupported { command: "vkDestroySamplerYcbcrConversion".to_owned() })
     })
 }
 
@@ -3573,9 +3280,7 @@ unsafe extern "system" fn vkResetQueryPool(
 ) {
     guard(device, "vkResetQueryPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::query_pool::reset_query_pool(handle::get(query_pool)?, first_query, query_count)
-        }
+        unsafe { crate::query_pool::reset_query_pool(handle::get(query_pool)?, first_query, query_count) }
     })
 }
 
@@ -3589,10 +3294,7 @@ unsafe extern "system" fn vkGetSemaphoreCounterValue(
         unsafe {
             valid::output(
                 p_value,
-                crate::sync::get_semaphore_counter_value(
-                    handle::get(device)?,
-                    handle::get(semaphore)?,
-                )?,
+                crate::sync::get_semaphore_counter_value(handle::get(device)?, handle::get(semaphore)?)?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -3627,8 +3329,7 @@ unsafe extern "system" fn vkSignalSemaphore(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             let info = valid::input(p_signal_info)?;
-            crate::sync::signal_semaphore(handle::get(info.semaphore)?, info.value)
-                .map(|()| vk::Result::SUCCESS)
+            crate::sync::signal_semaphore(handle::get(info.semaphore)?, info.value).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -3707,21 +3408,17 @@ unsafe extern "system" fn vkCmdDrawIndexedIndirectCount(
     guard(command_buffer, "vkCmdDrawIndexedIndirectCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdDrawIndexedIndirectCount",
-                |recorder| {
-                    crate::command::draw::cmd_draw_indexed_indirect_count(
-                        recorder,
-                        handle::get(buffer)?,
-                        offset,
-                        handle::get(count_buffer)?,
-                        count_buffer_offset,
-                        max_draw_count,
-                        stride,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdDrawIndexedIndirectCount", |recorder| {
+                crate::command::draw::cmd_draw_indexed_indirect_count(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    handle::get(count_buffer)?,
+                    count_buffer_offset,
+                    max_draw_count,
+                    stride,
+                )
+            })
         }
     })
 }
@@ -3737,9 +3434,7 @@ unsafe extern "system" fn vkCreateRenderPass2(
         unsafe {
             valid::output(
                 p_render_pass,
-                handle::create(crate::render_pass::create_render_pass2(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::render_pass::create_render_pass2(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -3755,10 +3450,7 @@ unsafe extern "system" fn vkCmdBeginRenderPass2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBeginRenderPass2", |recorder| {
-                crate::command::render_pass::cmd_begin_render_pass(
-                    recorder,
-                    valid::input(p_render_pass_begin)?,
-                )
+                crate::command::render_pass::cmd_begin_render_pass(recorder, valid::input(p_render_pass_begin)?)
             })
         }
     })
@@ -3779,10 +3471,7 @@ unsafe extern "system" fn vkCmdNextSubpass2(
     })
 }
 
-unsafe extern "system" fn vkCmdEndRenderPass2(
-    command_buffer: vk::CommandBuffer,
-    _: *const vk::SubpassEndInfo<'_>,
-) {
+unsafe extern "system" fn vkCmdEndRenderPass2(command_buffer: vk::CommandBuffer, _: *const vk::SubpassEndInfo<'_>) {
     guard(command_buffer, "vkCmdEndRenderPass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -3818,11 +3507,8 @@ unsafe extern "system" fn vkCreatePrivateDataSlot(
     guard(device, "vkCreatePrivateDataSlot", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_private_data_slot,
-                handle::create(crate::device::create_private_data_slot()?),
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_private_data_slot, handle::create(crate::device::create_private_data_slot()?))
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -3848,13 +3534,8 @@ unsafe extern "system" fn vkSetPrivateData(
     guard(device, "vkSetPrivateData", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::device::set_private_data(
-                object_type,
-                object_handle,
-                handle::get(private_data_slot)?,
-                data,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            crate::device::set_private_data(object_type, object_handle, handle::get(private_data_slot)?, data)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -3871,20 +3552,13 @@ unsafe extern "system" fn vkGetPrivateData(
         unsafe {
             valid::output(
                 p_data,
-                crate::device::get_private_data(
-                    object_type,
-                    object_handle,
-                    handle::get(private_data_slot)?,
-                )?,
+                crate::device::get_private_data(object_type, object_handle, handle::get(private_data_slot)?)?,
             )
         }
     })
 }
 
-unsafe extern "system" fn vkCmdPipelineBarrier2(
-    command_buffer: vk::CommandBuffer,
-    _: *const vk::DependencyInfo<'_>,
-) {
+unsafe extern "system" fn vkCmdPipelineBarrier2(command_buffer: vk::CommandBuffer, _: *const vk::DependencyInfo<'_>) {
     guard(command_buffer, "vkCmdPipelineBarrier2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -3905,11 +3579,7 @@ unsafe extern "system" fn vkCmdWriteTimestamp2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdWriteTimestamp2", |recorder| {
-                crate::command::query::cmd_write_timestamp(
-                    recorder,
-                    handle::get(query_pool)?,
-                    query,
-                )
+                crate::command::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
             })
         }
     })
@@ -4105,10 +3775,7 @@ unsafe extern "system" fn vkCmdWaitEvents2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdWaitEvents2", |recorder| {
-                crate::command::sync::cmd_wait_events(
-                    recorder,
-                    &handle::get_all(valid::slice(p_events, event_count)?)?,
-                )
+                crate::command::sync::cmd_wait_events(recorder, &handle::get_all(valid::slice(p_events, event_count)?)?)
             })
         }
     })
@@ -4163,10 +3830,7 @@ unsafe extern "system" fn vkCmdBeginRendering(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBeginRendering", |recorder| {
-                crate::command::render_pass::cmd_begin_rendering(
-                    recorder,
-                    valid::input(p_rendering_info)?,
-                )
+                crate::command::render_pass::cmd_begin_rendering(recorder, valid::input(p_rendering_info)?)
             })
         }
     })
@@ -4183,10 +3847,7 @@ unsafe extern "system" fn vkCmdEndRendering(command_buffer: vk::CommandBuffer) {
     })
 }
 
-unsafe extern "system" fn vkCmdSetCullMode(
-    command_buffer: vk::CommandBuffer,
-    cull_mode: vk::CullModeFlags,
-) {
+unsafe extern "system" fn vkCmdSetCullMode(command_buffer: vk::CommandBuffer, cull_mode: vk::CullModeFlags) {
     guard(command_buffer, "vkCmdSetCullMode", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4198,10 +3859,7 @@ unsafe extern "system" fn vkCmdSetCullMode(
     })
 }
 
-unsafe extern "system" fn vkCmdSetFrontFace(
-    command_buffer: vk::CommandBuffer,
-    front_face: vk::FrontFace,
-) {
+unsafe extern "system" fn vkCmdSetFrontFace(command_buffer: vk::CommandBuffer, front_face: vk::FrontFace) {
     guard(command_buffer, "vkCmdSetFrontFace", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4221,10 +3879,7 @@ unsafe extern "system" fn vkCmdSetPrimitiveTopology(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetPrimitiveTopology", |recorder| {
-                crate::command::dynamic_state::cmd_set_primitive_topology(
-                    recorder,
-                    primitive_topology,
-                )
+                crate::command::dynamic_state::cmd_set_primitive_topology(recorder, primitive_topology)
             })
         }
     })
@@ -4284,58 +3939,39 @@ unsafe extern "system" fn vkCmdBindVertexBuffers2(
                     first_binding,
                     handle::Handles::new(valid::slice(p_buffers, binding_count)?),
                     valid::slice(p_offsets, binding_count)?,
-                    (!p_sizes.is_null())
-                        .then(|| valid::slice(p_sizes, binding_count))
-                        .transpose()?,
-                    (!p_strides.is_null())
-                        .then(|| valid::slice(p_strides, binding_count))
-                        .transpose()?,
+                    (!p_sizes.is_null()).then(|| valid::slice(p_sizes, binding_count)).transpose()?,
+                    (!p_strides.is_null()).then(|| valid::slice(p_strides, binding_count)).transpose()?,
                 )
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetDepthTestEnable(
-    command_buffer: vk::CommandBuffer,
-    depth_test_enable: vk::Bool32,
-) {
+unsafe extern "system" fn vkCmdSetDepthTestEnable(command_buffer: vk::CommandBuffer, depth_test_enable: vk::Bool32) {
     guard(command_buffer, "vkCmdSetDepthTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthTestEnable", |recorder| {
                 let enable = depth_test_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::DepthTestEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthTestEnable { enable })
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetDepthWriteEnable(
-    command_buffer: vk::CommandBuffer,
-    depth_write_enable: vk::Bool32,
-) {
+unsafe extern "system" fn vkCmdSetDepthWriteEnable(command_buffer: vk::CommandBuffer, depth_write_enable: vk::Bool32) {
     guard(command_buffer, "vkCmdSetDepthWriteEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthWriteEnable", |recorder| {
                 let enable = depth_write_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::DepthWriteEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthWriteEnable { enable })
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetDepthCompareOp(
-    command_buffer: vk::CommandBuffer,
-    depth_compare_op: vk::CompareOp,
-) {
+unsafe extern "system" fn vkCmdSetDepthCompareOp(command_buffer: vk::CommandBuffer, depth_compare_op: vk::CompareOp) {
     guard(command_buffer, "vkCmdSetDepthCompareOp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4353,17 +3989,10 @@ unsafe extern "system" fn vkCmdSetDepthBoundsTestEnable(
     guard(command_buffer, "vkCmdSetDepthBoundsTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetDepthBoundsTestEnable",
-                |recorder| {
-                    let enable = depth_bounds_test_enable != vk::FALSE;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::DepthBoundsTestEnable { enable },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetDepthBoundsTestEnable", |recorder| {
+                let enable = depth_bounds_test_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthBoundsTestEnable { enable })
+            })
         }
     })
 }
@@ -4377,10 +4006,7 @@ unsafe extern "system" fn vkCmdSetStencilTestEnable(
         unsafe {
             record(command_buffer, "vkCmdSetStencilTestEnable", |recorder| {
                 let enable = stencil_test_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::StencilTestEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::StencilTestEnable { enable })
             })
         }
     })
@@ -4418,34 +4044,21 @@ unsafe extern "system" fn vkCmdSetRasterizerDiscardEnable(
     guard(command_buffer, "vkCmdSetRasterizerDiscardEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetRasterizerDiscardEnable",
-                |recorder| {
-                    let enable = rasterizer_discard_enable != vk::FALSE;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::RasterizerDiscardEnable { enable },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetRasterizerDiscardEnable", |recorder| {
+                let enable = rasterizer_discard_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::RasterizerDiscardEnable { enable })
+            })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetDepthBiasEnable(
-    command_buffer: vk::CommandBuffer,
-    depth_bias_enable: vk::Bool32,
-) {
+unsafe extern "system" fn vkCmdSetDepthBiasEnable(command_buffer: vk::CommandBuffer, depth_bias_enable: vk::Bool32) {
     guard(command_buffer, "vkCmdSetDepthBiasEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthBiasEnable", |recorder| {
                 let enable = depth_bias_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::DepthBiasEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthBiasEnable { enable })
             })
         }
     })
@@ -4458,17 +4071,10 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     guard(command_buffer, "vkCmdSetPrimitiveRestartEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetPrimitiveRestartEnable",
-                |recorder| {
-                    let enable = primitive_restart_enable != vk::FALSE;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::PrimitiveRestartEnable { enable },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetPrimitiveRestartEnable", |recorder| {
+                let enable = primitive_restart_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::PrimitiveRestartEnable { enable })
+            })
         }
     })
 }
@@ -4478,21 +4084,16 @@ unsafe extern "system" fn vkGetPhysicalDeviceCalibrateableTimeDomainsEXT(
     p_time_domain_count: *mut u32,
     p_time_domains: *mut vk::TimeDomainKHR,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_time_domain_count,
-                    p_time_domains,
-                    &crate::calibrated_timestamps::get_physical_device_calibrateable_time_domains(
-                    )?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_time_domain_count,
+                p_time_domains,
+                &crate::calibrated_timestamps::get_physical_device_calibrateable_time_domains()?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetCalibratedTimestampsEXT(
@@ -4541,16 +4142,12 @@ unsafe extern "system" fn vkCmdBeginConditionalRenderingEXT(
     guard(command_buffer, "vkCmdBeginConditionalRenderingEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdBeginConditionalRenderingEXT",
-                |recorder| {
-                    crate::command::conditional::cmd_begin_conditional_rendering(
-                        recorder,
-                        valid::input(p_conditional_rendering_begin)?,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdBeginConditionalRenderingEXT", |recorder| {
+                crate::command::conditional::cmd_begin_conditional_rendering(
+                    recorder,
+                    valid::input(p_conditional_rendering_begin)?,
+                )
+            })
         }
     })
 }
@@ -4559,11 +4156,9 @@ unsafe extern "system" fn vkCmdEndConditionalRenderingEXT(command_buffer: vk::Co
     guard(command_buffer, "vkCmdEndConditionalRenderingEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdEndConditionalRenderingEXT",
-                |recorder| crate::command::conditional::cmd_end_conditional_rendering(recorder),
-            )
+            record(command_buffer, "vkCmdEndConditionalRenderingEXT", |recorder| {
+                crate::command::conditional::cmd_end_conditional_rendering(recorder)
+            })
         }
     })
 }
@@ -4596,12 +4191,7 @@ unsafe extern "system" fn vkDestroyDebugReportCallbackEXT(
 ) {
     guard(instance, "vkDestroyDebugReportCallbackEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::instance::destroy_debug_report_callback(
-                handle::get(instance)?,
-                handle::destroy(callback)?,
-            )
-        }
+        unsafe { crate::instance::destroy_debug_report_callback(handle::get(instance)?, handle::destroy(callback)?) }
     })
 }
 
@@ -4625,9 +4215,7 @@ unsafe extern "system" fn vkDebugReportMessageEXT(
                 object,
                 location,
                 message_code,
-                valid::string(p_layer_prefix).ok_or(Error::NullPointer {
-                    what: "p_layer_prefix",
-                })?,
+                valid::string(p_layer_prefix).ok_or(Error::NullPointer { what: "p_layer_prefix" })?,
                 valid::string(p_message).ok_or(Error::NullPointer { what: "p_message" })?,
             )
         }
@@ -4638,24 +4226,17 @@ unsafe extern "system" fn vkSetDebugUtilsObjectNameEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
 ) -> vk::Result {
-    guard(device, "vkSetDebugUtilsObjectNameEXT", || {
-        Ok(vk::Result::SUCCESS)
-    })
+    guard(device, "vkSetDebugUtilsObjectNameEXT", || Ok(vk::Result::SUCCESS))
 }
 
 unsafe extern "system" fn vkSetDebugUtilsObjectTagEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectTagInfoEXT<'_>,
 ) -> vk::Result {
-    guard(device, "vkSetDebugUtilsObjectTagEXT", || {
-        Ok(vk::Result::SUCCESS)
-    })
+    guard(device, "vkSetDebugUtilsObjectTagEXT", || Ok(vk::Result::SUCCESS))
 }
 
-unsafe extern "system" fn vkQueueBeginDebugUtilsLabelEXT(
-    queue: vk::Queue,
-    _: *const vk::DebugUtilsLabelEXT<'_>,
-) {
+unsafe extern "system" fn vkQueueBeginDebugUtilsLabelEXT(queue: vk::Queue, _: *const vk::DebugUtilsLabelEXT<'_>) {
     guard(queue, "vkQueueBeginDebugUtilsLabelEXT", || Ok(()))
 }
 
@@ -4663,10 +4244,7 @@ unsafe extern "system" fn vkQueueEndDebugUtilsLabelEXT(queue: vk::Queue) {
     guard(queue, "vkQueueEndDebugUtilsLabelEXT", || Ok(()))
 }
 
-unsafe extern "system" fn vkQueueInsertDebugUtilsLabelEXT(
-    queue: vk::Queue,
-    _: *const vk::DebugUtilsLabelEXT<'_>,
-) {
+unsafe extern "system" fn vkQueueInsertDebugUtilsLabelEXT(queue: vk::Queue, _: *const vk::DebugUtilsLabelEXT<'_>) {
     guard(queue, "vkQueueInsertDebugUtilsLabelEXT", || Ok(()))
 }
 
@@ -4716,12 +4294,7 @@ unsafe extern "system" fn vkDestroyDebugUtilsMessengerEXT(
 ) {
     guard(instance, "vkDestroyDebugUtilsMessengerEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::instance::destroy_debug_utils_messenger(
-                handle::get(instance)?,
-                handle::destroy(messenger)?,
-            )
-        }
+        unsafe { crate::instance::destroy_debug_utils_messenger(handle::get(instance)?, handle::destroy(messenger)?) }
     })
 }
 
@@ -4744,32 +4317,19 @@ unsafe extern "system" fn vkSubmitDebugUtilsMessageEXT(
     })
 }
 
-unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(
-    command_buffer: vk::CommandBuffer,
-    patch_control_points: u32,
-) {
+unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::CommandBuffer, patch_control_points: u32) {
     guard(command_buffer, "vkCmdSetPatchControlPointsEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetPatchControlPointsEXT",
-                |recorder| {
-                    let count = patch_control_points;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::PatchControlPoints { count },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetPatchControlPointsEXT", |recorder| {
+                let count = patch_control_points;
+                crate::command::dynamic_state::set(recorder, DynamicState::PatchControlPoints { count })
+            })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetLogicOpEXT(
-    command_buffer: vk::CommandBuffer,
-    logic_op: vk::LogicOp,
-) {
+unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, logic_op: vk::LogicOp) {
     guard(command_buffer, "vkCmdSetLogicOpEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4789,19 +4349,13 @@ unsafe extern "system" fn vkCmdSetDepthClampEnableEXT(
         unsafe {
             record(command_buffer, "vkCmdSetDepthClampEnableEXT", |recorder| {
                 let enable = depth_clamp_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::DepthClampEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthClampEnable { enable })
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetPolygonModeEXT(
-    command_buffer: vk::CommandBuffer,
-    polygon_mode: vk::PolygonMode,
-) {
+unsafe extern "system" fn vkCmdSetPolygonModeEXT(command_buffer: vk::CommandBuffer, polygon_mode: vk::PolygonMode) {
     guard(command_buffer, "vkCmdSetPolygonModeEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4812,17 +4366,12 @@ unsafe extern "system" fn vkCmdSetPolygonModeEXT(
     })
 }
 
-unsafe extern "system" fn vkCmdSetRasterizationSamplesEXT(
-    command_buffer: vk::CommandBuffer,
-    _: vk::SampleCountFlags,
-) {
+unsafe extern "system" fn vkCmdSetRasterizationSamplesEXT(command_buffer: vk::CommandBuffer, _: vk::SampleCountFlags) {
     guard(command_buffer, "vkCmdSetRasterizationSamplesEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
             record(command_buffer, "vkCmdSetRasterizationSamplesEXT", |_| {
-                Err(Error::Unsupported {
-                    command: "vkCmdSetRasterizationSamplesEXT".to_owned(),
-                })
+                Err(Error::Unsupported { command: "vkCmdSetRasterizationSamplesEXT".to_owned() })
             })
         }
     })
@@ -4837,10 +4386,7 @@ unsafe extern "system" fn vkCmdSetSampleMaskEXT(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetSampleMaskEXT", |recorder| {
-                crate::command::dynamic_state::cmd_set_sample_mask(
-                    recorder,
-                    valid::optional(p_sample_mask),
-                )
+                crate::command::dynamic_state::cmd_set_sample_mask(recorder, valid::optional(p_sample_mask))
             })
         }
     })
@@ -4853,17 +4399,10 @@ unsafe extern "system" fn vkCmdSetAlphaToCoverageEnableEXT(
     guard(command_buffer, "vkCmdSetAlphaToCoverageEnableEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetAlphaToCoverageEnableEXT",
-                |recorder| {
-                    let enable = alpha_to_coverage_enable != vk::FALSE;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::AlphaToCoverageEnable { enable },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetAlphaToCoverageEnableEXT", |recorder| {
+                let enable = alpha_to_coverage_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::AlphaToCoverageEnable { enable })
+            })
         }
     })
 }
@@ -4877,19 +4416,13 @@ unsafe extern "system" fn vkCmdSetAlphaToOneEnableEXT(
         unsafe {
             record(command_buffer, "vkCmdSetAlphaToOneEnableEXT", |recorder| {
                 let enable = alpha_to_one_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::AlphaToOneEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::AlphaToOneEnable { enable })
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetLogicOpEnableEXT(
-    command_buffer: vk::CommandBuffer,
-    logic_op_enable: vk::Bool32,
-) {
+unsafe extern "system" fn vkCmdSetLogicOpEnableEXT(command_buffer: vk::CommandBuffer, logic_op_enable: vk::Bool32) {
     guard(command_buffer, "vkCmdSetLogicOpEnableEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -4930,17 +4463,13 @@ unsafe extern "system" fn vkCmdSetColorBlendEquationEXT(
     guard(command_buffer, "vkCmdSetColorBlendEquationEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetColorBlendEquationEXT",
-                |recorder| {
-                    crate::command::dynamic_state::cmd_set_color_blend_equation(
-                        recorder,
-                        first_attachment,
-                        valid::slice(p_color_blend_equations, attachment_count)?,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetColorBlendEquationEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_blend_equation(
+                    recorder,
+                    first_attachment,
+                    valid::slice(p_color_blend_equations, attachment_count)?,
+                )
+            })
         }
     })
 }
@@ -4969,46 +4498,25 @@ unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
     command_buffer: vk::CommandBuffer,
     domain_origin: vk::TessellationDomainOrigin,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetTessellationDomainOriginEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetTessellationDomainOriginEXT",
-                    |recorder| {
-                        let origin = domain_origin;
-                        crate::command::dynamic_state::set(
-                            recorder,
-                            DynamicState::TessellationDomainOrigin { origin },
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetTessellationDomainOriginEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetTessellationDomainOriginEXT", |recorder| {
+                let origin = domain_origin;
+                crate::command::dynamic_state::set(recorder, DynamicState::TessellationDomainOrigin { origin })
+            })
+        }
+    })
 }
 
-unsafe extern "system" fn vkCmdSetRasterizationStreamEXT(
-    command_buffer: vk::CommandBuffer,
-    rasterization_stream: u32,
-) {
+unsafe extern "system" fn vkCmdSetRasterizationStreamEXT(command_buffer: vk::CommandBuffer, rasterization_stream: u32) {
     guard(command_buffer, "vkCmdSetRasterizationStreamEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetRasterizationStreamEXT",
-                |recorder| {
-                    let stream = rasterization_stream;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::RasterizationStream { stream },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetRasterizationStreamEXT", |recorder| {
+                let stream = rasterization_stream;
+                crate::command::dynamic_state::set(recorder, DynamicState::RasterizationStream { stream })
+            })
         }
     })
 }
@@ -5017,79 +4525,45 @@ unsafe extern "system" fn vkCmdSetConservativeRasterizationModeEXT(
     command_buffer: vk::CommandBuffer,
     _: vk::ConservativeRasterizationModeEXT,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetConservativeRasterizationModeEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetConservativeRasterizationModeEXT",
-                    |_| {
-                        Err(Error::Unsupported {
-                            command: "vkCmdSetConservativeRasterizationModeEXT".to_owned(),
-                        })
-                    },
-                )
-            }
-        },
-    )
-}
-
-unsafe extern "system" fn vkCmdSetExtraPrimitiveOverestimationSizeEXT(
-    command_buffer: vk::CommandBuffer,
-    _: f32,
-) {
-    guard(
-        command_buffer,
-        "vkCmdSetExtraPrimitiveOverestimationSizeEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetExtraPrimitiveOverestimationSizeEXT",
-                    |_| {
-                        Err(Error::Unsupported {
-                            command: "vkCmdSetExtraPrimitiveOverestimationSizeEXT".to_owned(),
-                        })
-                    },
-                )
-            }
-        },
-    )
-}
-
-unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(
-    command_buffer: vk::CommandBuffer,
-    depth_clip_enable: vk::Bool32,
-) {
-    guard(command_buffer, "vkCmdSetDepthClipEnableEXT", || {
-        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+    guard(command_buffer, "vkCmdSetConservativeRasterizationModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
-            record(command_buffer, "vkCmdSetDepthClipEnableEXT", |recorder| {
-                let enable = depth_clip_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::DepthClipEnable { enable },
-                )
+            record(command_buffer, "vkCmdSetConservativeRasterizationModeEXT", |_| {
+                Err(Error::Unsupported { command: "vkCmdSetConservativeRasterizationModeEXT".to_owned() })
             })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetSampleLocationsEnableEXT(
-    command_buffer: vk::CommandBuffer,
-    _: vk::Bool32,
-) {
+unsafe extern "system" fn vkCmdSetExtraPrimitiveOverestimationSizeEXT(command_buffer: vk::CommandBuffer, _: f32) {
+    guard(command_buffer, "vkCmdSetExtraPrimitiveOverestimationSizeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetExtraPrimitiveOverestimationSizeEXT", |_| {
+                Err(Error::Unsupported { command: "vkCmdSetExtraPrimitiveOverestimationSizeEXT".to_owned() })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(command_buffer: vk::CommandBuffer, depth_clip_enable: vk::Bool32) {
+    guard(command_buffer, "vkCmdSetDepthClipEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClipEnableEXT", |recorder| {
+                let enable = depth_clip_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthClipEnable { enable })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetSampleLocationsEnableEXT(command_buffer: vk::CommandBuffer, _: vk::Bool32) {
     guard(command_buffer, "vkCmdSetSampleLocationsEnableEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
             record(command_buffer, "vkCmdSetSampleLocationsEnableEXT", |_| {
-                Err(Error::Unsupported {
-                    command: "vkCmdSetSampleLocationsEnableEXT".to_owned(),
-                })
+                Err(Error::Unsupported { command: "vkCmdSetSampleLocationsEnableEXT".to_owned() })
             })
         }
     })
@@ -5105,9 +4579,7 @@ unsafe extern "system" fn vkCmdSetColorBlendAdvancedEXT(
         // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
             record(command_buffer, "vkCmdSetColorBlendAdvancedEXT", |_| {
-                Err(Error::Unsupported {
-                    command: "vkCmdSetColorBlendAdvancedEXT".to_owned(),
-                })
+                Err(Error::Unsupported { command: "vkCmdSetColorBlendAdvancedEXT".to_owned() })
             })
         }
     })
@@ -5120,17 +4592,10 @@ unsafe extern "system" fn vkCmdSetProvokingVertexModeEXT(
     guard(command_buffer, "vkCmdSetProvokingVertexModeEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetProvokingVertexModeEXT",
-                |recorder| {
-                    let mode = provoking_vertex_mode;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::ProvokingVertexMode { mode },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetProvokingVertexModeEXT", |recorder| {
+                let mode = provoking_vertex_mode;
+                crate::command::dynamic_state::set(recorder, DynamicState::ProvokingVertexMode { mode })
+            })
         }
     })
 }
@@ -5142,17 +4607,10 @@ unsafe extern "system" fn vkCmdSetLineRasterizationModeEXT(
     guard(command_buffer, "vkCmdSetLineRasterizationModeEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetLineRasterizationModeEXT",
-                |recorder| {
-                    let mode = line_rasterization_mode;
-                    crate::command::dynamic_state::set(
-                        recorder,
-                        DynamicState::LineRasterizationMode { mode },
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetLineRasterizationModeEXT", |recorder| {
+                let mode = line_rasterization_mode;
+                crate::command::dynamic_state::set(recorder, DynamicState::LineRasterizationMode { mode })
+            })
         }
     })
 }
@@ -5166,10 +4624,7 @@ unsafe extern "system" fn vkCmdSetLineStippleEnableEXT(
         unsafe {
             record(command_buffer, "vkCmdSetLineStippleEnableEXT", |recorder| {
                 let enable = stippled_line_enable != vk::FALSE;
-                crate::command::dynamic_state::set(
-                    recorder,
-                    DynamicState::LineStippleEnable { enable },
-                )
+                crate::command::dynamic_state::set(recorder, DynamicState::LineStippleEnable { enable })
             })
         }
     })
@@ -5179,26 +4634,15 @@ unsafe extern "system" fn vkCmdSetDepthClipNegativeOneToOneEXT(
     command_buffer: vk::CommandBuffer,
     negative_one_to_one: vk::Bool32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetDepthClipNegativeOneToOneEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetDepthClipNegativeOneToOneEXT",
-                    |recorder| {
-                        let enable = negative_one_to_one != vk::FALSE;
-                        crate::command::dynamic_state::set(
-                            recorder,
-                            DynamicState::DepthClipNegativeOneToOne { enable },
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetDepthClipNegativeOneToOneEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClipNegativeOneToOneEXT", |recorder| {
+                let enable = negative_one_to_one != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::DepthClipNegativeOneToOne { enable })
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
@@ -5210,20 +4654,13 @@ unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
     guard(instance, "vkCreateHeadlessSurfaceEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_surface,
-                handle::create(crate::surface::create_headless_surface()?),
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_surface, handle::create(crate::surface::create_headless_surface()?))
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetLineStippleEXT(
-    command_buffer: vk::CommandBuffer,
-    _: u32,
-    _: u16,
-) {
+unsafe extern "system" fn vkCmdSetLineStippleEXT(command_buffer: vk::CommandBuffer, _: u32, _: u16) {
     guard(command_buffer, "vkCmdSetLineStippleEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
@@ -5294,30 +4731,20 @@ unsafe extern "system" fn vkCmdBindTransformFeedbackBuffersEXT(
     p_offsets: *const vk::DeviceSize,
     p_sizes: *const vk::DeviceSize,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdBindTransformFeedbackBuffersEXT",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdBindTransformFeedbackBuffersEXT",
-                    |recorder| {
-                        crate::command::transform_feedback::cmd_bind_transform_feedback_buffers(
-                            recorder,
-                            first_binding,
-                            &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
-                            valid::slice(p_offsets, binding_count)?,
-                            (!p_sizes.is_null())
-                                .then(|| valid::slice(p_sizes, binding_count))
-                                .transpose()?,
-                        )
-                    },
+    guard(command_buffer, "vkCmdBindTransformFeedbackBuffersEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdBindTransformFeedbackBuffersEXT", |recorder| {
+                crate::command::transform_feedback::cmd_bind_transform_feedback_buffers(
+                    recorder,
+                    first_binding,
+                    &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
+                    valid::slice(p_offsets, binding_count)?,
+                    (!p_sizes.is_null()).then(|| valid::slice(p_sizes, binding_count)).transpose()?,
                 )
-            }
-        },
-    )
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdBeginTransformFeedbackEXT(
@@ -5330,23 +4757,19 @@ unsafe extern "system" fn vkCmdBeginTransformFeedbackEXT(
     guard(command_buffer, "vkCmdBeginTransformFeedbackEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdBeginTransformFeedbackEXT",
-                |recorder| {
-                    crate::command::transform_feedback::cmd_begin_transform_feedback(
-                        recorder,
-                        first_counter_buffer,
-                        (!p_counter_buffers.is_null())
-                            .then(|| valid::slice(p_counter_buffers, counter_buffer_count))
-                            .transpose()?
-                            .map(|them| handle::Handles::new(them)),
-                        (!p_counter_buffer_offsets.is_null())
-                            .then(|| valid::slice(p_counter_buffer_offsets, counter_buffer_count))
-                            .transpose()?,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdBeginTransformFeedbackEXT", |recorder| {
+                crate::command::transform_feedback::cmd_begin_transform_feedback(
+                    recorder,
+                    first_counter_buffer,
+                    (!p_counter_buffers.is_null())
+                        .then(|| valid::slice(p_counter_buffers, counter_buffer_count))
+                        .transpose()?
+                        .map(|them| handle::Handles::new(them)),
+                    (!p_counter_buffer_offsets.is_null())
+                        .then(|| valid::slice(p_counter_buffer_offsets, counter_buffer_count))
+                        .transpose()?,
+                )
+            })
         }
     })
 }
@@ -5410,11 +4833,7 @@ unsafe extern "system" fn vkCmdEndQueryIndexedEXT(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdEndQueryIndexedEXT", |recorder| {
-                crate::command::transform_feedback::cmd_end_query_indexed(
-                    recorder,
-                    handle::get(query_pool)?,
-                    query,
-                )
+                crate::command::transform_feedback::cmd_end_query_indexed(recorder, handle::get(query_pool)?, query)
             })
         }
     })
@@ -5432,21 +4851,17 @@ unsafe extern "system" fn vkCmdDrawIndirectByteCountEXT(
     guard(command_buffer, "vkCmdDrawIndirectByteCountEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdDrawIndirectByteCountEXT",
-                |recorder| {
-                    crate::command::transform_feedback::cmd_draw_indirect_byte_count(
-                        recorder,
-                        instance_count,
-                        first_instance,
-                        handle::get(counter_buffer)?,
-                        counter_buffer_offset,
-                        counter_offset,
-                        vertex_stride,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdDrawIndirectByteCountEXT", |recorder| {
+                crate::command::transform_feedback::cmd_draw_indirect_byte_count(
+                    recorder,
+                    instance_count,
+                    first_instance,
+                    handle::get(counter_buffer)?,
+                    counter_buffer_offset,
+                    counter_offset,
+                    vertex_stride,
+                )
+            })
         }
     })
 }
@@ -5464,14 +4879,8 @@ unsafe extern "system" fn vkCmdSetVertexInputEXT(
             record(command_buffer, "vkCmdSetVertexInputEXT", |recorder| {
                 crate::command::bind::cmd_set_vertex_input(
                     recorder,
-                    valid::slice(
-                        p_vertex_binding_descriptions,
-                        vertex_binding_description_count,
-                    )?,
-                    valid::slice(
-                        p_vertex_attribute_descriptions,
-                        vertex_attribute_description_count,
-                    )?,
+                    valid::slice(p_vertex_binding_descriptions, vertex_binding_description_count)?,
+                    valid::slice(p_vertex_attribute_descriptions, vertex_attribute_description_count)?,
                 )
             })
         }
@@ -5486,16 +4895,9 @@ unsafe extern "system" fn vkCmdSetGaussianCamerasGAURAST(
     guard(command_buffer, "vkCmdSetGaussianCamerasGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetGaussianCamerasGAURAST",
-                |recorder| {
-                    crate::command::camera::cmd_set_gaussian_cameras(
-                        recorder,
-                        valid::slice(p_cameras, camera_count)?,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetGaussianCamerasGAURAST", |recorder| {
+                crate::command::camera::cmd_set_gaussian_cameras(recorder, valid::slice(p_cameras, camera_count)?)
+            })
         }
     })
 }
@@ -5503,9 +4905,7 @@ unsafe extern "system" fn vkCmdSetGaussianCamerasGAURAST(
 unsafe extern "system" fn vkCmdBeginGaussianSetGAURAST(command_buffer: vk::CommandBuffer) {
     guard(command_buffer, "vkCmdBeginGaussianSetGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::command::gaussian_set::cmd_begin_gaussian_set(handle::get(command_buffer)?)
-        }
+        unsafe { crate::command::gaussian_set::cmd_begin_gaussian_set(handle::get(command_buffer)?) }
     })
 }
 
@@ -5524,19 +4924,15 @@ unsafe extern "system" fn vkCmdBindGaussianSphericalHarmonicsGAURAST(
     command_buffer: vk::CommandBuffer,
     p_buffer: *const gaurast::vk::GaussianSphericalHarmonicsBufferGAURAST<'_>,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdBindGaussianSphericalHarmonicsGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::command::gaussian_harmonics::cmd_bind_gaussian_spherical_harmonics(
-                    handle::get(command_buffer)?,
-                    valid::input(p_buffer)?,
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdBindGaussianSphericalHarmonicsGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::gaussian_harmonics::cmd_bind_gaussian_spherical_harmonics(
+                handle::get(command_buffer)?,
+                valid::input(p_buffer)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianOrderGAURAST(
@@ -5557,196 +4953,109 @@ unsafe extern "system" fn vkCmdSetGaussianAntialiasingGAURAST(
     command_buffer: vk::CommandBuffer,
     antialiasing: gaurast::vk::GaussianAntialiasingGAURAST,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianAntialiasingGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianAntialiasingGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_antialiasing(
-                            recorder,
-                            antialiasing,
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetGaussianAntialiasingGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianAntialiasingGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_antialiasing(recorder, antialiasing)
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianLowPassVarianceGAURAST(
     command_buffer: vk::CommandBuffer,
     low_pass_variance: f32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianLowPassVarianceGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianLowPassVarianceGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_low_pass_variance(
-                            recorder,
-                            low_pass_variance,
-                        )
-                    },
-                )
-            }
-        },
-    )
-}
-
-unsafe extern "system" fn vkCmdSetGaussianAlphaFloorGAURAST(
-    command_buffer: vk::CommandBuffer,
-    alpha_floor: f32,
-) {
-    guard(command_buffer, "vkCmdSetGaussianAlphaFloorGAURAST", || {
+    guard(command_buffer, "vkCmdSetGaussianLowPassVarianceGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(
-                command_buffer,
-                "vkCmdSetGaussianAlphaFloorGAURAST",
-                |recorder| {
-                    crate::command::gaussian_state::cmd_set_gaussian_alpha_floor(
-                        recorder,
-                        alpha_floor,
-                    )
-                },
-            )
+            record(command_buffer, "vkCmdSetGaussianLowPassVarianceGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_low_pass_variance(recorder, low_pass_variance)
+            })
         }
     })
 }
 
-unsafe extern "system" fn vkCmdSetGaussianAlphaCeilingGAURAST(
-    command_buffer: vk::CommandBuffer,
-    alpha_ceiling: f32,
-) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianAlphaCeilingGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianAlphaCeilingGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_alpha_ceiling(
-                            recorder,
-                            alpha_ceiling,
-                        )
-                    },
-                )
-            }
-        },
-    )
+unsafe extern "system" fn vkCmdSetGaussianAlphaFloorGAURAST(command_buffer: vk::CommandBuffer, alpha_floor: f32) {
+    guard(command_buffer, "vkCmdSetGaussianAlphaFloorGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianAlphaFloorGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_alpha_floor(recorder, alpha_floor)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetGaussianAlphaCeilingGAURAST(command_buffer: vk::CommandBuffer, alpha_ceiling: f32) {
+    guard(command_buffer, "vkCmdSetGaussianAlphaCeilingGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianAlphaCeilingGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_alpha_ceiling(recorder, alpha_ceiling)
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianTransmittanceFloorGAURAST(
     command_buffer: vk::CommandBuffer,
     transmittance_floor: f32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianTransmittanceFloorGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianTransmittanceFloorGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_transmittance_floor(
-                            recorder,
-                            transmittance_floor,
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetGaussianTransmittanceFloorGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianTransmittanceFloorGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_transmittance_floor(recorder, transmittance_floor)
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST(
     command_buffer: vk::CommandBuffer,
     spherical_harmonics_degree: u32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_spherical_harmonics_degree(
-                            recorder,
-                            spherical_harmonics_degree,
-                        )
-                    },
+    guard(command_buffer, "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_spherical_harmonics_degree(
+                    recorder,
+                    spherical_harmonics_degree,
                 )
-            }
-        },
-    )
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianExponentialErrorGAURAST(
     command_buffer: vk::CommandBuffer,
     exponential_error: f32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianExponentialErrorGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianExponentialErrorGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_exponential_error(
-                            recorder,
-                            exponential_error,
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetGaussianExponentialErrorGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianExponentialErrorGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_exponential_error(recorder, exponential_error)
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdSetGaussianContributionBudgetGAURAST(
     command_buffer: vk::CommandBuffer,
     contribution_budget: f32,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdSetGaussianContributionBudgetGAURAST",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdSetGaussianContributionBudgetGAURAST",
-                    |recorder| {
-                        crate::command::gaussian_state::cmd_set_gaussian_contribution_budget(
-                            recorder,
-                            contribution_budget,
-                        )
-                    },
-                )
-            }
-        },
-    )
+    guard(command_buffer, "vkCmdSetGaussianContributionBudgetGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianContributionBudgetGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_contribution_budget(recorder, contribution_budget)
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
@@ -5756,28 +5065,20 @@ unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
     set: u32,
     p_data: *const std::ffi::c_void,
 ) {
-    guard(
-        command_buffer,
-        "vkCmdPushDescriptorSetWithTemplateKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdPushDescriptorSetWithTemplateKHR",
-                    |recorder| {
-                        crate::command::bind::cmd_push_descriptor_set_with_template(
-                            recorder,
-                            handle::get(descriptor_update_template)?,
-                            handle::get(layout)?,
-                            set,
-                            p_data,
-                        )
-                    },
+    guard(command_buffer, "vkCmdPushDescriptorSetWithTemplateKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdPushDescriptorSetWithTemplateKHR", |recorder| {
+                crate::command::bind::cmd_push_descriptor_set_with_template(
+                    recorder,
+                    handle::get(descriptor_update_template)?,
+                    handle::get(layout)?,
+                    set,
+                    p_data,
                 )
-            }
-        },
-    )
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetDeviceGroupPresentCapabilitiesKHR(
@@ -5803,11 +5104,8 @@ unsafe extern "system" fn vkGetDeviceGroupSurfacePresentModesKHR(
     guard(device, "vkGetDeviceGroupSurfacePresentModesKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_modes,
-                crate::surface::get_device_group_surface_present_modes(handle::get(surface)?)?,
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_modes, crate::surface::get_device_group_surface_present_modes(handle::get(surface)?)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -5818,20 +5116,16 @@ unsafe extern "system" fn vkGetPhysicalDevicePresentRectanglesKHR(
     p_rect_count: *mut u32,
     p_rects: *mut vk::Rect2D,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDevicePresentRectanglesKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_rect_count,
-                    p_rects,
-                    &crate::surface::get_physical_device_present_rectangles(handle::get(surface)?)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDevicePresentRectanglesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_rect_count,
+                p_rects,
+                &crate::surface::get_physical_device_present_rectangles(handle::get(surface)?)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkAcquireNextImage2KHR(
@@ -5859,21 +5153,17 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilities2KHR(
     p_surface_info: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
     p_surface_capabilities: *mut vk::SurfaceCapabilities2KHR<'_>,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfaceCapabilities2KHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                let info = valid::input(p_surface_info)?;
-                crate::surface::get_physical_device_surface_capabilities2(
-                    handle::get(info.surface)?,
-                    OutputChain::new(p_surface_capabilities)?,
-                )
-                .map(|()| vk::Result::SUCCESS)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSurfaceCapabilities2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            let info = valid::input(p_surface_info)?;
+            crate::surface::get_physical_device_surface_capabilities2(
+                handle::get(info.surface)?,
+                OutputChain::new(p_surface_capabilities)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
@@ -5882,19 +5172,15 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
     p_surface_format_count: *mut u32,
     p_surface_formats: *mut vk::SurfaceFormat2KHR<'_>,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfaceFormats2KHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::surface::get_physical_device_surface_formats2(Structures::new(
-                    p_surface_format_count,
-                    p_surface_formats,
-                )?)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSurfaceFormats2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::surface::get_physical_device_surface_formats2(Structures::new(
+                p_surface_format_count,
+                p_surface_formats,
+            )?)
+        }
+    })
 }
 
 unsafe extern "system" fn vkMapMemory2KHR(
@@ -5908,11 +5194,7 @@ unsafe extern "system" fn vkMapMemory2KHR(
             let info = valid::input(p_memory_map_info)?;
             valid::output(
                 pp_data,
-                crate::resource::memory::map_memory(
-                    handle::get(info.memory)?,
-                    info.offset,
-                    info.size,
-                )?,
+                crate::resource::memory::map_memory(handle::get(info.memory)?, info.offset, info.size)?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -5927,8 +5209,7 @@ unsafe extern "system" fn vkUnmapMemory2KHR(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             let info = valid::input(p_memory_unmap_info)?;
-            crate::resource::memory::unmap_memory(handle::get(info.memory)?)
-                .map(|()| vk::Result::SUCCESS)
+            crate::resource::memory::unmap_memory(handle::get(info.memory)?).map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -5940,21 +5221,17 @@ unsafe extern "system" fn vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCo
     p_counters: *mut vk::PerformanceCounterKHR<'_>,
     p_counter_descriptions: *mut vk::PerformanceCounterDescriptionKHR<'_>,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                crate::physical_device::enumerate_performance_query_counters(
-                    queue_family_index,
-                    p_counter_count,
-                    p_counters,
-                    p_counter_descriptions,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::enumerate_performance_query_counters(
+                queue_family_index,
+                p_counter_count,
+                p_counters,
+                p_counter_descriptions,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR(
@@ -5962,19 +5239,10 @@ unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKH
     _: *const vk::QueryPoolPerformanceCreateInfoKHR<'_>,
     p_num_passes: *mut u32,
 ) {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::output(
-                    p_num_passes,
-                    crate::physical_device::get_performance_query_passes()?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { valid::output(p_num_passes, crate::physical_device::get_performance_query_passes()?) }
+    })
 }
 
 unsafe extern "system" fn vkAcquireProfilingLockKHR(
@@ -5983,10 +5251,7 @@ unsafe extern "system" fn vkAcquireProfilingLockKHR(
 ) -> vk::Result {
     guard(device, "vkAcquireProfilingLockKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::device::acquire_profiling_lock(handle::get(device)?)
-                .map(|()| vk::Result::SUCCESS)
-        }
+        unsafe { crate::device::acquire_profiling_lock(handle::get(device)?).map(|()| vk::Result::SUCCESS) }
     })
 }
 
@@ -6035,20 +5300,13 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceSupportKHR(
     surface: vk::SurfaceKHR,
     p_supported: *mut vk::Bool32,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfaceSupportKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::output(
-                    p_supported,
-                    crate::surface::get_physical_device_surface_support(handle::get(surface)?)?,
-                )
+    guard(physical_device, "vkGetPhysicalDeviceSurfaceSupportKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(p_supported, crate::surface::get_physical_device_surface_support(handle::get(surface)?)?)
                 .map(|()| vk::Result::SUCCESS)
-            }
-        },
-    )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
@@ -6056,22 +5314,16 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
     surface: vk::SurfaceKHR,
     p_surface_capabilities: *mut vk::SurfaceCapabilitiesKHR,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfaceCapabilitiesKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::output(
-                    p_surface_capabilities,
-                    crate::surface::get_physical_device_surface_capabilities(handle::get(
-                        surface,
-                    )?)?,
-                )
-                .map(|()| vk::Result::SUCCESS)
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSurfaceCapabilitiesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface_capabilities,
+                crate::surface::get_physical_device_surface_capabilities(handle::get(surface)?)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormatsKHR(
@@ -6080,20 +5332,16 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormatsKHR(
     p_surface_format_count: *mut u32,
     p_surface_formats: *mut vk::SurfaceFormatKHR,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfaceFormatsKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_surface_format_count,
-                    p_surface_formats,
-                    &crate::surface::get_physical_device_surface_formats(handle::get(surface)?)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSurfaceFormatsKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_surface_format_count,
+                p_surface_formats,
+                &crate::surface::get_physical_device_surface_formats(handle::get(surface)?)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSurfacePresentModesKHR(
@@ -6102,22 +5350,16 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfacePresentModesKHR(
     p_present_mode_count: *mut u32,
     p_present_modes: *mut vk::PresentModeKHR,
 ) -> vk::Result {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceSurfacePresentModesKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                valid::enumerate(
-                    p_present_mode_count,
-                    p_present_modes,
-                    &crate::surface::get_physical_device_surface_present_modes(handle::get(
-                        surface,
-                    )?)?,
-                )
-            }
-        },
-    )
+    guard(physical_device, "vkGetPhysicalDeviceSurfacePresentModesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_present_mode_count,
+                p_present_modes,
+                &crate::surface::get_physical_device_surface_present_modes(handle::get(surface)?)?,
+            )
+        }
+    })
 }
 
 unsafe extern "system" fn vkCreateSwapchainKHR(
@@ -6201,9 +5443,7 @@ unsafe extern "system" fn vkQueuePresentKHR(
 ) -> vk::Result {
     guard(queue, "vkQueuePresentKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe {
-            crate::swapchain::queue_present(handle::get(queue)?, valid::input(p_present_info)?)
-        }
+        unsafe { crate::swapchain::queue_present(handle::get(queue)?, valid::input(p_present_info)?) }
     })
 }
 
@@ -6218,9 +5458,7 @@ unsafe extern "system" fn vkCreateWaylandSurfaceKHR(
         unsafe {
             valid::output(
                 p_surface,
-                handle::create(crate::surface::create_wayland_surface(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::surface::create_wayland_surface(valid::input(p_create_info)?)?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -6232,11 +5470,9 @@ unsafe extern "system" fn vkGetPhysicalDeviceWaylandPresentationSupportKHR(
     queue_family_index: u32,
     _: *mut vk::wl_display,
 ) -> vk::Bool32 {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceWaylandPresentationSupportKHR",
-        || crate::surface::get_physical_device_presentation_support(queue_family_index),
-    )
+    guard(physical_device, "vkGetPhysicalDeviceWaylandPresentationSupportKHR", || {
+        crate::surface::get_physical_device_presentation_support(queue_family_index)
+    })
 }
 
 unsafe extern "system" fn vkCreateXcbSurfaceKHR(
@@ -6248,13 +5484,8 @@ unsafe extern "system" fn vkCreateXcbSurfaceKHR(
     guard(instance, "vkCreateXcbSurfaceKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_surface,
-                handle::create(crate::surface::create_xcb_surface(valid::input(
-                    p_create_info,
-                )?)?),
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_surface, handle::create(crate::surface::create_xcb_surface(valid::input(p_create_info)?)?))
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -6265,11 +5496,9 @@ unsafe extern "system" fn vkGetPhysicalDeviceXcbPresentationSupportKHR(
     _: *mut vk::xcb_connection_t,
     _: vk::xcb_visualid_t,
 ) -> vk::Bool32 {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceXcbPresentationSupportKHR",
-        || crate::surface::get_physical_device_presentation_support(queue_family_index),
-    )
+    guard(physical_device, "vkGetPhysicalDeviceXcbPresentationSupportKHR", || {
+        crate::surface::get_physical_device_presentation_support(queue_family_index)
+    })
 }
 
 unsafe extern "system" fn vkCreateXlibSurfaceKHR(
@@ -6281,13 +5510,8 @@ unsafe extern "system" fn vkCreateXlibSurfaceKHR(
     guard(instance, "vkCreateXlibSurfaceKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            valid::output(
-                p_surface,
-                handle::create(crate::surface::create_xlib_surface(valid::input(
-                    p_create_info,
-                )?)?),
-            )
-            .map(|()| vk::Result::SUCCESS)
+            valid::output(p_surface, handle::create(crate::surface::create_xlib_surface(valid::input(p_create_info)?)?))
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -6298,9 +5522,7 @@ unsafe extern "system" fn vkGetPhysicalDeviceXlibPresentationSupportKHR(
     _: *mut vk::Display,
     _: vk::VisualID,
 ) -> vk::Bool32 {
-    guard(
-        physical_device,
-        "vkGetPhysicalDeviceXlibPresentationSupportKHR",
-        || crate::surface::get_physical_device_presentation_support(queue_family_index),
-    )
+    guard(physical_device, "vkGetPhysicalDeviceXlibPresentationSupportKHR", || {
+        crate::surface::get_physical_device_presentation_support(queue_family_index)
+    })
 }

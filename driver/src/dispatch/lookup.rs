@@ -72,44 +72,32 @@ pub(super) struct Commands {
 impl Commands {
     /// A table of these rows.
     pub(super) const fn new(rows: &'static [Command]) -> Self {
-        Self {
-            rows,
-            by_name: OnceLock::new(),
-        }
+        Self { rows, by_name: OnceLock::new() }
     }
 
     fn find(&self, name: &CStr) -> Option<&'static Command> {
         let by_name = self.by_name.get_or_init(|| {
             let rows = self.rows.iter();
-            rows.map(|command| (command.name.as_bytes(), command))
-                .collect()
+            rows.map(|command| (command.name.as_bytes(), command)).collect()
         });
         by_name.get(name.to_bytes()).copied()
     }
 
     /// `vkGetInstanceProcAddr` without an instance.
     pub(super) fn global_command(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
-        self.find(name)
-            .filter(|command| command.scope == Scope::Global)
-            .map(|command| command.function)
+        self.find(name).filter(|command| command.scope == Scope::Global).map(|command| command.function)
     }
 
     /// `vkGetInstanceProcAddr` of an instance: its own commands, and those of all devices, whose `device_extensions`
     /// are all that are supported. All core commands of devices are found, whatever version the instance requested,
     /// because devices have them.
-    pub(super) fn instance_command(
-        &self,
-        name: &CStr,
-        enabled: &EnabledExtensions<'_>,
-    ) -> vk::PFN_vkVoidFunction {
+    pub(super) fn instance_command(&self, name: &CStr, enabled: &EnabledExtensions<'_>) -> vk::PFN_vkVoidFunction {
         let is_reachable = |command: &&Command| match (command.scope, command.availability) {
             (Scope::Global, _) => command.name == "vkGetInstanceProcAddr",
             (Scope::Device, Availability::Core(_)) => true,
             (_, availability) => availability.is_available(enabled),
         };
-        self.find(name)
-            .filter(is_reachable)
-            .map(|command| command.function)
+        self.find(name).filter(is_reachable).map(|command| command.function)
     }
 
     /// `vk_icdGetPhysicalDeviceProcAddr`: commands whose first parameter is a physical device.
@@ -119,37 +107,26 @@ impl Commands {
         enabled: &EnabledExtensions<'_>,
     ) -> vk::PFN_vkVoidFunction {
         self.find(name)
-            .filter(|command| {
-                command.scope == Scope::PhysicalDevice && command.availability.is_available(enabled)
-            })
+            .filter(|command| command.scope == Scope::PhysicalDevice && command.availability.is_available(enabled))
             .map(|command| command.function)
     }
 
     /// `vkGetDeviceProcAddr`: commands of a device, its queues and command buffers.
-    pub(super) fn device_command(
-        &self,
-        name: &CStr,
-        enabled: &EnabledExtensions<'_>,
-    ) -> vk::PFN_vkVoidFunction {
+    pub(super) fn device_command(&self, name: &CStr, enabled: &EnabledExtensions<'_>) -> vk::PFN_vkVoidFunction {
         self.find(name)
-            .filter(|command| {
-                command.scope == Scope::Device && command.availability.is_available(enabled)
-            })
+            .filter(|command| command.scope == Scope::Device && command.availability.is_available(enabled))
             .map(|command| command.function)
     }
 }
 
 fn version_reaches(enabled: u32, needed: u32) -> bool {
-    (
-        vk::api_version_major(enabled),
-        vk::api_version_minor(enabled),
-    ) >= (vk::api_version_major(needed), vk::api_version_minor(needed))
+    (vk::api_version_major(enabled), vk::api_version_minor(enabled))
+        >= (vk::api_version_major(needed), vk::api_version_minor(needed))
 }
 
 impl Availability {
     fn is_available(self, enabled: &EnabledExtensions<'_>) -> bool {
-        let is_any =
-            |names: &[&CStr], enabled: &[&CStr]| names.iter().any(|name| enabled.contains(name));
+        let is_any = |names: &[&CStr], enabled: &[&CStr]| names.iter().any(|name| enabled.contains(name));
         match self {
             Self::Core(version) => version_reaches(enabled.api_version, version),
             Self::InstanceExtension(names) => is_any(names, enabled.instance_extensions),

@@ -11,10 +11,7 @@ use ash::vk;
 use std::ffi::CStr;
 
 /// `vk_icdGetPhysicalDeviceProcAddr`: commands whose first parameter is a physical device.
-pub(crate) fn physical_device_command(
-    name: &CStr,
-    enabled: &EnabledExtensions<'_>,
-) -> vk::PFN_vkVoidFunction {
+pub(crate) fn physical_device_command(name: &CStr, enabled: &EnabledExtensions<'_>) -> vk::PFN_vkVoidFunction {
     COMMANDS.physical_device_command(name, enabled)
 }
 

@@ -14,9 +14,7 @@ pub(crate) fn fill(index: usize, out: &mut vk::PerformanceCounterKHR<'_>) {
     out.unit = match info.unit {
         // Vulkan has no unit of energy; descriptions say that these are nanojoules.
         Unit::Count | Unit::Nanojoules => vk::PerformanceCounterUnitKHR::GENERIC,
-        Unit::Nanoseconds | Unit::SimulatedNanoseconds => {
-            vk::PerformanceCounterUnitKHR::NANOSECONDS
-        }
+        Unit::Nanoseconds | Unit::SimulatedNanoseconds => vk::PerformanceCounterUnitKHR::NANOSECONDS,
         Unit::Cycles => vk::PerformanceCounterUnitKHR::CYCLES,
         Unit::Bytes => vk::PerformanceCounterUnitKHR::BYTES,
         Unit::Percent => vk::PerformanceCounterUnitKHR::PERCENTAGE,
@@ -49,11 +47,7 @@ fn uuid(category: &str, name: &str) -> [u8; vk::UUID_SIZE] {
     const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
     let bytes = category.bytes().chain([0]).chain(name.bytes());
-    bytes
-        .fold(OFFSET, |hash, byte| {
-            (hash ^ u128::from(byte)).wrapping_mul(PRIME)
-        })
-        .to_be_bytes()
+    bytes.fold(OFFSET, |hash, byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME)).to_be_bytes()
 }
 
 #[cfg(test)]

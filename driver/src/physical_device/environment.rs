@@ -68,17 +68,13 @@ fn simulated_timestamps(name: &str) -> Result<bool, Error> {
     match name {
         "" | "host" => Ok(false),
         "simulated" => Ok(true),
-        other => Err(Error::InitializationFailed(format!(
-            "{TIMESTAMPS}={other} is neither host nor simulated"
-        ))),
+        other => Err(Error::InitializationFailed(format!("{TIMESTAMPS}={other} is neither host nor simulated"))),
     }
 }
 
 /// Writes a trace. A failure is logged.
 fn write_trace(file: &Path, trace: &Trace) {
-    let written = serde_json::to_vec(trace)
-        .map_err(std::io::Error::from)
-        .and_then(|json| std::fs::write(file, json));
+    let written = serde_json::to_vec(trace).map_err(std::io::Error::from).and_then(|json| std::fs::write(file, json));
     if let Err(error) = written {
         log::error!("{TRACE}={}: {error}", file.display());
     }
@@ -105,9 +101,7 @@ fn parse_dump(names: &str) -> Result<Dump, Error> {
         match name {
             "ir" => dump.ir = true,
             other => {
-                return Err(Error::InitializationFailed(format!(
-                    "{DUMP}={other} is not ir"
-                )));
+                return Err(Error::InitializationFailed(format!("{DUMP}={other} is not ir")));
             }
         }
     }
@@ -118,9 +112,7 @@ fn variable(name: &str) -> Result<Option<String>, Error> {
     match std::env::var(name) {
         Ok(value) => Ok(Some(value)),
         Err(std::env::VarError::NotPresent) => Ok(None),
-        Err(std::env::VarError::NotUnicode(_)) => {
-            Err(Error::InitializationFailed(format!("{name} is not text")))
-        }
+        Err(std::env::VarError::NotUnicode(_)) => Err(Error::InitializationFailed(format!("{name} is not text"))),
     }
 }
 
@@ -131,10 +123,8 @@ fn config(
     timeout: Option<&str>,
     optimizations: Option<&str>,
 ) -> Result<Config, Error> {
-    let mut config = Config {
-        cluster_budget_bytes: memory::heap_size() / HEAP_PER_CLUSTER_BUDGET,
-        ..Config::default()
-    };
+    let mut config =
+        Config { cluster_budget_bytes: memory::heap_size() / HEAP_PER_CLUSTER_BUDGET, ..Config::default() };
     if let Some(name) = simd {
         config.simd = SimdLevel::from_name(name).ok_or_else(|| {
             let names: Vec<_> = SimdLevel::NAMES.iter().map(|(name, _)| *name).collect();
@@ -142,20 +132,19 @@ fn config(
         })?;
     }
     if let Some(count) = threads {
-        config.threads = count.parse().map_err(|_| {
-            Error::InitializationFailed(format!("{THREADS}={count} is not a number of threads"))
-        })?;
+        config.threads = count
+            .parse()
+            .map_err(|_| Error::InitializationFailed(format!("{THREADS}={count} is not a number of threads")))?;
     }
     if let Some(milliseconds) = timeout {
-        let milliseconds = milliseconds.parse().map_err(|_| {
-            Error::InitializationFailed(format!("{TIMEOUT}={milliseconds} is not a number"))
-        })?;
+        let milliseconds = milliseconds
+            .parse()
+            .map_err(|_| Error::InitializationFailed(format!("{TIMEOUT}={milliseconds} is not a number")))?;
         config.shader_timeout = Duration::from_millis(milliseconds);
     }
     if let Some(names) = optimizations {
-        let unknown = |error: UnknownOptimization| {
-            Error::InitializationFailed(format!("{OPTIMIZATIONS}={names}: {error}"))
-        };
+        let unknown =
+            |error: UnknownOptimization| Error::InitializationFailed(format!("{OPTIMIZATIONS}={names}: {error}"));
         config.optimizations = names.parse().map_err(unknown)?;
     }
     Ok(config)
@@ -177,17 +166,9 @@ mod tests {
         assert!(error.to_string().contains("GAURAST_SIMD=mmx"));
         assert!(config(None, Some("-1"), None, None).is_err());
         assert!(config(None, None, Some("soon"), None).is_err());
-        assert!(
-            chosen.optimizations.has(Optimization::Bounds)
-                && !chosen.optimizations.has(Optimization::Ellipse)
-        );
+        assert!(chosen.optimizations.has(Optimization::Bounds) && !chosen.optimizations.has(Optimization::Ellipse));
         let error = config(None, None, None, Some("blocks,much")).unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .contains("GAURAST_OPTIMIZATIONS=blocks,much: \"much\" is"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("GAURAST_OPTIMIZATIONS=blocks,much: \"much\" is"), "{error}");
         assert!(simulated_timestamps("simulated").unwrap());
         assert!(!simulated_timestamps("host").unwrap() && !simulated_timestamps("").unwrap());
         assert!(simulated_timestamps("device").is_err());

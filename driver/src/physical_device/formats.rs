@@ -30,10 +30,7 @@ pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
 /// The device's format that has Vulkan's name in camel case.
 fn named(vulkan_name: &str) -> Option<Format> {
     let name = vulkan_name.replace('_', "");
-    Format::ALL
-        .iter()
-        .copied()
-        .find(|format| format!("{format:?}").eq_ignore_ascii_case(&name))
+    Format::ALL.iter().copied().find(|format| format!("{format:?}").eq_ignore_ascii_case(&name))
 }
 
 fn is_color(format: Format) -> bool {
@@ -154,14 +151,10 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
 }
 
 /// `VkFormatProperties3`: the 64-bit features that correspond to 32-bit ones.
-pub(crate) fn features2(
-    format: vk::Format,
-    features: vk::FormatFeatureFlags,
-) -> vk::FormatFeatureFlags2 {
+pub(crate) fn features2(format: vk::Format, features: vk::FormatFeatureFlags) -> vk::FormatFeatureFlags2 {
     // The 64-bit features begin with the 32-bit ones.
     let mut wide = vk::FormatFeatureFlags2::from_raw(features.as_raw().into());
-    let stored =
-        vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+    let stored = vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
     if features.intersects(stored) {
         wide |= vk::FormatFeatureFlags2::STORAGE_READ_WITHOUT_FORMAT
             | vk::FormatFeatureFlags2::STORAGE_WRITE_WITHOUT_FORMAT;
@@ -185,55 +178,26 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
 
 /// The features that usages require; other usages are not supported.
 const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
-    (
-        vk::ImageUsageFlags::TRANSFER_SRC,
-        vk::FormatFeatureFlags::TRANSFER_SRC,
-    ),
-    (
-        vk::ImageUsageFlags::TRANSFER_DST,
-        vk::FormatFeatureFlags::TRANSFER_DST,
-    ),
-    (
-        vk::ImageUsageFlags::SAMPLED,
-        vk::FormatFeatureFlags::SAMPLED_IMAGE,
-    ),
-    (
-        vk::ImageUsageFlags::STORAGE,
-        vk::FormatFeatureFlags::STORAGE_IMAGE,
-    ),
-    (
-        vk::ImageUsageFlags::COLOR_ATTACHMENT,
-        vk::FormatFeatureFlags::COLOR_ATTACHMENT,
-    ),
-    (
-        vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-        vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
-    ),
-    (
-        vk::ImageUsageFlags::INPUT_ATTACHMENT,
-        vk::FormatFeatureFlags::SAMPLED_IMAGE,
-    ),
-    (
-        vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT,
-        vk::FormatFeatureFlags::SAMPLED_IMAGE,
-    ),
+    (vk::ImageUsageFlags::TRANSFER_SRC, vk::FormatFeatureFlags::TRANSFER_SRC),
+    (vk::ImageUsageFlags::TRANSFER_DST, vk::FormatFeatureFlags::TRANSFER_DST),
+    (vk::ImageUsageFlags::SAMPLED, vk::FormatFeatureFlags::SAMPLED_IMAGE),
+    (vk::ImageUsageFlags::STORAGE, vk::FormatFeatureFlags::STORAGE_IMAGE),
+    (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::FormatFeatureFlags::COLOR_ATTACHMENT),
+    (vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT),
+    (vk::ImageUsageFlags::INPUT_ATTACHMENT, vk::FormatFeatureFlags::SAMPLED_IMAGE),
+    (vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT, vk::FormatFeatureFlags::SAMPLED_IMAGE),
     // A transient attachment's contents stay in the tile buffers; the flag is used with an attachment usage.
-    (
-        vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
-        vk::FormatFeatureFlags::empty(),
-    ),
+    (vk::ImageUsageFlags::TRANSIENT_ATTACHMENT, vk::FormatFeatureFlags::empty()),
 ];
 
 /// The usages by which shaders read attachments.
 const READ_ATTACHMENT: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
-    vk::ImageUsageFlags::INPUT_ATTACHMENT.as_raw()
-        | vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT.as_raw(),
+    vk::ImageUsageFlags::INPUT_ATTACHMENT.as_raw() | vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT.as_raw(),
 );
 
 /// The features of which the format of such an attachment must have one: shaders read only what can be rendered to.
 const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
-    vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()
-        | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+    vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw() | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
 fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
@@ -268,13 +232,7 @@ pub(crate) struct ImageQuery {
 /// [`Error::FormatNotSupported`] if no such image is supported.
 pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatProperties, Error> {
     let refuse = |what: String| Err(Error::FormatNotSupported(what));
-    let ImageQuery {
-        format,
-        ty,
-        tiling,
-        usage,
-        flags,
-    } = query;
+    let ImageQuery { format, ty, tiling, usage, flags } = query;
     let properties = properties(format);
     let features = match tiling {
         vk::ImageTiling::OPTIMAL => properties.optimal_tiling_features,
@@ -282,14 +240,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         _ => return refuse(format!("image tiling {tiling:?} is not supported")),
     };
     if features.is_empty() {
-        return refuse(format!(
-            "{tiling:?} images of format {format:?} are not supported"
-        ));
+        return refuse(format!("{tiling:?} images of format {format:?} are not supported"));
     }
     if !supports_usage(features, usage) {
-        return refuse(format!(
-            "images of format {format:?} do not support all of {usage:?}"
-        ));
+        return refuse(format!("images of format {format:?} do not support all of {usage:?}"));
     }
     if !IMAGE_FLAGS.contains(flags) {
         return refuse(format!("image flags {flags:?} are not supported"));
@@ -297,22 +251,16 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
     let is_compressed = device_format(format).is_some_and(is_compressed);
     let (max_extent, layers) = match ty {
-        vk::ImageType::TYPE_1D if !is_compressed => (
-            extent(limits::MAX_IMAGE_DIMENSION, 1, 1),
-            limits::MAX_LAYERS,
-        ),
-        vk::ImageType::TYPE_2D => (
-            extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1),
-            limits::MAX_LAYERS,
-        ),
+        vk::ImageType::TYPE_1D if !is_compressed => (extent(limits::MAX_IMAGE_DIMENSION, 1, 1), limits::MAX_LAYERS),
+        vk::ImageType::TYPE_2D => {
+            (extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1), limits::MAX_LAYERS)
+        }
         vk::ImageType::TYPE_3D if !is_depth_stencil => {
             let side = limits::MAX_IMAGE_DIMENSION_3D;
             (extent(side, side, side), 1)
         }
         _ => {
-            return refuse(format!(
-                "{ty:?} images of format {format:?} are not supported"
-            ));
+            return refuse(format!("{ty:?} images of format {format:?} are not supported"));
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
@@ -326,25 +274,13 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     }
     Ok(vk::ImageFormatProperties {
         max_extent,
-        max_mip_levels: if is_linear {
-            1
-        } else {
-            max_extent.width.ilog2() + 1
-        },
+        max_mip_levels: if is_linear { 1 } else { max_extent.width.ilog2() + 1 },
         max_array_layers: if is_linear { 1 } else { layers },
-        sample_counts: if has_samples {
-            limits::SAMPLE_COUNTS
-        } else {
-            vk::SampleCountFlags::TYPE_1
-        },
+        sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
         max_resource_size: memory::heap_size(),
     })
 }
 
 fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
-    vk::Extent3D {
-        width,
-        height,
-        depth,
-    }
+    vk::Extent3D { width, height, depth }
 }

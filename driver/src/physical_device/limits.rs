@@ -8,9 +8,7 @@ use crate::convert;
 use crate::instance::API_VERSION;
 use crate::registry::properties::Properties;
 use ash::vk;
-use simdevice::limits::{
-    MAX_LINE_WIDTH, MAX_POINT_SIZE, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS,
-};
+use simdevice::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS};
 use std::ffi::{CStr, c_char};
 use std::sync::LazyLock;
 
@@ -18,11 +16,10 @@ const DEVICE_NAME: &CStr = c"GauRast simulated device";
 const DRIVER_NAME: &CStr = c"GauRast";
 
 /// The driver's version, in text.
-const DRIVER_INFO: &CStr =
-    match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
-        Ok(text) => text,
-        Err(_) => c"",
-    };
+const DRIVER_INFO: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+    Ok(text) => text,
+    Err(_) => c"",
+};
 
 /// The vendor id; none is registered for this driver.
 const VENDOR_ID: u32 = 0;
@@ -52,9 +49,8 @@ const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
 const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::limits::MAX_CLIP_CULL_DISTANCES as u32;
 
 /// The sample counts of attachments.
-pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
-    vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw(),
-);
+pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags =
+    vk::SampleCountFlags::from_raw(vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw());
 
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
@@ -239,10 +235,7 @@ fn find_properties() -> Properties {
         max_sampler_anisotropy: MAX_SAMPLER_ANISOTROPY,
         max_viewports: simdevice::limits::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
-        viewport_bounds_range: [
-            -2.0 * MAX_IMAGE_DIMENSION as f32,
-            2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0,
-        ],
+        viewport_bounds_range: [-2.0 * MAX_IMAGE_DIMENSION as f32, 2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0],
         viewport_sub_pixel_bits: 8,
         min_memory_map_alignment: memory::ALIGNMENT as usize,
         min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
@@ -416,8 +409,7 @@ fn find_properties() -> Properties {
         integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: false,
         integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: false,
         integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: false,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated:
-            false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated: false,
         integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: false,
         integer_dot_product_accumulating_saturating16_bit_signed_accelerated: false,
         integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: false,
@@ -449,10 +441,7 @@ fn find_properties() -> Properties {
         // The fragment stage alone says how its inputs are interpolated.
         graphics_pipeline_library_independent_interpolation_decoration: true,
         max_vertex_attrib_divisor: u32::MAX,
-        tile_size: vk::Extent2D {
-            width: 16,
-            height: 16,
-        },
+        tile_size: vk::Extent2D { width: 16, height: 16 },
         max_spherical_harmonics_degree: MAX_SPHERICAL_HARMONICS_DEGREE,
         gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,

@@ -35,8 +35,7 @@ pub(crate) fn type_properties(index: u32) -> Option<vk::MemoryPropertyFlags> {
 
 /// The size of the heap in bytes: three quarters of the host's memory.
 pub(crate) fn heap_size() -> u64 {
-    static SIZE: LazyLock<u64> =
-        LazyLock::new(|| host_memory().map_or(FALLBACK_HEAP_SIZE, |bytes| bytes / 4 * 3));
+    static SIZE: LazyLock<u64> = LazyLock::new(|| host_memory().map_or(FALLBACK_HEAP_SIZE, |bytes| bytes / 4 * 3));
     *SIZE
 }
 
@@ -65,15 +64,9 @@ pub(crate) fn properties() -> vk::PhysicalDeviceMemoryProperties {
         ..Default::default()
     };
     for (place, flags) in properties.memory_types.iter_mut().zip(TYPES) {
-        *place = vk::MemoryType {
-            property_flags: flags,
-            heap_index: 0,
-        };
+        *place = vk::MemoryType { property_flags: flags, heap_index: 0 };
     }
-    properties.memory_heaps[0] = vk::MemoryHeap {
-        size: heap_size(),
-        flags: vk::MemoryHeapFlags::DEVICE_LOCAL,
-    };
+    properties.memory_heaps[0] = vk::MemoryHeap { size: heap_size(), flags: vk::MemoryHeapFlags::DEVICE_LOCAL };
     properties
 }
 
@@ -85,9 +78,7 @@ pub(crate) fn write_budget(out: &mut vk::PhysicalDeviceMemoryBudgetPropertiesEXT
     out.heap_budget = [0; vk::MAX_MEMORY_HEAPS];
     out.heap_usage = [0; vk::MAX_MEMORY_HEAPS];
     out.heap_usage[0] = TAKEN.load(Ordering::Acquire);
-    let free = std::fs::read_to_string("/proc/meminfo")
-        .ok()
-        .and_then(|text| kibibytes(&text, "MemAvailable:"));
+    let free = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| kibibytes(&text, "MemAvailable:"));
     // Memory that other processes use is not available.
     let available = free.map_or(u64::MAX, |free| free.saturating_add(out.heap_usage[0]));
     out.heap_budget[0] = available.min(heap_size());
@@ -103,10 +94,7 @@ pub(crate) struct Heap {
 impl Heap {
     /// An unused heap of `size` bytes.
     pub(crate) fn new(size: u64) -> Self {
-        Self {
-            size,
-            used: AtomicU64::new(0),
-        }
+        Self { size, used: AtomicU64::new(0) }
     }
 
     /// Allocates `size` bytes of the heap, or none.

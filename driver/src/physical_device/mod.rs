@@ -20,9 +20,7 @@ pub(crate) const QUEUE_FAMILY: u32 = 0;
 /// The capabilities of the queues of each family: everything, all except draws, and copies.
 pub(crate) const QUEUE_FAMILIES: [vk::QueueFlags; 3] = [
     vk::QueueFlags::from_raw(
-        vk::QueueFlags::GRAPHICS.as_raw()
-            | vk::QueueFlags::COMPUTE.as_raw()
-            | vk::QueueFlags::TRANSFER.as_raw(),
+        vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw() | vk::QueueFlags::TRANSFER.as_raw(),
     ),
     vk::QueueFlags::from_raw(vk::QueueFlags::COMPUTE.as_raw() | vk::QueueFlags::TRANSFER.as_raw()),
     vk::QueueFlags::TRANSFER,
@@ -37,20 +35,13 @@ fn queue_family_properties(queue_flags: vk::QueueFlags) -> vk::QueueFamilyProper
         queue_flags,
         queue_count: QUEUE_COUNT,
         timestamp_valid_bits: 64,
-        min_image_transfer_granularity: vk::Extent3D {
-            width: 1,
-            height: 1,
-            depth: 1,
-        },
+        min_image_transfer_granularity: vk::Extent3D { width: 1, height: 1, depth: 1 },
     }
 }
 
 /// Answers whether such an image is supported. That it isn't is an answer and not reported as a failure, because
 /// applications ask to find out.
-fn image_format_answer(
-    query: ImageQuery,
-    out: &mut vk::ImageFormatProperties,
-) -> Result<vk::Result, Error> {
+fn image_format_answer(query: ImageQuery, out: &mut vk::ImageFormatProperties) -> Result<vk::Result, Error> {
     match formats::image_properties(query) {
         Ok(properties) => {
             *out = properties;
@@ -93,9 +84,7 @@ pub(crate) fn get_physical_device_features2(
 }
 
 #[doc(alias = "vkGetPhysicalDeviceFormatProperties")]
-pub(crate) fn get_physical_device_format_properties(
-    format: vk::Format,
-) -> Result<vk::FormatProperties, Error> {
+pub(crate) fn get_physical_device_format_properties(format: vk::Format) -> Result<vk::FormatProperties, Error> {
     Ok(formats::properties(format))
 }
 
@@ -126,13 +115,7 @@ pub(crate) fn get_physical_device_image_format_properties(
     flags: vk::ImageCreateFlags,
     image_format_properties: &mut vk::ImageFormatProperties,
 ) -> Result<vk::Result, Error> {
-    let query = ImageQuery {
-        format,
-        ty,
-        tiling,
-        usage,
-        flags,
-    };
+    let query = ImageQuery { format, ty, tiling, usage, flags };
     image_format_answer(query, image_format_properties)
 }
 
@@ -145,9 +128,7 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
 ) -> Result<vk::Result, Error> {
     let info = image_format_info;
     // SAFETY: the caller's promise.
-    let external = unsafe {
-        valid::find_in_chain::<vk::PhysicalDeviceExternalImageFormatInfo<'_>>(info.p_next)
-    };
+    let external = unsafe { valid::find_in_chain::<vk::PhysicalDeviceExternalImageFormatInfo<'_>>(info.p_next) };
     if external.is_some_and(|external| !external.handle_type.is_empty()) {
         image_format_properties.image_format_properties = vk::ImageFormatProperties::default();
         return Ok(vk::Result::ERROR_FORMAT_NOT_SUPPORTED);
@@ -170,8 +151,8 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
 }
 
 #[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties")]
-pub(crate) fn get_physical_device_sparse_image_format_properties()
--> Result<[vk::SparseImageFormatProperties; 0], Error> {
+pub(crate) fn get_physical_device_sparse_image_format_properties() -> Result<[vk::SparseImageFormatProperties; 0], Error>
+{
     Ok([])
 }
 
@@ -201,8 +182,7 @@ pub(crate) fn get_physical_device_queue_family_properties2(
 }
 
 #[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]
-pub(crate) fn get_physical_device_memory_properties()
--> Result<vk::PhysicalDeviceMemoryProperties, Error> {
+pub(crate) fn get_physical_device_memory_properties() -> Result<vk::PhysicalDeviceMemoryProperties, Error> {
     Ok(memory::properties())
 }
 
@@ -280,18 +260,12 @@ pub(crate) unsafe fn enumerate_performance_query_counters(
     counters: *mut vk::PerformanceCounterKHR<'_>,
     counter_descriptions: *mut vk::PerformanceCounterDescriptionKHR<'_>,
 ) -> Result<vk::Result, Error> {
-    let available = if queue_family_index == QUEUE_FAMILY {
-        counters::COUNT
-    } else {
-        0
-    };
+    let available = if queue_family_index == QUEUE_FAMILY { counters::COUNT } else { 0 };
     // SAFETY: the caller's promise.
     unsafe {
         if !counters.is_null() {
             let mut room = *valid::input(counter_count)?;
-            Structures::new(&raw mut room, counter_descriptions)?
-                .fill(available, counters::describe)
-                .map(drop)?;
+            Structures::new(&raw mut room, counter_descriptions)?.fill(available, counters::describe).map(drop)?;
         }
         Structures::new(counter_count, counters)?.fill(available, counters::fill)
     }

@@ -26,19 +26,9 @@ impl ComputePipeline {
     /// # Errors
     /// [`Error::InvalidShader`] if it is malformed or asks for what the device lacks; [`Error::InvalidUsage`] if it
     /// does not fit the layout.
-    pub(crate) fn new(
-        device: &Device,
-        layout: &PipelineLayout,
-        stage: &ShaderStage,
-    ) -> Result<Self, Error> {
-        let subgroup_size = stage
-            .required_subgroup_size
-            .unwrap_or(limits::SUBGROUP_SIZE);
-        let options = Options {
-            subgroup_size,
-            unsized_descriptors: layout.longest_binding(),
-            ..Options::default()
-        };
+    pub(crate) fn new(device: &Device, layout: &PipelineLayout, stage: &ShaderStage) -> Result<Self, Error> {
+        let subgroup_size = stage.required_subgroup_size.unwrap_or(limits::SUBGROUP_SIZE);
+        let options = Options { subgroup_size, unsized_descriptors: layout.longest_binding(), ..Options::default() };
         let shader = stage.translate(Stage::Compute, &options)?;
         let interface = &shader.interface;
         layout.check(interface)?;
@@ -55,50 +45,36 @@ impl ComputePipeline {
         }
         let inputs = inputs(interface);
         let resources = ProgramResources::new(device, interface);
-        let program = ComputeProgram::new(
-            device.simulated().level(),
-            shader.program,
-            invocations,
-            subgroup_size,
-            inputs,
-        )
-        .map_err(|error| Error::InvalidShader(error.to_string()))?;
-        Ok(Self {
-            program: Arc::new(program),
-            resources,
-        })
+        let program =
+            ComputeProgram::new(device.simulated().level(), shader.program, invocations, subgroup_size, inputs)
+                .map_err(|error| Error::InvalidShader(error.to_string()))?;
+        Ok(Self { program: Arc::new(program), resources })
     }
 }
 
 /// The number of invocations of a workgroup.
 fn invocations(interface: &Interface) -> Result<u32, Error> {
     let size = interface.workgroup_size;
-    let product = size
-        .into_iter()
-        .try_fold(1u32, |product, size| product.checked_mul(size));
+    let product = size.into_iter().try_fold(1u32, |product, size| product.checked_mul(size));
     let fits = std::iter::zip(size, limits::MAX_WORKGROUP_SIZE).all(|(size, max)| size <= max);
-    product
-        .filter(|product| fits && (1..=limits::MAX_WORKGROUP_INVOCATIONS).contains(product))
-        .ok_or_else(|| {
-            Error::InvalidShader(format!(
-                "a workgroup of {size:?} is larger than {:?} with at most {} invocations",
-                limits::MAX_WORKGROUP_SIZE,
-                limits::MAX_WORKGROUP_INVOCATIONS
-            ))
-        })
+    product.filter(|product| fits && (1..=limits::MAX_WORKGROUP_INVOCATIONS).contains(product)).ok_or_else(|| {
+        Error::InvalidShader(format!(
+            "a workgroup of {size:?} is larger than {:?} with at most {} invocations",
+            limits::MAX_WORKGROUP_SIZE,
+            limits::MAX_WORKGROUP_INVOCATIONS
+        ))
+    })
 }
 
 /// The values that the device gives to the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
     let input = |input: &Input| match input.source {
-        InputSource::BuiltIn {
-            built_in: BuiltIn::WorkgroupId,
-            component,
-        } => Some(ComputeInput::WorkgroupId(component as usize % 3)),
-        InputSource::BuiltIn {
-            built_in: BuiltIn::NumWorkgroups,
-            component,
-        } => Some(ComputeInput::WorkgroupCount(component as usize % 3)),
+        InputSource::BuiltIn { built_in: BuiltIn::WorkgroupId, component } => {
+            Some(ComputeInput::WorkgroupId(component as usize % 3))
+        }
+        InputSource::BuiltIn { built_in: BuiltIn::NumWorkgroups, component } => {
+            Some(ComputeInput::WorkgroupCount(component as usize % 3))
+        }
         _ => None,
     };
     interface.inputs.iter().map(input).collect()

@@ -46,9 +46,8 @@ pub(super) unsafe fn read(
         gathered.claim(parts)?;
         if let Some(state) = valid::optional(info.p_dynamic_state) {
             let dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
-            let own = dynamic.iter().filter(|&&state| {
-                dynamic_state::part(state).is_none_or(|part| parts.contains(part))
-            });
+            let own =
+                dynamic.iter().filter(|&&state| dynamic_state::part(state).is_none_or(|part| parts.contains(part)));
             gathered.dynamic.extend(own);
         }
         let shaders = Parts::PRE_RASTERIZATION_SHADERS | Parts::FRAGMENT_SHADER;
@@ -79,8 +78,7 @@ pub(super) unsafe fn read(
             // interface has them.
             let is_unknown = info.render_pass == vk::RenderPass::null() && !has_output;
             if subpass.has_depth_stencil || is_unknown {
-                gathered.fragment_shader.depth_stencil =
-                    valid::optional(info.p_depth_stencil_state).map(depth_stencil);
+                gathered.fragment_shader.depth_stencil = valid::optional(info.p_depth_stencil_state).map(depth_stencil);
             }
         }
         if has_output {
@@ -96,14 +94,10 @@ pub(super) unsafe fn read(
 /// The create info and its chain are valid.
 unsafe fn parts(info: &vk::GraphicsPipelineCreateInfo<'_>, has_libraries: bool) -> Parts {
     // SAFETY: the caller's promise.
-    let given = unsafe {
-        valid::find_in_chain::<vk::GraphicsPipelineLibraryCreateInfoEXT<'_>>(info.p_next)
-    };
+    let given = unsafe { valid::find_in_chain::<vk::GraphicsPipelineLibraryCreateInfoEXT<'_>>(info.p_next) };
     match given {
         Some(given) => given.flags & all_parts(),
-        None if has_libraries || info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) => {
-            Parts::empty()
-        }
+        None if has_libraries || info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) => Parts::empty(),
         None => all_parts(),
     }
 }
@@ -151,24 +145,12 @@ unsafe fn read_vertex_input(
     unsafe {
         if !is_dynamic && let Some(state) = valid::optional(info.p_vertex_input_state) {
             let (bindings, attributes) = (
-                valid::slice(
-                    state.p_vertex_binding_descriptions,
-                    state.vertex_binding_description_count,
-                )?,
-                valid::slice(
-                    state.p_vertex_attribute_descriptions,
-                    state.vertex_attribute_description_count,
-                )?,
+                valid::slice(state.p_vertex_binding_descriptions, state.vertex_binding_description_count)?,
+                valid::slice(state.p_vertex_attribute_descriptions, state.vertex_attribute_description_count)?,
             );
-            let divisors = valid::find_in_chain::<
-                vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>,
-            >(state.p_next);
-            let divisors = divisors.map(|state| {
-                valid::slice(
-                    state.p_vertex_binding_divisors,
-                    state.vertex_binding_divisor_count,
-                )
-            });
+            let divisors = valid::find_in_chain::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(state.p_next);
+            let divisors =
+                divisors.map(|state| valid::slice(state.p_vertex_binding_divisors, state.vertex_binding_divisor_count));
             own.input = VertexInput {
                 bindings: bindings.to_vec(),
                 divisors: divisors.transpose()?.unwrap_or_default().to_vec(),
@@ -196,61 +178,44 @@ unsafe fn read_rasterization(
     // SAFETY: the caller's promise.
     unsafe {
         own.gaussian =
-            valid::find_in_chain::<gvk::PipelineGaussianStateCreateInfoGAURAST<'_>>(info.p_next)
-                .map(gaussian);
-        own.approximation = valid::find_in_chain::<
-            gvk::PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
-        >(info.p_next)
+            valid::find_in_chain::<gvk::PipelineGaussianStateCreateInfoGAURAST<'_>>(info.p_next).map(gaussian);
+        own.approximation = valid::find_in_chain::<gvk::PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(
+            info.p_next,
+        )
         .map(|state| {
             unchained!(
                 state,
-                gvk::PipelineGaussianApproximationStateCreateInfoGAURAST {
-                    exponential_error,
-                    contribution_budget,
-                }
+                gvk::PipelineGaussianApproximationStateCreateInfoGAURAST { exponential_error, contribution_budget }
             )
         });
-        own.footprint = valid::find_in_chain::<
-            gvk::PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
-        >(info.p_next)
-        .map(|state| {
-            unchained!(
-                state,
-                gvk::PipelineGaussianFootprintStateCreateInfoGAURAST {
-                    cut_off,
-                    cut_off_deviations,
-                    compensation_floor,
-                }
-            )
-        });
+        own.footprint = valid::find_in_chain::<gvk::PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(info.p_next)
+            .map(|state| {
+                unchained!(
+                    state,
+                    gvk::PipelineGaussianFootprintStateCreateInfoGAURAST {
+                        cut_off,
+                        cut_off_deviations,
+                        compensation_floor,
+                    }
+                )
+            });
         if tessellates && let Some(state) = valid::optional(info.p_tessellation_state) {
             own.patch_control_points = state.patch_control_points;
-            let origin = valid::find_in_chain::<
-                vk::PipelineTessellationDomainOriginStateCreateInfo<'_>,
-            >(state.p_next);
-            own.lower_left_domain = origin.is_some_and(|state| {
-                state.domain_origin == vk::TessellationDomainOrigin::LOWER_LEFT
-            });
+            let origin = valid::find_in_chain::<vk::PipelineTessellationDomainOriginStateCreateInfo<'_>>(state.p_next);
+            own.lower_left_domain =
+                origin.is_some_and(|state| state.domain_origin == vk::TessellationDomainOrigin::LOWER_LEFT);
         }
         if let Some(state) = valid::optional(info.p_rasterization_state) {
             own.rasterization = rasterization(state);
-            let provoking = valid::find_in_chain::<
-                vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>,
-            >(state.p_next);
-            own.provoking_last = provoking.is_some_and(|state| {
-                state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
-            });
-            let stream = valid::find_in_chain::<
-                vk::PipelineRasterizationStateStreamCreateInfoEXT<'_>,
-            >(state.p_next);
+            let provoking =
+                valid::find_in_chain::<vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>>(state.p_next);
+            own.provoking_last =
+                provoking.is_some_and(|state| state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX);
+            let stream = valid::find_in_chain::<vk::PipelineRasterizationStateStreamCreateInfoEXT<'_>>(state.p_next);
             own.rasterized_stream = stream.map_or(0, |state| state.rasterization_stream);
-            let clip = valid::find_in_chain::<
-                vk::PipelineRasterizationDepthClipStateCreateInfoEXT<'_>,
-            >(state.p_next);
+            let clip = valid::find_in_chain::<vk::PipelineRasterizationDepthClipStateCreateInfoEXT<'_>>(state.p_next);
             own.depth_clip = clip.map(|state| state.depth_clip_enable != vk::FALSE);
-            let lines = valid::find_in_chain::<vk::PipelineRasterizationLineStateCreateInfoKHR<'_>>(
-                state.p_next,
-            );
+            let lines = valid::find_in_chain::<vk::PipelineRasterizationLineStateCreateInfoKHR<'_>>(state.p_next);
             own.lines = lines.map(line_rasterization).unwrap_or_default();
         }
         if !gathered.discards()
@@ -279,11 +244,8 @@ unsafe fn read_viewports(
     own.scissor_count = state.scissor_count;
     // SAFETY: the caller's promise; a null pointer is not followed.
     unsafe {
-        let control = valid::find_in_chain::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(
-            state.p_next,
-        );
-        own.negative_one_to_one =
-            control.is_some_and(|control| control.negative_one_to_one != vk::FALSE);
+        let control = valid::find_in_chain::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next);
+        own.negative_one_to_one = control.is_some_and(|control| control.negative_one_to_one != vk::FALSE);
         if !dynamic_viewports && !state.p_viewports.is_null() {
             own.viewports = valid::slice(state.p_viewports, state.viewport_count)?.to_vec();
         }
@@ -325,8 +287,7 @@ unsafe fn read_output(
             if !has_dynamic_blending {
                 own.blend = valid::slice(state.p_attachments, state.attachment_count)?.to_vec();
             }
-            let writes =
-                valid::find_in_chain::<vk::PipelineColorWriteCreateInfoEXT<'_>>(state.p_next);
+            let writes = valid::find_in_chain::<vk::PipelineColorWriteCreateInfoEXT<'_>>(state.p_next);
             if let Some(writes) = writes
                 && !dynamic_enables
             {
@@ -355,10 +316,7 @@ impl Subpass {
     ///
     /// # Safety
     /// The create info and its chain are valid.
-    unsafe fn new(
-        info: &vk::GraphicsPipelineCreateInfo<'_>,
-        reads_formats: bool,
-    ) -> Result<Self, Error> {
+    unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>, reads_formats: bool) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
         unsafe {
             if let Some(render_pass) = handle::get_optional(info.render_pass)? {
@@ -376,21 +334,13 @@ impl Subpass {
                     view_mask: subpass.view_mask,
                 });
             }
-            let Some(rendering) =
-                valid::find_in_chain::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next)
-            else {
+            let Some(rendering) = valid::find_in_chain::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next) else {
                 return Ok(Self::default());
             };
             if !reads_formats {
-                return Ok(Self {
-                    view_mask: rendering.view_mask,
-                    ..Self::default()
-                });
+                return Ok(Self { view_mask: rendering.view_mask, ..Self::default() });
             }
-            let color = valid::slice(
-                rendering.p_color_attachment_formats,
-                rendering.color_attachment_count,
-            )?;
+            let color = valid::slice(rendering.p_color_attachment_formats, rendering.color_attachment_count)?;
             let undefined = vk::Format::UNDEFINED;
             Ok(Self {
                 color_formats: color.to_vec(),
@@ -458,9 +408,7 @@ fn depth_stencil(
 }
 
 /// Multisample state without the pointer to the mask.
-fn multisample(
-    state: &vk::PipelineMultisampleStateCreateInfo<'_>,
-) -> vk::PipelineMultisampleStateCreateInfo<'static> {
+fn multisample(state: &vk::PipelineMultisampleStateCreateInfo<'_>) -> vk::PipelineMultisampleStateCreateInfo<'static> {
     let copy = unchained!(
         state,
         vk::PipelineMultisampleStateCreateInfo {
@@ -473,10 +421,7 @@ fn multisample(
             alpha_to_one_enable,
         }
     );
-    vk::PipelineMultisampleStateCreateInfo {
-        p_sample_mask: std::ptr::null(),
-        ..copy
-    }
+    vk::PipelineMultisampleStateCreateInfo { p_sample_mask: std::ptr::null(), ..copy }
 }
 
 fn gaussian(

@@ -26,18 +26,14 @@ pub(super) trait GaussianStates {
 impl GaussianStates for vk::DynamicState {
     const GAUSSIAN_ORDER: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST;
     const GAUSSIAN_ANTIALIASING: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST;
-    const GAUSSIAN_LOW_PASS_VARIANCE: Self =
-        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST;
+    const GAUSSIAN_LOW_PASS_VARIANCE: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST;
     const GAUSSIAN_ALPHA_FLOOR: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST;
     const GAUSSIAN_ALPHA_CEILING: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST;
-    const GAUSSIAN_TRANSMITTANCE_FLOOR: Self =
-        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST;
+    const GAUSSIAN_TRANSMITTANCE_FLOOR: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST;
     const GAUSSIAN_SPHERICAL_HARMONICS_DEGREE: Self =
         gaurast::vk::DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST;
-    const GAUSSIAN_EXPONENTIAL_ERROR: Self =
-        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST;
-    const GAUSSIAN_CONTRIBUTION_BUDGET: Self =
-        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST;
+    const GAUSSIAN_EXPONENTIAL_ERROR: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST;
+    const GAUSSIAN_CONTRIBUTION_BUDGET: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST;
 }
 
 /// Reports whether a state is one of the extension's.
@@ -303,9 +299,7 @@ fn row(state: vk::DynamicState) -> Option<&'static Row> {
 /// state.
 pub(crate) fn part(state: vk::DynamicState) -> Option<Parts> {
     let of_looked_up = || LOOKED_UP.iter().find(|(other, _)| *other == state);
-    row(state)
-        .map(|row| row.part)
-        .or_else(|| of_looked_up().map(|(_, part)| *part))
+    row(state).map(|row| row.part).or_else(|| of_looked_up().map(|(_, part)| *part))
 }
 
 /// Reports whether the driver supports a dynamic state.
@@ -334,9 +328,7 @@ pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
 /// The faces of a mask.
 pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
     let flags = [vk::StencilFaceFlags::FRONT, vk::StencilFaceFlags::BACK];
-    (0..)
-        .zip(flags)
-        .filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
+    (0..).zip(flags).filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
 }
 
 /// The states that a command buffer has set so far, with the last value of each.
@@ -361,11 +353,7 @@ impl DynamicStates {
     ///
     /// # Errors
     /// The first state that is not set but needed by the draw.
-    pub(crate) fn apply(
-        &self,
-        dynamic: &[vk::DynamicState],
-        fixed: &mut Fixed,
-    ) -> Result<(), vk::DynamicState> {
+    pub(crate) fn apply(&self, dynamic: &[vk::DynamicState], fixed: &mut Fixed) -> Result<(), vk::DynamicState> {
         let mut missing = Vec::new();
         for &state in dynamic {
             let mut values = self.of(state).peekable();
@@ -396,10 +384,7 @@ mod tests {
         let width = DynamicState::LineWidth { width: 3.0 };
         states.set(width);
         let of = |state| states.of(state).collect::<Vec<_>>();
-        assert_eq!(
-            of(vk::DynamicState::STENCIL_REFERENCE),
-            [reference(0, 1), reference(1, 2)]
-        );
+        assert_eq!(of(vk::DynamicState::STENCIL_REFERENCE), [reference(0, 1), reference(1, 2)]);
         assert_eq!(of(vk::DynamicState::LINE_WIDTH), [width]);
         assert!(of(vk::DynamicState::DEPTH_BIAS).is_empty());
     }

@@ -41,10 +41,7 @@ impl PipelineLayout {
                 ));
             }
         }
-        Ok(Self {
-            set_layouts,
-            push_constants: push_constants.to_vec(),
-        })
+        Ok(Self { set_layouts, push_constants: push_constants.to_vec() })
     }
 
     /// The sets and push constants of two layouts. The layouts of a pipeline's libraries agree on a set that both have.
@@ -70,25 +67,14 @@ impl PipelineLayout {
     pub(crate) fn set_layout(&self, set: u32) -> Result<&Arc<DescriptorSetLayout>, Error> {
         let layout = self.set_layouts.get(set as usize).and_then(Option::as_ref);
         layout.ok_or_else(|| {
-            Error::usage(
-                "VUID-vkCmdBindDescriptorSets-firstSet-00360",
-                format!("the pipeline layout has no set {set}"),
-            )
+            Error::usage("VUID-vkCmdBindDescriptorSets-firstSet-00360", format!("the pipeline layout has no set {set}"))
         })
     }
 
     /// The most descriptors of a binding: the greatest length of a descriptor array without one.
     pub(crate) fn longest_binding(&self) -> u32 {
-        let bindings = self
-            .set_layouts
-            .iter()
-            .flatten()
-            .flat_map(|set| set.bindings());
-        bindings
-            .map(|binding| binding.count)
-            .max()
-            .unwrap_or(0)
-            .max(1)
+        let bindings = self.set_layouts.iter().flatten().flat_map(|set| set.bindings());
+        bindings.map(|binding| binding.count).max().unwrap_or(0).max(1)
     }
 
     /// Checks that the layout has the resources that a shader uses.
@@ -111,9 +97,7 @@ impl PipelineLayout {
     pub(super) fn mismatches(&self, interface: &Interface) -> Vec<String> {
         let stage = interface.stage;
         let descriptors = interface.descriptors.iter();
-        let mut found: Vec<String> = descriptors
-            .filter_map(|wanted| self.descriptor_mismatch(stage, wanted))
-            .collect();
+        let mut found: Vec<String> = descriptors.filter_map(|wanted| self.descriptor_mismatch(stage, wanted)).collect();
         if let Some(bytes) = &interface.push_constants
             && !self.has_push_constants(stage, bytes)
         {
@@ -135,21 +119,14 @@ impl PipelineLayout {
         let name = name.map_or_else(String::new, |name| format!(" (\"{name}\")"));
         let place = format!("set {}, binding {}{name}", wanted.set, wanted.binding);
         let Some((given, given_kind)) = given else {
-            return Some(format!(
-                "the {stage} shader uses {place}, which the pipeline layout doesn't have"
-            ));
+            return Some(format!("the {stage} shader uses {place}, which the pipeline layout doesn't have"));
         };
         if !given.stages.contains(stage_flag(stage)) {
-            return Some(format!(
-                "{place} of the pipeline layout isn't visible to the {stage} stage"
-            ));
+            return Some(format!("{place} of the pipeline layout isn't visible to the {stage} stage"));
         }
         // A combined descriptor can be used as either of its parts.
         let is_part = given_kind == DescriptorKind::CombinedImageSampler
-            && matches!(
-                wanted.kind,
-                DescriptorKind::SampledImage | DescriptorKind::Sampler
-            );
+            && matches!(wanted.kind, DescriptorKind::SampledImage | DescriptorKind::Sampler);
         if wanted.kind != given_kind && !is_part {
             return Some(format!(
                 "{place} is a {:?} in the {stage} shader, but a {given_kind:?} in the pipeline layout",

@@ -7,22 +7,19 @@
 //! too, and so are the outputs that transform feedback captures.
 
 use super::link_primitives::{
-    self, Given, TessellationShaders, carry_written, components_written, given, gives_memory,
-    output_given,
+    self, Given, TessellationShaders, carry_written, components_written, given, gives_memory, output_given,
 };
-use super::varyings::{
-    InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs,
-};
+use super::varyings::{InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs};
 use crate::abi::error::Error;
 use gaurast_spirv::{
-    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
-    Sampling, ScalarType, Shader,
+    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling, ScalarType,
+    Shader,
 };
 use simdevice::isa::ir::Output as ProgramOutput;
 use simdevice::program::interface;
 use simdevice::program::interface::{
-    CapturedOutputs, CapturedValue, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms,
-    VertexInput, VertexOutput,
+    CapturedOutputs, CapturedValue, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput,
+    VertexOutput,
 };
 
 /// The shaders of a pipeline's stages.
@@ -66,12 +63,7 @@ pub(crate) fn link(
     }
     let read = varyings.len() as u32;
     let captured = carry_captured(last, &mut varyings);
-    let StageShaders {
-        vertex,
-        tessellation,
-        geometry,
-        fragment,
-    } = shaders;
+    let StageShaders { vertex, tessellation, geometry, fragment } = shaders;
     // The values that each stage gives to a stage of primitives after it.
     let control = tessellation.as_ref().map(|it| &it.control);
     let next = control.or(geometry.as_ref());
@@ -92,9 +84,8 @@ pub(crate) fn link(
             let given = of_vertices.as_ref().unwrap_or(&none);
             link_primitives::tessellation(shaders, given, |target| output(target, &of_evaluation))
         }),
-        geometry: geometry.map(|shader| {
-            link_primitives::geometry(shader, of_last.unwrap_or(&none), &varyings, live_outputs)
-        }),
+        geometry: geometry
+            .map(|shader| link_primitives::geometry(shader, of_last.unwrap_or(&none), &varyings, live_outputs)),
         fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, live_outputs)),
         ..programs
     })
@@ -113,19 +104,13 @@ pub(crate) fn link_projection(
     let varyings: Varyings = components.iter().copied().zip(0..).collect();
     Ok(DrawPrograms {
         varyings: components.len() as u32,
-        ..vertex_programs(vertex, stream, |target| {
-            vertex_output(target, &varyings, LiveOutputs::default())
-        })
+        ..vertex_programs(vertex, stream, |target| vertex_output(target, &varyings, LiveOutputs::default()))
     })
 }
 
 /// Links a fragment program that computes colours from the accumulated values of Gaussians. `varyings` gives their
 /// numbers.
-pub(crate) fn link_resolve(
-    fragment: Shader,
-    varyings: &Varyings,
-    live_outputs: LiveOutputs<'_>,
-) -> FragmentPrograms {
+pub(crate) fn link_resolve(fragment: Shader, varyings: &Varyings, live_outputs: LiveOutputs<'_>) -> FragmentPrograms {
     fragment_programs(fragment, varyings, live_outputs)
 }
 
@@ -135,21 +120,10 @@ fn vertex_programs(
     stream: impl Fn(u32) -> Option<usize>,
     meaning: impl Fn(OutputTarget) -> Option<VertexOutput>,
 ) -> DrawPrograms {
-    let Shader {
-        program: mut vertex,
-        interface,
-    } = vertex;
-    let vertex_inputs: Vec<_> = interface
-        .inputs
-        .iter()
-        .map(|input| vertex_input(input, &stream))
-        .collect();
+    let Shader { program: mut vertex, interface } = vertex;
+    let vertex_inputs: Vec<_> = interface.inputs.iter().map(|input| vertex_input(input, &stream)).collect();
     zero_inputs(&mut vertex, &vertex_inputs);
-    let vertex_outputs: Vec<_> = interface
-        .outputs
-        .iter()
-        .map(|output| meaning(output.target))
-        .collect();
+    let vertex_outputs: Vec<_> = interface.outputs.iter().map(|output| meaning(output.target)).collect();
     drop_outputs(&mut vertex, &vertex_outputs);
     DrawPrograms {
         vertex,
@@ -163,29 +137,16 @@ fn vertex_programs(
     }
 }
 
-fn fragment_programs(
-    fragment: Shader,
-    varyings: &Varyings,
-    live_outputs: LiveOutputs<'_>,
-) -> FragmentPrograms {
-    let Shader {
-        mut program,
-        interface,
-    } = fragment;
-    let inputs: Vec<_> = interface
-        .inputs
-        .iter()
-        .map(|input| fragment_input(input, varyings, live_outputs.views))
-        .collect();
+fn fragment_programs(fragment: Shader, varyings: &Varyings, live_outputs: LiveOutputs<'_>) -> FragmentPrograms {
+    let Shader { mut program, interface } = fragment;
+    let inputs: Vec<_> =
+        interface.inputs.iter().map(|input| fragment_input(input, varyings, live_outputs.views)).collect();
     zero_inputs(&mut program, &inputs);
     let keeps_depth = interface.depth == DepthMode::NotWritten;
     let outputs: Vec<_> = interface
         .outputs
         .iter()
-        .map(|output| {
-            fragment_output(output, live_outputs)
-                .filter(|it| !(keeps_depth && *it == FragmentOutput::Depth))
-        })
+        .map(|output| fragment_output(output, live_outputs).filter(|it| !(keeps_depth && *it == FragmentOutput::Depth)))
         .collect();
     drop_outputs(&mut program, &outputs);
     FragmentPrograms {
@@ -204,15 +165,11 @@ fn check_attributes(vertex: &Interface) -> Result<(), Error> {
     let is_wide = |input: &Input| {
         matches!(
             input.numeric,
-            ScalarType::Float { width: 64 }
-                | ScalarType::Int { width: 64 }
-                | ScalarType::Uint { width: 64 }
+            ScalarType::Float { width: 64 } | ScalarType::Int { width: 64 } | ScalarType::Uint { width: 64 }
         )
     };
     if vertex.inputs.iter().any(is_wide) {
-        return Err(Error::FeatureNotPresent(
-            "an input of 64 bits in the vertex shader".into(),
-        ));
+        return Err(Error::FeatureNotPresent("an input of 64 bits in the vertex shader".into()));
     }
     Ok(())
 }
@@ -233,11 +190,7 @@ fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
 /// are written to varyings as well.
 fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
     for input in &mut fragment.interface.inputs {
-        let InputSource::BuiltIn {
-            built_in,
-            component,
-        } = input.source
-        else {
+        let InputSource::BuiltIn { built_in, component } = input.source else {
             continue;
         };
         let Some(location) = location_of_distance(built_in) else {
@@ -249,10 +202,7 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
             interpolation: Interpolation::Perspective,
             sampling: Sampling::Center,
         };
-        let written = OutputTarget::BuiltIn {
-            built_in,
-            component,
-        };
+        let written = OutputTarget::BuiltIn { built_in, component };
         carry(vertex, written, (location, component));
     }
 }
@@ -269,10 +219,7 @@ fn carry_captured(last: &mut Shader, varyings: &mut Varyings) -> Option<Captured
     for scalar in &feedback.scalars {
         let place = (LOCATION_OF_CAPTURED, captured.varyings);
         if carry(last, scalar.target, place).is_some() {
-            let value = CapturedValue {
-                offset: scalar.offset,
-                varying: first + captured.varyings,
-            };
+            let value = CapturedValue { offset: scalar.offset, varying: first + captured.varyings };
             varyings.insert(place, value.varying);
             captured.varyings += 1;
             captured.buffers[scalar.buffer as usize].values.push(value);
@@ -282,16 +229,8 @@ fn carry_captured(last: &mut Shader, varyings: &mut Varyings) -> Option<Captured
 }
 
 /// Writes an output to a place as well. `None` if the stage never writes it.
-fn carry(
-    shader: &mut Shader,
-    written: OutputTarget,
-    (location, component): InterfaceComponent,
-) -> Option<()> {
-    let target = OutputTarget::Location {
-        location,
-        component,
-        index: 0,
-    };
+fn carry(shader: &mut Shader, written: OutputTarget, (location, component): InterfaceComponent) -> Option<()> {
+    let target = OutputTarget::Location { location, component, index: 0 };
     if gives_memory(&shader.interface) {
         return carry_written(&mut shader.interface, written, target);
     }
@@ -299,23 +238,16 @@ fn carry(
     let slot = outputs.iter().position(|output| output.target == written)?;
     let mut program_outputs = shader.program.outputs.iter();
     let output = program_outputs.find(|output| output.slot as usize == slot)?;
-    let output = ProgramOutput {
-        slot: outputs.len() as u32,
-        reg: output.reg,
-    };
+    let output = ProgramOutput { slot: outputs.len() as u32, reg: output.reg };
     shader.program.outputs.push(output);
-    outputs.push(Output {
-        target,
-        numeric: outputs[slot].numeric,
-    });
+    outputs.push(Output { target, numeric: outputs[slot].numeric });
     Some(())
 }
 
 /// Numbers the components that the vertex stage writes and the fragment stage reads, in order.
 fn varyings_read(vertex: &Interface, fragment: &Interface) -> Varyings {
-    let mut components: Vec<InterfaceComponent> = components_read(fragment)
-        .filter(|place| writes(vertex, *place))
-        .collect();
+    let mut components: Vec<InterfaceComponent> =
+        components_read(fragment).filter(|place| writes(vertex, *place)).collect();
     components.sort_unstable();
     components.dedup();
     components.into_iter().zip(0..).collect()
@@ -323,9 +255,8 @@ fn varyings_read(vertex: &Interface, fragment: &Interface) -> Varyings {
 
 /// The components that the fragment stage reads and the vertex stage doesn't write, in the order of its inputs.
 pub(super) fn unwritten(vertex: &Interface, fragment: &Interface) -> Vec<InterfaceComponent> {
-    let mut components: Vec<InterfaceComponent> = components_read(fragment)
-        .filter(|place| !writes(vertex, *place))
-        .collect();
+    let mut components: Vec<InterfaceComponent> =
+        components_read(fragment).filter(|place| !writes(vertex, *place)).collect();
     components.dedup();
     components
 }
@@ -334,11 +265,7 @@ pub(super) fn unwritten(vertex: &Interface, fragment: &Interface) -> Vec<Interfa
 fn components_read(interface: &Interface) -> impl Iterator<Item = InterfaceComponent> {
     let inputs = interface.inputs.iter();
     inputs.filter_map(|input| match input.source {
-        InputSource::Location {
-            location,
-            component,
-            ..
-        } => Some((location, component)),
+        InputSource::Location { location, component, .. } => Some((location, component)),
         InputSource::BuiltIn { .. } | InputSource::Patch => None,
     })
 }
@@ -350,14 +277,9 @@ fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
 
 fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<VertexInput> {
     match input.source {
-        InputSource::Location {
-            location,
-            component,
-            ..
-        } => Some(VertexInput::Attribute {
-            stream: stream(location)?,
-            component: component as usize,
-        }),
+        InputSource::Location { location, component, .. } => {
+            Some(VertexInput::Attribute { stream: stream(location)?, component: component as usize })
+        }
         InputSource::BuiltIn { built_in, .. } => match built_in {
             BuiltIn::VertexIndex => Some(VertexInput::VertexIndex),
             BuiltIn::InstanceIndex => Some(VertexInput::InstanceIndex),
@@ -374,14 +296,8 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
 
 fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<FragmentInput> {
     match input.source {
-        InputSource::Location {
-            location,
-            component,
-            interpolation,
-            sampling,
-        } => varyings
-            .get(&(location, component))
-            .map(|&index| FragmentInput::Varying {
+        InputSource::Location { location, component, interpolation, sampling } => {
+            varyings.get(&(location, component)).map(|&index| FragmentInput::Varying {
                 index,
                 interpolation: match interpolation {
                     Interpolation::Perspective => interface::Interpolation::Perspective,
@@ -393,11 +309,9 @@ fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<Fra
                     Sampling::Centroid => interface::Sampling::Centroid,
                     Sampling::Sample => interface::Sampling::Sample,
                 },
-            }),
-        InputSource::BuiltIn {
-            built_in,
-            component,
-        } => {
+            })
+        }
+        InputSource::BuiltIn { built_in, component } => {
             let component = component as usize;
             match built_in {
                 BuiltIn::FragCoord => Some(FragmentInput::FragCoord(component)),
@@ -420,23 +334,16 @@ fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<Fra
 
 fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<FragmentOutput> {
     match output.target {
-        OutputTarget::Location {
-            location,
-            component,
-            index,
-        } => {
-            let has_effect = live_outputs.color.get(location as usize) == Some(&true)
-                && (index == 0 || live_outputs.second_source);
+        OutputTarget::Location { location, component, index } => {
+            let has_effect =
+                live_outputs.color.get(location as usize) == Some(&true) && (index == 0 || live_outputs.second_source);
             has_effect.then_some(FragmentOutput::Color {
                 attachment: location as usize,
                 component: component as usize,
                 index: index as usize,
             })
         }
-        OutputTarget::BuiltIn {
-            built_in,
-            component,
-        } => match built_in {
+        OutputTarget::BuiltIn { built_in, component } => match built_in {
             BuiltIn::FragDepth => Some(FragmentOutput::Depth),
             BuiltIn::SampleMask if component == 0 => Some(FragmentOutput::SampleMask),
             _ => None,
@@ -469,32 +376,17 @@ mod tests {
     }
 
     fn to(location: u32, component: u32) -> Output {
-        Output {
-            target: OutputTarget::Location {
-                location,
-                component,
-                index: 0,
-            },
-            numeric: FLOAT,
-        }
+        Output { target: OutputTarget::Location { location, component, index: 0 }, numeric: FLOAT }
     }
 
     fn built_in(built_in: BuiltIn, component: u32) -> Output {
-        Output {
-            target: OutputTarget::BuiltIn {
-                built_in,
-                component,
-            },
-            numeric: FLOAT,
-        }
+        Output { target: OutputTarget::BuiltIn { built_in, component }, numeric: FLOAT }
     }
 
     /// A shader that copies its inputs to its outputs; further outputs are zero.
     fn shader(stage: Stage, inputs: Vec<Input>, outputs: Vec<Output>) -> Shader {
         let mut builder = Builder::new();
-        let read: Vec<_> = (0..inputs.len() as u32)
-            .map(|slot| builder.input(slot, Type::B32, Rate::Varying))
-            .collect();
+        let read: Vec<_> = (0..inputs.len() as u32).map(|slot| builder.input(slot, Type::B32, Rate::Varying)).collect();
         for slot in 0..outputs.len() {
             let output = builder.output(slot as u32, Type::B32);
             let value = match read.get(slot) {
@@ -526,12 +418,7 @@ mod tests {
     }
 
     fn stages(vertex: Shader, fragment: Option<Shader>) -> StageShaders {
-        StageShaders {
-            vertex,
-            tessellation: None,
-            geometry: None,
-            fragment,
-        }
+        StageShaders { vertex, tessellation: None, geometry: None, fragment }
     }
 
     #[test]
@@ -539,36 +426,14 @@ mod tests {
         let vertex = shader(
             Stage::Vertex,
             vec![at(7, 1), at(8, 0)],
-            vec![
-                built_in(BuiltIn::Position, 0),
-                to(2, 0),
-                to(0, 3),
-                to(5, 0),
-                built_in(BuiltIn::PointSize, 0),
-            ],
+            vec![built_in(BuiltIn::Position, 0), to(2, 0), to(0, 3), to(5, 0), built_in(BuiltIn::PointSize, 0)],
         );
-        let fragment = shader(
-            Stage::Fragment,
-            vec![at(2, 0), at(9, 0), at(0, 3)],
-            vec![to(0, 0), to(1, 0), to(0, 1)],
-        );
-        let live_outputs = LiveOutputs {
-            color: &[true, false],
-            ..LiveOutputs::default()
-        };
+        let fragment = shader(Stage::Fragment, vec![at(2, 0), at(9, 0), at(0, 3)], vec![to(0, 0), to(1, 0), to(0, 1)]);
+        let live_outputs = LiveOutputs { color: &[true, false], ..LiveOutputs::default() };
         let stream = |location| (location == 7).then_some(3);
         let linked = link(stages(vertex, Some(fragment)), stream, live_outputs).unwrap();
         assert_eq!(linked.varyings, 2);
-        assert_eq!(
-            linked.vertex_inputs,
-            [
-                Some(VertexInput::Attribute {
-                    stream: 3,
-                    component: 1
-                }),
-                None
-            ]
-        );
+        assert_eq!(linked.vertex_inputs, [Some(VertexInput::Attribute { stream: 3, component: 1 }), None]);
         assert_eq!(
             linked.vertex_outputs,
             [
@@ -596,13 +461,7 @@ mod tests {
         assert_eq!(fragment.inputs, [varying(1), None, varying(0)]);
         // An input that is never written is replaced by a constant zero.
         assert_eq!(slots(&fragment.program), (vec![0, 2], vec![0, 2]));
-        let color = |component| {
-            Some(FragmentOutput::Color {
-                attachment: 0,
-                component,
-                index: 0,
-            })
-        };
+        let color = |component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 });
         assert_eq!(fragment.outputs, [color(0), None, color(1)]);
     }
 
@@ -617,25 +476,11 @@ mod tests {
                 built_in(BuiltIn::CullDistance, 0),
             ],
         );
-        let read = |built_in, component| Input {
-            source: InputSource::BuiltIn {
-                built_in,
-                component,
-            },
-            numeric: FLOAT,
-        };
-        let inputs = vec![
-            read(BuiltIn::ClipDistance, 1),
-            read(BuiltIn::CullDistance, 0),
-            read(BuiltIn::CullDistance, 3),
-        ];
+        let read = |built_in, component| Input { source: InputSource::BuiltIn { built_in, component }, numeric: FLOAT };
+        let inputs =
+            vec![read(BuiltIn::ClipDistance, 1), read(BuiltIn::CullDistance, 0), read(BuiltIn::CullDistance, 3)];
         let fragment = shader(Stage::Fragment, inputs, vec![to(0, 0)]);
-        let linked = link(
-            stages(vertex, Some(fragment)),
-            |_| None,
-            LiveOutputs::default(),
-        )
-        .unwrap();
+        let linked = link(stages(vertex, Some(fragment)), |_| None, LiveOutputs::default()).unwrap();
         assert_eq!(linked.varyings, 2);
         let outputs = [
             VertexOutput::ClipDistance(0),

@@ -1,16 +1,13 @@
 //! Linking of tessellation and geometry programs: the exchange of vertices with the stages before and after them.
 
-use super::varyings::{
-    InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs,
-};
+use super::varyings::{InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs};
 use crate::abi::error::Error;
 use gaurast_spirv::{
-    BuiltIn, Domain, InputPrimitive, InputSource, Interface, MemoryScalar, OutputPrimitive,
-    OutputTarget, PrimitiveModes, Shader, Spacing, Stage, VertexMemory as ShaderMemory,
+    BuiltIn, Domain, InputPrimitive, InputSource, Interface, MemoryScalar, OutputPrimitive, OutputTarget,
+    PrimitiveModes, Shader, Spacing, Stage, VertexMemory as ShaderMemory,
 };
 use simdevice::program::interface::{
-    GeometryPrograms, PrimitiveInput, PrimitiveProgram, TessellationPrograms, VertexMemory,
-    VertexOutput, VertexValue,
+    GeometryPrograms, PrimitiveInput, PrimitiveProgram, TessellationPrograms, VertexMemory, VertexOutput, VertexValue,
 };
 use simdevice::state::Topology;
 use simdevice::tessellation::{self, Tessellation};
@@ -58,46 +55,28 @@ pub(super) fn tessellation(
     given: &Given,
     outputs: impl Fn(OutputTarget) -> Option<VertexOutput>,
 ) -> TessellationPrograms {
-    let TessellationShaders {
-        control,
-        evaluation,
-    } = shaders;
+    let TessellationShaders { control, evaluation } = shaders;
     let memory = &control.interface.exchange.outputs;
     let levels = |built_in, component| {
-        let target = OutputTarget::BuiltIn {
-            built_in,
-            component,
-        };
+        let target = OutputTarget::BuiltIn { built_in, component };
         let scalar = memory.scalars.iter().find(|it| it.target == target);
         scalar.map(|it| it.offset)
     };
     let outer_levels = [0, 1, 2, 3].map(|index| levels(BuiltIn::TessLevelOuter, index));
     let inner_levels = [0, 1].map(|index| levels(BuiltIn::TessLevelInner, index));
     let wanted = &evaluation.interface.exchange.inputs.scalars;
-    let taken: Vec<MemoryScalar> = memory
-        .scalars
-        .iter()
-        .copied()
-        .filter(|written| wanted.iter().any(|read| is_same(read, written)))
-        .collect();
+    let taken: Vec<MemoryScalar> =
+        memory.scalars.iter().copied().filter(|written| wanted.iter().any(|read| is_same(read, written))).collect();
     let gives = VertexMemory {
         start: memory.start,
         stride: memory.stride,
-        values: (0..)
-            .zip(&taken)
-            .map(|(number, it)| value(number, it))
-            .collect(),
+        values: (0..).zip(&taken).map(|(number, it)| value(number, it)).collect(),
     };
     let source = |read: &MemoryScalar| taken.iter().position(|written| is_same(read, written));
     let modes = [control.interface.modes, evaluation.interface.modes];
     let output_vertices = modes[0].output_vertices.unwrap_or(1);
     let mut evaluation = evaluation;
-    let meanings: Vec<_> = evaluation
-        .interface
-        .outputs
-        .iter()
-        .map(|output| outputs(output.target))
-        .collect();
+    let meanings: Vec<_> = evaluation.interface.outputs.iter().map(|output| outputs(output.target)).collect();
     drop_outputs(&mut evaluation.program, &meanings);
     TessellationPrograms {
         control: program(control, |read| position(given, read.target)),
@@ -120,11 +99,7 @@ pub(super) fn geometry(
 ) -> GeometryPrograms {
     let memory = &shader.interface.exchange.outputs;
     let modes = shader.interface.modes;
-    let mut gives = VertexMemory {
-        start: memory.start,
-        stride: memory.stride,
-        values: Vec::new(),
-    };
+    let mut gives = VertexMemory { start: memory.start, stride: memory.stride, values: Vec::new() };
     let mut outputs = Vec::new();
     for scalar in &memory.scalars {
         let meaning = vertex_output(scalar.target, varyings, live_outputs);
@@ -151,11 +126,7 @@ pub(super) fn geometry(
 }
 
 /// Gives an output of a geometry stage a second target. `None` if the stage never writes it.
-pub(super) fn carry_written(
-    interface: &mut Interface,
-    written: OutputTarget,
-    target: OutputTarget,
-) -> Option<()> {
+pub(super) fn carry_written(interface: &mut Interface, written: OutputTarget, target: OutputTarget) -> Option<()> {
     let scalars = &mut interface.exchange.outputs.scalars;
     let found = scalars.iter().find(|scalar| scalar.target == written);
     let scalar = MemoryScalar { target, ..*found? };
@@ -175,26 +146,12 @@ fn taken_corners(input: InputPrimitive) -> usize {
 }
 
 /// The program of a stage that takes vertices. `source` gives the number of the value that an input takes.
-fn program(
-    mut shader: Shader,
-    source: impl Fn(&MemoryScalar) -> Option<usize>,
-) -> PrimitiveProgram {
+fn program(mut shader: Shader, source: impl Fn(&MemoryScalar) -> Option<usize>) -> PrimitiveProgram {
     let exchange = &shader.interface.exchange;
-    let inputs: Vec<_> = shader
-        .interface
-        .inputs
-        .iter()
-        .map(|input| primitive_input(input.source))
-        .collect();
+    let inputs: Vec<_> = shader.interface.inputs.iter().map(|input| primitive_input(input.source)).collect();
     zero_inputs(&mut shader.program, &inputs);
     let takes = memory(&exchange.inputs, source);
-    PrimitiveProgram {
-        inputs,
-        takes,
-        groups: exchange.groups,
-        lanes: exchange.lanes,
-        program: shader.program,
-    }
+    PrimitiveProgram { inputs, takes, groups: exchange.groups, lanes: exchange.lanes, program: shader.program }
 }
 
 /// The values that a stage takes. Those without a source stay zero.
@@ -203,18 +160,12 @@ fn memory(memory: &ShaderMemory, source: impl Fn(&MemoryScalar) -> Option<usize>
     VertexMemory {
         start: memory.start,
         stride: memory.stride,
-        values: values
-            .filter_map(|scalar| Some(value(source(scalar)? as u32, scalar)))
-            .collect(),
+        values: values.filter_map(|scalar| Some(value(source(scalar)? as u32, scalar))).collect(),
     }
 }
 
 fn value(number: u32, scalar: &MemoryScalar) -> VertexValue {
-    VertexValue {
-        number,
-        offset: scalar.offset,
-        vertex_stride: scalar.vertex_stride,
-    }
+    VertexValue { number, offset: scalar.offset, vertex_stride: scalar.vertex_stride }
 }
 
 fn position(given: &Given, target: OutputTarget) -> Option<usize> {
@@ -229,10 +180,7 @@ fn is_same(read: &MemoryScalar, written: &MemoryScalar) -> bool {
 fn primitive_input(source: InputSource) -> Option<PrimitiveInput> {
     match source {
         InputSource::Patch => Some(PrimitiveInput::Patch),
-        InputSource::BuiltIn {
-            built_in,
-            component,
-        } => match built_in {
+        InputSource::BuiltIn { built_in, component } => match built_in {
             BuiltIn::PrimitiveId => Some(PrimitiveInput::PrimitiveId),
             BuiltIn::InvocationId => Some(PrimitiveInput::InvocationId),
             BuiltIn::PatchVertices => Some(PrimitiveInput::PatchVertices),
@@ -267,12 +215,8 @@ fn primitives_of(topology: Topology) -> Option<InputPrimitive> {
     match topology {
         Topology::PointList => Some(InputPrimitive::Points),
         Topology::LineList | Topology::LineStrip => Some(InputPrimitive::Lines),
-        Topology::LineListWithAdjacency | Topology::LineStripWithAdjacency => {
-            Some(InputPrimitive::LinesAdjacency)
-        }
-        Topology::TriangleList | Topology::TriangleStrip | Topology::TriangleFan => {
-            Some(InputPrimitive::Triangles)
-        }
+        Topology::LineListWithAdjacency | Topology::LineStripWithAdjacency => Some(InputPrimitive::LinesAdjacency),
+        Topology::TriangleList | Topology::TriangleStrip | Topology::TriangleFan => Some(InputPrimitive::Triangles),
         Topology::TriangleListWithAdjacency | Topology::TriangleStripWithAdjacency => {
             Some(InputPrimitive::TrianglesAdjacency)
         }
@@ -289,11 +233,7 @@ pub(crate) fn check(
     geometry: Option<&Shader>,
     topology: Option<Topology>,
 ) -> Result<(), Error> {
-    if let Some(TessellationShaders {
-        control,
-        evaluation,
-    }) = tessellation
-    {
+    if let Some(TessellationShaders { control, evaluation }) = tessellation {
         let (first, second) = (control.interface.modes, evaluation.interface.modes);
         if first.domain.or(second.domain).is_none() {
             return Err(Error::usage(
@@ -327,17 +267,12 @@ pub(crate) fn check(
         ));
     }
     if let (Some(taken), Some(shaders)) = (taken, tessellation) {
-        let modes = [
-            shaders.control.interface.modes,
-            shaders.evaluation.interface.modes,
-        ];
+        let modes = [shaders.control.interface.modes, shaders.evaluation.interface.modes];
         let corners = division(modes).corners();
         if taken_corners(taken) != corners {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-pStages-00739",
-                format!(
-                    "the geometry shader takes {taken:?}, but tessellation makes primitives of {corners} vertices"
-                ),
+                format!("the geometry shader takes {taken:?}, but tessellation makes primitives of {corners} vertices"),
             ));
         }
     }
@@ -345,15 +280,9 @@ pub(crate) fn check(
 }
 
 /// The components of locations that a stage writes.
-pub(super) fn components_written(
-    interface: &Interface,
-) -> impl Iterator<Item = InterfaceComponent> + '_ {
+pub(super) fn components_written(interface: &Interface) -> impl Iterator<Item = InterfaceComponent> + '_ {
     targets(interface).filter_map(|target| match target {
-        OutputTarget::Location {
-            location,
-            component,
-            ..
-        } => Some((location, component)),
+        OutputTarget::Location { location, component, .. } => Some((location, component)),
         _ => None,
     })
 }

@@ -99,9 +99,7 @@ pub(crate) struct PipelineCache;
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn libraries<'a>(
-    info: &'a vk::GraphicsPipelineCreateInfo<'_>,
-) -> Result<Vec<&'a GraphicsState>, Error> {
+unsafe fn libraries<'a>(info: &'a vk::GraphicsPipelineCreateInfo<'_>) -> Result<Vec<&'a GraphicsState>, Error> {
     // SAFETY: the caller's promise.
     let handles = unsafe {
         match valid::find_in_chain::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next) {
@@ -115,9 +113,7 @@ unsafe fn libraries<'a>(
             Pipeline::Library(library) => Ok(&**library),
             Pipeline::Graphics(_) | Pipeline::Compute(_) => Err(Error::usage(
                 "VUID-VkPipelineLibraryCreateInfoKHR-pLibraries-03381",
-                format!(
-                    "pLibraries[{index}] was created without VK_PIPELINE_CREATE_LIBRARY_BIT_KHR"
-                ),
+                format!("pLibraries[{index}] was created without VK_PIPELINE_CREATE_LIBRARY_BIT_KHR"),
             )),
         }
     };
@@ -128,16 +124,12 @@ unsafe fn libraries<'a>(
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn new_graphics_pipeline(
-    device: &Device,
-    info: &vk::GraphicsPipelineCreateInfo<'_>,
-) -> Result<Pipeline, Error> {
+unsafe fn new_graphics_pipeline(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<Pipeline, Error> {
     let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
     if is_library && !device.features().graphics_pipeline_library {
         return Err(Error::FeatureNotEnabled {
             vuid: "VUID-VkGraphicsPipelineCreateInfo-graphicsPipelineLibrary-06606",
-            message: "flags has VK_PIPELINE_CREATE_LIBRARY_BIT_KHR, and graphicsPipelineLibrary is not enabled"
-                .into(),
+            message: "flags has VK_PIPELINE_CREATE_LIBRARY_BIT_KHR, and graphicsPipelineLibrary is not enabled".into(),
         });
     }
     // SAFETY: the caller's promise.
@@ -158,10 +150,7 @@ unsafe fn new_graphics_pipeline(
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn new_compute_pipeline(
-    device: &Device,
-    info: &vk::ComputePipelineCreateInfo<'_>,
-) -> Result<Pipeline, Error> {
+unsafe fn new_compute_pipeline(device: &Device, info: &vk::ComputePipelineCreateInfo<'_>) -> Result<Pipeline, Error> {
     if info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) {
         return Err(Error::FeatureNotPresent("a library of compute".into()));
     }
@@ -175,11 +164,7 @@ unsafe fn new_compute_pipeline(
     let pipeline = unsafe {
         write_empty_creation_feedback(info.p_next)?;
         let layout = handle::get(info.layout)?;
-        ComputePipeline::new(
-            device,
-            layout,
-            &ShaderStage::from_create_info(device, &info.stage)?,
-        )?
+        ComputePipeline::new(device, layout, &ShaderStage::from_create_info(device, &info.stage)?)?
     };
     Ok(Pipeline::Compute(Arc::new(pipeline)))
 }
@@ -228,8 +213,7 @@ fn create_each<T>(
 unsafe fn write_empty_creation_feedback(chain: *const c_void) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
-        let Some(feedback) = valid::find_in_chain::<vk::PipelineCreationFeedbackCreateInfo>(chain)
-        else {
+        let Some(feedback) = valid::find_in_chain::<vk::PipelineCreationFeedbackCreateInfo>(chain) else {
             return Ok(());
         };
         let none = vk::PipelineCreationFeedback::default();
@@ -278,10 +262,7 @@ pub(crate) fn create_pipeline_cache(
 /// # Safety
 /// The data is null or as long as its size says.
 #[doc(alias = "vkGetPipelineCacheData")]
-pub(crate) unsafe fn get_pipeline_cache_data(
-    data_size: &mut usize,
-    data: *mut c_void,
-) -> Result<vk::Result, Error> {
+pub(crate) unsafe fn get_pipeline_cache_data(data_size: &mut usize, data: *mut c_void) -> Result<vk::Result, Error> {
     let header = cache_header();
     if data.is_null() {
         *data_size = header.len();

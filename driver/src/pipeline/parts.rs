@@ -6,8 +6,8 @@ use crate::abi::error::Error;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use std::sync::Arc;
 
@@ -17,22 +17,14 @@ pub(crate) type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
 /// Each part with its name.
 const NAMES: [(Parts, &str); 4] = [
     (Parts::VERTEX_INPUT_INTERFACE, "vertex input interface"),
-    (
-        Parts::PRE_RASTERIZATION_SHADERS,
-        "pre-rasterization shaders",
-    ),
+    (Parts::PRE_RASTERIZATION_SHADERS, "pre-rasterization shaders"),
     (Parts::FRAGMENT_SHADER, "fragment shader"),
-    (
-        Parts::FRAGMENT_OUTPUT_INTERFACE,
-        "fragment output interface",
-    ),
+    (Parts::FRAGMENT_OUTPUT_INTERFACE, "fragment output interface"),
 ];
 
 /// All parts.
 pub(crate) fn all_parts() -> Parts {
-    NAMES
-        .iter()
-        .fold(Parts::empty(), |parts, (part, _)| parts | *part)
+    NAMES.iter().fold(Parts::empty(), |parts, (part, _)| parts | *part)
 }
 
 /// The names of parts.
@@ -248,25 +240,20 @@ impl GraphicsState {
     }
 
     /// The shader stages, to be changed.
-    pub(super) fn stages_mut(
-        &mut self,
-    ) -> impl Iterator<Item = &mut (vk::ShaderStageFlags, ShaderStage)> {
+    pub(super) fn stages_mut(&mut self) -> impl Iterator<Item = &mut (vk::ShaderStageFlags, ShaderStage)> {
         let before = self.pre_rasterization.stages.iter_mut();
         before.chain(&mut self.fragment_shader.stages)
     }
 
     /// Depth and stencil state, if the subpass has such an attachment.
-    pub(crate) fn depth_stencil(
-        &self,
-    ) -> Option<&vk::PipelineDepthStencilStateCreateInfo<'static>> {
+    pub(crate) fn depth_stencil(&self) -> Option<&vk::PipelineDepthStencilStateCreateInfo<'static>> {
         let state = self.fragment_shader.depth_stencil.as_ref();
         state.filter(|_| self.fragment_output.has_depth_stencil)
     }
 
     /// Reports whether there are tessellation stages.
     pub(crate) fn tessellates(&self) -> bool {
-        let both = vk::ShaderStageFlags::TESSELLATION_CONTROL
-            | vk::ShaderStageFlags::TESSELLATION_EVALUATION;
+        let both = vk::ShaderStageFlags::TESSELLATION_CONTROL | vk::ShaderStageFlags::TESSELLATION_EVALUATION;
         self.stages().any(|(stage, _)| both.contains(*stage))
     }
 
@@ -277,23 +264,16 @@ impl GraphicsState {
 
     /// Reports whether nothing is ever rasterized, so that all rasterization state is ignored.
     pub(crate) fn discards(&self) -> bool {
-        self.pre_rasterization
-            .rasterization
-            .rasterizer_discard_enable
-            != vk::FALSE
+        self.pre_rasterization.rasterization.rasterizer_discard_enable != vk::FALSE
             && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
     }
 
     /// Reports whether all state of single colour attachments is dynamic, so that the pipeline has none of it.
     pub(super) fn has_dynamic_blending(&self) -> bool {
         use vk::DynamicState as S;
-        [
-            S::COLOR_BLEND_ENABLE_EXT,
-            S::COLOR_BLEND_EQUATION_EXT,
-            S::COLOR_WRITE_MASK_EXT,
-        ]
-        .into_iter()
-        .all(|state| self.is_dynamic(state))
+        [S::COLOR_BLEND_ENABLE_EXT, S::COLOR_BLEND_EQUATION_EXT, S::COLOR_WRITE_MASK_EXT]
+            .into_iter()
+            .all(|state| self.is_dynamic(state))
     }
 
     /// Fails if primitive restart is enabled for a list, which needs the feature `primitiveTopologyListRestart`.
@@ -311,10 +291,7 @@ impl GraphicsState {
                 | T::LINE_LIST_WITH_ADJACENCY
                 | T::TRIANGLE_LIST_WITH_ADJACENCY
         );
-        if !self.vertex_input.primitive_restart
-            || !is_list
-            || self.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
-        {
+        if !self.vertex_input.primitive_restart || !is_list || self.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY) {
             return Ok(());
         }
         Err(Error::usage(

@@ -6,9 +6,7 @@ use super::link::{self, StageShaders};
 use super::link_primitives::{self, TessellationShaders};
 use super::parts::GraphicsState;
 use super::stages::{self, ProgramResources};
-use super::state::{
-    self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source,
-};
+use super::state::{self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source};
 use super::varyings::LiveOutputs;
 use crate::abi::error::Error;
 use crate::device::Device;
@@ -75,10 +73,7 @@ impl PrimitivePipeline {
         fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.as_ref().ok_or_else(|| {
-            Error::usage(
-                "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
-                "the pipeline has no layout",
-            )
+            Error::usage("VUID-VkGraphicsPipelineCreateInfo-layout-06602", "the pipeline has no layout")
         })?;
         let stages = Stages::find(device, info)?;
         let shaders = stages.translate(device, layout, fixed.draw.samples)?;
@@ -89,19 +84,14 @@ impl PrimitivePipeline {
         )?;
         let locations = shaders.vertex.interface.locations_read();
         let is_dynamic = info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
-        let attributes = if is_dynamic {
-            Vec::new()
-        } else {
-            stages::attributes(&info.vertex_input.input, &locations)?
-        };
+        let attributes =
+            if is_dynamic { Vec::new() } else { stages::attributes(&info.vertex_input.input, &locations)? };
         if let Some(fragment) = &shaders.fragment {
             let last = &shaders.last().interface;
             stages::warn_of_unwritten(device, last, &fragment.interface);
         }
         let resources = |shader: Option<&Shader>| {
-            shader.map_or_else(Default::default, |shader| {
-                ProgramResources::new(device, &shader.interface)
-            })
+            shader.map_or_else(Default::default, |shader| ProgramResources::new(device, &shader.interface))
         };
         let tessellation = shaders.tessellation.as_ref();
         let vertex_resources = resources(Some(&shaders.vertex));
@@ -125,9 +115,7 @@ impl PrimitivePipeline {
         let programs = link::link(shaders, stream, live_outputs)?;
         let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
-        let is_static = dynamic.is_empty()
-            && viewports == ViewportSource::Static
-            && scissors == ViewportSource::Static;
+        let is_static = dynamic.is_empty() && viewports == ViewportSource::Static && scissors == ViewportSource::Static;
         Ok(Self {
             programs: Arc::new(programs),
             attributes,
@@ -159,15 +147,9 @@ struct Stages<'a> {
 impl<'a> Stages<'a> {
     fn find(device: &Device, info: &'a GraphicsState) -> Result<Self, Error> {
         use vk::ShaderStageFlags as F;
-        let known = F::VERTEX
-            | F::TESSELLATION_CONTROL
-            | F::TESSELLATION_EVALUATION
-            | F::GEOMETRY
-            | F::FRAGMENT;
+        let known = F::VERTEX | F::TESSELLATION_CONTROL | F::TESSELLATION_EVALUATION | F::GEOMETRY | F::FRAGMENT;
         if let Some((stage, _)) = info.stages().find(|(stage, _)| !known.contains(*stage)) {
-            return Err(Error::FeatureNotPresent(format!(
-                "a shader stage {stage:?}"
-            )));
+            return Err(Error::FeatureNotPresent(format!("a shader stage {stage:?}")));
         }
         let find = |wanted| {
             let mut found = info.stages().filter(move |(stage, _)| *stage == wanted);
@@ -182,10 +164,7 @@ impl<'a> Stages<'a> {
         let vertex = find(F::VERTEX)?.ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
-                format!(
-                    "a pipeline of topology {:?} has no vertex stage",
-                    info.vertex_input.topology
-                ),
+                format!("a pipeline of topology {:?} has no vertex stage", info.vertex_input.topology),
             )
         })?;
         let control = find(F::TESSELLATION_CONTROL)?;
@@ -211,26 +190,13 @@ impl<'a> Stages<'a> {
         require_features(device, tessellation.is_some(), geometry.is_some())?;
         check_adjacency(device, info.vertex_input.topology)?;
         check_patches(info, tessellation.is_some())?;
-        Ok(Self {
-            vertex,
-            tessellation,
-            geometry,
-            fragment: fragment.filter(|_| !info.discards()),
-        })
+        Ok(Self { vertex, tessellation, geometry, fragment: fragment.filter(|_| !info.discards()) })
     }
 
     /// Translates all stages.
-    fn translate(
-        &self,
-        device: &Device,
-        layout: &PipelineLayout,
-        samples: u32,
-    ) -> Result<StageShaders, Error> {
-        let translate =
-            |stage: &ShaderStage, kind| stages::translate(device, layout, stage, kind, samples);
-        let optional = |stage: Option<&ShaderStage>, kind| {
-            stage.map(|stage| translate(stage, kind)).transpose()
-        };
+    fn translate(&self, device: &Device, layout: &PipelineLayout, samples: u32) -> Result<StageShaders, Error> {
+        let translate = |stage: &ShaderStage, kind| stages::translate(device, layout, stage, kind, samples);
+        let optional = |stage: Option<&ShaderStage>, kind| stage.map(|stage| translate(stage, kind)).transpose();
         Ok(StageShaders {
             vertex: translate(self.vertex, Stage::Vertex)?,
             tessellation: match self.tessellation {
@@ -304,19 +270,14 @@ fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
     if tessellates && !is_dynamic && !(1..=limits::MAX_PATCH_SIZE).contains(&points) {
         return Err(Error::usage(
             "VUID-VkPipelineTessellationStateCreateInfo-patchControlPoints-01214",
-            format!(
-                "patchControlPoints is {points}, not 1 to maxTessellationPatchSize ({})",
-                limits::MAX_PATCH_SIZE
-            ),
+            format!("patchControlPoints is {points}, not 1 to maxTessellationPatchSize ({})", limits::MAX_PATCH_SIZE),
         ));
     }
     Ok(())
 }
 
 /// The dynamic states, and the sources of viewports and scissors.
-fn dynamic(
-    info: &GraphicsState,
-) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
+fn dynamic(info: &GraphicsState) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
     use vk::DynamicState as S;
     let (mut viewports, mut scissors) = (ViewportSource::Static, ViewportSource::Static);
     let mut dynamic = Vec::new();
@@ -332,9 +293,7 @@ fn dynamic(
             // Attribute streams are looked up for each draw.
             state if dynamic_state::is_supported(state) => {}
             other => {
-                return Err(Error::FeatureNotPresent(format!(
-                    "the dynamic state {other:?}"
-                )));
+                return Err(Error::FeatureNotPresent(format!("the dynamic state {other:?}")));
             }
         }
     }

@@ -32,9 +32,7 @@ impl ProgramResources {
     pub(crate) fn new(device: &Device, interface: &Interface) -> Self {
         Self {
             descriptors: interface.descriptors.clone(),
-            addresses: interface
-                .uses_addresses
-                .then(|| Arc::clone(device.addresses())),
+            addresses: interface.uses_addresses.then(|| Arc::clone(device.addresses())),
             writes: interface.has_side_effects,
         }
     }
@@ -101,10 +99,7 @@ pub(crate) fn translate_library(device: &Device, library: &mut GraphicsState) ->
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
-pub(crate) fn attributes(
-    info: &VertexInput,
-    locations: &[(u32, ScalarType)],
-) -> Result<Vec<AttributeSource>, Error> {
+pub(crate) fn attributes(info: &VertexInput, locations: &[(u32, ScalarType)]) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, ScalarType)| {
         source(info, location).map_err(|what| {
             Error::usage(
@@ -120,10 +115,7 @@ pub(crate) fn attributes(
     if mismatches.is_empty() {
         return Ok(sources);
     }
-    Err(Error::usage(
-        "VUID-VkGraphicsPipelineCreateInfo-Input-08733",
-        mismatches.join("; "),
-    ))
+    Err(Error::usage("VUID-VkGraphicsPipelineCreateInfo-Input-08733", mismatches.join("; ")))
 }
 
 /// The difference between the type that a shader reads at a location and the attribute's format, if there is one.
@@ -135,9 +127,7 @@ pub(super) fn type_mismatch(location: u32, wanted: ScalarType, format: Format) -
         _ => ScalarType::Float { width: 32 },
     };
     (class(given) != class(wanted)).then(|| {
-        format!(
-            "the vertex shader reads location {location} as {wanted:?}, but the attribute's format is {given:?}"
-        )
+        format!("the vertex shader reads location {location} as {wanted:?}, but the attribute's format is {given:?}")
     })
 }
 

@@ -10,8 +10,8 @@ use gaurast::vk::GAUSSIAN_LOCATION_UNUSED_GAURAST;
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest,
-    DrawState, LogicOp, PolygonMode, StencilFace, StencilOp, Topology,
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, LogicOp,
+    PolygonMode, StencilFace, StencilOp, Topology,
 };
 
 /// The source of an attribute.
@@ -52,14 +52,10 @@ pub(crate) fn attribute(
     let source = source(&info.vertex_input.input, location).map_err(refuse)?;
     let format = source.format;
     if format.is_integer() {
-        return Err(refuse(format!(
-            "whose format {format:?} does not convert to floating point"
-        )));
+        return Err(refuse(format!("whose format {format:?} does not convert to floating point")));
     }
     if (format.components().len() as u32) < components {
-        return Err(refuse(format!(
-            "whose format {format:?} has fewer than {components} components"
-        )));
+        return Err(refuse(format!("whose format {format:?} has fewer than {components} components")));
     }
     Ok(source)
 }
@@ -73,16 +69,12 @@ pub(crate) fn source(info: &VertexInput, location: u32) -> Result<AttributeSourc
     let attribute = attribute.ok_or("which the vertex input state does not have")?;
     let number = attribute.binding;
     let binding = info.bindings.iter().find(|b| b.binding == number);
-    let binding = binding
-        .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
+    let binding = binding.ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
-    let format = formats::device_format(attribute.format)
-        .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    let format =
+        formats::device_format(attribute.format).filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
     let format = format.ok_or_else(|| {
-        format!(
-            "whose format {:?} this device does not read as a vertex attribute",
-            attribute.format
-        )
+        format!("whose format {:?} this device does not read as a vertex attribute", attribute.format)
     })?;
     let instance_divisor = match binding.input_rate {
         vk::VertexInputRate::VERTEX => None,
@@ -92,13 +84,7 @@ pub(crate) fn source(info: &VertexInput, location: u32) -> Result<AttributeSourc
         }
         rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
     };
-    Ok(AttributeSource {
-        binding: number,
-        stride: binding.stride,
-        offset: attribute.offset,
-        format,
-        instance_divisor,
-    })
+    Ok(AttributeSource { binding: number, stride: binding.stride, offset: attribute.offset, format, instance_divisor })
 }
 
 /// The state of a single colour attachment.
@@ -116,30 +102,19 @@ pub(crate) struct AttachmentState {
 pub(crate) type BlendEquations = (BlendEquation, BlendEquation);
 
 /// The equation that gives the source.
-const REPLACE: BlendEquation = BlendEquation {
-    source: BlendFactor::One,
-    destination: BlendFactor::Zero,
-    op: BlendOp::Add,
-};
+const REPLACE: BlendEquation =
+    BlendEquation { source: BlendFactor::One, destination: BlendFactor::Zero, op: BlendOp::Add };
 
 impl AttachmentState {
     /// The state that writes the source unchanged.
-    const WRITTEN: Self = Self {
-        blend_enable: false,
-        equations: (REPLACE, REPLACE),
-        write_mask: 0xf,
-        write_enable: true,
-    };
+    const WRITTEN: Self =
+        Self { blend_enable: false, equations: (REPLACE, REPLACE), write_mask: 0xf, write_enable: true };
 
     /// The state for the device.
     fn blend_state(self) -> BlendState {
         BlendState {
             equations: self.blend_enable.then_some(self.equations),
-            write_mask: if self.write_enable {
-                self.write_mask
-            } else {
-                0
-            },
+            write_mask: if self.write_enable { self.write_mask } else { 0 },
         }
     }
 }
@@ -179,8 +154,7 @@ fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error
                 ..AttachmentState::WRITTEN
             };
             // An unused value may be anything.
-            let may_blend =
-                blend_enable || info.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
+            let may_blend = blend_enable || info.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
             if may_blend && !info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT) {
                 state.equations = convert::blend_equations(given)?;
             }
@@ -198,12 +172,8 @@ pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState)
         state.src_alpha_blend_factor,
         state.dst_alpha_blend_factor,
     ];
-    let is_second = |factor: F| {
-        matches!(
-            factor,
-            F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA
-        )
-    };
+    let is_second =
+        |factor: F| matches!(factor, F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA);
     state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
 }
 
@@ -279,12 +249,7 @@ impl FixedFunctionState {
     pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
         // The topology has no effect.
         let mut state = Self::of(info, Topology::TriangleStrip)?;
-        if !info
-            .fragment_output
-            .multisample
-            .rasterization_samples
-            .is_empty()
-        {
+        if !info.fragment_output.multisample.rasterization_samples.is_empty() {
             state.set_samples(info)?;
         }
         state.set_depth_stencil(info)?;
@@ -297,16 +262,8 @@ impl FixedFunctionState {
         let raster = &info.pre_rasterization.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
         let needs = [
-            (
-                polygon_mode != PolygonMode::Fill,
-                supported!(fill_mode_non_solid),
-                "a polygon mode but FILL",
-            ),
-            (
-                raster.depth_clamp_enable != vk::FALSE,
-                supported!(depth_clamp),
-                "depthClampEnable",
-            ),
+            (polygon_mode != PolygonMode::Fill, supported!(fill_mode_non_solid), "a polygon mode but FILL"),
+            (raster.depth_clamp_enable != vk::FALSE, supported!(depth_clamp), "depthClampEnable"),
             (
                 raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
                 supported!(depth_bias_clamp),
@@ -315,13 +272,9 @@ impl FixedFunctionState {
             (
                 !matches!(
                     info.pre_rasterization.lines.line_rasterization_mode,
-                    vk::LineRasterizationModeKHR::DEFAULT
-                        | vk::LineRasterizationModeKHR::RECTANGULAR
+                    vk::LineRasterizationModeKHR::DEFAULT | vk::LineRasterizationModeKHR::RECTANGULAR
                 ),
-                (
-                    SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines,
-                    "bresenhamLines or smoothLines",
-                ),
+                (SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines, "bresenhamLines or smoothLines"),
                 "a line rasterization mode but DEFAULT and RECTANGULAR",
             ),
             (
@@ -330,11 +283,7 @@ impl FixedFunctionState {
                 supported!(stippled_rectangular_lines),
                 "stippledLineEnable",
             ),
-            (
-                info.line_width() != 1.0,
-                supported!(wide_lines),
-                "a line width but 1",
-            ),
+            (info.line_width() != 1.0, supported!(wide_lines), "a line width but 1"),
         ];
         require_all(&needs)?;
         let draw = DrawState {
@@ -361,11 +310,7 @@ impl FixedFunctionState {
             sample_shading: false,
             alpha_to_coverage: false,
             alpha_to_one: false,
-            depth_stencil: DepthStencil {
-                depth: None,
-                bounds: None,
-                stencil: None,
-            },
+            depth_stencil: DepthStencil { depth: None, bounds: None, stencil: None },
             logic_op: None,
             blend: Vec::new(),
             blend_constants: [0.0; 4],
@@ -398,14 +343,8 @@ impl FixedFunctionState {
 
     fn set_viewports(&mut self, info: &GraphicsState) -> Result<(), Error> {
         use vk::DynamicState as S;
-        let counts = [
-            info.pre_rasterization.viewport_count,
-            info.pre_rasterization.scissor_count,
-        ];
-        let dynamic = [
-            info.is_dynamic(S::VIEWPORT_WITH_COUNT),
-            info.is_dynamic(S::SCISSOR_WITH_COUNT),
-        ];
+        let counts = [info.pre_rasterization.viewport_count, info.pre_rasterization.scissor_count];
+        let dynamic = [info.is_dynamic(S::VIEWPORT_WITH_COUNT), info.is_dynamic(S::SCISSOR_WITH_COUNT)];
         for (count, dynamic) in counts.into_iter().zip(dynamic) {
             if count > limits::properties().max_viewports {
                 return Err(Error::usage(
@@ -423,10 +362,7 @@ impl FixedFunctionState {
         if counts[0] != counts[1] && dynamic == [false; 2] {
             return Err(Error::usage(
                 "VUID-VkPipelineViewportStateCreateInfo-scissorCount-04134",
-                format!(
-                    "there are {} viewports, but {} scissors",
-                    counts[0], counts[1]
-                ),
+                format!("there are {} viewports, but {} scissors", counts[0], counts[1]),
             ));
         }
         let has = |given: usize, count: u32| given == count as usize;
@@ -441,22 +377,10 @@ impl FixedFunctionState {
             ));
         }
         if static_viewports {
-            self.draw.viewports = info
-                .pre_rasterization
-                .viewports
-                .iter()
-                .copied()
-                .map(convert::viewport)
-                .collect();
+            self.draw.viewports = info.pre_rasterization.viewports.iter().copied().map(convert::viewport).collect();
         }
         if static_scissors {
-            self.draw.scissors = info
-                .pre_rasterization
-                .scissors
-                .iter()
-                .copied()
-                .map(convert::rect)
-                .collect();
+            self.draw.scissors = info.pre_rasterization.scissors.iter().copied().map(convert::rect).collect();
         }
         Ok(())
     }
@@ -472,16 +396,8 @@ impl FixedFunctionState {
             )));
         }
         let needs = [
-            (
-                multisample.sample_shading_enable != vk::FALSE,
-                supported!(sample_rate_shading),
-                "sampleShadingEnable",
-            ),
-            (
-                multisample.alpha_to_one_enable != vk::FALSE,
-                supported!(alpha_to_one),
-                "alphaToOneEnable",
-            ),
+            (multisample.sample_shading_enable != vk::FALSE, supported!(sample_rate_shading), "sampleShadingEnable"),
+            (multisample.alpha_to_one_enable != vk::FALSE, supported!(alpha_to_one), "alphaToOneEnable"),
         ];
         require_all(&needs)?;
         let draw = &mut self.draw;
@@ -500,11 +416,7 @@ impl FixedFunctionState {
             return Ok(());
         };
         let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
-        require_all(&[(
-            bounds_test,
-            supported!(depth_bounds),
-            "depthBoundsTestEnable",
-        )])?;
+        require_all(&[(bounds_test, supported!(depth_bounds), "depthBoundsTestEnable")])?;
         self.depth_test = state.depth_test_enable != vk::FALSE;
         self.depth_write = state.depth_write_enable != vk::FALSE;
         self.depth_bounds_test = bounds_test;
@@ -572,8 +484,7 @@ impl FixedFunctionState {
     /// Reports whether lines are drawn, so that their width is used.
     pub(super) fn draws_lines(&self) -> bool {
         let draw = &self.draw;
-        let are_lines =
-            draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines;
+        let are_lines = draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines;
         self.rasterizes() && are_lines
     }
 
@@ -624,11 +535,7 @@ impl FixedFunctionState {
 
     /// Reports whether a colour attachment is blended.
     pub(super) fn blends(&self) -> bool {
-        self.rasterizes()
-            && self
-                .attachments
-                .iter()
-                .any(|attachment| attachment.blend_enable)
+        self.rasterizes() && self.attachments.iter().any(|attachment| attachment.blend_enable)
     }
 
     /// Changes the state of a colour attachment, if it exists.
@@ -669,17 +576,12 @@ impl FixedFunctionState {
         DrawState {
             depth_bias: self.depth_bias_enable.then_some(self.depth_bias),
             depth_stencil: DepthStencil {
-                depth: self.depth_test.then_some(DepthTest {
-                    compare: self.depth_compare,
-                    write: self.depth_write,
-                }),
+                depth: self.depth_test.then_some(DepthTest { compare: self.depth_compare, write: self.depth_write }),
                 bounds: self.depth_bounds_test.then_some(self.depth_bounds),
                 stencil: self.stencil_test.then_some(self.stencil),
             },
             topology: match self.draw.topology {
-                Topology::PatchList { .. } => Topology::PatchList {
-                    control_points: self.patch_control_points,
-                },
+                Topology::PatchList { .. } => Topology::PatchList { control_points: self.patch_control_points },
                 other => other,
             },
             logic_op: self.logic_op_enable.then_some(self.logic_op),
@@ -691,19 +593,10 @@ impl FixedFunctionState {
 
 /// Reports whether an attachment's blending uses the blend constants.
 fn blends_by_constants(attachments: &[AttachmentState]) -> bool {
-    let blended = attachments
-        .iter()
-        .filter(|attachment| attachment.blend_enable);
+    let blended = attachments.iter().filter(|attachment| attachment.blend_enable);
     blended
         .map(|attachment| attachment.equations)
-        .flat_map(|(color, alpha)| {
-            [
-                color.source,
-                color.destination,
-                alpha.source,
-                alpha.destination,
-            ]
-        })
+        .flat_map(|(color, alpha)| [color.source, color.destination, alpha.source, alpha.destination])
         .any(|factor| {
             matches!(
                 factor,
@@ -748,14 +641,9 @@ pub(crate) fn class(topology: Topology) -> Class {
 /// Fails for the first required feature that the device lacks.
 fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
     let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
-    match needs
-        .iter()
-        .find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported))
-    {
+    match needs.iter().find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported)) {
         None => Ok(()),
-        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!(
-            "{what} (feature {feature})"
-        ))),
+        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!("{what} (feature {feature})"))),
     }
 }
 
@@ -763,15 +651,10 @@ fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
 pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
     // Dynamic state may be enabled.
     let any_mask = info.is_dynamic(vk::DynamicState::COLOR_WRITE_MASK_EXT);
-    let mut live_outputs: Vec<_> =
-        std::iter::zip(&fixed.attachments, &info.fragment_output.color_formats)
-            .map(|(attachment, format)| {
-                (any_mask || attachment.write_mask != 0) && *format != vk::Format::UNDEFINED
-            })
-            .collect();
-    if fixed.draw.alpha_to_coverage
-        || info.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT)
-    {
+    let mut live_outputs: Vec<_> = std::iter::zip(&fixed.attachments, &info.fragment_output.color_formats)
+        .map(|(attachment, format)| (any_mask || attachment.write_mask != 0) && *format != vk::Format::UNDEFINED)
+        .collect();
+    if fixed.draw.alpha_to_coverage || info.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT) {
         match live_outputs.first_mut() {
             Some(first) => *first = true,
             None => live_outputs.push(true),

@@ -18,10 +18,7 @@ fn interface(name: &str, stage: Stage) -> Interface {
 fn translated(name: &str, stage: Stage, options: &Options) -> Interface {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("spirv/tests/shaders");
     let bytes = std::fs::read(folder.join(format!("{name}.spv"))).unwrap();
-    let words: Vec<u32> = bytes
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
-        .collect();
+    let words: Vec<u32> = bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect();
     let specialization = Specialization::default();
     let module = Module::parse(&words).unwrap();
     let shader = translate(&module, "main", stage, &specialization, options).unwrap();
@@ -43,10 +40,7 @@ fn binding(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
 /// A layout of sets with a binding each.
 fn layout(sets: Vec<BindingInfo>) -> PipelineLayout {
     let set = |info| {
-        Some(Arc::new(
-            DescriptorSetLayout::new(vec![info], vk::DescriptorSetLayoutCreateFlags::empty())
-                .unwrap(),
-        ))
+        Some(Arc::new(DescriptorSetLayout::new(vec![info], vk::DescriptorSetLayoutCreateFlags::empty()).unwrap()))
     };
     PipelineLayout::new(sets.into_iter().map(set).collect(), &[], 0).unwrap()
 }
@@ -54,10 +48,7 @@ fn layout(sets: Vec<BindingInfo>) -> PipelineLayout {
 #[test]
 fn disagreements_with_the_layout_are_told() {
     let found = interface("descriptor_arrays.comp", Stage::Compute);
-    let (storage, uniform) = (
-        vk::DescriptorType::STORAGE_BUFFER,
-        vk::DescriptorType::UNIFORM_BUFFER,
-    );
+    let (storage, uniform) = (vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_BUFFER);
     let fits = layout(vec![binding(2, storage, 1), binding(3, storage, 4)]);
     assert_eq!(fits.mismatches(&found), [""; 0]);
     let other = layout(vec![binding(2, uniform, 1), binding(3, storage, 2)]);
@@ -69,10 +60,7 @@ fn disagreements_with_the_layout_are_told() {
             "set 1, binding 3 (\"buffers\") has 2 descriptors in the pipeline layout; the compute shader wants 4",
         ]
     );
-    let invisible = BindingInfo {
-        stages: vk::ShaderStageFlags::VERTEX,
-        ..binding(2, uniform, 1)
-    };
+    let invisible = BindingInfo { stages: vk::ShaderStageFlags::VERTEX, ..binding(2, uniform, 1) };
     assert_eq!(
         layout(vec![invisible]).mismatches(&found),
         [
@@ -84,10 +72,7 @@ fn disagreements_with_the_layout_are_told() {
 
 #[test]
 fn arrays_without_a_length_take_what_the_layout_has() {
-    let options = Options {
-        unsized_descriptors: 5,
-        ..Options::default()
-    };
+    let options = Options { unsized_descriptors: 5, ..Options::default() };
     let found = translated("unsized_descriptors.comp", Stage::Compute, &options);
     let storage = vk::DescriptorType::STORAGE_BUFFER;
     for count in [1, 7] {
@@ -135,9 +120,5 @@ fn push_constants_attributes_and_stages_are_compared() {
 
     let fragment = interface("textured.frag", Stage::Fragment);
     let missing = link::unwritten(&vertex, &fragment);
-    assert_eq!(
-        missing.len(),
-        4,
-        "uv, layer and fog aren't written: {missing:?}"
-    );
+    assert_eq!(missing.len(), 4, "uv, layer and fog aren't written: {missing:?}");
 }

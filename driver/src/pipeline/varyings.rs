@@ -32,17 +32,10 @@ pub(super) fn vertex_output(
 ) -> Option<VertexOutput> {
     match target {
         OutputTarget::VertexCount => None,
-        OutputTarget::Location {
-            location,
-            component,
-            ..
-        } => varyings
-            .get(&(location, component))
-            .map(|&index| VertexOutput::Varying(index)),
-        OutputTarget::BuiltIn {
-            built_in,
-            component,
-        } => {
+        OutputTarget::Location { location, component, .. } => {
+            varyings.get(&(location, component)).map(|&index| VertexOutput::Varying(index))
+        }
+        OutputTarget::BuiltIn { built_in, component } => {
             let component = component as usize;
             match built_in {
                 BuiltIn::Position => Some(VertexOutput::Position(component)),
@@ -60,18 +53,11 @@ pub(super) fn vertex_output(
 
 /// Replaces by a constant zero the inputs without a source. (Slots are indices into `inputs`.)
 pub(super) fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
-    let Program {
-        inputs: registers,
-        constants,
-        ..
-    } = program;
+    let Program { inputs: registers, constants, .. } = program;
     registers.retain(|input| {
         let is_given = inputs[input.slot as usize].is_some();
         if !is_given {
-            constants.push(Constant {
-                reg: input.reg,
-                bits: 0,
-            });
+            constants.push(Constant { reg: input.reg, bits: 0 });
         }
         is_given
     });
@@ -79,7 +65,5 @@ pub(super) fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
 
 /// Removes outputs that are never read.
 pub(super) fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
-    program
-        .outputs
-        .retain(|output| outputs[output.slot as usize].is_some());
+    program.outputs.retain(|output| outputs[output.slot as usize].is_some());
 }

@@ -1034,10 +1034,7 @@ impl Features {
             ("dualSrcBlend", self.dual_src_blend),
             ("logicOp", self.logic_op),
             ("multiDrawIndirect", self.multi_draw_indirect),
-            (
-                "drawIndirectFirstInstance",
-                self.draw_indirect_first_instance,
-            ),
+            ("drawIndirectFirstInstance", self.draw_indirect_first_instance),
             ("depthClamp", self.depth_clamp),
             ("depthBiasClamp", self.depth_bias_clamp),
             ("fillModeNonSolid", self.fill_mode_non_solid),
@@ -1048,58 +1045,22 @@ impl Features {
             ("multiViewport", self.multi_viewport),
             ("samplerAnisotropy", self.sampler_anisotropy),
             ("textureCompressionETC2", self.texture_compression_etc2),
-            (
-                "textureCompressionASTC_LDR",
-                self.texture_compression_astc_ldr,
-            ),
+            ("textureCompressionASTC_LDR", self.texture_compression_astc_ldr),
             ("textureCompressionBC", self.texture_compression_bc),
             ("occlusionQueryPrecise", self.occlusion_query_precise),
             ("pipelineStatisticsQuery", self.pipeline_statistics_query),
-            (
-                "vertexPipelineStoresAndAtomics",
-                self.vertex_pipeline_stores_and_atomics,
-            ),
+            ("vertexPipelineStoresAndAtomics", self.vertex_pipeline_stores_and_atomics),
             ("fragmentStoresAndAtomics", self.fragment_stores_and_atomics),
-            (
-                "shaderTessellationAndGeometryPointSize",
-                self.shader_tessellation_and_geometry_point_size,
-            ),
-            (
-                "shaderImageGatherExtended",
-                self.shader_image_gather_extended,
-            ),
-            (
-                "shaderStorageImageExtendedFormats",
-                self.shader_storage_image_extended_formats,
-            ),
-            (
-                "shaderStorageImageMultisample",
-                self.shader_storage_image_multisample,
-            ),
-            (
-                "shaderStorageImageReadWithoutFormat",
-                self.shader_storage_image_read_without_format,
-            ),
-            (
-                "shaderStorageImageWriteWithoutFormat",
-                self.shader_storage_image_write_without_format,
-            ),
-            (
-                "shaderUniformBufferArrayDynamicIndexing",
-                self.shader_uniform_buffer_array_dynamic_indexing,
-            ),
-            (
-                "shaderSampledImageArrayDynamicIndexing",
-                self.shader_sampled_image_array_dynamic_indexing,
-            ),
-            (
-                "shaderStorageBufferArrayDynamicIndexing",
-                self.shader_storage_buffer_array_dynamic_indexing,
-            ),
-            (
-                "shaderStorageImageArrayDynamicIndexing",
-                self.shader_storage_image_array_dynamic_indexing,
-            ),
+            ("shaderTessellationAndGeometryPointSize", self.shader_tessellation_and_geometry_point_size),
+            ("shaderImageGatherExtended", self.shader_image_gather_extended),
+            ("shaderStorageImageExtendedFormats", self.shader_storage_image_extended_formats),
+            ("shaderStorageImageMultisample", self.shader_storage_image_multisample),
+            ("shaderStorageImageReadWithoutFormat", self.shader_storage_image_read_without_format),
+            ("shaderStorageImageWriteWithoutFormat", self.shader_storage_image_write_without_format),
+            ("shaderUniformBufferArrayDynamicIndexing", self.shader_uniform_buffer_array_dynamic_indexing),
+            ("shaderSampledImageArrayDynamicIndexing", self.shader_sampled_image_array_dynamic_indexing),
+            ("shaderStorageBufferArrayDynamicIndexing", self.shader_storage_buffer_array_dynamic_indexing),
+            ("shaderStorageImageArrayDynamicIndexing", self.shader_storage_image_array_dynamic_indexing),
             ("shaderClipDistance", self.shader_clip_distance),
             ("shaderCullDistance", self.shader_cull_distance),
             ("shaderFloat64", self.shader_float64),
@@ -1119,74 +1080,35 @@ impl Features {
             ("variableMultisampleRate", self.variable_multisample_rate),
             ("inheritedQueries", self.inherited_queries),
             ("storageBuffer16BitAccess", self.storage_buffer16_bit_access),
-            (
-                "uniformAndStorageBuffer16BitAccess",
-                self.uniform_and_storage_buffer16_bit_access,
-            ),
+            ("uniformAndStorageBuffer16BitAccess", self.uniform_and_storage_buffer16_bit_access),
             ("storagePushConstant16", self.storage_push_constant16),
             ("storageInputOutput16", self.storage_input_output16),
             ("multiview", self.multiview),
             ("multiviewGeometryShader", self.multiview_geometry_shader),
-            (
-                "multiviewTessellationShader",
-                self.multiview_tessellation_shader,
-            ),
-            (
-                "variablePointersStorageBuffer",
-                self.variable_pointers_storage_buffer,
-            ),
+            ("multiviewTessellationShader", self.multiview_tessellation_shader),
+            ("variablePointersStorageBuffer", self.variable_pointers_storage_buffer),
             ("variablePointers", self.variable_pointers),
             ("protectedMemory", self.protected_memory),
             ("samplerYcbcrConversion", self.sampler_ycbcr_conversion),
             ("shaderDrawParameters", self.shader_draw_parameters),
-            (
-                "samplerMirrorClampToEdge",
-                self.sampler_mirror_clamp_to_edge,
-            ),
+            ("samplerMirrorClampToEdge", self.sampler_mirror_clamp_to_edge),
             ("drawIndirectCount", self.draw_indirect_count),
             ("storageBuffer8BitAccess", self.storage_buffer8_bit_access),
-            (
-                "uniformAndStorageBuffer8BitAccess",
-                self.uniform_and_storage_buffer8_bit_access,
-            ),
+            ("uniformAndStorageBuffer8BitAccess", self.uniform_and_storage_buffer8_bit_access),
             ("storagePushConstant8", self.storage_push_constant8),
             ("shaderBufferInt64Atomics", self.shader_buffer_int64_atomics),
             ("shaderSharedInt64Atomics", self.shader_shared_int64_atomics),
             ("shaderFloat16", self.shader_float16),
             ("shaderInt8", self.shader_int8),
             ("descriptorIndexing", self.descriptor_indexing),
-            (
-                "shaderInputAttachmentArrayDynamicIndexing",
-                self.shader_input_attachment_array_dynamic_indexing,
-            ),
-            (
-                "shaderUniformTexelBufferArrayDynamicIndexing",
-                self.shader_uniform_texel_buffer_array_dynamic_indexing,
-            ),
-            (
-                "shaderStorageTexelBufferArrayDynamicIndexing",
-                self.shader_storage_texel_buffer_array_dynamic_indexing,
-            ),
-            (
-                "shaderUniformBufferArrayNonUniformIndexing",
-                self.shader_uniform_buffer_array_non_uniform_indexing,
-            ),
-            (
-                "shaderSampledImageArrayNonUniformIndexing",
-                self.shader_sampled_image_array_non_uniform_indexing,
-            ),
-            (
-                "shaderStorageBufferArrayNonUniformIndexing",
-                self.shader_storage_buffer_array_non_uniform_indexing,
-            ),
-            (
-                "shaderStorageImageArrayNonUniformIndexing",
-                self.shader_storage_image_array_non_uniform_indexing,
-            ),
-            (
-                "shaderInputAttachmentArrayNonUniformIndexing",
-                self.shader_input_attachment_array_non_uniform_indexing,
-            ),
+            ("shaderInputAttachmentArrayDynamicIndexing", self.shader_input_attachment_array_dynamic_indexing),
+            ("shaderUniformTexelBufferArrayDynamicIndexing", self.shader_uniform_texel_buffer_array_dynamic_indexing),
+            ("shaderStorageTexelBufferArrayDynamicIndexing", self.shader_storage_texel_buffer_array_dynamic_indexing),
+            ("shaderUniformBufferArrayNonUniformIndexing", self.shader_uniform_buffer_array_non_uniform_indexing),
+            ("shaderSampledImageArrayNonUniformIndexing", self.shader_sampled_image_array_non_uniform_indexing),
+            ("shaderStorageBufferArrayNonUniformIndexing", self.shader_storage_buffer_array_non_uniform_indexing),
+            ("shaderStorageImageArrayNonUniformIndexing", self.shader_storage_image_array_non_uniform_indexing),
+            ("shaderInputAttachmentArrayNonUniformIndexing", self.shader_input_attachment_array_non_uniform_indexing),
             (
                 "shaderUniformTexelBufferArrayNonUniformIndexing",
                 self.shader_uniform_texel_buffer_array_non_uniform_indexing,
@@ -1195,22 +1117,10 @@ impl Features {
                 "shaderStorageTexelBufferArrayNonUniformIndexing",
                 self.shader_storage_texel_buffer_array_non_uniform_indexing,
             ),
-            (
-                "descriptorBindingUniformBufferUpdateAfterBind",
-                self.descriptor_binding_uniform_buffer_update_after_bind,
-            ),
-            (
-                "descriptorBindingSampledImageUpdateAfterBind",
-                self.descriptor_binding_sampled_image_update_after_bind,
-            ),
-            (
-                "descriptorBindingStorageImageUpdateAfterBind",
-                self.descriptor_binding_storage_image_update_after_bind,
-            ),
-            (
-                "descriptorBindingStorageBufferUpdateAfterBind",
-                self.descriptor_binding_storage_buffer_update_after_bind,
-            ),
+            ("descriptorBindingUniformBufferUpdateAfterBind", self.descriptor_binding_uniform_buffer_update_after_bind),
+            ("descriptorBindingSampledImageUpdateAfterBind", self.descriptor_binding_sampled_image_update_after_bind),
+            ("descriptorBindingStorageImageUpdateAfterBind", self.descriptor_binding_storage_image_update_after_bind),
+            ("descriptorBindingStorageBufferUpdateAfterBind", self.descriptor_binding_storage_buffer_update_after_bind),
             (
                 "descriptorBindingUniformTexelBufferUpdateAfterBind",
                 self.descriptor_binding_uniform_texel_buffer_update_after_bind,
@@ -1219,183 +1129,75 @@ impl Features {
                 "descriptorBindingStorageTexelBufferUpdateAfterBind",
                 self.descriptor_binding_storage_texel_buffer_update_after_bind,
             ),
-            (
-                "descriptorBindingUpdateUnusedWhilePending",
-                self.descriptor_binding_update_unused_while_pending,
-            ),
-            (
-                "descriptorBindingPartiallyBound",
-                self.descriptor_binding_partially_bound,
-            ),
-            (
-                "descriptorBindingVariableDescriptorCount",
-                self.descriptor_binding_variable_descriptor_count,
-            ),
+            ("descriptorBindingUpdateUnusedWhilePending", self.descriptor_binding_update_unused_while_pending),
+            ("descriptorBindingPartiallyBound", self.descriptor_binding_partially_bound),
+            ("descriptorBindingVariableDescriptorCount", self.descriptor_binding_variable_descriptor_count),
             ("runtimeDescriptorArray", self.runtime_descriptor_array),
             ("samplerFilterMinmax", self.sampler_filter_minmax),
             ("scalarBlockLayout", self.scalar_block_layout),
             ("imagelessFramebuffer", self.imageless_framebuffer),
-            (
-                "uniformBufferStandardLayout",
-                self.uniform_buffer_standard_layout,
-            ),
-            (
-                "shaderSubgroupExtendedTypes",
-                self.shader_subgroup_extended_types,
-            ),
-            (
-                "separateDepthStencilLayouts",
-                self.separate_depth_stencil_layouts,
-            ),
+            ("uniformBufferStandardLayout", self.uniform_buffer_standard_layout),
+            ("shaderSubgroupExtendedTypes", self.shader_subgroup_extended_types),
+            ("separateDepthStencilLayouts", self.separate_depth_stencil_layouts),
             ("hostQueryReset", self.host_query_reset),
             ("timelineSemaphore", self.timeline_semaphore),
             ("bufferDeviceAddress", self.buffer_device_address),
-            (
-                "bufferDeviceAddressCaptureReplay",
-                self.buffer_device_address_capture_replay,
-            ),
-            (
-                "bufferDeviceAddressMultiDevice",
-                self.buffer_device_address_multi_device,
-            ),
+            ("bufferDeviceAddressCaptureReplay", self.buffer_device_address_capture_replay),
+            ("bufferDeviceAddressMultiDevice", self.buffer_device_address_multi_device),
             ("vulkanMemoryModel", self.vulkan_memory_model),
-            (
-                "vulkanMemoryModelDeviceScope",
-                self.vulkan_memory_model_device_scope,
-            ),
-            (
-                "vulkanMemoryModelAvailabilityVisibilityChains",
-                self.vulkan_memory_model_availability_visibility_chains,
-            ),
-            (
-                "shaderOutputViewportIndex",
-                self.shader_output_viewport_index,
-            ),
+            ("vulkanMemoryModelDeviceScope", self.vulkan_memory_model_device_scope),
+            ("vulkanMemoryModelAvailabilityVisibilityChains", self.vulkan_memory_model_availability_visibility_chains),
+            ("shaderOutputViewportIndex", self.shader_output_viewport_index),
             ("shaderOutputLayer", self.shader_output_layer),
-            (
-                "subgroupBroadcastDynamicId",
-                self.subgroup_broadcast_dynamic_id,
-            ),
+            ("subgroupBroadcastDynamicId", self.subgroup_broadcast_dynamic_id),
             ("robustImageAccess", self.robust_image_access),
             ("inlineUniformBlock", self.inline_uniform_block),
             (
                 "descriptorBindingInlineUniformBlockUpdateAfterBind",
                 self.descriptor_binding_inline_uniform_block_update_after_bind,
             ),
-            (
-                "pipelineCreationCacheControl",
-                self.pipeline_creation_cache_control,
-            ),
+            ("pipelineCreationCacheControl", self.pipeline_creation_cache_control),
             ("privateData", self.private_data),
-            (
-                "shaderDemoteToHelperInvocation",
-                self.shader_demote_to_helper_invocation,
-            ),
-            (
-                "shaderTerminateInvocation",
-                self.shader_terminate_invocation,
-            ),
+            ("shaderDemoteToHelperInvocation", self.shader_demote_to_helper_invocation),
+            ("shaderTerminateInvocation", self.shader_terminate_invocation),
             ("subgroupSizeControl", self.subgroup_size_control),
             ("computeFullSubgroups", self.compute_full_subgroups),
             ("synchronization2", self.synchronization2),
-            (
-                "textureCompressionASTC_HDR",
-                self.texture_compression_astc_hdr,
-            ),
-            (
-                "shaderZeroInitializeWorkgroupMemory",
-                self.shader_zero_initialize_workgroup_memory,
-            ),
+            ("textureCompressionASTC_HDR", self.texture_compression_astc_hdr),
+            ("shaderZeroInitializeWorkgroupMemory", self.shader_zero_initialize_workgroup_memory),
             ("dynamicRendering", self.dynamic_rendering),
             ("shaderIntegerDotProduct", self.shader_integer_dot_product),
             ("maintenance4", self.maintenance4),
-            (
-                "shaderEarlyAndLateFragmentTests",
-                self.shader_early_and_late_fragment_tests,
-            ),
+            ("shaderEarlyAndLateFragmentTests", self.shader_early_and_late_fragment_tests),
             ("formatA4R4G4B4", self.format_a4r4g4b4),
             ("formatA4B4G4R4", self.format_a4b4g4r4),
-            (
-                "attachmentFeedbackLoopLayout",
-                self.attachment_feedback_loop_layout,
-            ),
+            ("attachmentFeedbackLoopLayout", self.attachment_feedback_loop_layout),
             ("borderColorSwizzle", self.border_color_swizzle),
-            (
-                "borderColorSwizzleFromImage",
-                self.border_color_swizzle_from_image,
-            ),
+            ("borderColorSwizzleFromImage", self.border_color_swizzle_from_image),
             ("colorWriteEnable", self.color_write_enable),
             ("conditionalRendering", self.conditional_rendering),
-            (
-                "inheritedConditionalRendering",
-                self.inherited_conditional_rendering,
-            ),
+            ("inheritedConditionalRendering", self.inherited_conditional_rendering),
             ("customBorderColors", self.custom_border_colors),
-            (
-                "customBorderColorWithoutFormat",
-                self.custom_border_color_without_format,
-            ),
+            ("customBorderColorWithoutFormat", self.custom_border_color_without_format),
             ("depthClampZeroOne", self.depth_clamp_zero_one),
             ("depthClipControl", self.depth_clip_control),
             ("depthClipEnable", self.depth_clip_enable),
             ("extendedDynamicState", self.extended_dynamic_state),
             ("extendedDynamicState2", self.extended_dynamic_state2),
-            (
-                "extendedDynamicState2LogicOp",
-                self.extended_dynamic_state2_logic_op,
-            ),
-            (
-                "extendedDynamicState2PatchControlPoints",
-                self.extended_dynamic_state2_patch_control_points,
-            ),
-            (
-                "extendedDynamicState3TessellationDomainOrigin",
-                self.extended_dynamic_state3_tessellation_domain_origin,
-            ),
-            (
-                "extendedDynamicState3DepthClampEnable",
-                self.extended_dynamic_state3_depth_clamp_enable,
-            ),
-            (
-                "extendedDynamicState3PolygonMode",
-                self.extended_dynamic_state3_polygon_mode,
-            ),
-            (
-                "extendedDynamicState3RasterizationSamples",
-                self.extended_dynamic_state3_rasterization_samples,
-            ),
-            (
-                "extendedDynamicState3SampleMask",
-                self.extended_dynamic_state3_sample_mask,
-            ),
-            (
-                "extendedDynamicState3AlphaToCoverageEnable",
-                self.extended_dynamic_state3_alpha_to_coverage_enable,
-            ),
-            (
-                "extendedDynamicState3AlphaToOneEnable",
-                self.extended_dynamic_state3_alpha_to_one_enable,
-            ),
-            (
-                "extendedDynamicState3LogicOpEnable",
-                self.extended_dynamic_state3_logic_op_enable,
-            ),
-            (
-                "extendedDynamicState3ColorBlendEnable",
-                self.extended_dynamic_state3_color_blend_enable,
-            ),
-            (
-                "extendedDynamicState3ColorBlendEquation",
-                self.extended_dynamic_state3_color_blend_equation,
-            ),
-            (
-                "extendedDynamicState3ColorWriteMask",
-                self.extended_dynamic_state3_color_write_mask,
-            ),
-            (
-                "extendedDynamicState3RasterizationStream",
-                self.extended_dynamic_state3_rasterization_stream,
-            ),
+            ("extendedDynamicState2LogicOp", self.extended_dynamic_state2_logic_op),
+            ("extendedDynamicState2PatchControlPoints", self.extended_dynamic_state2_patch_control_points),
+            ("extendedDynamicState3TessellationDomainOrigin", self.extended_dynamic_state3_tessellation_domain_origin),
+            ("extendedDynamicState3DepthClampEnable", self.extended_dynamic_state3_depth_clamp_enable),
+            ("extendedDynamicState3PolygonMode", self.extended_dynamic_state3_polygon_mode),
+            ("extendedDynamicState3RasterizationSamples", self.extended_dynamic_state3_rasterization_samples),
+            ("extendedDynamicState3SampleMask", self.extended_dynamic_state3_sample_mask),
+            ("extendedDynamicState3AlphaToCoverageEnable", self.extended_dynamic_state3_alpha_to_coverage_enable),
+            ("extendedDynamicState3AlphaToOneEnable", self.extended_dynamic_state3_alpha_to_one_enable),
+            ("extendedDynamicState3LogicOpEnable", self.extended_dynamic_state3_logic_op_enable),
+            ("extendedDynamicState3ColorBlendEnable", self.extended_dynamic_state3_color_blend_enable),
+            ("extendedDynamicState3ColorBlendEquation", self.extended_dynamic_state3_color_blend_equation),
+            ("extendedDynamicState3ColorWriteMask", self.extended_dynamic_state3_color_write_mask),
+            ("extendedDynamicState3RasterizationStream", self.extended_dynamic_state3_rasterization_stream),
             (
                 "extendedDynamicState3ConservativeRasterizationMode",
                 self.extended_dynamic_state3_conservative_rasterization_mode,
@@ -1404,74 +1206,32 @@ impl Features {
                 "extendedDynamicState3ExtraPrimitiveOverestimationSize",
                 self.extended_dynamic_state3_extra_primitive_overestimation_size,
             ),
-            (
-                "extendedDynamicState3DepthClipEnable",
-                self.extended_dynamic_state3_depth_clip_enable,
-            ),
-            (
-                "extendedDynamicState3SampleLocationsEnable",
-                self.extended_dynamic_state3_sample_locations_enable,
-            ),
-            (
-                "extendedDynamicState3ColorBlendAdvanced",
-                self.extended_dynamic_state3_color_blend_advanced,
-            ),
-            (
-                "extendedDynamicState3ProvokingVertexMode",
-                self.extended_dynamic_state3_provoking_vertex_mode,
-            ),
-            (
-                "extendedDynamicState3LineRasterizationMode",
-                self.extended_dynamic_state3_line_rasterization_mode,
-            ),
-            (
-                "extendedDynamicState3LineStippleEnable",
-                self.extended_dynamic_state3_line_stipple_enable,
-            ),
+            ("extendedDynamicState3DepthClipEnable", self.extended_dynamic_state3_depth_clip_enable),
+            ("extendedDynamicState3SampleLocationsEnable", self.extended_dynamic_state3_sample_locations_enable),
+            ("extendedDynamicState3ColorBlendAdvanced", self.extended_dynamic_state3_color_blend_advanced),
+            ("extendedDynamicState3ProvokingVertexMode", self.extended_dynamic_state3_provoking_vertex_mode),
+            ("extendedDynamicState3LineRasterizationMode", self.extended_dynamic_state3_line_rasterization_mode),
+            ("extendedDynamicState3LineStippleEnable", self.extended_dynamic_state3_line_stipple_enable),
             (
                 "extendedDynamicState3DepthClipNegativeOneToOne",
                 self.extended_dynamic_state3_depth_clip_negative_one_to_one,
             ),
-            (
-                "extendedDynamicState3ViewportWScalingEnable",
-                self.extended_dynamic_state3_viewport_w_scaling_enable,
-            ),
-            (
-                "extendedDynamicState3ViewportSwizzle",
-                self.extended_dynamic_state3_viewport_swizzle,
-            ),
-            (
-                "extendedDynamicState3CoverageToColorEnable",
-                self.extended_dynamic_state3_coverage_to_color_enable,
-            ),
-            (
-                "extendedDynamicState3CoverageToColorLocation",
-                self.extended_dynamic_state3_coverage_to_color_location,
-            ),
-            (
-                "extendedDynamicState3CoverageModulationMode",
-                self.extended_dynamic_state3_coverage_modulation_mode,
-            ),
+            ("extendedDynamicState3ViewportWScalingEnable", self.extended_dynamic_state3_viewport_w_scaling_enable),
+            ("extendedDynamicState3ViewportSwizzle", self.extended_dynamic_state3_viewport_swizzle),
+            ("extendedDynamicState3CoverageToColorEnable", self.extended_dynamic_state3_coverage_to_color_enable),
+            ("extendedDynamicState3CoverageToColorLocation", self.extended_dynamic_state3_coverage_to_color_location),
+            ("extendedDynamicState3CoverageModulationMode", self.extended_dynamic_state3_coverage_modulation_mode),
             (
                 "extendedDynamicState3CoverageModulationTableEnable",
                 self.extended_dynamic_state3_coverage_modulation_table_enable,
             ),
-            (
-                "extendedDynamicState3CoverageModulationTable",
-                self.extended_dynamic_state3_coverage_modulation_table,
-            ),
-            (
-                "extendedDynamicState3CoverageReductionMode",
-                self.extended_dynamic_state3_coverage_reduction_mode,
-            ),
+            ("extendedDynamicState3CoverageModulationTable", self.extended_dynamic_state3_coverage_modulation_table),
+            ("extendedDynamicState3CoverageReductionMode", self.extended_dynamic_state3_coverage_reduction_mode),
             (
                 "extendedDynamicState3RepresentativeFragmentTestEnable",
                 self.extended_dynamic_state3_representative_fragment_test_enable,
             ),
-            (
-                "extendedDynamicState3ShadingRateImageEnable",
-                self.extended_dynamic_state3_shading_rate_image_enable,
-            ),
+            ("extendedDynamicState3ShadingRateImageEnable", self.extended_dynamic_state3_shading_rate_image_enable),
             ("graphicsPipelineLibrary", self.graphics_pipeline_library),
             ("image2DViewOf3D", self.image2_d_view_of3_d),
             ("sampler2DViewOf3D", self.sampler2_d_view_of3_d),
@@ -1484,143 +1244,47 @@ impl Features {
             ("stippledSmoothLines", self.stippled_smooth_lines),
             ("multiDraw", self.multi_draw),
             ("nonSeamlessCubeMap", self.non_seamless_cube_map),
-            (
-                "primitiveTopologyListRestart",
-                self.primitive_topology_list_restart,
-            ),
-            (
-                "primitiveTopologyPatchListRestart",
-                self.primitive_topology_patch_list_restart,
-            ),
+            ("primitiveTopologyListRestart", self.primitive_topology_list_restart),
+            ("primitiveTopologyPatchListRestart", self.primitive_topology_patch_list_restart),
             ("primitivesGeneratedQuery", self.primitives_generated_query),
-            (
-                "primitivesGeneratedQueryWithRasterizerDiscard",
-                self.primitives_generated_query_with_rasterizer_discard,
-            ),
-            (
-                "primitivesGeneratedQueryWithNonZeroStreams",
-                self.primitives_generated_query_with_non_zero_streams,
-            ),
+            ("primitivesGeneratedQueryWithRasterizerDiscard", self.primitives_generated_query_with_rasterizer_discard),
+            ("primitivesGeneratedQueryWithNonZeroStreams", self.primitives_generated_query_with_non_zero_streams),
             ("provokingVertexLast", self.provoking_vertex_last),
-            (
-                "transformFeedbackPreservesProvokingVertex",
-                self.transform_feedback_preserves_provoking_vertex,
-            ),
+            ("transformFeedbackPreservesProvokingVertex", self.transform_feedback_preserves_provoking_vertex),
             ("robustBufferAccess2", self.robust_buffer_access2),
             ("robustImageAccess2", self.robust_image_access2),
             ("nullDescriptor", self.null_descriptor),
-            (
-                "shaderBufferFloat32Atomics",
-                self.shader_buffer_float32_atomics,
-            ),
-            (
-                "shaderBufferFloat32AtomicAdd",
-                self.shader_buffer_float32_atomic_add,
-            ),
-            (
-                "shaderBufferFloat64Atomics",
-                self.shader_buffer_float64_atomics,
-            ),
-            (
-                "shaderBufferFloat64AtomicAdd",
-                self.shader_buffer_float64_atomic_add,
-            ),
-            (
-                "shaderSharedFloat32Atomics",
-                self.shader_shared_float32_atomics,
-            ),
-            (
-                "shaderSharedFloat32AtomicAdd",
-                self.shader_shared_float32_atomic_add,
-            ),
-            (
-                "shaderSharedFloat64Atomics",
-                self.shader_shared_float64_atomics,
-            ),
-            (
-                "shaderSharedFloat64AtomicAdd",
-                self.shader_shared_float64_atomic_add,
-            ),
-            (
-                "shaderImageFloat32Atomics",
-                self.shader_image_float32_atomics,
-            ),
-            (
-                "shaderImageFloat32AtomicAdd",
-                self.shader_image_float32_atomic_add,
-            ),
-            (
-                "sparseImageFloat32Atomics",
-                self.sparse_image_float32_atomics,
-            ),
-            (
-                "sparseImageFloat32AtomicAdd",
-                self.sparse_image_float32_atomic_add,
-            ),
-            (
-                "shaderBufferFloat16Atomics",
-                self.shader_buffer_float16_atomics,
-            ),
-            (
-                "shaderBufferFloat16AtomicAdd",
-                self.shader_buffer_float16_atomic_add,
-            ),
-            (
-                "shaderBufferFloat16AtomicMinMax",
-                self.shader_buffer_float16_atomic_min_max,
-            ),
-            (
-                "shaderBufferFloat32AtomicMinMax",
-                self.shader_buffer_float32_atomic_min_max,
-            ),
-            (
-                "shaderBufferFloat64AtomicMinMax",
-                self.shader_buffer_float64_atomic_min_max,
-            ),
-            (
-                "shaderSharedFloat16Atomics",
-                self.shader_shared_float16_atomics,
-            ),
-            (
-                "shaderSharedFloat16AtomicAdd",
-                self.shader_shared_float16_atomic_add,
-            ),
-            (
-                "shaderSharedFloat16AtomicMinMax",
-                self.shader_shared_float16_atomic_min_max,
-            ),
-            (
-                "shaderSharedFloat32AtomicMinMax",
-                self.shader_shared_float32_atomic_min_max,
-            ),
-            (
-                "shaderSharedFloat64AtomicMinMax",
-                self.shader_shared_float64_atomic_min_max,
-            ),
-            (
-                "shaderImageFloat32AtomicMinMax",
-                self.shader_image_float32_atomic_min_max,
-            ),
-            (
-                "sparseImageFloat32AtomicMinMax",
-                self.sparse_image_float32_atomic_min_max,
-            ),
+            ("shaderBufferFloat32Atomics", self.shader_buffer_float32_atomics),
+            ("shaderBufferFloat32AtomicAdd", self.shader_buffer_float32_atomic_add),
+            ("shaderBufferFloat64Atomics", self.shader_buffer_float64_atomics),
+            ("shaderBufferFloat64AtomicAdd", self.shader_buffer_float64_atomic_add),
+            ("shaderSharedFloat32Atomics", self.shader_shared_float32_atomics),
+            ("shaderSharedFloat32AtomicAdd", self.shader_shared_float32_atomic_add),
+            ("shaderSharedFloat64Atomics", self.shader_shared_float64_atomics),
+            ("shaderSharedFloat64AtomicAdd", self.shader_shared_float64_atomic_add),
+            ("shaderImageFloat32Atomics", self.shader_image_float32_atomics),
+            ("shaderImageFloat32AtomicAdd", self.shader_image_float32_atomic_add),
+            ("sparseImageFloat32Atomics", self.sparse_image_float32_atomics),
+            ("sparseImageFloat32AtomicAdd", self.sparse_image_float32_atomic_add),
+            ("shaderBufferFloat16Atomics", self.shader_buffer_float16_atomics),
+            ("shaderBufferFloat16AtomicAdd", self.shader_buffer_float16_atomic_add),
+            ("shaderBufferFloat16AtomicMinMax", self.shader_buffer_float16_atomic_min_max),
+            ("shaderBufferFloat32AtomicMinMax", self.shader_buffer_float32_atomic_min_max),
+            ("shaderBufferFloat64AtomicMinMax", self.shader_buffer_float64_atomic_min_max),
+            ("shaderSharedFloat16Atomics", self.shader_shared_float16_atomics),
+            ("shaderSharedFloat16AtomicAdd", self.shader_shared_float16_atomic_add),
+            ("shaderSharedFloat16AtomicMinMax", self.shader_shared_float16_atomic_min_max),
+            ("shaderSharedFloat32AtomicMinMax", self.shader_shared_float32_atomic_min_max),
+            ("shaderSharedFloat64AtomicMinMax", self.shader_shared_float64_atomic_min_max),
+            ("shaderImageFloat32AtomicMinMax", self.shader_image_float32_atomic_min_max),
+            ("sparseImageFloat32AtomicMinMax", self.sparse_image_float32_atomic_min_max),
             ("texelBufferAlignment", self.texel_buffer_alignment),
             ("transformFeedback", self.transform_feedback),
             ("geometryStreams", self.geometry_streams),
-            (
-                "vertexAttributeInstanceRateDivisor",
-                self.vertex_attribute_instance_rate_divisor,
-            ),
-            (
-                "vertexAttributeInstanceRateZeroDivisor",
-                self.vertex_attribute_instance_rate_zero_divisor,
-            ),
+            ("vertexAttributeInstanceRateDivisor", self.vertex_attribute_instance_rate_divisor),
+            ("vertexAttributeInstanceRateZeroDivisor", self.vertex_attribute_instance_rate_zero_divisor),
             ("vertexInputDynamicState", self.vertex_input_dynamic_state),
-            (
-                "gaussianPrimitiveTopology",
-                self.gaussian_primitive_topology,
-            ),
+            ("gaussianPrimitiveTopology", self.gaussian_primitive_topology),
             ("vertexShaderProjection", self.vertex_shader_projection),
             ("resolveFragmentShader", self.resolve_fragment_shader),
             ("radialDistanceOrder", self.radial_distance_order),
@@ -1646,32 +1310,17 @@ impl Features {
             ("resolveGaussianIndices", self.resolve_gaussian_indices),
             ("gaussianCutOff", self.gaussian_cut_off),
             ("opacityCompensationFloor", self.opacity_compensation_floor),
-            (
-                "performanceCounterQueryPools",
-                self.performance_counter_query_pools,
-            ),
-            (
-                "performanceCounterMultipleQueryPools",
-                self.performance_counter_multiple_query_pools,
-            ),
+            ("performanceCounterQueryPools", self.performance_counter_query_pools),
+            ("performanceCounterMultipleQueryPools", self.performance_counter_multiple_query_pools),
             ("shaderSubgroupClock", self.shader_subgroup_clock),
             ("shaderDeviceClock", self.shader_device_clock),
-            (
-                "workgroupMemoryExplicitLayout",
-                self.workgroup_memory_explicit_layout,
-            ),
+            ("workgroupMemoryExplicitLayout", self.workgroup_memory_explicit_layout),
             (
                 "workgroupMemoryExplicitLayoutScalarBlockLayout",
                 self.workgroup_memory_explicit_layout_scalar_block_layout,
             ),
-            (
-                "workgroupMemoryExplicitLayout8BitAccess",
-                self.workgroup_memory_explicit_layout8_bit_access,
-            ),
-            (
-                "workgroupMemoryExplicitLayout16BitAccess",
-                self.workgroup_memory_explicit_layout16_bit_access,
-            ),
+            ("workgroupMemoryExplicitLayout8BitAccess", self.workgroup_memory_explicit_layout8_bit_access),
+            ("workgroupMemoryExplicitLayout16BitAccess", self.workgroup_memory_explicit_layout16_bit_access),
         ]
     }
 
@@ -1705,32 +1354,16 @@ impl Features {
             pipeline_statistics_query: self.pipeline_statistics_query.into(),
             vertex_pipeline_stores_and_atomics: self.vertex_pipeline_stores_and_atomics.into(),
             fragment_stores_and_atomics: self.fragment_stores_and_atomics.into(),
-            shader_tessellation_and_geometry_point_size: self
-                .shader_tessellation_and_geometry_point_size
-                .into(),
+            shader_tessellation_and_geometry_point_size: self.shader_tessellation_and_geometry_point_size.into(),
             shader_image_gather_extended: self.shader_image_gather_extended.into(),
-            shader_storage_image_extended_formats: self
-                .shader_storage_image_extended_formats
-                .into(),
+            shader_storage_image_extended_formats: self.shader_storage_image_extended_formats.into(),
             shader_storage_image_multisample: self.shader_storage_image_multisample.into(),
-            shader_storage_image_read_without_format: self
-                .shader_storage_image_read_without_format
-                .into(),
-            shader_storage_image_write_without_format: self
-                .shader_storage_image_write_without_format
-                .into(),
-            shader_uniform_buffer_array_dynamic_indexing: self
-                .shader_uniform_buffer_array_dynamic_indexing
-                .into(),
-            shader_sampled_image_array_dynamic_indexing: self
-                .shader_sampled_image_array_dynamic_indexing
-                .into(),
-            shader_storage_buffer_array_dynamic_indexing: self
-                .shader_storage_buffer_array_dynamic_indexing
-                .into(),
-            shader_storage_image_array_dynamic_indexing: self
-                .shader_storage_image_array_dynamic_indexing
-                .into(),
+            shader_storage_image_read_without_format: self.shader_storage_image_read_without_format.into(),
+            shader_storage_image_write_without_format: self.shader_storage_image_write_without_format.into(),
+            shader_uniform_buffer_array_dynamic_indexing: self.shader_uniform_buffer_array_dynamic_indexing.into(),
+            shader_sampled_image_array_dynamic_indexing: self.shader_sampled_image_array_dynamic_indexing.into(),
+            shader_storage_buffer_array_dynamic_indexing: self.shader_storage_buffer_array_dynamic_indexing.into(),
+            shader_storage_image_array_dynamic_indexing: self.shader_storage_image_array_dynamic_indexing.into(),
             shader_clip_distance: self.shader_clip_distance.into(),
             shader_cull_distance: self.shader_cull_distance.into(),
             shader_float64: self.shader_float64.into(),
@@ -1779,16 +1412,13 @@ impl Features {
         self.texture_compression_bc |= requested.texture_compression_bc != vk::FALSE;
         self.occlusion_query_precise |= requested.occlusion_query_precise != vk::FALSE;
         self.pipeline_statistics_query |= requested.pipeline_statistics_query != vk::FALSE;
-        self.vertex_pipeline_stores_and_atomics |=
-            requested.vertex_pipeline_stores_and_atomics != vk::FALSE;
+        self.vertex_pipeline_stores_and_atomics |= requested.vertex_pipeline_stores_and_atomics != vk::FALSE;
         self.fragment_stores_and_atomics |= requested.fragment_stores_and_atomics != vk::FALSE;
         self.shader_tessellation_and_geometry_point_size |=
             requested.shader_tessellation_and_geometry_point_size != vk::FALSE;
         self.shader_image_gather_extended |= requested.shader_image_gather_extended != vk::FALSE;
-        self.shader_storage_image_extended_formats |=
-            requested.shader_storage_image_extended_formats != vk::FALSE;
-        self.shader_storage_image_multisample |=
-            requested.shader_storage_image_multisample != vk::FALSE;
+        self.shader_storage_image_extended_formats |= requested.shader_storage_image_extended_formats != vk::FALSE;
+        self.shader_storage_image_multisample |= requested.shader_storage_image_multisample != vk::FALSE;
         self.shader_storage_image_read_without_format |=
             requested.shader_storage_image_read_without_format != vk::FALSE;
         self.shader_storage_image_write_without_format |=
@@ -1825,8 +1455,7 @@ impl Features {
     pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan11Features<'_>>() {
             out.storage_buffer16_bit_access = self.storage_buffer16_bit_access.into();
-            out.uniform_and_storage_buffer16_bit_access =
-                self.uniform_and_storage_buffer16_bit_access.into();
+            out.uniform_and_storage_buffer16_bit_access = self.uniform_and_storage_buffer16_bit_access.into();
             out.storage_push_constant16 = self.storage_push_constant16.into();
             out.storage_input_output16 = self.storage_input_output16.into();
             out.multiview = self.multiview.into();
@@ -1842,8 +1471,7 @@ impl Features {
             out.sampler_mirror_clamp_to_edge = self.sampler_mirror_clamp_to_edge.into();
             out.draw_indirect_count = self.draw_indirect_count.into();
             out.storage_buffer8_bit_access = self.storage_buffer8_bit_access.into();
-            out.uniform_and_storage_buffer8_bit_access =
-                self.uniform_and_storage_buffer8_bit_access.into();
+            out.uniform_and_storage_buffer8_bit_access = self.uniform_and_storage_buffer8_bit_access.into();
             out.storage_push_constant8 = self.storage_push_constant8.into();
             out.shader_buffer_int64_atomics = self.shader_buffer_int64_atomics.into();
             out.shader_shared_int64_atomics = self.shader_shared_int64_atomics.into();
@@ -1852,12 +1480,10 @@ impl Features {
             out.descriptor_indexing = self.descriptor_indexing.into();
             out.shader_input_attachment_array_dynamic_indexing =
                 self.shader_input_attachment_array_dynamic_indexing.into();
-            out.shader_uniform_texel_buffer_array_dynamic_indexing = self
-                .shader_uniform_texel_buffer_array_dynamic_indexing
-                .into();
-            out.shader_storage_texel_buffer_array_dynamic_indexing = self
-                .shader_storage_texel_buffer_array_dynamic_indexing
-                .into();
+            out.shader_uniform_texel_buffer_array_dynamic_indexing =
+                self.shader_uniform_texel_buffer_array_dynamic_indexing.into();
+            out.shader_storage_texel_buffer_array_dynamic_indexing =
+                self.shader_storage_texel_buffer_array_dynamic_indexing.into();
             out.shader_uniform_buffer_array_non_uniform_indexing =
                 self.shader_uniform_buffer_array_non_uniform_indexing.into();
             out.shader_sampled_image_array_non_uniform_indexing =
@@ -1866,38 +1492,28 @@ impl Features {
                 self.shader_storage_buffer_array_non_uniform_indexing.into();
             out.shader_storage_image_array_non_uniform_indexing =
                 self.shader_storage_image_array_non_uniform_indexing.into();
-            out.shader_input_attachment_array_non_uniform_indexing = self
-                .shader_input_attachment_array_non_uniform_indexing
-                .into();
-            out.shader_uniform_texel_buffer_array_non_uniform_indexing = self
-                .shader_uniform_texel_buffer_array_non_uniform_indexing
-                .into();
-            out.shader_storage_texel_buffer_array_non_uniform_indexing = self
-                .shader_storage_texel_buffer_array_non_uniform_indexing
-                .into();
-            out.descriptor_binding_uniform_buffer_update_after_bind = self
-                .descriptor_binding_uniform_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_sampled_image_update_after_bind = self
-                .descriptor_binding_sampled_image_update_after_bind
-                .into();
-            out.descriptor_binding_storage_image_update_after_bind = self
-                .descriptor_binding_storage_image_update_after_bind
-                .into();
-            out.descriptor_binding_storage_buffer_update_after_bind = self
-                .descriptor_binding_storage_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_uniform_texel_buffer_update_after_bind = self
-                .descriptor_binding_uniform_texel_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_storage_texel_buffer_update_after_bind = self
-                .descriptor_binding_storage_texel_buffer_update_after_bind
-                .into();
+            out.shader_input_attachment_array_non_uniform_indexing =
+                self.shader_input_attachment_array_non_uniform_indexing.into();
+            out.shader_uniform_texel_buffer_array_non_uniform_indexing =
+                self.shader_uniform_texel_buffer_array_non_uniform_indexing.into();
+            out.shader_storage_texel_buffer_array_non_uniform_indexing =
+                self.shader_storage_texel_buffer_array_non_uniform_indexing.into();
+            out.descriptor_binding_uniform_buffer_update_after_bind =
+                self.descriptor_binding_uniform_buffer_update_after_bind.into();
+            out.descriptor_binding_sampled_image_update_after_bind =
+                self.descriptor_binding_sampled_image_update_after_bind.into();
+            out.descriptor_binding_storage_image_update_after_bind =
+                self.descriptor_binding_storage_image_update_after_bind.into();
+            out.descriptor_binding_storage_buffer_update_after_bind =
+                self.descriptor_binding_storage_buffer_update_after_bind.into();
+            out.descriptor_binding_uniform_texel_buffer_update_after_bind =
+                self.descriptor_binding_uniform_texel_buffer_update_after_bind.into();
+            out.descriptor_binding_storage_texel_buffer_update_after_bind =
+                self.descriptor_binding_storage_texel_buffer_update_after_bind.into();
             out.descriptor_binding_update_unused_while_pending =
                 self.descriptor_binding_update_unused_while_pending.into();
             out.descriptor_binding_partially_bound = self.descriptor_binding_partially_bound.into();
-            out.descriptor_binding_variable_descriptor_count =
-                self.descriptor_binding_variable_descriptor_count.into();
+            out.descriptor_binding_variable_descriptor_count = self.descriptor_binding_variable_descriptor_count.into();
             out.runtime_descriptor_array = self.runtime_descriptor_array.into();
             out.sampler_filter_minmax = self.sampler_filter_minmax.into();
             out.scalar_block_layout = self.scalar_block_layout.into();
@@ -1908,14 +1524,12 @@ impl Features {
             out.host_query_reset = self.host_query_reset.into();
             out.timeline_semaphore = self.timeline_semaphore.into();
             out.buffer_device_address = self.buffer_device_address.into();
-            out.buffer_device_address_capture_replay =
-                self.buffer_device_address_capture_replay.into();
+            out.buffer_device_address_capture_replay = self.buffer_device_address_capture_replay.into();
             out.buffer_device_address_multi_device = self.buffer_device_address_multi_device.into();
             out.vulkan_memory_model = self.vulkan_memory_model.into();
             out.vulkan_memory_model_device_scope = self.vulkan_memory_model_device_scope.into();
-            out.vulkan_memory_model_availability_visibility_chains = self
-                .vulkan_memory_model_availability_visibility_chains
-                .into();
+            out.vulkan_memory_model_availability_visibility_chains =
+                self.vulkan_memory_model_availability_visibility_chains.into();
             out.shader_output_viewport_index = self.shader_output_viewport_index.into();
             out.shader_output_layer = self.shader_output_layer.into();
             out.subgroup_broadcast_dynamic_id = self.subgroup_broadcast_dynamic_id.into();
@@ -1923,9 +1537,8 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan13Features<'_>>() {
             out.robust_image_access = self.robust_image_access.into();
             out.inline_uniform_block = self.inline_uniform_block.into();
-            out.descriptor_binding_inline_uniform_block_update_after_bind = self
-                .descriptor_binding_inline_uniform_block_update_after_bind
-                .into();
+            out.descriptor_binding_inline_uniform_block_update_after_bind =
+                self.descriptor_binding_inline_uniform_block_update_after_bind.into();
             out.pipeline_creation_cache_control = self.pipeline_creation_cache_control.into();
             out.private_data = self.private_data.into();
             out.shader_demote_to_helper_invocation = self.shader_demote_to_helper_invocation.into();
@@ -1934,8 +1547,7 @@ impl Features {
             out.compute_full_subgroups = self.compute_full_subgroups.into();
             out.synchronization2 = self.synchronization2.into();
             out.texture_compression_astc_hdr = self.texture_compression_astc_hdr.into();
-            out.shader_zero_initialize_workgroup_memory =
-                self.shader_zero_initialize_workgroup_memory.into();
+            out.shader_zero_initialize_workgroup_memory = self.shader_zero_initialize_workgroup_memory.into();
             out.dynamic_rendering = self.dynamic_rendering.into();
             out.shader_integer_dot_product = self.shader_integer_dot_product.into();
             out.maintenance4 = self.maintenance4.into();
@@ -1945,8 +1557,7 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>() {
             out.storage_buffer16_bit_access = self.storage_buffer16_bit_access.into();
-            out.uniform_and_storage_buffer16_bit_access =
-                self.uniform_and_storage_buffer16_bit_access.into();
+            out.uniform_and_storage_buffer16_bit_access = self.uniform_and_storage_buffer16_bit_access.into();
             out.storage_push_constant16 = self.storage_push_constant16.into();
             out.storage_input_output16 = self.storage_input_output16.into();
         }
@@ -1954,8 +1565,7 @@ impl Features {
             out.variable_pointers_storage_buffer = self.variable_pointers_storage_buffer.into();
             out.variable_pointers = self.variable_pointers.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>() {
             out.sampler_ycbcr_conversion = self.sampler_ycbcr_conversion.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>() {
@@ -1969,9 +1579,8 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>() {
             out.vulkan_memory_model = self.vulkan_memory_model.into();
             out.vulkan_memory_model_device_scope = self.vulkan_memory_model_device_scope.into();
-            out.vulkan_memory_model_availability_visibility_chains = self
-                .vulkan_memory_model_availability_visibility_chains
-                .into();
+            out.vulkan_memory_model_availability_visibility_chains =
+                self.vulkan_memory_model_availability_visibility_chains.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>() {
             out.host_query_reset = self.host_query_reset.into();
@@ -1981,14 +1590,12 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>() {
             out.buffer_device_address = self.buffer_device_address.into();
-            out.buffer_device_address_capture_replay =
-                self.buffer_device_address_capture_replay.into();
+            out.buffer_device_address_capture_replay = self.buffer_device_address_capture_replay.into();
             out.buffer_device_address_multi_device = self.buffer_device_address_multi_device.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>() {
             out.storage_buffer8_bit_access = self.storage_buffer8_bit_access.into();
-            out.uniform_and_storage_buffer8_bit_access =
-                self.uniform_and_storage_buffer8_bit_access.into();
+            out.uniform_and_storage_buffer8_bit_access = self.uniform_and_storage_buffer8_bit_access.into();
             out.storage_push_constant8 = self.storage_push_constant8.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>() {
@@ -2002,12 +1609,10 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>() {
             out.shader_input_attachment_array_dynamic_indexing =
                 self.shader_input_attachment_array_dynamic_indexing.into();
-            out.shader_uniform_texel_buffer_array_dynamic_indexing = self
-                .shader_uniform_texel_buffer_array_dynamic_indexing
-                .into();
-            out.shader_storage_texel_buffer_array_dynamic_indexing = self
-                .shader_storage_texel_buffer_array_dynamic_indexing
-                .into();
+            out.shader_uniform_texel_buffer_array_dynamic_indexing =
+                self.shader_uniform_texel_buffer_array_dynamic_indexing.into();
+            out.shader_storage_texel_buffer_array_dynamic_indexing =
+                self.shader_storage_texel_buffer_array_dynamic_indexing.into();
             out.shader_uniform_buffer_array_non_uniform_indexing =
                 self.shader_uniform_buffer_array_non_uniform_indexing.into();
             out.shader_sampled_image_array_non_uniform_indexing =
@@ -2016,59 +1621,43 @@ impl Features {
                 self.shader_storage_buffer_array_non_uniform_indexing.into();
             out.shader_storage_image_array_non_uniform_indexing =
                 self.shader_storage_image_array_non_uniform_indexing.into();
-            out.shader_input_attachment_array_non_uniform_indexing = self
-                .shader_input_attachment_array_non_uniform_indexing
-                .into();
-            out.shader_uniform_texel_buffer_array_non_uniform_indexing = self
-                .shader_uniform_texel_buffer_array_non_uniform_indexing
-                .into();
-            out.shader_storage_texel_buffer_array_non_uniform_indexing = self
-                .shader_storage_texel_buffer_array_non_uniform_indexing
-                .into();
-            out.descriptor_binding_uniform_buffer_update_after_bind = self
-                .descriptor_binding_uniform_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_sampled_image_update_after_bind = self
-                .descriptor_binding_sampled_image_update_after_bind
-                .into();
-            out.descriptor_binding_storage_image_update_after_bind = self
-                .descriptor_binding_storage_image_update_after_bind
-                .into();
-            out.descriptor_binding_storage_buffer_update_after_bind = self
-                .descriptor_binding_storage_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_uniform_texel_buffer_update_after_bind = self
-                .descriptor_binding_uniform_texel_buffer_update_after_bind
-                .into();
-            out.descriptor_binding_storage_texel_buffer_update_after_bind = self
-                .descriptor_binding_storage_texel_buffer_update_after_bind
-                .into();
+            out.shader_input_attachment_array_non_uniform_indexing =
+                self.shader_input_attachment_array_non_uniform_indexing.into();
+            out.shader_uniform_texel_buffer_array_non_uniform_indexing =
+                self.shader_uniform_texel_buffer_array_non_uniform_indexing.into();
+            out.shader_storage_texel_buffer_array_non_uniform_indexing =
+                self.shader_storage_texel_buffer_array_non_uniform_indexing.into();
+            out.descriptor_binding_uniform_buffer_update_after_bind =
+                self.descriptor_binding_uniform_buffer_update_after_bind.into();
+            out.descriptor_binding_sampled_image_update_after_bind =
+                self.descriptor_binding_sampled_image_update_after_bind.into();
+            out.descriptor_binding_storage_image_update_after_bind =
+                self.descriptor_binding_storage_image_update_after_bind.into();
+            out.descriptor_binding_storage_buffer_update_after_bind =
+                self.descriptor_binding_storage_buffer_update_after_bind.into();
+            out.descriptor_binding_uniform_texel_buffer_update_after_bind =
+                self.descriptor_binding_uniform_texel_buffer_update_after_bind.into();
+            out.descriptor_binding_storage_texel_buffer_update_after_bind =
+                self.descriptor_binding_storage_texel_buffer_update_after_bind.into();
             out.descriptor_binding_update_unused_while_pending =
                 self.descriptor_binding_update_unused_while_pending.into();
             out.descriptor_binding_partially_bound = self.descriptor_binding_partially_bound.into();
-            out.descriptor_binding_variable_descriptor_count =
-                self.descriptor_binding_variable_descriptor_count.into();
+            out.descriptor_binding_variable_descriptor_count = self.descriptor_binding_variable_descriptor_count.into();
             out.runtime_descriptor_array = self.runtime_descriptor_array.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>() {
             out.scalar_block_layout = self.scalar_block_layout.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>() {
             out.uniform_buffer_standard_layout = self.uniform_buffer_standard_layout.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>() {
             out.shader_subgroup_extended_types = self.shader_subgroup_extended_types.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>() {
             out.imageless_framebuffer = self.imageless_framebuffer.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>() {
             out.separate_depth_stencil_layouts = self.separate_depth_stencil_layouts.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>() {
@@ -2077,34 +1666,23 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceSynchronization2Features<'_>>() {
             out.synchronization2 = self.synchronization2.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>() {
             out.texture_compression_astc_hdr = self.texture_compression_astc_hdr.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance4Features<'_>>() {
             out.maintenance4 = self.maintenance4.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>() {
             out.shader_terminate_invocation = self.shader_terminate_invocation.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>() {
             out.shader_demote_to_helper_invocation = self.shader_demote_to_helper_invocation.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>() {
             out.pipeline_creation_cache_control = self.pipeline_creation_cache_control.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>()
-        {
-            out.shader_zero_initialize_workgroup_memory =
-                self.shader_zero_initialize_workgroup_memory.into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>() {
+            out.shader_zero_initialize_workgroup_memory = self.shader_zero_initialize_workgroup_memory.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>() {
             out.robust_image_access = self.robust_image_access.into();
@@ -2115,30 +1693,23 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>() {
             out.inline_uniform_block = self.inline_uniform_block.into();
-            out.descriptor_binding_inline_uniform_block_update_after_bind = self
-                .descriptor_binding_inline_uniform_block_update_after_bind
-                .into();
+            out.descriptor_binding_inline_uniform_block_update_after_bind =
+                self.descriptor_binding_inline_uniform_block_update_after_bind.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>() {
             out.shader_integer_dot_product = self.shader_integer_dot_product.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>()
-        {
-            out.shader_early_and_late_fragment_tests =
-                self.shader_early_and_late_fragment_tests.into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>() {
+            out.shader_early_and_late_fragment_tests = self.shader_early_and_late_fragment_tests.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>() {
             out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
             out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>() {
             out.attachment_feedback_loop_layout = self.attachment_feedback_loop_layout.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>() {
@@ -2148,8 +1719,7 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>() {
             out.color_write_enable = self.color_write_enable.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>() {
             out.conditional_rendering = self.conditional_rendering.into();
             out.inherited_conditional_rendering = self.inherited_conditional_rendering.into();
         }
@@ -2166,97 +1736,66 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>() {
             out.depth_clip_enable = self.depth_clip_enable.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>() {
             out.extended_dynamic_state = self.extended_dynamic_state.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>() {
             out.extended_dynamic_state2 = self.extended_dynamic_state2.into();
             out.extended_dynamic_state2_logic_op = self.extended_dynamic_state2_logic_op.into();
-            out.extended_dynamic_state2_patch_control_points =
-                self.extended_dynamic_state2_patch_control_points.into();
+            out.extended_dynamic_state2_patch_control_points = self.extended_dynamic_state2_patch_control_points.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>()
-        {
-            out.extended_dynamic_state3_tessellation_domain_origin = self
-                .extended_dynamic_state3_tessellation_domain_origin
-                .into();
-            out.extended_dynamic_state3_depth_clamp_enable =
-                self.extended_dynamic_state3_depth_clamp_enable.into();
-            out.extended_dynamic_state3_polygon_mode =
-                self.extended_dynamic_state3_polygon_mode.into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>() {
+            out.extended_dynamic_state3_tessellation_domain_origin =
+                self.extended_dynamic_state3_tessellation_domain_origin.into();
+            out.extended_dynamic_state3_depth_clamp_enable = self.extended_dynamic_state3_depth_clamp_enable.into();
+            out.extended_dynamic_state3_polygon_mode = self.extended_dynamic_state3_polygon_mode.into();
             out.extended_dynamic_state3_rasterization_samples =
                 self.extended_dynamic_state3_rasterization_samples.into();
-            out.extended_dynamic_state3_sample_mask =
-                self.extended_dynamic_state3_sample_mask.into();
+            out.extended_dynamic_state3_sample_mask = self.extended_dynamic_state3_sample_mask.into();
             out.extended_dynamic_state3_alpha_to_coverage_enable =
                 self.extended_dynamic_state3_alpha_to_coverage_enable.into();
-            out.extended_dynamic_state3_alpha_to_one_enable =
-                self.extended_dynamic_state3_alpha_to_one_enable.into();
-            out.extended_dynamic_state3_logic_op_enable =
-                self.extended_dynamic_state3_logic_op_enable.into();
-            out.extended_dynamic_state3_color_blend_enable =
-                self.extended_dynamic_state3_color_blend_enable.into();
-            out.extended_dynamic_state3_color_blend_equation =
-                self.extended_dynamic_state3_color_blend_equation.into();
-            out.extended_dynamic_state3_color_write_mask =
-                self.extended_dynamic_state3_color_write_mask.into();
-            out.extended_dynamic_state3_rasterization_stream =
-                self.extended_dynamic_state3_rasterization_stream.into();
-            out.extended_dynamic_state3_conservative_rasterization_mode = self
-                .extended_dynamic_state3_conservative_rasterization_mode
-                .into();
-            out.extended_dynamic_state3_extra_primitive_overestimation_size = self
-                .extended_dynamic_state3_extra_primitive_overestimation_size
-                .into();
-            out.extended_dynamic_state3_depth_clip_enable =
-                self.extended_dynamic_state3_depth_clip_enable.into();
+            out.extended_dynamic_state3_alpha_to_one_enable = self.extended_dynamic_state3_alpha_to_one_enable.into();
+            out.extended_dynamic_state3_logic_op_enable = self.extended_dynamic_state3_logic_op_enable.into();
+            out.extended_dynamic_state3_color_blend_enable = self.extended_dynamic_state3_color_blend_enable.into();
+            out.extended_dynamic_state3_color_blend_equation = self.extended_dynamic_state3_color_blend_equation.into();
+            out.extended_dynamic_state3_color_write_mask = self.extended_dynamic_state3_color_write_mask.into();
+            out.extended_dynamic_state3_rasterization_stream = self.extended_dynamic_state3_rasterization_stream.into();
+            out.extended_dynamic_state3_conservative_rasterization_mode =
+                self.extended_dynamic_state3_conservative_rasterization_mode.into();
+            out.extended_dynamic_state3_extra_primitive_overestimation_size =
+                self.extended_dynamic_state3_extra_primitive_overestimation_size.into();
+            out.extended_dynamic_state3_depth_clip_enable = self.extended_dynamic_state3_depth_clip_enable.into();
             out.extended_dynamic_state3_sample_locations_enable =
                 self.extended_dynamic_state3_sample_locations_enable.into();
-            out.extended_dynamic_state3_color_blend_advanced =
-                self.extended_dynamic_state3_color_blend_advanced.into();
+            out.extended_dynamic_state3_color_blend_advanced = self.extended_dynamic_state3_color_blend_advanced.into();
             out.extended_dynamic_state3_provoking_vertex_mode =
                 self.extended_dynamic_state3_provoking_vertex_mode.into();
             out.extended_dynamic_state3_line_rasterization_mode =
                 self.extended_dynamic_state3_line_rasterization_mode.into();
-            out.extended_dynamic_state3_line_stipple_enable =
-                self.extended_dynamic_state3_line_stipple_enable.into();
-            out.extended_dynamic_state3_depth_clip_negative_one_to_one = self
-                .extended_dynamic_state3_depth_clip_negative_one_to_one
-                .into();
-            out.extended_dynamic_state3_viewport_w_scaling_enable = self
-                .extended_dynamic_state3_viewport_w_scaling_enable
-                .into();
-            out.extended_dynamic_state3_viewport_swizzle =
-                self.extended_dynamic_state3_viewport_swizzle.into();
+            out.extended_dynamic_state3_line_stipple_enable = self.extended_dynamic_state3_line_stipple_enable.into();
+            out.extended_dynamic_state3_depth_clip_negative_one_to_one =
+                self.extended_dynamic_state3_depth_clip_negative_one_to_one.into();
+            out.extended_dynamic_state3_viewport_w_scaling_enable =
+                self.extended_dynamic_state3_viewport_w_scaling_enable.into();
+            out.extended_dynamic_state3_viewport_swizzle = self.extended_dynamic_state3_viewport_swizzle.into();
             out.extended_dynamic_state3_coverage_to_color_enable =
                 self.extended_dynamic_state3_coverage_to_color_enable.into();
-            out.extended_dynamic_state3_coverage_to_color_location = self
-                .extended_dynamic_state3_coverage_to_color_location
-                .into();
+            out.extended_dynamic_state3_coverage_to_color_location =
+                self.extended_dynamic_state3_coverage_to_color_location.into();
             out.extended_dynamic_state3_coverage_modulation_mode =
                 self.extended_dynamic_state3_coverage_modulation_mode.into();
-            out.extended_dynamic_state3_coverage_modulation_table_enable = self
-                .extended_dynamic_state3_coverage_modulation_table_enable
-                .into();
-            out.extended_dynamic_state3_coverage_modulation_table = self
-                .extended_dynamic_state3_coverage_modulation_table
-                .into();
+            out.extended_dynamic_state3_coverage_modulation_table_enable =
+                self.extended_dynamic_state3_coverage_modulation_table_enable.into();
+            out.extended_dynamic_state3_coverage_modulation_table =
+                self.extended_dynamic_state3_coverage_modulation_table.into();
             out.extended_dynamic_state3_coverage_reduction_mode =
                 self.extended_dynamic_state3_coverage_reduction_mode.into();
-            out.extended_dynamic_state3_representative_fragment_test_enable = self
-                .extended_dynamic_state3_representative_fragment_test_enable
-                .into();
-            out.extended_dynamic_state3_shading_rate_image_enable = self
-                .extended_dynamic_state3_shading_rate_image_enable
-                .into();
+            out.extended_dynamic_state3_representative_fragment_test_enable =
+                self.extended_dynamic_state3_representative_fragment_test_enable.into();
+            out.extended_dynamic_state3_shading_rate_image_enable =
+                self.extended_dynamic_state3_shading_rate_image_enable.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>() {
             out.graphics_pipeline_library = self.graphics_pipeline_library.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>() {
@@ -2280,20 +1819,14 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>() {
             out.non_seamless_cube_map = self.non_seamless_cube_map.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>() {
             out.primitive_topology_list_restart = self.primitive_topology_list_restart.into();
-            out.primitive_topology_patch_list_restart =
-                self.primitive_topology_patch_list_restart.into();
+            out.primitive_topology_patch_list_restart = self.primitive_topology_patch_list_restart.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>() {
             out.primitives_generated_query = self.primitives_generated_query.into();
-            out.primitives_generated_query_with_rasterizer_discard = self
-                .primitives_generated_query_with_rasterizer_discard
-                .into();
+            out.primitives_generated_query_with_rasterizer_discard =
+                self.primitives_generated_query_with_rasterizer_discard.into();
             out.primitives_generated_query_with_non_zero_streams =
                 self.primitives_generated_query_with_non_zero_streams.into();
         }
@@ -2324,49 +1857,32 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>() {
             out.shader_buffer_float16_atomics = self.shader_buffer_float16_atomics.into();
             out.shader_buffer_float16_atomic_add = self.shader_buffer_float16_atomic_add.into();
-            out.shader_buffer_float16_atomic_min_max =
-                self.shader_buffer_float16_atomic_min_max.into();
-            out.shader_buffer_float32_atomic_min_max =
-                self.shader_buffer_float32_atomic_min_max.into();
-            out.shader_buffer_float64_atomic_min_max =
-                self.shader_buffer_float64_atomic_min_max.into();
+            out.shader_buffer_float16_atomic_min_max = self.shader_buffer_float16_atomic_min_max.into();
+            out.shader_buffer_float32_atomic_min_max = self.shader_buffer_float32_atomic_min_max.into();
+            out.shader_buffer_float64_atomic_min_max = self.shader_buffer_float64_atomic_min_max.into();
             out.shader_shared_float16_atomics = self.shader_shared_float16_atomics.into();
             out.shader_shared_float16_atomic_add = self.shader_shared_float16_atomic_add.into();
-            out.shader_shared_float16_atomic_min_max =
-                self.shader_shared_float16_atomic_min_max.into();
-            out.shader_shared_float32_atomic_min_max =
-                self.shader_shared_float32_atomic_min_max.into();
-            out.shader_shared_float64_atomic_min_max =
-                self.shader_shared_float64_atomic_min_max.into();
-            out.shader_image_float32_atomic_min_max =
-                self.shader_image_float32_atomic_min_max.into();
-            out.sparse_image_float32_atomic_min_max =
-                self.sparse_image_float32_atomic_min_max.into();
+            out.shader_shared_float16_atomic_min_max = self.shader_shared_float16_atomic_min_max.into();
+            out.shader_shared_float32_atomic_min_max = self.shader_shared_float32_atomic_min_max.into();
+            out.shader_shared_float64_atomic_min_max = self.shader_shared_float64_atomic_min_max.into();
+            out.shader_image_float32_atomic_min_max = self.shader_image_float32_atomic_min_max.into();
+            out.sparse_image_float32_atomic_min_max = self.sparse_image_float32_atomic_min_max.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>() {
             out.texel_buffer_alignment = self.texel_buffer_alignment.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>() {
             out.transform_feedback = self.transform_feedback.into();
             out.geometry_streams = self.geometry_streams.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>()
-        {
-            out.vertex_attribute_instance_rate_divisor =
-                self.vertex_attribute_instance_rate_divisor.into();
-            out.vertex_attribute_instance_rate_zero_divisor =
-                self.vertex_attribute_instance_rate_zero_divisor.into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>() {
+            out.vertex_attribute_instance_rate_divisor = self.vertex_attribute_instance_rate_divisor.into();
+            out.vertex_attribute_instance_rate_zero_divisor = self.vertex_attribute_instance_rate_zero_divisor.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>() {
             out.vertex_input_dynamic_state = self.vertex_input_dynamic_state.into();
         }
-        if let Some(out) = structure
-            .cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(
-        ) {
+        if let Some(out) = structure.cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>() {
             out.gaussian_primitive_topology = self.gaussian_primitive_topology.into();
             out.vertex_shader_projection = self.vertex_shader_projection.into();
             out.resolve_fragment_shader = self.resolve_fragment_shader.into();
@@ -2396,22 +1912,17 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>() {
             out.performance_counter_query_pools = self.performance_counter_query_pools.into();
-            out.performance_counter_multiple_query_pools =
-                self.performance_counter_multiple_query_pools.into();
+            out.performance_counter_multiple_query_pools = self.performance_counter_multiple_query_pools.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>() {
             out.shader_subgroup_clock = self.shader_subgroup_clock.into();
             out.shader_device_clock = self.shader_device_clock.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>() {
             out.workgroup_memory_explicit_layout = self.workgroup_memory_explicit_layout.into();
-            out.workgroup_memory_explicit_layout_scalar_block_layout = self
-                .workgroup_memory_explicit_layout_scalar_block_layout
-                .into();
-            out.workgroup_memory_explicit_layout8_bit_access =
-                self.workgroup_memory_explicit_layout8_bit_access.into();
+            out.workgroup_memory_explicit_layout_scalar_block_layout =
+                self.workgroup_memory_explicit_layout_scalar_block_layout.into();
+            out.workgroup_memory_explicit_layout8_bit_access = self.workgroup_memory_explicit_layout8_bit_access.into();
             out.workgroup_memory_explicit_layout16_bit_access =
                 self.workgroup_memory_explicit_layout16_bit_access.into();
         }
@@ -2427,18 +1938,15 @@ impl Features {
             self.storage_input_output16 |= requested.storage_input_output16 != vk::FALSE;
             self.multiview |= requested.multiview != vk::FALSE;
             self.multiview_geometry_shader |= requested.multiview_geometry_shader != vk::FALSE;
-            self.multiview_tessellation_shader |=
-                requested.multiview_tessellation_shader != vk::FALSE;
-            self.variable_pointers_storage_buffer |=
-                requested.variable_pointers_storage_buffer != vk::FALSE;
+            self.multiview_tessellation_shader |= requested.multiview_tessellation_shader != vk::FALSE;
+            self.variable_pointers_storage_buffer |= requested.variable_pointers_storage_buffer != vk::FALSE;
             self.variable_pointers |= requested.variable_pointers != vk::FALSE;
             self.protected_memory |= requested.protected_memory != vk::FALSE;
             self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
             self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
         }
         if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan12Features<'_>>(structure) {
-            self.sampler_mirror_clamp_to_edge |=
-                requested.sampler_mirror_clamp_to_edge != vk::FALSE;
+            self.sampler_mirror_clamp_to_edge |= requested.sampler_mirror_clamp_to_edge != vk::FALSE;
             self.draw_indirect_count |= requested.draw_indirect_count != vk::FALSE;
             self.storage_buffer8_bit_access |= requested.storage_buffer8_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer8_bit_access |=
@@ -2483,147 +1991,105 @@ impl Features {
                 requested.descriptor_binding_storage_texel_buffer_update_after_bind != vk::FALSE;
             self.descriptor_binding_update_unused_while_pending |=
                 requested.descriptor_binding_update_unused_while_pending != vk::FALSE;
-            self.descriptor_binding_partially_bound |=
-                requested.descriptor_binding_partially_bound != vk::FALSE;
+            self.descriptor_binding_partially_bound |= requested.descriptor_binding_partially_bound != vk::FALSE;
             self.descriptor_binding_variable_descriptor_count |=
                 requested.descriptor_binding_variable_descriptor_count != vk::FALSE;
             self.runtime_descriptor_array |= requested.runtime_descriptor_array != vk::FALSE;
             self.sampler_filter_minmax |= requested.sampler_filter_minmax != vk::FALSE;
             self.scalar_block_layout |= requested.scalar_block_layout != vk::FALSE;
             self.imageless_framebuffer |= requested.imageless_framebuffer != vk::FALSE;
-            self.uniform_buffer_standard_layout |=
-                requested.uniform_buffer_standard_layout != vk::FALSE;
-            self.shader_subgroup_extended_types |=
-                requested.shader_subgroup_extended_types != vk::FALSE;
-            self.separate_depth_stencil_layouts |=
-                requested.separate_depth_stencil_layouts != vk::FALSE;
+            self.uniform_buffer_standard_layout |= requested.uniform_buffer_standard_layout != vk::FALSE;
+            self.shader_subgroup_extended_types |= requested.shader_subgroup_extended_types != vk::FALSE;
+            self.separate_depth_stencil_layouts |= requested.separate_depth_stencil_layouts != vk::FALSE;
             self.host_query_reset |= requested.host_query_reset != vk::FALSE;
             self.timeline_semaphore |= requested.timeline_semaphore != vk::FALSE;
             self.buffer_device_address |= requested.buffer_device_address != vk::FALSE;
-            self.buffer_device_address_capture_replay |=
-                requested.buffer_device_address_capture_replay != vk::FALSE;
-            self.buffer_device_address_multi_device |=
-                requested.buffer_device_address_multi_device != vk::FALSE;
+            self.buffer_device_address_capture_replay |= requested.buffer_device_address_capture_replay != vk::FALSE;
+            self.buffer_device_address_multi_device |= requested.buffer_device_address_multi_device != vk::FALSE;
             self.vulkan_memory_model |= requested.vulkan_memory_model != vk::FALSE;
-            self.vulkan_memory_model_device_scope |=
-                requested.vulkan_memory_model_device_scope != vk::FALSE;
+            self.vulkan_memory_model_device_scope |= requested.vulkan_memory_model_device_scope != vk::FALSE;
             self.vulkan_memory_model_availability_visibility_chains |=
                 requested.vulkan_memory_model_availability_visibility_chains != vk::FALSE;
-            self.shader_output_viewport_index |=
-                requested.shader_output_viewport_index != vk::FALSE;
+            self.shader_output_viewport_index |= requested.shader_output_viewport_index != vk::FALSE;
             self.shader_output_layer |= requested.shader_output_layer != vk::FALSE;
-            self.subgroup_broadcast_dynamic_id |=
-                requested.subgroup_broadcast_dynamic_id != vk::FALSE;
+            self.subgroup_broadcast_dynamic_id |= requested.subgroup_broadcast_dynamic_id != vk::FALSE;
         }
         if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan13Features<'_>>(structure) {
             self.robust_image_access |= requested.robust_image_access != vk::FALSE;
             self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
             self.descriptor_binding_inline_uniform_block_update_after_bind |=
                 requested.descriptor_binding_inline_uniform_block_update_after_bind != vk::FALSE;
-            self.pipeline_creation_cache_control |=
-                requested.pipeline_creation_cache_control != vk::FALSE;
+            self.pipeline_creation_cache_control |= requested.pipeline_creation_cache_control != vk::FALSE;
             self.private_data |= requested.private_data != vk::FALSE;
-            self.shader_demote_to_helper_invocation |=
-                requested.shader_demote_to_helper_invocation != vk::FALSE;
+            self.shader_demote_to_helper_invocation |= requested.shader_demote_to_helper_invocation != vk::FALSE;
             self.shader_terminate_invocation |= requested.shader_terminate_invocation != vk::FALSE;
             self.subgroup_size_control |= requested.subgroup_size_control != vk::FALSE;
             self.compute_full_subgroups |= requested.compute_full_subgroups != vk::FALSE;
             self.synchronization2 |= requested.synchronization2 != vk::FALSE;
-            self.texture_compression_astc_hdr |=
-                requested.texture_compression_astc_hdr != vk::FALSE;
+            self.texture_compression_astc_hdr |= requested.texture_compression_astc_hdr != vk::FALSE;
             self.shader_zero_initialize_workgroup_memory |=
                 requested.shader_zero_initialize_workgroup_memory != vk::FALSE;
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
             self.shader_integer_dot_product |= requested.shader_integer_dot_product != vk::FALSE;
             self.maintenance4 |= requested.maintenance4 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>(structure) {
             self.protected_memory |= requested.protected_memory != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>(structure) {
             self.storage_buffer16_bit_access |= requested.storage_buffer16_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer16_bit_access |=
                 requested.uniform_and_storage_buffer16_bit_access != vk::FALSE;
             self.storage_push_constant16 |= requested.storage_push_constant16 != vk::FALSE;
             self.storage_input_output16 |= requested.storage_input_output16 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>(structure)
-        {
-            self.variable_pointers_storage_buffer |=
-                requested.variable_pointers_storage_buffer != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>(structure) {
+            self.variable_pointers_storage_buffer |= requested.variable_pointers_storage_buffer != vk::FALSE;
             self.variable_pointers |= requested.variable_pointers != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>(structure) {
             self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
         }
         if let Some(requested) = valid::cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>(structure) {
             self.multiview |= requested.multiview != vk::FALSE;
             self.multiview_geometry_shader |= requested.multiview_geometry_shader != vk::FALSE;
-            self.multiview_tessellation_shader |=
-                requested.multiview_tessellation_shader != vk::FALSE;
+            self.multiview_tessellation_shader |= requested.multiview_tessellation_shader != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>(structure) {
             self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(structure) {
             self.vulkan_memory_model |= requested.vulkan_memory_model != vk::FALSE;
-            self.vulkan_memory_model_device_scope |=
-                requested.vulkan_memory_model_device_scope != vk::FALSE;
+            self.vulkan_memory_model_device_scope |= requested.vulkan_memory_model_device_scope != vk::FALSE;
             self.vulkan_memory_model_availability_visibility_chains |=
                 requested.vulkan_memory_model_availability_visibility_chains != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>(structure) {
             self.host_query_reset |= requested.host_query_reset != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>(structure) {
             self.timeline_semaphore |= requested.timeline_semaphore != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(structure) {
             self.buffer_device_address |= requested.buffer_device_address != vk::FALSE;
-            self.buffer_device_address_capture_replay |=
-                requested.buffer_device_address_capture_replay != vk::FALSE;
-            self.buffer_device_address_multi_device |=
-                requested.buffer_device_address_multi_device != vk::FALSE;
+            self.buffer_device_address_capture_replay |= requested.buffer_device_address_capture_replay != vk::FALSE;
+            self.buffer_device_address_multi_device |= requested.buffer_device_address_multi_device != vk::FALSE;
         }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>(structure) {
             self.storage_buffer8_bit_access |= requested.storage_buffer8_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer8_bit_access |=
                 requested.uniform_and_storage_buffer8_bit_access != vk::FALSE;
             self.storage_push_constant8 |= requested.storage_push_constant8 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>(structure) {
             self.shader_buffer_int64_atomics |= requested.shader_buffer_int64_atomics != vk::FALSE;
             self.shader_shared_int64_atomics |= requested.shader_shared_int64_atomics != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>(structure) {
             self.shader_float16 |= requested.shader_float16 != vk::FALSE;
             self.shader_int8 |= requested.shader_int8 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>(structure) {
             self.shader_input_attachment_array_dynamic_indexing |=
                 requested.shader_input_attachment_array_dynamic_indexing != vk::FALSE;
             self.shader_uniform_texel_buffer_array_dynamic_indexing |=
@@ -2658,198 +2124,125 @@ impl Features {
                 requested.descriptor_binding_storage_texel_buffer_update_after_bind != vk::FALSE;
             self.descriptor_binding_update_unused_while_pending |=
                 requested.descriptor_binding_update_unused_while_pending != vk::FALSE;
-            self.descriptor_binding_partially_bound |=
-                requested.descriptor_binding_partially_bound != vk::FALSE;
+            self.descriptor_binding_partially_bound |= requested.descriptor_binding_partially_bound != vk::FALSE;
             self.descriptor_binding_variable_descriptor_count |=
                 requested.descriptor_binding_variable_descriptor_count != vk::FALSE;
             self.runtime_descriptor_array |= requested.runtime_descriptor_array != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>(structure) {
             self.scalar_block_layout |= requested.scalar_block_layout != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>(structure)
-        {
-            self.uniform_buffer_standard_layout |=
-                requested.uniform_buffer_standard_layout != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>(structure) {
+            self.uniform_buffer_standard_layout |= requested.uniform_buffer_standard_layout != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>(structure)
-        {
-            self.shader_subgroup_extended_types |=
-                requested.shader_subgroup_extended_types != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>(structure) {
+            self.shader_subgroup_extended_types |= requested.shader_subgroup_extended_types != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>(structure) {
             self.imageless_framebuffer |= requested.imageless_framebuffer != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>(structure)
-        {
-            self.separate_depth_stencil_layouts |=
-                requested.separate_depth_stencil_layouts != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>(structure) {
+            self.separate_depth_stencil_layouts |= requested.separate_depth_stencil_layouts != vk::FALSE;
         }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>(structure) {
             self.private_data |= requested.private_data != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceSynchronization2Features<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSynchronization2Features<'_>>(structure) {
             self.synchronization2 |= requested.synchronization2 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>(structure)
-        {
-            self.texture_compression_astc_hdr |=
-                requested.texture_compression_astc_hdr != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>(structure) {
+            self.texture_compression_astc_hdr |= requested.texture_compression_astc_hdr != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceMaintenance4Features<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMaintenance4Features<'_>>(structure) {
             self.maintenance4 |= requested.maintenance4 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>(structure) {
             self.shader_terminate_invocation |= requested.shader_terminate_invocation != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(structure)
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(structure)
         {
-            self.shader_demote_to_helper_invocation |=
-                requested.shader_demote_to_helper_invocation != vk::FALSE;
+            self.shader_demote_to_helper_invocation |= requested.shader_demote_to_helper_invocation != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>(structure)
-        {
-            self.pipeline_creation_cache_control |=
-                requested.pipeline_creation_cache_control != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>(structure) {
+            self.pipeline_creation_cache_control |= requested.pipeline_creation_cache_control != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>(structure) {
             self.shader_zero_initialize_workgroup_memory |=
                 requested.shader_zero_initialize_workgroup_memory != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>(structure) {
             self.robust_image_access |= requested.robust_image_access != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>(structure) {
             self.subgroup_size_control |= requested.subgroup_size_control != vk::FALSE;
             self.compute_full_subgroups |= requested.compute_full_subgroups != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>(structure) {
             self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
             self.descriptor_binding_inline_uniform_block_update_after_bind |=
                 requested.descriptor_binding_inline_uniform_block_update_after_bind != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>(structure) {
             self.shader_integer_dot_product |= requested.shader_integer_dot_product != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(structure) {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
-        if let Some(requested) = valid::cast::<
-            vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>,
-        >(structure)
-        {
-            self.shader_early_and_late_fragment_tests |=
-                requested.shader_early_and_late_fragment_tests != vk::FALSE;
-        }
         if let Some(requested) =
-            valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>(structure)
         {
+            self.shader_early_and_late_fragment_tests |= requested.shader_early_and_late_fragment_tests != vk::FALSE;
+        }
+        if let Some(requested) = valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure) {
             self.format_a4r4g4b4 |= requested.format_a4r4g4b4 != vk::FALSE;
             self.format_a4b4g4r4 |= requested.format_a4b4g4r4 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(structure)
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(structure)
         {
-            self.attachment_feedback_loop_layout |=
-                requested.attachment_feedback_loop_layout != vk::FALSE;
+            self.attachment_feedback_loop_layout |= requested.attachment_feedback_loop_layout != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(structure) {
             self.border_color_swizzle |= requested.border_color_swizzle != vk::FALSE;
-            self.border_color_swizzle_from_image |=
-                requested.border_color_swizzle_from_image != vk::FALSE;
+            self.border_color_swizzle_from_image |= requested.border_color_swizzle_from_image != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(structure) {
             self.color_write_enable |= requested.color_write_enable != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(structure) {
             self.conditional_rendering |= requested.conditional_rendering != vk::FALSE;
-            self.inherited_conditional_rendering |=
-                requested.inherited_conditional_rendering != vk::FALSE;
+            self.inherited_conditional_rendering |= requested.inherited_conditional_rendering != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure) {
             self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
-            self.custom_border_color_without_format |=
-                requested.custom_border_color_without_format != vk::FALSE;
+            self.custom_border_color_without_format |= requested.custom_border_color_without_format != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>(structure) {
             self.depth_clamp_zero_one |= requested.depth_clamp_zero_one != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure) {
             self.depth_clip_control |= requested.depth_clip_control != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure) {
             self.depth_clip_enable |= requested.depth_clip_enable != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure) {
             self.extended_dynamic_state |= requested.extended_dynamic_state != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(structure) {
             self.extended_dynamic_state2 |= requested.extended_dynamic_state2 != vk::FALSE;
-            self.extended_dynamic_state2_logic_op |=
-                requested.extended_dynamic_state2_logic_op != vk::FALSE;
+            self.extended_dynamic_state2_logic_op |= requested.extended_dynamic_state2_logic_op != vk::FALSE;
             self.extended_dynamic_state2_patch_control_points |=
                 requested.extended_dynamic_state2_patch_control_points != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(structure) {
             self.extended_dynamic_state3_tessellation_domain_origin |=
                 requested.extended_dynamic_state3_tessellation_domain_origin != vk::FALSE;
             self.extended_dynamic_state3_depth_clamp_enable |=
                 requested.extended_dynamic_state3_depth_clamp_enable != vk::FALSE;
-            self.extended_dynamic_state3_polygon_mode |=
-                requested.extended_dynamic_state3_polygon_mode != vk::FALSE;
+            self.extended_dynamic_state3_polygon_mode |= requested.extended_dynamic_state3_polygon_mode != vk::FALSE;
             self.extended_dynamic_state3_rasterization_samples |=
                 requested.extended_dynamic_state3_rasterization_samples != vk::FALSE;
-            self.extended_dynamic_state3_sample_mask |=
-                requested.extended_dynamic_state3_sample_mask != vk::FALSE;
+            self.extended_dynamic_state3_sample_mask |= requested.extended_dynamic_state3_sample_mask != vk::FALSE;
             self.extended_dynamic_state3_alpha_to_coverage_enable |=
                 requested.extended_dynamic_state3_alpha_to_coverage_enable != vk::FALSE;
             self.extended_dynamic_state3_alpha_to_one_enable |=
@@ -2903,25 +2296,17 @@ impl Features {
             self.extended_dynamic_state3_shading_rate_image_enable |=
                 requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(structure) {
             self.graphics_pipeline_library |= requested.graphics_pipeline_library != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure) {
             self.image2_d_view_of3_d |= requested.image2_d_view_of3_d != vk::FALSE;
             self.sampler2_d_view_of3_d |= requested.sampler2_d_view_of3_d != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure) {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(structure) {
             self.rectangular_lines |= requested.rectangular_lines != vk::FALSE;
             self.bresenham_lines |= requested.bresenham_lines != vk::FALSE;
             self.smooth_lines |= requested.smooth_lines != vk::FALSE;
@@ -2929,130 +2314,80 @@ impl Features {
             self.stippled_bresenham_lines |= requested.stippled_bresenham_lines != vk::FALSE;
             self.stippled_smooth_lines |= requested.stippled_smooth_lines != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure) {
             self.multi_draw |= requested.multi_draw != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(structure) {
             self.non_seamless_cube_map |= requested.non_seamless_cube_map != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
         {
-            self.primitive_topology_list_restart |=
-                requested.primitive_topology_list_restart != vk::FALSE;
-            self.primitive_topology_patch_list_restart |=
-                requested.primitive_topology_patch_list_restart != vk::FALSE;
+            self.primitive_topology_list_restart |= requested.primitive_topology_list_restart != vk::FALSE;
+            self.primitive_topology_patch_list_restart |= requested.primitive_topology_patch_list_restart != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(structure) {
             self.primitives_generated_query |= requested.primitives_generated_query != vk::FALSE;
             self.primitives_generated_query_with_rasterizer_discard |=
                 requested.primitives_generated_query_with_rasterizer_discard != vk::FALSE;
             self.primitives_generated_query_with_non_zero_streams |=
                 requested.primitives_generated_query_with_non_zero_streams != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure) {
             self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
             self.transform_feedback_preserves_provoking_vertex |=
                 requested.transform_feedback_preserves_provoking_vertex != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(structure) {
             self.robust_buffer_access2 |= requested.robust_buffer_access2 != vk::FALSE;
             self.robust_image_access2 |= requested.robust_image_access2 != vk::FALSE;
             self.null_descriptor |= requested.null_descriptor != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(structure)
-        {
-            self.shader_buffer_float32_atomics |=
-                requested.shader_buffer_float32_atomics != vk::FALSE;
-            self.shader_buffer_float32_atomic_add |=
-                requested.shader_buffer_float32_atomic_add != vk::FALSE;
-            self.shader_buffer_float64_atomics |=
-                requested.shader_buffer_float64_atomics != vk::FALSE;
-            self.shader_buffer_float64_atomic_add |=
-                requested.shader_buffer_float64_atomic_add != vk::FALSE;
-            self.shader_shared_float32_atomics |=
-                requested.shader_shared_float32_atomics != vk::FALSE;
-            self.shader_shared_float32_atomic_add |=
-                requested.shader_shared_float32_atomic_add != vk::FALSE;
-            self.shader_shared_float64_atomics |=
-                requested.shader_shared_float64_atomics != vk::FALSE;
-            self.shader_shared_float64_atomic_add |=
-                requested.shader_shared_float64_atomic_add != vk::FALSE;
-            self.shader_image_float32_atomics |=
-                requested.shader_image_float32_atomics != vk::FALSE;
-            self.shader_image_float32_atomic_add |=
-                requested.shader_image_float32_atomic_add != vk::FALSE;
-            self.sparse_image_float32_atomics |=
-                requested.sparse_image_float32_atomics != vk::FALSE;
-            self.sparse_image_float32_atomic_add |=
-                requested.sparse_image_float32_atomic_add != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(structure) {
+            self.shader_buffer_float32_atomics |= requested.shader_buffer_float32_atomics != vk::FALSE;
+            self.shader_buffer_float32_atomic_add |= requested.shader_buffer_float32_atomic_add != vk::FALSE;
+            self.shader_buffer_float64_atomics |= requested.shader_buffer_float64_atomics != vk::FALSE;
+            self.shader_buffer_float64_atomic_add |= requested.shader_buffer_float64_atomic_add != vk::FALSE;
+            self.shader_shared_float32_atomics |= requested.shader_shared_float32_atomics != vk::FALSE;
+            self.shader_shared_float32_atomic_add |= requested.shader_shared_float32_atomic_add != vk::FALSE;
+            self.shader_shared_float64_atomics |= requested.shader_shared_float64_atomics != vk::FALSE;
+            self.shader_shared_float64_atomic_add |= requested.shader_shared_float64_atomic_add != vk::FALSE;
+            self.shader_image_float32_atomics |= requested.shader_image_float32_atomics != vk::FALSE;
+            self.shader_image_float32_atomic_add |= requested.shader_image_float32_atomic_add != vk::FALSE;
+            self.sparse_image_float32_atomics |= requested.sparse_image_float32_atomics != vk::FALSE;
+            self.sparse_image_float32_atomic_add |= requested.sparse_image_float32_atomic_add != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(structure)
-        {
-            self.shader_buffer_float16_atomics |=
-                requested.shader_buffer_float16_atomics != vk::FALSE;
-            self.shader_buffer_float16_atomic_add |=
-                requested.shader_buffer_float16_atomic_add != vk::FALSE;
-            self.shader_buffer_float16_atomic_min_max |=
-                requested.shader_buffer_float16_atomic_min_max != vk::FALSE;
-            self.shader_buffer_float32_atomic_min_max |=
-                requested.shader_buffer_float32_atomic_min_max != vk::FALSE;
-            self.shader_buffer_float64_atomic_min_max |=
-                requested.shader_buffer_float64_atomic_min_max != vk::FALSE;
-            self.shader_shared_float16_atomics |=
-                requested.shader_shared_float16_atomics != vk::FALSE;
-            self.shader_shared_float16_atomic_add |=
-                requested.shader_shared_float16_atomic_add != vk::FALSE;
-            self.shader_shared_float16_atomic_min_max |=
-                requested.shader_shared_float16_atomic_min_max != vk::FALSE;
-            self.shader_shared_float32_atomic_min_max |=
-                requested.shader_shared_float32_atomic_min_max != vk::FALSE;
-            self.shader_shared_float64_atomic_min_max |=
-                requested.shader_shared_float64_atomic_min_max != vk::FALSE;
-            self.shader_image_float32_atomic_min_max |=
-                requested.shader_image_float32_atomic_min_max != vk::FALSE;
-            self.sparse_image_float32_atomic_min_max |=
-                requested.sparse_image_float32_atomic_min_max != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(structure) {
+            self.shader_buffer_float16_atomics |= requested.shader_buffer_float16_atomics != vk::FALSE;
+            self.shader_buffer_float16_atomic_add |= requested.shader_buffer_float16_atomic_add != vk::FALSE;
+            self.shader_buffer_float16_atomic_min_max |= requested.shader_buffer_float16_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float32_atomic_min_max |= requested.shader_buffer_float32_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float64_atomic_min_max |= requested.shader_buffer_float64_atomic_min_max != vk::FALSE;
+            self.shader_shared_float16_atomics |= requested.shader_shared_float16_atomics != vk::FALSE;
+            self.shader_shared_float16_atomic_add |= requested.shader_shared_float16_atomic_add != vk::FALSE;
+            self.shader_shared_float16_atomic_min_max |= requested.shader_shared_float16_atomic_min_max != vk::FALSE;
+            self.shader_shared_float32_atomic_min_max |= requested.shader_shared_float32_atomic_min_max != vk::FALSE;
+            self.shader_shared_float64_atomic_min_max |= requested.shader_shared_float64_atomic_min_max != vk::FALSE;
+            self.shader_image_float32_atomic_min_max |= requested.shader_image_float32_atomic_min_max != vk::FALSE;
+            self.sparse_image_float32_atomic_min_max |= requested.sparse_image_float32_atomic_min_max != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure) {
             self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(structure) {
             self.transform_feedback |= requested.transform_feedback != vk::FALSE;
             self.geometry_streams |= requested.geometry_streams != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure) {
             self.vertex_attribute_instance_rate_divisor |=
                 requested.vertex_attribute_instance_rate_divisor != vk::FALSE;
             self.vertex_attribute_instance_rate_zero_divisor |=
                 requested.vertex_attribute_instance_rate_zero_divisor != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(structure) {
             self.vertex_input_dynamic_state |= requested.vertex_input_dynamic_state != vk::FALSE;
         }
-        if let Some(requested) = valid::cast::<
-            gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(structure)
+        if let Some(requested) =
+            valid::cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(structure)
         {
             self.gaussian_primitive_topology |= requested.gaussian_primitive_topology != vk::FALSE;
             self.vertex_shader_projection |= requested.vertex_shader_projection != vk::FALSE;
@@ -3081,25 +2416,19 @@ impl Features {
             self.gaussian_cut_off |= requested.gaussian_cut_off != vk::FALSE;
             self.opacity_compensation_floor |= requested.opacity_compensation_floor != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)
-        {
-            self.performance_counter_query_pools |=
-                requested.performance_counter_query_pools != vk::FALSE;
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure) {
+            self.performance_counter_query_pools |= requested.performance_counter_query_pools != vk::FALSE;
             self.performance_counter_multiple_query_pools |=
                 requested.performance_counter_multiple_query_pools != vk::FALSE;
         }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(structure)
-        {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(structure) {
             self.shader_subgroup_clock |= requested.shader_subgroup_clock != vk::FALSE;
             self.shader_device_clock |= requested.shader_device_clock != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(structure)
         {
-            self.workgroup_memory_explicit_layout |=
-                requested.workgroup_memory_explicit_layout != vk::FALSE;
+            self.workgroup_memory_explicit_layout |= requested.workgroup_memory_explicit_layout != vk::FALSE;
             self.workgroup_memory_explicit_layout_scalar_block_layout |=
                 requested.workgroup_memory_explicit_layout_scalar_block_layout != vk::FALSE;
             self.workgroup_memory_explicit_layout8_bit_access |=
@@ -3120,86 +2449,44 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_attachment_feedback_loop_layout")
         }
-        vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_border_color_swizzle")
-        }
-        vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_color_write_enable")
-        }
-        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_conditional_rendering")
-        }
-        vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_custom_border_color")
-        }
-        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_depth_clamp_zero_one")
-        }
-        vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_depth_clip_control")
-        }
-        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_depth_clip_enable")
-        }
-        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_extended_dynamic_state")
-        }
-        vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_extended_dynamic_state2")
-        }
-        vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_extended_dynamic_state3")
-        }
+        vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_border_color_swizzle"),
+        vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_color_write_enable"),
+        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_conditional_rendering"),
+        vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_custom_border_color"),
+        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clamp_zero_one"),
+        vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clip_control"),
+        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clip_enable"),
+        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state"),
+        vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state2"),
+        vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state3"),
         vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_graphics_pipeline_library")
         }
-        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_image_2d_view_of_3d")
-        }
-        vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_index_type_uint8")
-        }
-        vk::PhysicalDeviceLineRasterizationFeaturesKHR::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_line_rasterization")
-        }
+        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_image_2d_view_of_3d"),
+        vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_index_type_uint8"),
+        vk::PhysicalDeviceLineRasterizationFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_line_rasterization"),
         vk::PhysicalDeviceMultiDrawFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_multi_draw"),
-        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_non_seamless_cube_map")
-        }
+        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_non_seamless_cube_map"),
         vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_primitive_topology_list_restart")
         }
         vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_primitives_generated_query")
         }
-        vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_provoking_vertex")
-        }
+        vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_provoking_vertex"),
         vk::PhysicalDeviceRobustness2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_robustness2"),
-        vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_shader_atomic_float")
-        }
-        vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_shader_atomic_float2")
-        }
-        vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_texel_buffer_alignment")
-        }
-        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_transform_feedback")
-        }
-        vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_vertex_attribute_divisor")
-        }
+        vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_shader_atomic_float"),
+        vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_shader_atomic_float2"),
+        vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_texel_buffer_alignment"),
+        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_transform_feedback"),
+        vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_vertex_attribute_divisor"),
         vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_vertex_input_dynamic_state")
         }
         gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::STRUCTURE_TYPE => {
             Some(c"VK_GAURAST_gaussian_primitive_topology")
         }
-        vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => {
-            Some(c"VK_KHR_performance_query")
-        }
+        vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_performance_query"),
         vk::PhysicalDeviceShaderClockFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_shader_clock"),
         vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_workgroup_memory_explicit_layout")
@@ -3212,14 +2499,7 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
 #[cfg(test)]
 pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
     (vk::API_VERSION_1_0, &["robustBufferAccess"]),
-    (
-        vk::API_VERSION_1_1,
-        &[
-            "multiview",
-            "shaderDrawParameters",
-            "storageBuffer16BitAccess",
-        ],
-    ),
+    (vk::API_VERSION_1_1, &["multiview", "shaderDrawParameters", "storageBuffer16BitAccess"]),
     (
         vk::API_VERSION_1_2,
         &[

@@ -440,8 +440,7 @@ pub(crate) struct Properties {
     /// `integerDotProductAccumulatingSaturating4x8BitPackedSignedAccelerated`.
     pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: bool,
     /// `integerDotProductAccumulatingSaturating4x8BitPackedMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated:
-        bool,
+    pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated: bool,
     /// `integerDotProductAccumulatingSaturating16BitUnsignedAccelerated`.
     pub(crate) integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: bool,
     /// `integerDotProductAccumulatingSaturating16BitSignedAccelerated`.
@@ -565,16 +564,13 @@ impl Properties {
             max_per_stage_descriptor_storage_buffers: self.max_per_stage_descriptor_storage_buffers,
             max_per_stage_descriptor_sampled_images: self.max_per_stage_descriptor_sampled_images,
             max_per_stage_descriptor_storage_images: self.max_per_stage_descriptor_storage_images,
-            max_per_stage_descriptor_input_attachments: self
-                .max_per_stage_descriptor_input_attachments,
+            max_per_stage_descriptor_input_attachments: self.max_per_stage_descriptor_input_attachments,
             max_per_stage_resources: self.max_per_stage_resources,
             max_descriptor_set_samplers: self.max_descriptor_set_samplers,
             max_descriptor_set_uniform_buffers: self.max_descriptor_set_uniform_buffers,
-            max_descriptor_set_uniform_buffers_dynamic: self
-                .max_descriptor_set_uniform_buffers_dynamic,
+            max_descriptor_set_uniform_buffers_dynamic: self.max_descriptor_set_uniform_buffers_dynamic,
             max_descriptor_set_storage_buffers: self.max_descriptor_set_storage_buffers,
-            max_descriptor_set_storage_buffers_dynamic: self
-                .max_descriptor_set_storage_buffers_dynamic,
+            max_descriptor_set_storage_buffers_dynamic: self.max_descriptor_set_storage_buffers_dynamic,
             max_descriptor_set_sampled_images: self.max_descriptor_set_sampled_images,
             max_descriptor_set_storage_images: self.max_descriptor_set_storage_images,
             max_descriptor_set_input_attachments: self.max_descriptor_set_input_attachments,
@@ -591,12 +587,9 @@ impl Properties {
                 .max_tessellation_control_per_vertex_output_components,
             max_tessellation_control_per_patch_output_components: self
                 .max_tessellation_control_per_patch_output_components,
-            max_tessellation_control_total_output_components: self
-                .max_tessellation_control_total_output_components,
-            max_tessellation_evaluation_input_components: self
-                .max_tessellation_evaluation_input_components,
-            max_tessellation_evaluation_output_components: self
-                .max_tessellation_evaluation_output_components,
+            max_tessellation_control_total_output_components: self.max_tessellation_control_total_output_components,
+            max_tessellation_evaluation_input_components: self.max_tessellation_evaluation_input_components,
+            max_tessellation_evaluation_output_components: self.max_tessellation_evaluation_output_components,
             max_geometry_shader_invocations: self.max_geometry_shader_invocations,
             max_geometry_input_components: self.max_geometry_input_components,
             max_geometry_output_components: self.max_geometry_output_components,
@@ -667,9 +660,7 @@ impl Properties {
     fn sparse_properties(&self) -> vk::PhysicalDeviceSparseProperties {
         vk::PhysicalDeviceSparseProperties {
             residency_standard2_d_block_shape: self.residency_standard2_d_block_shape.into(),
-            residency_standard2_d_multisample_block_shape: self
-                .residency_standard2_d_multisample_block_shape
-                .into(),
+            residency_standard2_d_multisample_block_shape: self.residency_standard2_d_multisample_block_shape.into(),
             residency_standard3_d_block_shape: self.residency_standard3_d_block_shape.into(),
             residency_aligned_mip_size: self.residency_aligned_mip_size.into(),
             residency_non_resident_strict: self.residency_non_resident_strict.into(),
@@ -687,8 +678,7 @@ impl Properties {
             out.subgroup_size = self.subgroup_size;
             out.subgroup_supported_stages = self.subgroup_supported_stages;
             out.subgroup_supported_operations = self.subgroup_supported_operations;
-            out.subgroup_quad_operations_in_all_stages =
-                self.subgroup_quad_operations_in_all_stages.into();
+            out.subgroup_quad_operations_in_all_stages = self.subgroup_quad_operations_in_all_stages.into();
             out.point_clipping_behavior = self.point_clipping_behavior;
             out.max_multiview_view_count = self.max_multiview_view_count;
             out.max_multiview_instance_index = self.max_multiview_instance_index;
@@ -703,46 +693,33 @@ impl Properties {
             out.conformance_version = self.conformance_version;
             out.denorm_behavior_independence = self.denorm_behavior_independence;
             out.rounding_mode_independence = self.rounding_mode_independence;
-            out.shader_signed_zero_inf_nan_preserve_float16 =
-                self.shader_signed_zero_inf_nan_preserve_float16.into();
-            out.shader_signed_zero_inf_nan_preserve_float32 =
-                self.shader_signed_zero_inf_nan_preserve_float32.into();
-            out.shader_signed_zero_inf_nan_preserve_float64 =
-                self.shader_signed_zero_inf_nan_preserve_float64.into();
+            out.shader_signed_zero_inf_nan_preserve_float16 = self.shader_signed_zero_inf_nan_preserve_float16.into();
+            out.shader_signed_zero_inf_nan_preserve_float32 = self.shader_signed_zero_inf_nan_preserve_float32.into();
+            out.shader_signed_zero_inf_nan_preserve_float64 = self.shader_signed_zero_inf_nan_preserve_float64.into();
             out.shader_denorm_preserve_float16 = self.shader_denorm_preserve_float16.into();
             out.shader_denorm_preserve_float32 = self.shader_denorm_preserve_float32.into();
             out.shader_denorm_preserve_float64 = self.shader_denorm_preserve_float64.into();
-            out.shader_denorm_flush_to_zero_float16 =
-                self.shader_denorm_flush_to_zero_float16.into();
-            out.shader_denorm_flush_to_zero_float32 =
-                self.shader_denorm_flush_to_zero_float32.into();
-            out.shader_denorm_flush_to_zero_float64 =
-                self.shader_denorm_flush_to_zero_float64.into();
+            out.shader_denorm_flush_to_zero_float16 = self.shader_denorm_flush_to_zero_float16.into();
+            out.shader_denorm_flush_to_zero_float32 = self.shader_denorm_flush_to_zero_float32.into();
+            out.shader_denorm_flush_to_zero_float64 = self.shader_denorm_flush_to_zero_float64.into();
             out.shader_rounding_mode_rte_float16 = self.shader_rounding_mode_rte_float16.into();
             out.shader_rounding_mode_rte_float32 = self.shader_rounding_mode_rte_float32.into();
             out.shader_rounding_mode_rte_float64 = self.shader_rounding_mode_rte_float64.into();
             out.shader_rounding_mode_rtz_float16 = self.shader_rounding_mode_rtz_float16.into();
             out.shader_rounding_mode_rtz_float32 = self.shader_rounding_mode_rtz_float32.into();
             out.shader_rounding_mode_rtz_float64 = self.shader_rounding_mode_rtz_float64.into();
-            out.max_update_after_bind_descriptors_in_all_pools =
-                self.max_update_after_bind_descriptors_in_all_pools;
-            out.shader_uniform_buffer_array_non_uniform_indexing_native = self
-                .shader_uniform_buffer_array_non_uniform_indexing_native
-                .into();
-            out.shader_sampled_image_array_non_uniform_indexing_native = self
-                .shader_sampled_image_array_non_uniform_indexing_native
-                .into();
-            out.shader_storage_buffer_array_non_uniform_indexing_native = self
-                .shader_storage_buffer_array_non_uniform_indexing_native
-                .into();
-            out.shader_storage_image_array_non_uniform_indexing_native = self
-                .shader_storage_image_array_non_uniform_indexing_native
-                .into();
-            out.shader_input_attachment_array_non_uniform_indexing_native = self
-                .shader_input_attachment_array_non_uniform_indexing_native
-                .into();
-            out.robust_buffer_access_update_after_bind =
-                self.robust_buffer_access_update_after_bind.into();
+            out.max_update_after_bind_descriptors_in_all_pools = self.max_update_after_bind_descriptors_in_all_pools;
+            out.shader_uniform_buffer_array_non_uniform_indexing_native =
+                self.shader_uniform_buffer_array_non_uniform_indexing_native.into();
+            out.shader_sampled_image_array_non_uniform_indexing_native =
+                self.shader_sampled_image_array_non_uniform_indexing_native.into();
+            out.shader_storage_buffer_array_non_uniform_indexing_native =
+                self.shader_storage_buffer_array_non_uniform_indexing_native.into();
+            out.shader_storage_image_array_non_uniform_indexing_native =
+                self.shader_storage_image_array_non_uniform_indexing_native.into();
+            out.shader_input_attachment_array_non_uniform_indexing_native =
+                self.shader_input_attachment_array_non_uniform_indexing_native.into();
+            out.robust_buffer_access_update_after_bind = self.robust_buffer_access_update_after_bind.into();
             out.quad_divergent_implicit_lod = self.quad_divergent_implicit_lod.into();
             out.max_per_stage_descriptor_update_after_bind_samplers =
                 self.max_per_stage_descriptor_update_after_bind_samplers;
@@ -756,10 +733,8 @@ impl Properties {
                 self.max_per_stage_descriptor_update_after_bind_storage_images;
             out.max_per_stage_descriptor_update_after_bind_input_attachments =
                 self.max_per_stage_descriptor_update_after_bind_input_attachments;
-            out.max_per_stage_update_after_bind_resources =
-                self.max_per_stage_update_after_bind_resources;
-            out.max_descriptor_set_update_after_bind_samplers =
-                self.max_descriptor_set_update_after_bind_samplers;
+            out.max_per_stage_update_after_bind_resources = self.max_per_stage_update_after_bind_resources;
+            out.max_descriptor_set_update_after_bind_samplers = self.max_descriptor_set_update_after_bind_samplers;
             out.max_descriptor_set_update_after_bind_uniform_buffers =
                 self.max_descriptor_set_update_after_bind_uniform_buffers;
             out.max_descriptor_set_update_after_bind_uniform_buffers_dynamic =
@@ -778,14 +753,10 @@ impl Properties {
             out.supported_stencil_resolve_modes = self.supported_stencil_resolve_modes;
             out.independent_resolve_none = self.independent_resolve_none.into();
             out.independent_resolve = self.independent_resolve.into();
-            out.filter_minmax_single_component_formats =
-                self.filter_minmax_single_component_formats.into();
-            out.filter_minmax_image_component_mapping =
-                self.filter_minmax_image_component_mapping.into();
-            out.max_timeline_semaphore_value_difference =
-                self.max_timeline_semaphore_value_difference;
-            out.framebuffer_integer_color_sample_counts =
-                self.framebuffer_integer_color_sample_counts;
+            out.filter_minmax_single_component_formats = self.filter_minmax_single_component_formats.into();
+            out.filter_minmax_image_component_mapping = self.filter_minmax_image_component_mapping.into();
+            out.max_timeline_semaphore_value_difference = self.max_timeline_semaphore_value_difference;
+            out.framebuffer_integer_color_sample_counts = self.framebuffer_integer_color_sample_counts;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan13Properties<'_>>() {
             out.min_subgroup_size = self.min_subgroup_size;
@@ -793,105 +764,75 @@ impl Properties {
             out.max_compute_workgroup_subgroups = self.max_compute_workgroup_subgroups;
             out.required_subgroup_size_stages = self.required_subgroup_size_stages;
             out.max_inline_uniform_block_size = self.max_inline_uniform_block_size;
-            out.max_per_stage_descriptor_inline_uniform_blocks =
-                self.max_per_stage_descriptor_inline_uniform_blocks;
+            out.max_per_stage_descriptor_inline_uniform_blocks = self.max_per_stage_descriptor_inline_uniform_blocks;
             out.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks =
                 self.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks;
-            out.max_descriptor_set_inline_uniform_blocks =
-                self.max_descriptor_set_inline_uniform_blocks;
+            out.max_descriptor_set_inline_uniform_blocks = self.max_descriptor_set_inline_uniform_blocks;
             out.max_descriptor_set_update_after_bind_inline_uniform_blocks =
                 self.max_descriptor_set_update_after_bind_inline_uniform_blocks;
             out.max_inline_uniform_total_size = self.max_inline_uniform_total_size;
             out.integer_dot_product8_bit_unsigned_accelerated =
                 self.integer_dot_product8_bit_unsigned_accelerated.into();
-            out.integer_dot_product8_bit_signed_accelerated =
-                self.integer_dot_product8_bit_signed_accelerated.into();
-            out.integer_dot_product8_bit_mixed_signedness_accelerated = self
-                .integer_dot_product8_bit_mixed_signedness_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_unsigned_accelerated = self
-                .integer_dot_product4x8_bit_packed_unsigned_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_signed_accelerated = self
-                .integer_dot_product4x8_bit_packed_signed_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated = self
-                .integer_dot_product4x8_bit_packed_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product8_bit_signed_accelerated = self.integer_dot_product8_bit_signed_accelerated.into();
+            out.integer_dot_product8_bit_mixed_signedness_accelerated =
+                self.integer_dot_product8_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_unsigned_accelerated =
+                self.integer_dot_product4x8_bit_packed_unsigned_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_signed_accelerated =
+                self.integer_dot_product4x8_bit_packed_signed_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated =
+                self.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated.into();
             out.integer_dot_product16_bit_unsigned_accelerated =
                 self.integer_dot_product16_bit_unsigned_accelerated.into();
-            out.integer_dot_product16_bit_signed_accelerated =
-                self.integer_dot_product16_bit_signed_accelerated.into();
-            out.integer_dot_product16_bit_mixed_signedness_accelerated = self
-                .integer_dot_product16_bit_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product16_bit_signed_accelerated = self.integer_dot_product16_bit_signed_accelerated.into();
+            out.integer_dot_product16_bit_mixed_signedness_accelerated =
+                self.integer_dot_product16_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product32_bit_unsigned_accelerated =
                 self.integer_dot_product32_bit_unsigned_accelerated.into();
-            out.integer_dot_product32_bit_signed_accelerated =
-                self.integer_dot_product32_bit_signed_accelerated.into();
-            out.integer_dot_product32_bit_mixed_signedness_accelerated = self
-                .integer_dot_product32_bit_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product32_bit_signed_accelerated = self.integer_dot_product32_bit_signed_accelerated.into();
+            out.integer_dot_product32_bit_mixed_signedness_accelerated =
+                self.integer_dot_product32_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product64_bit_unsigned_accelerated =
                 self.integer_dot_product64_bit_unsigned_accelerated.into();
-            out.integer_dot_product64_bit_signed_accelerated =
-                self.integer_dot_product64_bit_signed_accelerated.into();
-            out.integer_dot_product64_bit_mixed_signedness_accelerated = self
-                .integer_dot_product64_bit_mixed_signedness_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating8_bit_signed_accelerated
-                .into();
+            out.integer_dot_product64_bit_signed_accelerated = self.integer_dot_product64_bit_signed_accelerated.into();
+            out.integer_dot_product64_bit_mixed_signedness_accelerated =
+                self.integer_dot_product64_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating8_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated
-                    .into();
+                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated = self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating16_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated.into();
+            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated =
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating16_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating32_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating32_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating64_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating64_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated
-                    .into();
-            out.storage_texel_buffer_offset_alignment_bytes =
-                self.storage_texel_buffer_offset_alignment_bytes;
-            out.storage_texel_buffer_offset_single_texel_alignment = self
-                .storage_texel_buffer_offset_single_texel_alignment
-                .into();
-            out.uniform_texel_buffer_offset_alignment_bytes =
-                self.uniform_texel_buffer_offset_alignment_bytes;
-            out.uniform_texel_buffer_offset_single_texel_alignment = self
-                .uniform_texel_buffer_offset_single_texel_alignment
-                .into();
+                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated.into();
+            out.storage_texel_buffer_offset_alignment_bytes = self.storage_texel_buffer_offset_alignment_bytes;
+            out.storage_texel_buffer_offset_single_texel_alignment =
+                self.storage_texel_buffer_offset_single_texel_alignment.into();
+            out.uniform_texel_buffer_offset_alignment_bytes = self.uniform_texel_buffer_offset_alignment_bytes;
+            out.uniform_texel_buffer_offset_single_texel_alignment =
+                self.uniform_texel_buffer_offset_single_texel_alignment.into();
             out.max_buffer_size = self.max_buffer_size;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProtectedMemoryProperties<'_>>() {
@@ -928,27 +869,20 @@ impl Properties {
             out.conformance_version = self.conformance_version;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTimelineSemaphoreProperties<'_>>() {
-            out.max_timeline_semaphore_value_difference =
-                self.max_timeline_semaphore_value_difference;
+            out.max_timeline_semaphore_value_difference = self.max_timeline_semaphore_value_difference;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceFloatControlsProperties<'_>>() {
             out.denorm_behavior_independence = self.denorm_behavior_independence;
             out.rounding_mode_independence = self.rounding_mode_independence;
-            out.shader_signed_zero_inf_nan_preserve_float16 =
-                self.shader_signed_zero_inf_nan_preserve_float16.into();
-            out.shader_signed_zero_inf_nan_preserve_float32 =
-                self.shader_signed_zero_inf_nan_preserve_float32.into();
-            out.shader_signed_zero_inf_nan_preserve_float64 =
-                self.shader_signed_zero_inf_nan_preserve_float64.into();
+            out.shader_signed_zero_inf_nan_preserve_float16 = self.shader_signed_zero_inf_nan_preserve_float16.into();
+            out.shader_signed_zero_inf_nan_preserve_float32 = self.shader_signed_zero_inf_nan_preserve_float32.into();
+            out.shader_signed_zero_inf_nan_preserve_float64 = self.shader_signed_zero_inf_nan_preserve_float64.into();
             out.shader_denorm_preserve_float16 = self.shader_denorm_preserve_float16.into();
             out.shader_denorm_preserve_float32 = self.shader_denorm_preserve_float32.into();
             out.shader_denorm_preserve_float64 = self.shader_denorm_preserve_float64.into();
-            out.shader_denorm_flush_to_zero_float16 =
-                self.shader_denorm_flush_to_zero_float16.into();
-            out.shader_denorm_flush_to_zero_float32 =
-                self.shader_denorm_flush_to_zero_float32.into();
-            out.shader_denorm_flush_to_zero_float64 =
-                self.shader_denorm_flush_to_zero_float64.into();
+            out.shader_denorm_flush_to_zero_float16 = self.shader_denorm_flush_to_zero_float16.into();
+            out.shader_denorm_flush_to_zero_float32 = self.shader_denorm_flush_to_zero_float32.into();
+            out.shader_denorm_flush_to_zero_float64 = self.shader_denorm_flush_to_zero_float64.into();
             out.shader_rounding_mode_rte_float16 = self.shader_rounding_mode_rte_float16.into();
             out.shader_rounding_mode_rte_float32 = self.shader_rounding_mode_rte_float32.into();
             out.shader_rounding_mode_rte_float64 = self.shader_rounding_mode_rte_float64.into();
@@ -957,25 +891,18 @@ impl Properties {
             out.shader_rounding_mode_rtz_float64 = self.shader_rounding_mode_rtz_float64.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDescriptorIndexingProperties<'_>>() {
-            out.max_update_after_bind_descriptors_in_all_pools =
-                self.max_update_after_bind_descriptors_in_all_pools;
-            out.shader_uniform_buffer_array_non_uniform_indexing_native = self
-                .shader_uniform_buffer_array_non_uniform_indexing_native
-                .into();
-            out.shader_sampled_image_array_non_uniform_indexing_native = self
-                .shader_sampled_image_array_non_uniform_indexing_native
-                .into();
-            out.shader_storage_buffer_array_non_uniform_indexing_native = self
-                .shader_storage_buffer_array_non_uniform_indexing_native
-                .into();
-            out.shader_storage_image_array_non_uniform_indexing_native = self
-                .shader_storage_image_array_non_uniform_indexing_native
-                .into();
-            out.shader_input_attachment_array_non_uniform_indexing_native = self
-                .shader_input_attachment_array_non_uniform_indexing_native
-                .into();
-            out.robust_buffer_access_update_after_bind =
-                self.robust_buffer_access_update_after_bind.into();
+            out.max_update_after_bind_descriptors_in_all_pools = self.max_update_after_bind_descriptors_in_all_pools;
+            out.shader_uniform_buffer_array_non_uniform_indexing_native =
+                self.shader_uniform_buffer_array_non_uniform_indexing_native.into();
+            out.shader_sampled_image_array_non_uniform_indexing_native =
+                self.shader_sampled_image_array_non_uniform_indexing_native.into();
+            out.shader_storage_buffer_array_non_uniform_indexing_native =
+                self.shader_storage_buffer_array_non_uniform_indexing_native.into();
+            out.shader_storage_image_array_non_uniform_indexing_native =
+                self.shader_storage_image_array_non_uniform_indexing_native.into();
+            out.shader_input_attachment_array_non_uniform_indexing_native =
+                self.shader_input_attachment_array_non_uniform_indexing_native.into();
+            out.robust_buffer_access_update_after_bind = self.robust_buffer_access_update_after_bind.into();
             out.quad_divergent_implicit_lod = self.quad_divergent_implicit_lod.into();
             out.max_per_stage_descriptor_update_after_bind_samplers =
                 self.max_per_stage_descriptor_update_after_bind_samplers;
@@ -989,10 +916,8 @@ impl Properties {
                 self.max_per_stage_descriptor_update_after_bind_storage_images;
             out.max_per_stage_descriptor_update_after_bind_input_attachments =
                 self.max_per_stage_descriptor_update_after_bind_input_attachments;
-            out.max_per_stage_update_after_bind_resources =
-                self.max_per_stage_update_after_bind_resources;
-            out.max_descriptor_set_update_after_bind_samplers =
-                self.max_descriptor_set_update_after_bind_samplers;
+            out.max_per_stage_update_after_bind_resources = self.max_per_stage_update_after_bind_resources;
+            out.max_descriptor_set_update_after_bind_samplers = self.max_descriptor_set_update_after_bind_samplers;
             out.max_descriptor_set_update_after_bind_uniform_buffers =
                 self.max_descriptor_set_update_after_bind_uniform_buffers;
             out.max_descriptor_set_update_after_bind_uniform_buffers_dynamic =
@@ -1009,10 +934,8 @@ impl Properties {
                 self.max_descriptor_set_update_after_bind_input_attachments;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceSamplerFilterMinmaxProperties<'_>>() {
-            out.filter_minmax_single_component_formats =
-                self.filter_minmax_single_component_formats.into();
-            out.filter_minmax_image_component_mapping =
-                self.filter_minmax_image_component_mapping.into();
+            out.filter_minmax_single_component_formats = self.filter_minmax_single_component_formats.into();
+            out.filter_minmax_image_component_mapping = self.filter_minmax_image_component_mapping.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthStencilResolveProperties<'_>>() {
             out.supported_depth_resolve_modes = self.supported_depth_resolve_modes;
@@ -1031,133 +954,91 @@ impl Properties {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceInlineUniformBlockProperties<'_>>() {
             out.max_inline_uniform_block_size = self.max_inline_uniform_block_size;
-            out.max_per_stage_descriptor_inline_uniform_blocks =
-                self.max_per_stage_descriptor_inline_uniform_blocks;
+            out.max_per_stage_descriptor_inline_uniform_blocks = self.max_per_stage_descriptor_inline_uniform_blocks;
             out.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks =
                 self.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks;
-            out.max_descriptor_set_inline_uniform_blocks =
-                self.max_descriptor_set_inline_uniform_blocks;
+            out.max_descriptor_set_inline_uniform_blocks = self.max_descriptor_set_inline_uniform_blocks;
             out.max_descriptor_set_update_after_bind_inline_uniform_blocks =
                 self.max_descriptor_set_update_after_bind_inline_uniform_blocks;
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductProperties<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductProperties<'_>>() {
             out.integer_dot_product8_bit_unsigned_accelerated =
                 self.integer_dot_product8_bit_unsigned_accelerated.into();
-            out.integer_dot_product8_bit_signed_accelerated =
-                self.integer_dot_product8_bit_signed_accelerated.into();
-            out.integer_dot_product8_bit_mixed_signedness_accelerated = self
-                .integer_dot_product8_bit_mixed_signedness_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_unsigned_accelerated = self
-                .integer_dot_product4x8_bit_packed_unsigned_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_signed_accelerated = self
-                .integer_dot_product4x8_bit_packed_signed_accelerated
-                .into();
-            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated = self
-                .integer_dot_product4x8_bit_packed_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product8_bit_signed_accelerated = self.integer_dot_product8_bit_signed_accelerated.into();
+            out.integer_dot_product8_bit_mixed_signedness_accelerated =
+                self.integer_dot_product8_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_unsigned_accelerated =
+                self.integer_dot_product4x8_bit_packed_unsigned_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_signed_accelerated =
+                self.integer_dot_product4x8_bit_packed_signed_accelerated.into();
+            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated =
+                self.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated.into();
             out.integer_dot_product16_bit_unsigned_accelerated =
                 self.integer_dot_product16_bit_unsigned_accelerated.into();
-            out.integer_dot_product16_bit_signed_accelerated =
-                self.integer_dot_product16_bit_signed_accelerated.into();
-            out.integer_dot_product16_bit_mixed_signedness_accelerated = self
-                .integer_dot_product16_bit_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product16_bit_signed_accelerated = self.integer_dot_product16_bit_signed_accelerated.into();
+            out.integer_dot_product16_bit_mixed_signedness_accelerated =
+                self.integer_dot_product16_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product32_bit_unsigned_accelerated =
                 self.integer_dot_product32_bit_unsigned_accelerated.into();
-            out.integer_dot_product32_bit_signed_accelerated =
-                self.integer_dot_product32_bit_signed_accelerated.into();
-            out.integer_dot_product32_bit_mixed_signedness_accelerated = self
-                .integer_dot_product32_bit_mixed_signedness_accelerated
-                .into();
+            out.integer_dot_product32_bit_signed_accelerated = self.integer_dot_product32_bit_signed_accelerated.into();
+            out.integer_dot_product32_bit_mixed_signedness_accelerated =
+                self.integer_dot_product32_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product64_bit_unsigned_accelerated =
                 self.integer_dot_product64_bit_unsigned_accelerated.into();
-            out.integer_dot_product64_bit_signed_accelerated =
-                self.integer_dot_product64_bit_signed_accelerated.into();
-            out.integer_dot_product64_bit_mixed_signedness_accelerated = self
-                .integer_dot_product64_bit_mixed_signedness_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating8_bit_signed_accelerated
-                .into();
+            out.integer_dot_product64_bit_signed_accelerated = self.integer_dot_product64_bit_signed_accelerated.into();
+            out.integer_dot_product64_bit_mixed_signedness_accelerated =
+                self.integer_dot_product64_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating8_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated
-                    .into();
+                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated.into();
             out.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated = self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating16_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated.into();
+            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated =
+                self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating16_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating32_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating32_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated
-                    .into();
-            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated = self
-                .integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated
-                .into();
-            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated = self
-                .integer_dot_product_accumulating_saturating64_bit_signed_accelerated
-                .into();
+                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated.into();
+            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated =
+                self.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated.into();
+            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated =
+                self.integer_dot_product_accumulating_saturating64_bit_signed_accelerated.into();
             out.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated
-                    .into();
+                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentProperties<'_>>()
-        {
-            out.storage_texel_buffer_offset_alignment_bytes =
-                self.storage_texel_buffer_offset_alignment_bytes;
-            out.storage_texel_buffer_offset_single_texel_alignment = self
-                .storage_texel_buffer_offset_single_texel_alignment
-                .into();
-            out.uniform_texel_buffer_offset_alignment_bytes =
-                self.uniform_texel_buffer_offset_alignment_bytes;
-            out.uniform_texel_buffer_offset_single_texel_alignment = self
-                .uniform_texel_buffer_offset_single_texel_alignment
-                .into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentProperties<'_>>() {
+            out.storage_texel_buffer_offset_alignment_bytes = self.storage_texel_buffer_offset_alignment_bytes;
+            out.storage_texel_buffer_offset_single_texel_alignment =
+                self.storage_texel_buffer_offset_single_texel_alignment.into();
+            out.uniform_texel_buffer_offset_alignment_bytes = self.uniform_texel_buffer_offset_alignment_bytes;
+            out.uniform_texel_buffer_offset_single_texel_alignment =
+                self.uniform_texel_buffer_offset_single_texel_alignment.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorPropertiesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorPropertiesEXT<'_>>() {
             out.max_custom_border_color_samplers = self.max_custom_border_color_samplers;
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT<'_>>()
-        {
-            out.dynamic_primitive_topology_unrestricted =
-                self.dynamic_primitive_topology_unrestricted.into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT<'_>>() {
+            out.dynamic_primitive_topology_unrestricted = self.dynamic_primitive_topology_unrestricted.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT<'_>>()
-        {
-            out.graphics_pipeline_library_fast_linking =
-                self.graphics_pipeline_library_fast_linking.into();
-            out.graphics_pipeline_library_independent_interpolation_decoration = self
-                .graphics_pipeline_library_independent_interpolation_decoration
-                .into();
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT<'_>>() {
+            out.graphics_pipeline_library_fast_linking = self.graphics_pipeline_library_fast_linking.into();
+            out.graphics_pipeline_library_independent_interpolation_decoration =
+                self.graphics_pipeline_library_independent_interpolation_decoration.into();
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationPropertiesKHR<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationPropertiesKHR<'_>>() {
             out.line_sub_pixel_precision_bits = self.line_sub_pixel_precision_bits;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawPropertiesEXT<'_>>() {
@@ -1165,42 +1046,31 @@ impl Properties {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_>>() {
             out.provoking_vertex_mode_per_pipeline = self.provoking_vertex_mode_per_pipeline.into();
-            out.transform_feedback_preserves_triangle_fan_provoking_vertex = self
-                .transform_feedback_preserves_triangle_fan_provoking_vertex
-                .into();
+            out.transform_feedback_preserves_triangle_fan_provoking_vertex =
+                self.transform_feedback_preserves_triangle_fan_provoking_vertex.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceRobustness2PropertiesEXT<'_>>() {
-            out.robust_storage_buffer_access_size_alignment =
-                self.robust_storage_buffer_access_size_alignment;
-            out.robust_uniform_buffer_access_size_alignment =
-                self.robust_uniform_buffer_access_size_alignment;
+            out.robust_storage_buffer_access_size_alignment = self.robust_storage_buffer_access_size_alignment;
+            out.robust_uniform_buffer_access_size_alignment = self.robust_uniform_buffer_access_size_alignment;
         }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackPropertiesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackPropertiesEXT<'_>>() {
             out.max_transform_feedback_streams = self.max_transform_feedback_streams;
             out.max_transform_feedback_buffers = self.max_transform_feedback_buffers;
             out.max_transform_feedback_buffer_size = self.max_transform_feedback_buffer_size;
-            out.max_transform_feedback_stream_data_size =
-                self.max_transform_feedback_stream_data_size;
-            out.max_transform_feedback_buffer_data_size =
-                self.max_transform_feedback_buffer_data_size;
-            out.max_transform_feedback_buffer_data_stride =
-                self.max_transform_feedback_buffer_data_stride;
+            out.max_transform_feedback_stream_data_size = self.max_transform_feedback_stream_data_size;
+            out.max_transform_feedback_buffer_data_size = self.max_transform_feedback_buffer_data_size;
+            out.max_transform_feedback_buffer_data_stride = self.max_transform_feedback_buffer_data_stride;
             out.transform_feedback_queries = self.transform_feedback_queries.into();
-            out.transform_feedback_streams_lines_triangles =
-                self.transform_feedback_streams_lines_triangles.into();
+            out.transform_feedback_streams_lines_triangles = self.transform_feedback_streams_lines_triangles.into();
             out.transform_feedback_rasterization_stream_select =
                 self.transform_feedback_rasterization_stream_select.into();
             out.transform_feedback_draw = self.transform_feedback_draw.into();
         }
-        if let Some(out) =
-            structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_>>()
-        {
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_>>() {
             out.max_vertex_attrib_divisor = self.max_vertex_attrib_divisor;
         }
-        if let Some(out) = structure
-            .cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(
-        ) {
+        if let Some(out) = structure.cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>()
+        {
             out.tile_size = self.tile_size;
             out.max_spherical_harmonics_degree = self.max_spherical_harmonics_degree;
             out.gaussian_sample_counts = self.gaussian_sample_counts;

@@ -51,12 +51,7 @@ const VIEWED: BufferRules = BufferRules {
 impl Buffer {
     /// A buffer of `size` bytes, not yet bound to memory. With `addresses`, it gets one of them when it is bound.
     pub(crate) fn new(size: u64, addresses: Option<Arc<Addresses>>) -> Self {
-        Self {
-            size,
-            memory: OnceLock::new(),
-            addresses,
-            address: OnceLock::new(),
-        }
+        Self { size, memory: OnceLock::new(), addresses, address: OnceLock::new() }
     }
 
     /// The address of its first byte.
@@ -82,25 +77,13 @@ impl Buffer {
     /// # Errors
     /// [`Error::InvalidUsage`] if it is bound already or does not fit.
     pub(crate) fn bind(&self, memory: Arc<Allocation>, offset: u64) -> Result<(), Error> {
-        fits(
-            "VUID-vkBindBufferMemory-size-01037",
-            &memory,
-            offset,
-            self.size,
-        )?;
-        self.memory.set((memory, offset)).map_err(|_| {
-            Error::usage(
-                "VUID-vkBindBufferMemory-buffer-07459",
-                "the buffer is bound already",
-            )
-        })?;
+        fits("VUID-vkBindBufferMemory-size-01037", &memory, offset, self.size)?;
+        self.memory
+            .set((memory, offset))
+            .map_err(|_| Error::usage("VUID-vkBindBufferMemory-buffer-07459", "the buffer is bound already"))?;
         if let (Some(addresses), Some((memory, offset))) = (&self.addresses, self.memory.get()) {
             self.address.get_or_init(|| {
-                addresses.add(BufferRange {
-                    memory: Arc::clone(memory),
-                    offset: *offset,
-                    size: self.size,
-                })
+                addresses.add(BufferRange { memory: Arc::clone(memory), offset: *offset, size: self.size })
             });
         }
         Ok(())
@@ -110,25 +93,15 @@ impl Buffer {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the buffer is not bound or does not have these bytes.
-    pub(crate) fn range(
-        &self,
-        offset: u64,
-        size: Option<u64>,
-        rules: &BufferRules,
-    ) -> Result<BufferRange, Error> {
+    pub(crate) fn range(&self, offset: u64, size: Option<u64>, rules: &BufferRules) -> Result<BufferRange, Error> {
         let Some((memory, start)) = self.memory.get() else {
-            return Err(Error::usage(
-                rules.memory,
-                "a command uses a buffer that is not bound to memory",
-            ));
+            return Err(Error::usage(rules.memory, "a command uses a buffer that is not bound to memory"));
         };
         let rest = self.size.checked_sub(offset);
         match (rest, size) {
-            (Some(rest), size) if size.is_none_or(|size| size <= rest) => Ok(BufferRange {
-                memory: Arc::clone(memory),
-                offset: start + offset,
-                size: size.unwrap_or(rest),
-            }),
+            (Some(rest), size) if size.is_none_or(|size| size <= rest) => {
+                Ok(BufferRange { memory: Arc::clone(memory), offset: start + offset, size: size.unwrap_or(rest) })
+            }
             _ => Err(Error::usage(
                 rules.range,
                 format!(
@@ -177,12 +150,7 @@ pub(crate) struct BufferView {
 }
 
 /// Checks that `size` bytes from `offset` on lie in `memory` and that the offset is aligned.
-pub(crate) fn fits(
-    vuid: &'static str,
-    memory: &Allocation,
-    offset: u64,
-    size: u64,
-) -> Result<(), Error> {
+pub(crate) fn fits(vuid: &'static str, memory: &Allocation, offset: u64, size: u64) -> Result<(), Error> {
     let end = offset.checked_add(size);
     if offset.is_multiple_of(ALIGNMENT) && end.is_some_and(|end| end <= memory.len()) {
         return Ok(());
@@ -211,24 +179,13 @@ fn new_buffer(
         | vk::BufferCreateFlags::SPARSE_ALIASED
         | vk::BufferCreateFlags::PROTECTED;
     if info.flags.intersects(sparse_or_protected) {
-        return Err(Error::FeatureNotPresent(format!(
-            "a buffer with flags {:?}",
-            info.flags
-        )));
+        return Err(Error::FeatureNotPresent(format!("a buffer with flags {:?}", info.flags)));
     }
     if info.size == 0 {
-        return Err(Error::usage(
-            "VUID-VkBufferCreateInfo-size-00912",
-            "the size of a buffer is 0",
-        ));
+        return Err(Error::usage("VUID-VkBufferCreateInfo-size-00912", "the size of a buffer is 0"));
     }
-    let is_addressed = info
-        .usage
-        .contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
-    Ok(Buffer::new(
-        info.size,
-        is_addressed.then(|| Arc::clone(addresses)),
-    ))
+    let is_addressed = info.usage.contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+    Ok(Buffer::new(info.size, is_addressed.then(|| Arc::clone(addresses))))
 }
 
 /// Writes the requirements and, if the chain asks, that no dedicated allocation is preferred.
@@ -267,9 +224,7 @@ pub(crate) fn get_buffer_opaque_capture_address(buffer: &Buffer) -> Result<u64, 
 }
 
 #[doc(alias = "vkGetBufferMemoryRequirements")]
-pub(crate) fn get_buffer_memory_requirements(
-    buffer: &Buffer,
-) -> Result<vk::MemoryRequirements, Error> {
+pub(crate) fn get_buffer_memory_requirements(buffer: &Buffer) -> Result<vk::MemoryRequirements, Error> {
     Ok(buffer.requirements())
 }
 
@@ -291,20 +246,14 @@ pub(crate) fn get_device_buffer_memory_requirements(
 }
 
 #[doc(alias = "vkBindBufferMemory")]
-pub(crate) fn bind_buffer_memory(
-    buffer: &Buffer,
-    memory: &Memory,
-    memory_offset: vk::DeviceSize,
-) -> Result<(), Error> {
+pub(crate) fn bind_buffer_memory(buffer: &Buffer, memory: &Memory, memory_offset: vk::DeviceSize) -> Result<(), Error> {
     buffer.bind(Arc::clone(memory.allocation()), memory_offset)
 }
 
 /// # Safety
 /// The handles are live.
 #[doc(alias = "vkBindBufferMemory2")]
-pub(crate) unsafe fn bind_buffer_memory2(
-    bind_infos: &[vk::BindBufferMemoryInfo<'_>],
-) -> Result<(), Error> {
+pub(crate) unsafe fn bind_buffer_memory2(bind_infos: &[vk::BindBufferMemoryInfo<'_>]) -> Result<(), Error> {
     bind_infos.iter().try_for_each(|info| {
         // SAFETY: the caller's promise.
         let (buffer, memory) = unsafe { (handle::get(info.buffer)?, handle::get(info.memory)?) };
@@ -315,11 +264,7 @@ pub(crate) unsafe fn bind_buffer_memory2(
 /// The bytes of a texel, or of a component of one of three.
 fn texel_alignment(format: Format) -> u64 {
     let size = format.texel_size().max(1) as u64;
-    if size.is_multiple_of(3) {
-        size / 3
-    } else {
-        size
-    }
+    if size.is_multiple_of(3) { size / 3 } else { size }
 }
 
 #[doc(alias = "vkCreateBufferView")]
@@ -329,20 +274,13 @@ pub(crate) fn create_buffer_view(
 ) -> Result<Arc<BufferView>, Error> {
     let info = create_info;
     let size = (info.range != vk::WHOLE_SIZE).then_some(info.range);
-    let format = formats::device_format(info.format).ok_or_else(|| {
-        Error::FormatNotSupported(format!(
-            "{:?} is not supported for buffer views",
-            info.format
-        ))
-    })?;
+    let format = formats::device_format(info.format)
+        .ok_or_else(|| Error::FormatNotSupported(format!("{:?} is not supported for buffer views", info.format)))?;
     let alignment = MIN_BUFFER_OFFSET_ALIGNMENT.min(texel_alignment(format));
     if !info.offset.is_multiple_of(alignment) {
         return Err(Error::usage(
             "VUID-VkBufferViewCreateInfo-buffer-02751",
-            format!(
-                "the offset {} is not a multiple of {alignment}",
-                info.offset
-            ),
+            format!("the offset {} is not a multiple of {alignment}", info.offset),
         ));
     }
     let range = buffer.range(info.offset, size, &VIEWED)?;

@@ -34,14 +34,8 @@ impl Image {
     /// # Errors
     /// [`Error::OutOfDeviceMemory`] if no memory could hold it.
     pub(crate) fn new(desc: ImageDesc) -> Result<Self, Error> {
-        let size = desc
-            .memory_size()
-            .ok_or_else(|| Error::OutOfDeviceMemory(format!("{desc:?} is too large")))?;
-        Ok(Self {
-            desc,
-            size,
-            bound: OnceLock::new(),
-        })
+        let size = desc.memory_size().ok_or_else(|| Error::OutOfDeviceMemory(format!("{desc:?} is too large")))?;
+        Ok(Self { desc, size, bound: OnceLock::new() })
     }
 
     /// The bytes of memory that it needs.
@@ -51,10 +45,7 @@ impl Image {
 
     /// The memory that it needs, of any type.
     fn requirements(&self) -> vk::MemoryRequirements {
-        vk::MemoryRequirements {
-            alignment: image::IMAGE_ALIGNMENT,
-            ..buffer::requirements(self.size)
-        }
+        vk::MemoryRequirements { alignment: image::IMAGE_ALIGNMENT, ..buffer::requirements(self.size) }
     }
 
     /// Binds it to memory from byte `offset` on.
@@ -66,20 +57,14 @@ impl Image {
         if !offset.is_multiple_of(image::IMAGE_ALIGNMENT) {
             return Err(Error::usage(
                 vuid,
-                format!(
-                    "memoryOffset {offset} is not a multiple of {}",
-                    image::IMAGE_ALIGNMENT
-                ),
+                format!("memoryOffset {offset} is not a multiple of {}", image::IMAGE_ALIGNMENT),
             ));
         }
-        let bound = image::Image::new(self.desc, memory, offset)
-            .map_err(|error| Error::usage(vuid, error.to_string()))?;
-        self.bound.set(Arc::new(bound)).map_err(|_| {
-            Error::usage(
-                "VUID-vkBindImageMemory-image-07460",
-                "the image is bound already",
-            )
-        })
+        let bound =
+            image::Image::new(self.desc, memory, offset).map_err(|error| Error::usage(vuid, error.to_string()))?;
+        self.bound
+            .set(Arc::new(bound))
+            .map_err(|_| Error::usage("VUID-vkBindImageMemory-image-07460", "the image is bound already"))
     }
 
     /// The image in its memory.
@@ -87,12 +72,9 @@ impl Image {
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not bound.
     pub(crate) fn bound(&self, vuid: &'static str) -> Result<&Arc<image::Image>, Error> {
-        self.bound.get().ok_or_else(|| {
-            Error::usage(
-                vuid,
-                "a command or view uses an image that is not bound to memory",
-            )
-        })
+        self.bound
+            .get()
+            .ok_or_else(|| Error::usage(vuid, "a command or view uses an image that is not bound to memory"))
     }
 }
 
@@ -129,23 +111,14 @@ impl ImageView {
             ));
         }
         let base_mip_level = range.base_mip_level;
-        let level_count = count(
-            base_mip_level,
-            range.level_count,
-            vk::REMAINING_MIP_LEVELS,
-            desc.mip_levels,
-        );
+        let level_count = count(base_mip_level, range.level_count, vk::REMAINING_MIP_LEVELS, desc.mip_levels);
         let base_layer = range.base_array_layer;
         let are_slices = desc.kind == ImageKind::D3 && view_type != vk::ImageViewType::TYPE_3D;
         let layer_count = count(
             base_layer,
             range.layer_count,
             vk::REMAINING_ARRAY_LAYERS,
-            if are_slices {
-                desc.mip_extent(base_mip_level)[2]
-            } else {
-                desc.array_layers
-            },
+            if are_slices { desc.mip_extent(base_mip_level)[2] } else { desc.array_layers },
         );
         let (Some(level_count), Some(layer_count)) = (level_count, layer_count) else {
             return Err(Error::usage(
@@ -228,8 +201,7 @@ pub(crate) fn new_image(
             ));
         }
     };
-    let format =
-        formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
+    let format = formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
     Image::new(ImageDesc {
         kind,
         format,
@@ -250,9 +222,7 @@ pub(crate) fn create_image(
 }
 
 #[doc(alias = "vkGetImageMemoryRequirements")]
-pub(crate) fn get_image_memory_requirements(
-    image: &Image,
-) -> Result<vk::MemoryRequirements, Error> {
+pub(crate) fn get_image_memory_requirements(image: &Image) -> Result<vk::MemoryRequirements, Error> {
     Ok(image.requirements())
 }
 
@@ -275,8 +245,7 @@ pub(crate) fn get_device_image_memory_requirements(
 
 /// Returns nothing: no image is sparse.
 #[doc(alias = "vkGetImageSparseMemoryRequirements")]
-pub(crate) fn get_image_sparse_memory_requirements()
--> Result<[vk::SparseImageMemoryRequirements; 0], Error> {
+pub(crate) fn get_image_sparse_memory_requirements() -> Result<[vk::SparseImageMemoryRequirements; 0], Error> {
     Ok([])
 }
 
@@ -315,11 +284,7 @@ pub(crate) fn get_image_subresource_layout(
 }
 
 #[doc(alias = "vkBindImageMemory")]
-pub(crate) fn bind_image_memory(
-    image: &Image,
-    memory: &Memory,
-    memory_offset: vk::DeviceSize,
-) -> Result<(), Error> {
+pub(crate) fn bind_image_memory(image: &Image, memory: &Memory, memory_offset: vk::DeviceSize) -> Result<(), Error> {
     image.bind(Arc::clone(memory.allocation()), memory_offset)
 }
 
@@ -329,16 +294,8 @@ pub(crate) fn create_image_view(
     image: &Arc<Image>,
 ) -> Result<Arc<ImageView>, Error> {
     let info = create_info;
-    let format =
-        formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
-    let view = ImageView::new(
-        image,
-        info.view_type,
-        info.format,
-        format,
-        info.components,
-        &info.subresource_range,
-    )?;
+    let format = formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
+    let view = ImageView::new(image, info.view_type, info.format, format, info.components, &info.subresource_range)?;
     Ok(Arc::new(view))
 }
 

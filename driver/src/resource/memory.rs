@@ -27,21 +27,14 @@ impl Memory {
     /// [`Error::OutOfDeviceMemory`] if the heap or the host has not enough.
     pub(crate) fn new(heap: &Arc<Heap>, size: u64, host_visible: bool) -> Result<Self, Error> {
         if size == 0 {
-            return Err(Error::usage(
-                "VUID-VkMemoryAllocateInfo-allocationSize-07899",
-                "allocationSize is 0",
-            ));
+            return Err(Error::usage("VUID-VkMemoryAllocateInfo-allocationSize-07899", "allocationSize is 0"));
         }
         heap.take(size)?;
         let allocation = Allocation::new(size, host_visible).map_err(|error| {
             heap.give_back(size);
             Error::OutOfDeviceMemory(error.to_string())
         })?;
-        Ok(Self {
-            allocation,
-            heap: Arc::clone(heap),
-            mapped: AtomicBool::new(false),
-        })
+        Ok(Self { allocation, heap: Arc::clone(heap), mapped: AtomicBool::new(false) })
     }
 
     /// The allocation.
@@ -56,25 +49,17 @@ impl Memory {
     /// range exceeds it.
     pub(crate) fn map(&self, offset: u64, size: Option<u64>) -> Result<*mut u8, Error> {
         if !self.allocation.is_host_visible() {
-            return Err(Error::MemoryMapFailed(
-                "its type is not host-visible (VUID-vkMapMemory-memory-00682)".into(),
-            ));
+            return Err(Error::MemoryMapFailed("its type is not host-visible (VUID-vkMapMemory-memory-00682)".into()));
         }
         let end = offset.checked_add(size.unwrap_or(1));
         if end.is_none_or(|end| end > self.allocation.len()) {
             return Err(Error::usage(
                 "VUID-vkMapMemory-offset-00679",
-                format!(
-                    "the range at {offset} does not lie in an allocation of {} bytes",
-                    self.allocation.len()
-                ),
+                format!("the range at {offset} does not lie in an allocation of {} bytes", self.allocation.len()),
             ));
         }
         if self.mapped.swap(true, Ordering::AcqRel) {
-            return Err(Error::usage(
-                "VUID-vkMapMemory-memory-00678",
-                "the memory is mapped already",
-            ));
+            return Err(Error::usage("VUID-vkMapMemory-memory-00678", "the memory is mapped already"));
         }
         // The range was checked, so this stays inside the mapping.
         Ok(self.allocation.host_pointer().wrapping_add(offset as usize))
@@ -113,11 +98,7 @@ pub(crate) fn allocate_memory(
 
 #[doc(alias = "vkMapMemory")]
 #[doc(alias = "vkMapMemory2KHR")]
-pub(crate) fn map_memory(
-    memory: &Memory,
-    offset: vk::DeviceSize,
-    size: vk::DeviceSize,
-) -> Result<*mut c_void, Error> {
+pub(crate) fn map_memory(memory: &Memory, offset: vk::DeviceSize, size: vk::DeviceSize) -> Result<*mut c_void, Error> {
     let size = (size != vk::WHOLE_SIZE).then_some(size);
     Ok(memory.map(offset, size)?.cast())
 }
@@ -135,9 +116,7 @@ pub(crate) fn unmap_memory(memory: &Memory) -> Result<(), Error> {
 /// The ranges' handles are live.
 #[doc(alias = "vkFlushMappedMemoryRanges")]
 #[doc(alias = "vkInvalidateMappedMemoryRanges")]
-pub(crate) unsafe fn flush_mapped_memory_ranges(
-    memory_ranges: &[vk::MappedMemoryRange<'_>],
-) -> Result<(), Error> {
+pub(crate) unsafe fn flush_mapped_memory_ranges(memory_ranges: &[vk::MappedMemoryRange<'_>]) -> Result<(), Error> {
     memory_ranges.iter().try_for_each(|range| {
         // SAFETY: the caller's promise.
         unsafe { handle::get(range.memory) }.map(drop)
@@ -175,10 +154,7 @@ mod tests {
     fn only_host_visible_memory_is_mapped_and_once() {
         let heap = Arc::new(Heap::new(10_000));
         let device_local = Memory::new(&heap, 100, false).unwrap();
-        assert!(matches!(
-            device_local.map(0, None),
-            Err(Error::MemoryMapFailed(_))
-        ));
+        assert!(matches!(device_local.map(0, None), Err(Error::MemoryMapFailed(_))));
         let memory = Memory::new(&heap, 100, true).unwrap();
         assert!(memory.map(100, None).is_err());
         assert!(memory.map(60, Some(41)).is_err());

@@ -31,20 +31,10 @@ impl Sampler {
     ) -> Result<Self, Error> {
         let is_anisotropic = info.anisotropy_enable != vk::FALSE;
         let most = limits::MAX_SAMPLER_ANISOTROPY;
-        let [u, v, w] = [
-            info.address_mode_u,
-            info.address_mode_v,
-            info.address_mode_w,
-        ]
-        .map(convert::address_mode);
+        let [u, v, w] = [info.address_mode_u, info.address_mode_v, info.address_mode_w].map(convert::address_mode);
         let compares = info.compare_enable != vk::FALSE;
         let compare_op = compares
-            .then(|| {
-                convert::compare_op(
-                    info.compare_op,
-                    "VUID-VkSamplerCreateInfo-compareEnable-01080",
-                )
-            })
+            .then(|| convert::compare_op(info.compare_op, "VUID-VkSamplerCreateInfo-compareEnable-01080"))
             .transpose()?;
         let bias = limits::MAX_SAMPLER_LOD_BIAS;
         Ok(Self {
@@ -61,9 +51,7 @@ impl Sampler {
                     Some(color) => convert::custom_border_color(color),
                     None => convert::border_color(info.border_color)?,
                 },
-                has_seams: info
-                    .flags
-                    .contains(vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT),
+                has_seams: info.flags.contains(vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT),
                 unnormalized_coordinates: info.unnormalized_coordinates != vk::FALSE,
                 max_anisotropy: match is_anisotropic {
                     true => info.max_anisotropy.clamp(1.0, most),
@@ -81,22 +69,16 @@ impl Sampler {
 /// # Safety
 /// The create info's chain is valid.
 #[doc(alias = "vkCreateSampler")]
-pub(crate) unsafe fn create_sampler(
-    create_info: &vk::SamplerCreateInfo<'_>,
-) -> Result<Arc<Sampler>, Error> {
+pub(crate) unsafe fn create_sampler(create_info: &vk::SamplerCreateInfo<'_>) -> Result<Arc<Sampler>, Error> {
     // SAFETY: the caller's promise.
     let (reduction, border) = unsafe {
         (
             valid::find_in_chain::<vk::SamplerReductionModeCreateInfo<'_>>(create_info.p_next),
-            valid::find_in_chain::<vk::SamplerCustomBorderColorCreateInfoEXT<'_>>(
-                create_info.p_next,
-            ),
+            valid::find_in_chain::<vk::SamplerCustomBorderColorCreateInfoEXT<'_>>(create_info.p_next),
         )
     };
-    let is_custom = matches!(
-        create_info.border_color,
-        vk::BorderColor::FLOAT_CUSTOM_EXT | vk::BorderColor::INT_CUSTOM_EXT
-    );
+    let is_custom =
+        matches!(create_info.border_color, vk::BorderColor::FLOAT_CUSTOM_EXT | vk::BorderColor::INT_CUSTOM_EXT);
     if is_custom && border.is_none() {
         return Err(Error::usage(
             "VUID-VkSamplerCreateInfo-borderColor-04011",
@@ -106,9 +88,7 @@ pub(crate) unsafe fn create_sampler(
     Sampler::new(
         create_info,
         reduction.map(|info| info.reduction_mode),
-        border
-            .filter(|_| is_custom)
-            .map(|info| info.custom_border_color),
+        border.filter(|_| is_custom).map(|info| info.custom_border_color),
     )
     .map(Arc::new)
 }

@@ -5,9 +5,7 @@
 
 use crate::error::lost;
 use crate::shared_memory::SharedMemory;
-use driver::window::{
-    Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem,
-};
+use driver::window::{Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::ffi::CStr;
 use std::time::{Duration, Instant};
@@ -51,10 +49,7 @@ impl WindowSystem for Wayland {
         };
         let connection = Connection::from_backend(backend);
         let surface = WlSurface::from_id(&connection, id).map_err(lost)?;
-        Ok(Box::new(WaylandWindow {
-            connection,
-            surface,
-        }))
+        Ok(Box::new(WaylandWindow { connection, surface }))
     }
 }
 
@@ -95,11 +90,7 @@ impl Window for WaylandWindow {
         let shm: WlShm = globals.bind(&handle, 1..=1, ()).map_err(lost)?;
         let memory = SharedMemory::new(pool_size as usize)?;
         let pool = shm.create_pool(memory.descriptor(), pool_size, &handle, ());
-        let format = if options.has_alpha {
-            Format::Argb8888
-        } else {
-            Format::Xrgb8888
-        };
+        let format = if options.has_alpha { Format::Argb8888 } else { Format::Xrgb8888 };
         let buffers = std::array::from_fn(|index| {
             let offset = (index * size) as i32;
             pool.create_buffer(offset, width, height, 4 * width, format, &handle, index)
@@ -191,16 +182,10 @@ struct WaylandCanvas {
 
 impl WaylandCanvas {
     /// Dispatches events until `is_over`, at most for `longest`. Returns true if it is.
-    fn listen(
-        &mut self,
-        longest: Duration,
-        is_over: impl Fn(&Events) -> bool,
-    ) -> Result<bool, WindowLost> {
+    fn listen(&mut self, longest: Duration, is_over: impl Fn(&Events) -> bool) -> Result<bool, WindowLost> {
         let end = Instant::now() + longest;
         loop {
-            self.queue
-                .dispatch_pending(&mut self.events)
-                .map_err(lost)?;
+            self.queue.dispatch_pending(&mut self.events).map_err(lost)?;
             if is_over(&self.events) {
                 return Ok(true);
             }
@@ -214,10 +199,7 @@ impl WaylandCanvas {
                 continue;
             };
             let left = Timespec::try_from(left).map_err(lost)?;
-            let mut sockets = [PollFd::from_borrowed_fd(
-                guard.connection_fd(),
-                PollFlags::IN,
-            )];
+            let mut sockets = [PollFd::from_borrowed_fd(guard.connection_fd(), PollFlags::IN)];
             match poll(&mut sockets, Some(&left)) {
                 Ok(0) | Err(rustix::io::Errno::INTR) => {}
                 Ok(_) => {
@@ -259,9 +241,7 @@ impl Canvas for WaylandCanvas {
         self.surface.commit();
         self.connection.flush().or_else(|error| match error {
             // The socket is full: the rest is sent by the next flush.
-            wayland_backend::client::WaylandError::Io(error)
-                if error.kind() == std::io::ErrorKind::WouldBlock =>
-            {
+            wayland_backend::client::WaylandError::Io(error) if error.kind() == std::io::ErrorKind::WouldBlock => {
                 Ok(())
             }
             error => Err(lost(error)),

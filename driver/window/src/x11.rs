@@ -7,9 +7,7 @@
 
 use crate::error::lost;
 use crate::shared_memory::SharedMemory;
-use driver::window::{
-    Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem,
-};
+use driver::window::{Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem};
 use libloading::Library;
 use std::ffi::{CStr, c_int, c_void};
 use std::os::fd::{AsRawFd, BorrowedFd};
@@ -36,9 +34,7 @@ impl WindowSystem for Xcb {
     unsafe fn open(&self, window: NativeWindow) -> Result<Box<dyn Window>, WindowLost> {
         match window {
             // SAFETY: the caller's promise.
-            NativeWindow::Xcb { connection, window } => unsafe {
-                Ok(Box::new(X11Window::open(connection, window)?))
-            },
+            NativeWindow::Xcb { connection, window } => unsafe { Ok(Box::new(X11Window::open(connection, window)?)) },
             other => Err(lost(format_args!("{other:?} is no window of libxcb's"))),
         }
     }
@@ -56,10 +52,7 @@ impl WindowSystem for Xlib {
         match window {
             // SAFETY: the caller's promise; the connection lives as long as its display.
             NativeWindow::Xlib { display, window } => unsafe {
-                Ok(Box::new(X11Window::open(
-                    connection_of_display(display)?,
-                    window,
-                )?))
+                Ok(Box::new(X11Window::open(connection_of_display(display)?, window)?))
             },
             other => Err(lost(format_args!("{other:?} is no window of Xlib's"))),
         }
@@ -76,9 +69,7 @@ unsafe fn connection_of_display(display: NonNull<c_void>) -> Result<NonNull<c_vo
     // header.
     let connection = unsafe {
         let library = Library::new("libX11-xcb.so.1").map_err(lost)?;
-        let get = library
-            .get::<GetConnection>(b"XGetXCBConnection\0")
-            .map_err(lost)?;
+        let get = library.get::<GetConnection>(b"XGetXCBConnection\0").map_err(lost)?;
         get(display.as_ptr())
     };
     NonNull::new(connection).ok_or_else(|| lost("the display has no connection"))
@@ -94,16 +85,12 @@ unsafe fn check_connection(connection: NonNull<c_void>) -> Result<(), WindowLost
     // its header.
     let error = unsafe {
         let library = Library::new("libxcb.so.1").map_err(lost)?;
-        let has_error = library
-            .get::<HasError>(b"xcb_connection_has_error\0")
-            .map_err(lost)?;
+        let has_error = library.get::<HasError>(b"xcb_connection_has_error\0").map_err(lost)?;
         has_error(connection.as_ptr())
     };
     match error {
         0 => Ok(()),
-        error => Err(lost(format_args!(
-            "the connection to the X server is broken ({error})"
-        ))),
+        error => Err(lost(format_args!("the connection to the X server is broken ({error})"))),
     }
 }
 
@@ -130,15 +117,9 @@ impl X11Window {
         let setup = connection.setup();
         let is_supported = setup.image_byte_order == ImageOrder::LSB_FIRST
             && matches!(geometry.depth, 24 | 32)
-            && setup
-                .pixmap_formats
-                .iter()
-                .any(|format| format.depth == geometry.depth && format.bits_per_pixel == 32);
+            && setup.pixmap_formats.iter().any(|format| format.depth == geometry.depth && format.bits_per_pixel == 32);
         if !is_supported {
-            return Err(lost(format_args!(
-                "pixels of depth {} are not put to windows",
-                geometry.depth
-            )));
+            return Err(lost(format_args!("pixels of depth {} are not put to windows", geometry.depth)));
         }
         Ok(Self {
             window,
@@ -151,18 +132,14 @@ impl X11Window {
 
 /// The period of the fastest display of a screen; `None` if the server knows none.
 fn refresh_period(connection: &XCBConnection, root: u32) -> Option<Duration> {
-    connection
-        .extension_information(randr::X11_EXTENSION_NAME)
-        .ok()??;
+    connection.extension_information(randr::X11_EXTENSION_NAME).ok()??;
     let resources = connection.randr_get_screen_resources_current(root).ok()?;
     let resources = resources.reply().ok()?;
     let seconds = resources
         .crtcs
         .iter()
         .filter_map(|&crtc| {
-            let crtc = connection
-                .randr_get_crtc_info(crtc, resources.config_timestamp)
-                .ok()?;
+            let crtc = connection.randr_get_crtc_info(crtc, resources.config_timestamp).ok()?;
             let mode = crtc.reply().ok()?.mode;
             let mode = resources.modes.iter().find(|known| known.id == mode)?;
             let mut lines = f64::from(mode.vtotal);
@@ -188,11 +165,7 @@ impl Window for X11Window {
     }
 
     fn present_modes(&self) -> &'static [PresentMode] {
-        &[
-            PresentMode::Fifo,
-            PresentMode::Mailbox,
-            PresentMode::Immediate,
-        ]
+        &[PresentMode::Fifo, PresentMode::Mailbox, PresentMode::Immediate]
     }
 
     fn has_alpha(&self) -> bool {
@@ -206,9 +179,7 @@ impl Window for X11Window {
         };
         let connection = Arc::clone(&self.connection);
         let context = connection.generate_id().map_err(lost)?;
-        let created = connection
-            .create_gc(context, self.window, &CreateGCAux::new())
-            .map_err(lost)?;
+        let created = connection.create_gc(context, self.window, &CreateGCAux::new()).map_err(lost)?;
         created.check().map_err(lost)?;
         let size = 4 * usize::from(width) * usize::from(height);
         let pixels = match Segment::new(&connection, size) {
@@ -253,18 +224,14 @@ impl Segment {
         if address.address_family() != rustix::net::AddressFamily::UNIX {
             return None;
         }
-        connection
-            .extension_information(shm::X11_EXTENSION_NAME)
-            .ok()??;
+        connection.extension_information(shm::X11_EXTENSION_NAME).ok()??;
         let version = connection.shm_query_version().ok()?.reply().ok()?;
         if (version.major_version, version.minor_version) < (1, 2) {
             return None;
         }
         let memory = SharedMemory::new(size).ok()?;
         let id = connection.generate_id().ok()?;
-        let attached = connection
-            .shm_attach_fd(id, memory.own_descriptor().ok()?, true)
-            .ok()?;
+        let attached = connection.shm_attach_fd(id, memory.own_descriptor().ok()?, true).ok()?;
         attached.check().ok()?;
         Some(Self { memory, id })
     }

@@ -105,9 +105,8 @@ impl Gpu {
                 .push_next(&mut gaussian)
                 .push_next(&mut rendering);
             let device = instance.create_device(physical, &info, None)?;
-            let constants = [vk::PushConstantRange::default()
-                .stage_flags(vk::ShaderStageFlags::VERTEX)
-                .size(CONSTANTS)];
+            let constants =
+                [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(CONSTANTS)];
             let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
             Ok(Self {
                 layout: device.create_pipeline_layout(&info, None)?,
@@ -136,11 +135,7 @@ impl Gpu {
             .image_view(color.view)
             .image_layout(vk::ImageLayout::GENERAL)
             .load_op(vk::AttachmentLoadOp::CLEAR)
-            .clear_value(vk::ClearValue {
-                color: vk::ClearColorValue {
-                    float32: [0.03, 0.035, 0.05, 1.0],
-                },
-            });
+            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: [0.03, 0.035, 0.05, 1.0] } });
         if picture.samples != vk::SampleCountFlags::TYPE_1 {
             color_info = color_info
                 .resolve_mode(vk::ResolveModeFlags::AVERAGE)
@@ -152,12 +147,7 @@ impl Gpu {
             .image_view(depth.view)
             .image_layout(vk::ImageLayout::GENERAL)
             .load_op(vk::AttachmentLoadOp::CLEAR)
-            .clear_value(vk::ClearValue {
-                depth_stencil: vk::ClearDepthStencilValue {
-                    depth: 1.0,
-                    stencil: 0,
-                },
-            });
+            .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 } });
         let info = vk::RenderingInfo::default()
             .render_area(extent.into())
             .layer_count(1)
@@ -180,19 +170,14 @@ impl Gpu {
                 device.cmd_bind_pipeline(c, point, gaussians);
                 device.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
                 device.cmd_bind_vertex_buffers(c, 0, &[splats, instances], &[0; 2]);
-                self.extension
-                    .cmd_set_gaussian_cameras(c, &[picture.camera]);
+                self.extension.cmd_set_gaussian_cameras(c, &[picture.camera]);
                 let [fx, fy] = picture.camera.focal_length;
                 let [width, height] = picture.size.map(|side| side as f32);
                 let (vertex, constants) = (vk::ShaderStageFlags::VERTEX, [width, height, fx, fy]);
                 let constants = bytemuck::bytes_of(&constants);
                 device.cmd_push_constants(c, self.layout, vertex, 0, constants);
                 let all = [picture.splats.len() as u32];
-                let draws = if picture.draws.is_empty() {
-                    &all
-                } else {
-                    picture.draws
-                };
+                let draws = if picture.draws.is_empty() { &all } else { picture.draws };
                 let (mut first, instances) = (0, picture.instances.len().max(1) as u32);
                 if picture.share_a_set {
                     self.extension.cmd_begin_gaussian_set(c);
@@ -226,9 +211,7 @@ impl Gpu {
         images: &[(Image, vk::Format)],
         record: impl FnOnce(vk::CommandBuffer) -> Outcome<()>,
     ) -> Outcome<()> {
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(self.pool)
-            .command_buffer_count(1);
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         let barriers: Vec<_> = (images.iter())
             .map(|&(image, format)| {
                 vk::ImageMemoryBarrier::default()
@@ -264,8 +247,7 @@ impl Gpu {
         let types = &self.types;
         let index = (0..types.memory_type_count).find(|index| {
             let flags = types.memory_types[*index as usize].property_flags;
-            needs.memory_type_bits & (1 << index) != 0
-                && flags.contains(Memory::HOST_VISIBLE | Memory::HOST_COHERENT)
+            needs.memory_type_bits & (1 << index) != 0 && flags.contains(Memory::HOST_VISIBLE | Memory::HOST_COHERENT)
         });
         let info = vk::MemoryAllocateInfo::default()
             .allocation_size(needs.size)
@@ -280,9 +262,8 @@ impl Gpu {
 
     /// A vertex buffer with `bytes`; it has a minimum size if they are empty.
     fn buffer(&self, bytes: &[u8]) -> Outcome<vk::Buffer> {
-        let info = vk::BufferCreateInfo::default()
-            .size(bytes.len().max(64) as u64)
-            .usage(vk::BufferUsageFlags::VERTEX_BUFFER);
+        let info =
+            vk::BufferCreateInfo::default().size(bytes.len().max(64) as u64).usage(vk::BufferUsageFlags::VERTEX_BUFFER);
         // SAFETY: see above.
         unsafe {
             let buffer = self.device.create_buffer(&info, None)?;
@@ -295,25 +276,11 @@ impl Gpu {
     }
 
     /// An attachment of a picture's size. A colour attachment with one sample can be read.
-    fn image(
-        &self,
-        picture: &Picture<'_>,
-        format: vk::Format,
-        samples: vk::SampleCountFlags,
-    ) -> Outcome<Image> {
+    fn image(&self, picture: &Picture<'_>, format: vk::Format, samples: vk::SampleCountFlags) -> Outcome<Image> {
         let (usage, tiling) = match (format, samples) {
-            (DEPTH, _) => (
-                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-                vk::ImageTiling::OPTIMAL,
-            ),
-            (_, vk::SampleCountFlags::TYPE_1) => (
-                vk::ImageUsageFlags::COLOR_ATTACHMENT,
-                vk::ImageTiling::LINEAR,
-            ),
-            _ => (
-                vk::ImageUsageFlags::COLOR_ATTACHMENT,
-                vk::ImageTiling::OPTIMAL,
-            ),
+            (DEPTH, _) => (vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, vk::ImageTiling::OPTIMAL),
+            (_, vk::SampleCountFlags::TYPE_1) => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageTiling::LINEAR),
+            _ => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageTiling::OPTIMAL),
         };
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
@@ -335,28 +302,17 @@ impl Gpu {
                 .view_type(vk::ImageViewType::TYPE_2D)
                 .format(format)
                 .subresource_range(range(format));
-            Ok(Image {
-                raw,
-                view: self.device.create_image_view(&info, None)?,
-                pixels,
-            })
+            Ok(Image { raw, view: self.device.create_image_view(&info, None)?, pixels })
         }
     }
 
     /// A shader's stage.
-    fn stage(
-        &self,
-        spirv: &[u8],
-        kind: vk::ShaderStageFlags,
-    ) -> Outcome<vk::PipelineShaderStageCreateInfo<'static>> {
+    fn stage(&self, spirv: &[u8], kind: vk::ShaderStageFlags) -> Outcome<vk::PipelineShaderStageCreateInfo<'static>> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))?;
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: see above.
         let module = unsafe { self.device.create_shader_module(&info, None)? };
-        Ok(vk::PipelineShaderStageCreateInfo::default()
-            .stage(kind)
-            .module(module)
-            .name(c"main"))
+        Ok(vk::PipelineShaderStageCreateInfo::default().stage(kind).module(module).name(c"main"))
     }
 
     /// A pipeline for a picture's Gaussians.
@@ -369,18 +325,14 @@ impl Gpu {
                 .stride(size_of::<Instance>() as u32)
                 .input_rate(vk::VertexInputRate::INSTANCE),
         ];
-        let attribute =
-            |location, binding, format, first: u32| vk::VertexInputAttributeDescription {
-                location,
-                binding,
-                format,
-                offset: 4 * first,
-            };
+        let attribute = |location, binding, format, first: u32| vk::VertexInputAttributeDescription {
+            location,
+            binding,
+            format,
+            offset: 4 * first,
+        };
         let float = vk::Format::R32_SFLOAT;
-        let (vec3, vec4) = (
-            vk::Format::R32G32B32_SFLOAT,
-            vk::Format::R32G32B32A32_SFLOAT,
-        );
+        let (vec3, vec4) = (vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT);
         let attributes = [
             attribute(0, 0, vec3, 0),
             attribute(1, 0, vec3, 3),
@@ -399,30 +351,21 @@ impl Gpu {
             .opacity(3)
             .first_spherical_harmonics(4);
         if instanced {
-            locations = locations
-                .first_model_matrix(MODEL_MATRIX)
-                .model_opacity(MODEL_OPACITY);
+            locations = locations.first_model_matrix(MODEL_MATRIX).model_opacity(MODEL_OPACITY);
         }
         let mut gaussian = picture.state.attribute_locations(locations);
         let mut stages = Vec::new();
         if picture.by_shader {
-            gaussian = gaussian
-                .projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)
-                .vertex_output_locations(
-                    GaussianVertexOutputLocationsGAURAST::default()
-                        .covariance(0)
-                        .opacity(1)
-                        .color(2),
-                );
+            gaussian = gaussian.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER).vertex_output_locations(
+                GaussianVertexOutputLocationsGAURAST::default().covariance(0).opacity(1).color(2),
+            );
             let code = include_bytes!("../shaders/project.vert.spv");
             stages.push(self.stage(code, vk::ShaderStageFlags::VERTEX)?);
         }
         let kind = picture.resolve.map_or(0, |resolve| resolve as u32);
         let kind = kind.to_ne_bytes();
         let entries = [vk::SpecializationMapEntry::default().size(4)];
-        let special = vk::SpecializationInfo::default()
-            .map_entries(&entries)
-            .data(&kind);
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(&kind);
         if picture.resolve.is_some() {
             let inputs = GaussianResolveInputLocationsGAURAST::default();
             gaussian = gaussian.resolve_input_locations(inputs.accumulated_color(0).depth(1));
@@ -441,41 +384,24 @@ impl Gpu {
             .src_alpha_blend_factor(vk::BlendFactor::ONE)
             .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
         let topology = PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-        self.pipeline(
-            picture,
-            &vertices,
-            topology,
-            over,
-            &stages,
-            Some(&mut gaussian),
-        )
+        self.pipeline(picture, &vertices, topology, over, &stages, Some(&mut gaussian))
     }
 
     /// A pipeline for a triangle.
     fn triangle_pipeline(&self, picture: &Picture<'_>) -> Outcome<vk::Pipeline> {
         let stages = [
-            self.stage(
-                include_bytes!("../shaders/hello_triangle.vert.spv"),
-                vk::ShaderStageFlags::VERTEX,
-            )?,
-            self.stage(
-                include_bytes!("../shaders/hello_triangle.frag.spv"),
-                vk::ShaderStageFlags::FRAGMENT,
-            )?,
+            self.stage(include_bytes!("../shaders/hello_triangle.vert.spv"), vk::ShaderStageFlags::VERTEX)?,
+            self.stage(include_bytes!("../shaders/hello_triangle.frag.spv"), vk::ShaderStageFlags::FRAGMENT)?,
         ];
         let bindings = [vk::VertexInputBindingDescription::default().stride(5 * 4)];
         let attributes = [
             vk::VertexInputAttributeDescription::default().format(vk::Format::R32G32_SFLOAT),
-            vk::VertexInputAttributeDescription::default()
-                .location(1)
-                .format(vk::Format::R32G32B32_SFLOAT)
-                .offset(8),
+            vk::VertexInputAttributeDescription::default().location(1).format(vk::Format::R32G32B32_SFLOAT).offset(8),
         ];
         let vertices = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
-        let replace = vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA);
+        let replace = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let topology = vk::PrimitiveTopology::TRIANGLE_LIST;
         self.pipeline(picture, &vertices, topology, replace, &stages, None)
     }
@@ -491,9 +417,7 @@ impl Gpu {
     ) -> Outcome<vk::Pipeline> {
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(topology);
         let scissors = [extent(picture).into()];
-        let view = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(1)
-            .scissors(&scissors);
+        let view = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissors(&scissors);
         let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(picture.samples)
@@ -540,14 +464,7 @@ fn extent(picture: &Picture<'_>) -> vk::Extent2D {
 
 fn viewport(picture: &Picture<'_>, [min_depth, max_depth]: [f32; 2]) -> vk::Viewport {
     let [width, height] = picture.size.map(|side| side as f32);
-    vk::Viewport {
-        x: 0.0,
-        y: 0.0,
-        width,
-        height,
-        min_depth,
-        max_depth,
-    }
+    vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth, max_depth }
 }
 
 fn range(format: vk::Format) -> vk::ImageSubresourceRange {
@@ -555,8 +472,5 @@ fn range(format: vk::Format) -> vk::ImageSubresourceRange {
         DEPTH => vk::ImageAspectFlags::DEPTH,
         _ => vk::ImageAspectFlags::COLOR,
     };
-    vk::ImageSubresourceRange::default()
-        .aspect_mask(aspect)
-        .level_count(1)
-        .layer_count(1)
+    vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1)
 }

@@ -34,8 +34,7 @@ fn picture(gpu: &Gpu, content: &Content<'_>) -> Result<RgbImage, Box<dyn Error>>
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (options, folders): (Vec<_>, Vec<_>) =
-        (std::env::args().skip(1)).partition(|argument| argument == "--loader");
+    let (options, folders): (Vec<_>, Vec<_>) = (std::env::args().skip(1)).partition(|argument| argument == "--loader");
     let folder = Path::new(folders.first().map_or("samples", String::as_str));
     let entry = if options.is_empty() {
         vulkan_gaurast::entry()
@@ -50,25 +49,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut page = "# Gallery\n\nA picture of each mode. `cargo run --release -p gaurast-examples --example gallery` draws them and writes this page.\n".to_owned();
     for room in rooms::all(&scenes) {
         let (mut images, mut captions) = (String::new(), String::new());
-        for Exhibit {
-            name,
-            caption,
-            content,
-        } in &room.exhibits
-        {
+        for Exhibit { name, caption, content } in &room.exhibits {
             let file = BufWriter::new(File::create(pictures.join(format!("{name}.png")))?);
-            let encoder =
-                PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
+            let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
             picture(&gpu, content)?.write_with_encoder(encoder)?;
             write!(images, "| ![{name}](pictures/gallery/{name}.png) ")?;
             write!(captions, "| {caption} ")?;
         }
         let rule = "|---".repeat(room.exhibits.len());
         let (title, text) = (room.title, room.text);
-        write!(
-            page,
-            "\n## {title}\n\n{text}\n\n{images}|\n{rule}|\n{captions}|\n"
-        )?;
+        write!(page, "\n## {title}\n\n{text}\n\n{images}|\n{rule}|\n{captions}|\n")?;
     }
     std::fs::write(folder.join("GALLERY.md"), page)?;
     Ok(())

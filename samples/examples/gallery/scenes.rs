@@ -73,37 +73,13 @@ fn turned_about(axis: usize, angle: f32) -> [f32; 4] {
 fn crossing() -> Vec<Splat> {
     let sheet = [0.75, 0.55, 0.01];
     let mut splats = vec![
-        splat(
-            [0.0, 0.0, 2.65],
-            sheet,
-            turned_about(1, -1.0),
-            0.99,
-            hue(0.05),
-        ),
-        splat(
-            [0.0, 0.0, 2.6],
-            sheet,
-            turned_about(1, 1.0),
-            0.99,
-            hue(0.55),
-        ),
+        splat([0.0, 0.0, 2.65], sheet, turned_about(1, -1.0), 0.99, hue(0.05)),
+        splat([0.0, 0.0, 2.6], sheet, turned_about(1, 1.0), 0.99, hue(0.55)),
     ];
     for side in [-1.0, 1.0] {
         let size = [0.35, 0.8, 0.1];
-        splats.push(splat(
-            [2.75 * side, 0.25, 2.5],
-            size,
-            STRAIGHT,
-            0.98,
-            hue(0.3),
-        ));
-        splats.push(splat(
-            [3.15 * side, -0.25, 2.4],
-            size,
-            STRAIGHT,
-            0.98,
-            hue(0.8),
-        ));
+        splats.push(splat([2.75 * side, 0.25, 2.5], size, STRAIGHT, 0.98, hue(0.3)));
+        splats.push(splat([3.15 * side, -0.25, 2.4], size, STRAIGHT, 0.98, hue(0.8)));
     }
     splats
 }
@@ -139,13 +115,7 @@ fn floor() -> Vec<Splat> {
         let size = [0.26, 0.26, 0.0];
         for column in -1..=1 {
             let at = [0.75 * column as f32, 0.55, z];
-            splats.push(splat(
-                at,
-                size,
-                lies,
-                0.95,
-                hue(0.13 * (row + column) as f32),
-            ));
+            splats.push(splat(at, size, lies, 0.95, hue(0.13 * (row + column) as f32)));
         }
         for side in [-1.0, 1.0] {
             let color = hue(0.5 + 0.13 * row as f32);
@@ -160,23 +130,13 @@ fn veils() -> Vec<Splat> {
     let mut splats = Vec::new();
     for i in 0..60 {
         let color = hue(i as f32 / 15.0);
-        let place = [
-            0.5 * (i as f32).sin(),
-            0.3 * (1.7 * i as f32).cos(),
-            3.0 + 0.01 * i as f32,
-        ];
+        let place = [0.5 * (i as f32).sin(), 0.3 * (1.7 * i as f32).cos(), 3.0 + 0.01 * i as f32];
         splats.push(splat(place, [0.5, 0.5, 0.01], STRAIGHT, 0.03, color));
     }
     for i in 0..9 {
         let x = 0.5 * (i as f32 - 4.0);
         let turn = turned(0.35 + 0.1 * i as f32);
-        splats.push(splat(
-            [x, 0.0, 5.0],
-            [0.006, 1.3, 0.006],
-            turn,
-            0.95,
-            hue(i as f32 / 9.0),
-        ));
+        splats.push(splat([x, 0.0, 5.0], [0.006, 1.3, 0.006], turn, 0.95, hue(i as f32 / 9.0)));
     }
     splats
 }
@@ -204,11 +164,7 @@ fn around() -> Vec<Splat> {
             let (sin, cos) = longitude.sin_cos();
             let out = 3.0 * latitude.cos();
             let position = [out * sin, 3.0 * latitude.sin(), out * cos];
-            let color = if ring == 0 {
-                [0.95; 3]
-            } else {
-                hue(longitude / TAU)
-            };
+            let color = if ring == 0 { [0.95; 3] } else { hue(longitude / TAU) };
             let size = if ring == 0 { 0.1 } else { 0.19 };
             splats.push(splat(position, [size; 3], STRAIGHT, 0.95, color));
         }
@@ -252,33 +208,15 @@ fn still_life() -> Vec<Splat> {
 fn flower() -> Vec<Splat> {
     let z = 4.0;
     let mut splats = vec![
-        splat(
-            [0.0, 0.45, z],
-            [0.03, 0.3, 0.03],
-            STRAIGHT,
-            0.95,
-            [0.15, 0.5, 0.15],
-        ),
-        splat(
-            [0.0, 0.0, z - 0.06],
-            [0.09; 3],
-            STRAIGHT,
-            0.98,
-            [0.95, 0.8, 0.2],
-        ),
+        splat([0.0, 0.45, z], [0.03, 0.3, 0.03], STRAIGHT, 0.95, [0.15, 0.5, 0.15]),
+        splat([0.0, 0.0, z - 0.06], [0.09; 3], STRAIGHT, 0.98, [0.95, 0.8, 0.2]),
     ];
     for i in 0..7 {
         let angle = TAU * i as f32 / 7.0;
         let (sin, cos) = angle.sin_cos();
         let position = [0.22 * cos, 0.22 * sin, z];
         let color = [0.9, 0.35 + 0.03 * i as f32, 0.6];
-        splats.push(splat(
-            position,
-            [0.12, 0.07, 0.02],
-            turned(angle),
-            0.95,
-            color,
-        ));
+        splats.push(splat(position, [0.12, 0.07, 0.02], turned(angle), 0.95, color));
     }
     splats
 }
@@ -296,22 +234,14 @@ fn meadow() -> Vec<Instance> {
             let depth = 2.2 + 1.1 * row as f32;
             let x = 0.36 * depth * (column as f32 - 4.5 + 0.4 * random(93.9)) / 2.2;
             // Rotated about y, then sheared. The model is around (0, 0, 4).
-            let rows = [
-                [size * cos, size * lean, size * sin],
-                [0.0, size, 0.0],
-                [-size * sin, 0.0, size * cos],
-            ];
+            let rows = [[size * cos, size * lean, size * sin], [0.0, size, 0.0], [-size * sin, 0.0, size * cos]];
             let to = [x, 0.62, depth];
             let mut instance = [1.0; 13];
             for (axis, row) in rows.iter().enumerate() {
                 instance[4 * axis..][..3].copy_from_slice(row);
                 instance[4 * axis + 3] = to[axis] - 4.0 * row[2];
             }
-            instance[12] = if row < 4 {
-                1.0
-            } else {
-                0.75 - 0.3 * (row - 4) as f32
-            };
+            instance[12] = if row < 4 { 1.0 } else { 0.75 - 0.3 * (row - 4) as f32 };
             instances.push(instance);
         }
     }

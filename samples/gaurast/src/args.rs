@@ -67,10 +67,7 @@ impl FromStr for Placement {
         for word in text.split_whitespace() {
             let wrong = "a transform is scale=F, turn=X,Y,Z,DEGREES and move=X,Y,Z, with spaces between them";
             let (name, values) = word.split_once('=').ok_or(wrong)?;
-            let numbers = values
-                .split(',')
-                .map(finite)
-                .collect::<Result<Vec<f64>, _>>()?;
+            let numbers = values.split(',').map(finite).collect::<Result<Vec<f64>, _>>()?;
             match (name, &numbers[..]) {
                 ("scale", &[factor]) if factor > 0.0 => transform.scale = factor,
                 ("move", &[x, y, z]) => transform.translation = DVec3::new(x, y, z),
@@ -245,12 +242,7 @@ pub struct ModeArguments {
 impl ModeArguments {
     /// Camera options, with the near plane of the renderer that is followed, unless they say another one.
     pub fn cameras(&self, arguments: &CameraArguments) -> CameraArguments {
-        CameraArguments {
-            near: arguments
-                .near
-                .or(self.renderer.and_then(OtherRenderer::near)),
-            ..arguments.clone()
-        }
+        CameraArguments { near: arguments.near.or(self.renderer.and_then(OtherRenderer::near)), ..arguments.clone() }
     }
 }
 
@@ -306,13 +298,7 @@ pub struct OutputArguments {
     pub heatmap: Option<PathBuf>,
 
     /// The work that --heatmap shows
-    #[arg(
-        long,
-        value_name = "QUANTITY",
-        value_enum,
-        default_value_t,
-        requires = "heatmap"
-    )]
+    #[arg(long, value_name = "QUANTITY", value_enum, default_value_t, requires = "heatmap")]
     pub heatmap_of: Quantity,
 
     /// The frames per second of a video
@@ -438,10 +424,7 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         text.split_once('/')
             .and_then(|(index, count)| {
-                Some(Self {
-                    index: index.trim().parse().ok()?,
-                    count: count.trim().parse().ok()?,
-                })
+                Some(Self { index: index.trim().parse().ok()?, count: count.trim().parse().ok()? })
             })
             .filter(|shard| shard.index < shard.count)
             .ok_or("a share is I/N, with I from 0 to N - 1")
@@ -456,10 +439,8 @@ impl FromStr for Triple {
     type Err = &'static str;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let numbers: Option<Vec<f64>> = text
-            .split(',')
-            .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-            .collect();
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
         numbers
             .and_then(|numbers| numbers.try_into().ok())
             .map(Self)
@@ -468,31 +449,19 @@ impl FromStr for Triple {
 }
 
 fn part(text: &str) -> Result<f32, &'static str> {
-    text.parse()
-        .ok()
-        .filter(|part| (0.0..=1.0).contains(part))
-        .ok_or("it is at least 0 and at most 1")
+    text.parse().ok().filter(|part| (0.0..=1.0).contains(part)).ok_or("it is at least 0 and at most 1")
 }
 
 fn finite(text: &str) -> Result<f64, &'static str> {
-    text.parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite())
-        .ok_or("it is a number")
+    text.parse().ok().filter(|number: &f64| number.is_finite()).ok_or("it is a number")
 }
 
 pub fn positive(text: &str) -> Result<f64, &'static str> {
-    finite(text)
-        .ok()
-        .filter(|number| *number > 0.0)
-        .ok_or("it is a number greater than 0")
+    finite(text).ok().filter(|number| *number > 0.0).ok_or("it is a number greater than 0")
 }
 
 fn elevation(text: &str) -> Result<f64, &'static str> {
-    finite(text)
-        .ok()
-        .filter(|degrees| degrees.abs() <= 90.0)
-        .ok_or("it is at least -90 and at most 90 degrees")
+    finite(text).ok().filter(|degrees| degrees.abs() <= 90.0).ok_or("it is at least -90 and at most 90 degrees")
 }
 
 fn field_of_view(text: &str) -> Result<f64, &'static str> {
@@ -508,10 +477,7 @@ mod tests {
 
     #[test]
     fn triples() {
-        assert_eq!(
-            "1,-2.5, 3e2".parse::<Triple>().map(|t| t.0),
-            Ok([1., -2.5, 300.])
-        );
+        assert_eq!("1,-2.5, 3e2".parse::<Triple>().map(|t| t.0), Ok([1., -2.5, 300.]));
         for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
             assert!(bad.parse::<Triple>().is_err(), "{bad}");
         }
@@ -520,22 +486,11 @@ mod tests {
     #[test]
     fn transforms() {
         let placement: Placement = "scale=2 turn=0,0,5,90 move=1,-2,3".parse().expect("one");
-        let Transform {
-            scale,
-            rotation,
-            translation,
-        } = placement.0;
+        let Transform { scale, rotation, translation } = placement.0;
         assert_eq!((scale, translation), (2.0, DVec3::new(1.0, -2.0, 3.0)));
         assert!((rotation * DVec3::X).abs_diff_eq(DVec3::Y, 1e-12));
         assert_eq!("".parse(), Ok(Placement::default()));
-        for bad in [
-            "scale=0",
-            "move=1,2",
-            "turn=0,0,0,9",
-            "shift=1",
-            "scale",
-            "scale=nan",
-        ] {
+        for bad in ["scale=0", "move=1,2", "turn=0,0,0,9", "shift=1", "scale", "scale=nan"] {
             assert!(bad.parse::<Placement>().is_err(), "{bad}");
         }
     }

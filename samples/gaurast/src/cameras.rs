@@ -27,17 +27,9 @@ pub enum ViewError {
     #[error("{}: there is no view in it", path.display())]
     NoViews { path: PathBuf },
     #[error("{}: view {view}: there are {count} views, counted from 0", path.display())]
-    NoView {
-        path: PathBuf,
-        view: String,
-        count: usize,
-    },
+    NoView { path: PathBuf, view: String, count: usize },
     #[error("{}: view {view}: {matches} views have this in their names", path.display())]
-    NoName {
-        path: PathBuf,
-        view: String,
-        matches: usize,
-    },
+    NoName { path: PathBuf, view: String, matches: usize },
     #[error("--view {0}: neither an index, a range such as 3..7 or 0..100:10, nor all")]
     Range(String),
     #[error("--fov {0}: it is less than 180 degrees, unless the camera is a fisheye")]
@@ -45,15 +37,9 @@ pub enum ViewError {
     #[error("--view needs --cameras FILE, or a folder with a cameras.json as the scene")]
     NoCameras,
     #[error("{}: {source}", path.display())]
-    PathFile {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    PathFile { path: PathBuf, source: std::io::Error },
     #[error("{}: not a list of keyframes: {source}", path.display())]
-    Path {
-        path: PathBuf,
-        source: serde_json::Error,
-    },
+    Path { path: PathBuf, source: serde_json::Error },
     #[error("{}: there is no keyframe", path.display())]
     NoKeyframe { path: PathBuf },
 }
@@ -61,10 +47,7 @@ pub enum ViewError {
 impl ViewError {
     /// Returns true if the command line is invalid whatever the files contain.
     pub fn is_misuse(&self) -> bool {
-        matches!(
-            self,
-            Self::NoCameras | Self::Range(_) | Self::FieldOfView(_)
-        )
+        matches!(self, Self::NoCameras | Self::Range(_) | Self::FieldOfView(_))
     }
 }
 
@@ -108,11 +91,7 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
     }
     let size = arguments.size.map(|size| size.0);
     if let Some(path) = &arguments.path {
-        return Ok(Known::Path(path_cameras(
-            arguments,
-            path,
-            size.unwrap_or(DEFAULT_SIZE),
-        )?));
+        return Ok(Known::Path(path_cameras(arguments, path, size.unwrap_or(DEFAULT_SIZE))?));
     }
     let by_hand = arguments.eye.is_some()
         || arguments.up.is_some()
@@ -123,11 +102,7 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
         || arguments.fov.is_some();
     let beside = source.cameras.as_ref().filter(|_| !by_hand);
     let Some(path) = arguments.cameras.as_ref().or(beside) else {
-        return if arguments.view.is_empty() {
-            Ok(Known::Scene)
-        } else {
-            Err(ViewError::NoCameras)
-        };
+        return if arguments.view.is_empty() { Ok(Known::Scene) } else { Err(ViewError::NoCameras) };
     };
     let mut views = Views::default();
     let mut options = CameraFileOptions {
@@ -135,16 +110,11 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
         dataparser: arguments.dataparser.clone(),
         undistorted: arguments.undistorted,
     };
-    let transforms = path
-        .file_name()
-        .is_some_and(|name| name.to_string_lossy().starts_with("transforms"));
+    let transforms = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("transforms"));
     if options.dataparser.is_none() && transforms {
         options.dataparser.clone_from(&source.dataparser);
         if let Some(dataparser) = &source.dataparser {
-            let note = format!(
-                "the cameras are taken to the model by {}",
-                dataparser.display()
-            );
+            let note = format!("the cameras are taken to the model by {}", dataparser.display());
             views.notes.push(note);
         }
     }
@@ -165,15 +135,8 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
             Some(size) => camera.resized(size),
             None => camera,
         };
-        let name = if name.is_empty() {
-            format!("{index:05}")
-        } else {
-            name
-        };
-        views.views.push(View {
-            name: Some(name),
-            camera,
-        });
+        let name = if name.is_empty() { format!("{index:05}") } else { name };
+        views.views.push(View { name: Some(name), camera });
     }
     Ok(Known::File(views))
 }
@@ -182,12 +145,7 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
 ///
 /// # Errors
 /// See [`ViewError`].
-pub fn of_scene(
-    known: Known,
-    arguments: &CameraArguments,
-    scene: &Scene,
-    garden: bool,
-) -> Result<Views, ViewError> {
+pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden: bool) -> Result<Views, ViewError> {
     let extent = Extent::of(scene);
     let mut views = match known {
         Known::File(mut views) => {
@@ -218,10 +176,7 @@ pub fn of_scene(
 
 fn unnamed(cameras: impl Iterator<Item = Camera>) -> Views {
     let view = |camera| View { name: None, camera };
-    Views {
-        views: cameras.map(view).collect(),
-        ..Views::default()
-    }
+    Views { views: cameras.map(view).collect(), ..Views::default() }
 }
 
 /// True if a camera of this model sees all around it, and thus stands in the scene.
@@ -231,11 +186,7 @@ fn is_inside(model: CameraModel) -> bool {
 
 /// The camera with a near plane that fits a small scene, or a place inside the scene.
 fn with_near(camera: &Camera, inside: bool, extent: &Extent) -> Camera {
-    let near = if inside {
-        extent.near() / 4.0
-    } else {
-        extent.near()
-    };
+    let near = if inside { extent.near() / 4.0 } else { extent.near() };
     camera.with_planes(camera.near.min(near), camera.far)
 }
 
@@ -249,9 +200,7 @@ fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> C
     let middle = arguments.target.map_or(extent.centre, |target| target.0);
     let ahead = distance_ahead(camera, middle).max(1e-6 * extent.radius());
     match (arguments.model, camera.model) {
-        (CameraModel::Pinhole | CameraModel::Orthographic, Model::Orthographic) => {
-            orthographic(camera.clone(), ahead)
-        }
+        (CameraModel::Pinhole | CameraModel::Orthographic, Model::Orthographic) => orthographic(camera.clone(), ahead),
         (CameraModel::Orthographic, _) => orthographic(camera.orthographic(ahead), ahead),
         (CameraModel::Pinhole, _) | (CameraModel::Fisheye, Model::Fisheye) => camera.clone(),
         (CameraModel::Fisheye, _) => camera.fisheye(arguments.fov.unwrap_or(FISHEYE_FOV)),
@@ -262,9 +211,7 @@ fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> C
 /// The distance of `point` along the camera's axis.
 fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
     let [_, _, forward] = camera.rotation;
-    (0..3)
-        .map(|axis| forward[axis] * (point[axis] - camera.eye[axis]))
-        .sum()
+    (0..3).map(|axis| forward[axis] * (point[axis] - camera.eye[axis])).sum()
 }
 
 /// The camera given by options, or one that fits the scene; or an orbit that starts there.
@@ -303,10 +250,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
                 up,
                 ..Framing::new(fov.unwrap_or(DEFAULT_FOV), size)
             };
-            let around = Extent {
-                centre: arguments.target.map_or(extent.centre, |target| target.0),
-                ..*extent
-            };
+            let around = Extent { centre: arguments.target.map_or(extent.centre, |target| target.0), ..*extent };
             let camera = framing.camera(&around)?;
             let (azimuth, elevation) = default_angles();
             let placed = format!(
@@ -321,9 +265,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
                 ("--fov", fov.map(|fov| fov.to_string())),
                 ("--zoom", arguments.zoom.map(|zoom| zoom.to_string())),
             ];
-            let given = given
-                .into_iter()
-                .filter_map(|(name, value)| Some(format!(" {name} {}", value?)));
+            let given = given.into_iter().filter_map(|(name, value)| Some(format!(" {name} {}", value?)));
             said = Some(given.fold(placed, |said, option| said + &option));
             (camera, around.centre)
         }
@@ -352,45 +294,23 @@ fn triple(values: [f64; 3]) -> String {
     values.map(|value| short(value).to_string()).join(",")
 }
 
-fn path_cameras(
-    arguments: &CameraArguments,
-    path: &std::path::Path,
-    size: [u32; 2],
-) -> Result<Vec<Camera>, ViewError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ViewError::PathFile {
-        path: path.to_owned(),
-        source,
-    })?;
+fn path_cameras(arguments: &CameraArguments, path: &std::path::Path, size: [u32; 2]) -> Result<Vec<Camera>, ViewError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ViewError::PathFile { path: path.to_owned(), source })?;
     let keyframes: Vec<Keyframe> =
-        serde_json::from_str(&text).map_err(|source| ViewError::Path {
-            path: path.to_owned(),
-            source,
-        })?;
+        serde_json::from_str(&text).map_err(|source| ViewError::Path { path: path.to_owned(), source })?;
     if keyframes.is_empty() {
-        return Err(ViewError::NoKeyframe {
-            path: path.to_owned(),
-        });
+        return Err(ViewError::NoKeyframe { path: path.to_owned() });
     }
     let count = arguments.frames.map(|count| count as usize);
     Ok(camera_path::along(&keyframes, count, size)?)
 }
 
 /// The indices of the views that `text` selects.
-fn choose(
-    text: &str,
-    path: &std::path::Path,
-    views: &[camera_files::View],
-) -> Result<Vec<usize>, ViewError> {
+fn choose(text: &str, path: &std::path::Path, views: &[camera_files::View]) -> Result<Vec<usize>, ViewError> {
     let count = views.len();
-    let no_view = |view: &str| ViewError::NoView {
-        path: path.to_owned(),
-        view: view.to_owned(),
-        count,
-    };
+    let no_view = |view: &str| ViewError::NoView { path: path.to_owned(), view: view.to_owned(), count };
     if count == 0 {
-        return Err(ViewError::NoViews {
-            path: path.to_owned(),
-        });
+        return Err(ViewError::NoViews { path: path.to_owned() });
     }
     let text = text.trim();
     if text == "all" {
@@ -402,19 +322,14 @@ fn choose(
             if word.is_empty() {
                 return Ok(otherwise);
             }
-            (word.trim_start_matches('=').parse::<usize>())
-                .map_err(|_| ViewError::Range(text.to_owned()))
+            (word.trim_start_matches('=').parse::<usize>()).map_err(|_| ViewError::Range(text.to_owned()))
         };
         let (first, last) = (number(first, 0)?, number(last, count.saturating_sub(1))?);
         let step = number(step, 1)?;
         if first > last || step == 0 {
             return Err(ViewError::Range(text.to_owned()));
         }
-        return if last < count {
-            Ok((first..=last).step_by(step).collect())
-        } else {
-            Err(no_view(text))
-        };
+        return if last < count { Ok((first..=last).step_by(step).collect()) } else { Err(no_view(text)) };
     }
     // A number is an index, unless it has the form of a photograph's name.
     let leading_zero = text.len() > 1 && text.starts_with('0');
@@ -427,23 +342,15 @@ fn choose(
         }
     }
     let of_name = |matches: &dyn Fn(&str) -> bool| -> Vec<usize> {
-        let named = views
-            .iter()
-            .enumerate()
-            .filter(|(_, view)| matches(&view.name));
+        let named = views.iter().enumerate().filter(|(_, view)| matches(&view.name));
         named.map(|(index, _)| index).collect()
     };
     let file = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
-    let tests: [&dyn Fn(&str) -> bool; 4] = [
-        &|name| name == text,
-        &|name| file(name) == text,
-        &|name| stem(std::path::Path::new(name)) == text,
-        &|name| name.contains(text),
-    ];
-    let found = tests
-        .into_iter()
-        .map(of_name)
-        .find(|found| !found.is_empty());
+    let tests: [&dyn Fn(&str) -> bool; 4] =
+        [&|name| name == text, &|name| file(name) == text, &|name| stem(std::path::Path::new(name)) == text, &|name| {
+            name.contains(text)
+        }];
+    let found = tests.into_iter().map(of_name).find(|found| !found.is_empty());
     match found.as_deref() {
         Some([one]) => Ok(vec![*one]),
         found => Err(ViewError::NoName {
@@ -472,10 +379,7 @@ mod tests {
 
     fn named(names: &[&str]) -> Vec<camera_files::View> {
         let camera = Camera::orbit(1, [8, 8]).remove(0);
-        let view = |name: &&str| camera_files::View {
-            name: (*name).to_owned(),
-            camera: camera.clone(),
-        };
+        let view = |name: &&str| camera_files::View { name: (*name).to_owned(), camera: camera.clone() };
         names.iter().map(view).collect()
     }
 

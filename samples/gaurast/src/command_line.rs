@@ -113,23 +113,13 @@ mod tests {
         let words = |line: &str| {
             let words = line.split(' ').map(Into::into).collect();
             let words = with_command(words).into_iter();
-            words
-                .map(|word| word.into_string().expect("text"))
-                .collect::<Vec<_>>()
-                .join(" ")
+            words.map(|word| word.into_string().expect("text")).collect::<Vec<_>>().join(" ")
         };
         assert_eq!(words("gaurast"), "gaurast");
         assert_eq!(words("gaurast a.ply -q"), "gaurast render a.ply -q");
         assert_eq!(words("gaurast -o a.png"), "gaurast render -o a.png");
         assert_eq!(words("gaurast some/folder"), "gaurast render some/folder");
-        for own in [
-            "--help",
-            "-V",
-            "help render",
-            "render a.ply",
-            "simulate --paper",
-            "paint",
-        ] {
+        for own in ["--help", "-V", "help render", "render a.ply", "simulate --paper", "paint"] {
             let line = format!("gaurast {own}");
             assert_eq!(words(&line), line);
         }

@@ -22,10 +22,7 @@ pub enum Error {
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{}: {source}", path.display())]
-    Io {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(transparent)]
@@ -33,18 +30,9 @@ pub enum Error {
     #[error(transparent)]
     Draw(#[from] DrawError),
     #[error("{}: {a}, but {}: {b}: pictures of one size are compared", path.display(), other.display())]
-    Size {
-        path: PathBuf,
-        a: String,
-        other: PathBuf,
-        b: String,
-    },
+    Size { path: PathBuf, a: String, other: PathBuf, b: String },
     #[error("{}: there is no picture called {name} here, as in {}", folder.display(), other.display())]
-    Missing {
-        folder: PathBuf,
-        other: PathBuf,
-        name: String,
-    },
+    Missing { folder: PathBuf, other: PathBuf, name: String },
     #[error("{}: there is no picture in the folder", folder.display())]
     NoPicture { folder: PathBuf },
     #[error("{}: a folder of pictures is compared with another one", folder.display())]
@@ -133,23 +121,12 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     let mut compared = Vec::new();
     if arguments.a.is_dir() {
         for (name, a, b) in pairs(&arguments.a, &arguments.b)? {
-            let difference = arguments
-                .difference
-                .as_ref()
-                .map(|folder| folder.join(format!("{name}.png")));
+            let difference = arguments.difference.as_ref().map(|folder| folder.join(format!("{name}.png")));
             if let Some(path) = &difference {
                 let folder = gaurast_picture::folder(path);
-                std::fs::create_dir_all(folder).map_err(|source| Error::Io {
-                    path: folder.to_owned(),
-                    source,
-                })?;
+                std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
             }
-            let pair = Pair {
-                a: gaurast_picture::read(&a)?,
-                b: gaurast_picture::read(&b)?,
-                name,
-                difference,
-            };
+            let pair = Pair { a: gaurast_picture::read(&a)?, b: gaurast_picture::read(&b)?, name, difference };
             check_sizes(&pair.a, &a, &pair.b, &b)?;
             compared.push(compare(pair, arguments)?);
         }
@@ -164,12 +141,7 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
             if floats { drawn } else { in_eight_bits(drawn) }
         };
         check_sizes(&a, &arguments.a, &b, &arguments.b)?;
-        let pair = Pair {
-            name: arguments.a.display().to_string(),
-            a,
-            b,
-            difference: arguments.difference.clone(),
-        };
+        let pair = Pair { name: arguments.a.display().to_string(), a, b, difference: arguments.difference.clone() };
         compared.push(compare(pair, arguments)?);
     }
     if !arguments.quiet || arguments.json {
@@ -178,11 +150,7 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     if let Some(limit) = arguments.fail_below
         && let Some(worst) = compared.iter().find(|one| one.statistics.psnr < limit)
     {
-        return Err(Error::Below {
-            name: worst.name.clone(),
-            psnr: worst.statistics.psnr,
-            limit,
-        });
+        return Err(Error::Below { name: worst.name.clone(), psnr: worst.statistics.psnr, limit });
     }
     Ok(())
 }
@@ -222,28 +190,16 @@ fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> 
             let channel = |c: usize| (a[c] - b[c]).abs() * scale;
             [channel(0), channel(1), channel(2), 1.0]
         };
-        let picture = Picture {
-            pixels: a.iter().zip(&b).map(difference).collect(),
-            ..pair.a
-        };
+        let picture = Picture { pixels: a.iter().zip(&b).map(difference).collect(), ..pair.a };
         gaurast_picture::write(path, &picture, None)?;
     }
-    Ok(Compared {
-        name: pair.name,
-        statistics,
-        ssim: ssim(&a, &b, width),
-    })
+    Ok(Compared { name: pair.name, statistics, ssim: ssim(&a, &b, width) })
 }
 
 /// Draws the scene for a picture of `size`.
 fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> {
-    let progress = Progress {
-        quiet: arguments.quiet || arguments.json,
-    };
-    let source = Source::of(&SceneArguments {
-        scenes: vec![arguments.b.clone()],
-        ..SceneArguments::default()
-    })?;
+    let progress = Progress { quiet: arguments.quiet || arguments.json };
+    let source = Source::of(&SceneArguments { scenes: vec![arguments.b.clone()], ..SceneArguments::default() })?;
     let camera = CameraArguments {
         size: Some(arguments.camera.size.unwrap_or(Size(size))),
         ..arguments.modes.cameras(&arguments.camera)
@@ -251,16 +207,12 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let known = cameras::read(&camera, &source)?;
     let (scene, _) = source.load(progress)?;
     let views = cameras::of_scene(known, &camera, &scene, false)?.views;
-    let [view]: [View; 1] = views
-        .try_into()
-        .map_err(|views: Vec<View>| Error::Views(views.len()))?;
+    let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, false)?;
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(source.background);
-    Ok(frame
-        .picture
-        .over(background.map_or([0.0; 3], Background::color)))
+    Ok(frame.picture.over(background.map_or([0.0; 3], Background::color)))
 }
 
 /// The picture after rounding to eight bits, as in a file.
@@ -273,10 +225,7 @@ fn in_eight_bits(mut picture: Picture) -> Picture {
 
 /// The pictures in a folder, by name without extension.
 fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
-    let io = |source| Error::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io = |source| Error::Io { path: folder.to_owned(), source };
     let mut found = BTreeMap::new();
     for entry in folder.read_dir().map_err(io)? {
         let path = entry.map_err(io)?.path();
@@ -285,9 +234,7 @@ fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
         }
     }
     if found.is_empty() {
-        return Err(Error::NoPicture {
-            folder: folder.to_owned(),
-        });
+        return Err(Error::NoPicture { folder: folder.to_owned() });
     }
     Ok(found)
 }
@@ -295,9 +242,7 @@ fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
 /// The names that both folders have, each with both files.
 pub fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
     if !b.is_dir() {
-        return Err(Error::Folder {
-            folder: a.to_owned(),
-        });
+        return Err(Error::Folder { folder: a.to_owned() });
     }
     let (first, mut second) = (pictures(a)?, pictures(b)?);
     let missing = |folder: &Path, other: &Path, name: &str| Error::Missing {
@@ -318,14 +263,9 @@ pub fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Erro
 
 fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    let mean = |value: &dyn Fn(&Compared) -> f64| {
-        compared.iter().map(value).sum::<f64>() / compared.len().max(1) as f64
-    };
-    let means = [
-        mean(&|one| one.statistics.psnr),
-        mean(&|one| one.ssim),
-        mean(&|one| one.statistics.flip),
-    ];
+    let mean =
+        |value: &dyn Fn(&Compared) -> f64| compared.iter().map(value).sum::<f64>() / compared.len().max(1) as f64;
+    let means = [mean(&|one| one.statistics.psnr), mean(&|one| one.ssim), mean(&|one| one.statistics.flip)];
     if arguments.json {
         // JSON has no infinity, which is the PSNR of equal pictures.
         let finite = |value: f64| value.is_finite().then_some(value);
@@ -346,9 +286,7 @@ fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result
         return stdout.flush();
     }
     for one in compared {
-        let Statistics {
-            psnr, flip, max, ..
-        } = one.statistics;
+        let Statistics { psnr, flip, max, .. } = one.statistics;
         writeln!(
             stdout,
             "{}: PSNR {psnr:.2} dB, SSIM {:.4}, FLIP {flip:.4}, largest difference {:.1} of 255",
@@ -360,10 +298,7 @@ fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result
     if compared.len() > 1 {
         let [psnr, ssim, flip] = means;
         let count = compared.len();
-        writeln!(
-            stdout,
-            "mean of {count}: PSNR {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}"
-        )?;
+        writeln!(stdout, "mean of {count}: PSNR {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}")?;
     }
     stdout.flush()
 }

@@ -16,12 +16,8 @@ use crate::compare;
 use crate::report::write_json;
 
 /// The folders in which the Vulkan loader looks for drivers' manifests.
-const MANIFEST_FOLDERS: [&str; 4] = [
-    "/usr/share/vulkan/icd.d",
-    "/usr/local/share/vulkan/icd.d",
-    "/etc/vulkan/icd.d",
-    "/usr/local/etc/vulkan/icd.d",
-];
+const MANIFEST_FOLDERS: [&str; 4] =
+    ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/etc/vulkan/icd.d"];
 
 /// The shared library of this driver, which `cargo build --release` writes next to the command.
 const LIBRARY: &str = "libvulkan_gaurast.so";
@@ -36,10 +32,7 @@ const EDGE: f32 = 8.0 / 255.0;
 #[derive(Debug, Error)]
 pub enum Error {
     #[error("{}: {source}", path.display())]
-    Io {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     #[error(
         "{}: the driver's library is not there: `cargo build --release` makes it, and --driver names another manifest",
         path.display()
@@ -53,30 +46,17 @@ pub enum Error {
     #[error("{}: it is not empty: --force writes into it", path.display())]
     NotEmpty { path: PathBuf },
     #[error("{program}: {source}")]
-    Start {
-        program: String,
-        source: std::io::Error,
-    },
+    Start { program: String, source: std::io::Error },
     #[error("{program}: on {driver} it ended with {status}")]
-    Failed {
-        program: String,
-        driver: String,
-        status: ExitStatus,
-    },
-    #[error(
-        "{program}: it wrote no picture; see compare-drivers --help for their places and kinds"
-    )]
+    Failed { program: String, driver: String, status: ExitStatus },
+    #[error("{program}: it wrote no picture; see compare-drivers --help for their places and kinds")]
     NoPicture { program: String },
     #[error(transparent)]
     Compare(#[from] compare::Error),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{name}: the largest difference is {largest:.1} steps of 255, and {limit} are allowed")]
-    Above {
-        name: String,
-        largest: f64,
-        limit: f64,
-    },
+    Above { name: String, largest: f64, limit: f64 },
     #[error("output: {0}")]
     Stdout(std::io::Error),
 }
@@ -150,10 +130,7 @@ struct Compared {
 pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
     prepare(arguments)?;
     // The library's manifest is in this folder while the program runs.
-    let temporary = tempfile::tempdir().map_err(|source| Error::Io {
-        path: std::env::temp_dir(),
-        source,
-    })?;
+    let temporary = tempfile::tempdir().map_err(|source| Error::Io { path: std::env::temp_dir(), source })?;
     let ours = match &arguments.driver {
         Some(path) => absolute(path)?,
         None => manifest_of_library(temporary.path())?,
@@ -167,15 +144,8 @@ pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
         let folder = arguments.out.join(name);
         std::fs::create_dir_all(&folder)
             .and_then(|()| folder.canonicalize())
-            .map(|folder| Driver {
-                name: name.to_owned(),
-                manifest,
-                folder,
-            })
-            .map_err(|source| Error::Io {
-                path: arguments.out.join(name),
-                source,
-            })
+            .map(|folder| Driver { name: name.to_owned(), manifest, folder })
+            .map_err(|source| Error::Io { path: arguments.out.join(name), source })
     };
     let drivers = [driver("gaurast", ours)?, driver(&other, theirs)?];
     for driver in &drivers {
@@ -196,68 +166,44 @@ pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
         compared.push(one);
     }
     let page = arguments.out.join("index.html");
-    write_atomically(&page, page_of(&drivers, &compared).as_bytes()).map_err(|source| {
-        Error::Io {
-            path: page.clone(),
-            source,
-        }
-    })?;
+    write_atomically(&page, page_of(&drivers, &compared).as_bytes())
+        .map_err(|source| Error::Io { path: page.clone(), source })?;
     print(arguments, &compared, &page).map_err(Error::Stdout)?;
     if let Some(limit) = arguments.fail_above
         && let Some(worst) = compared.iter().find(|one| one.largest > limit)
     {
-        return Err(Error::Above {
-            name: worst.name.clone(),
-            largest: worst.largest,
-            limit,
-        });
+        return Err(Error::Above { name: worst.name.clone(), largest: worst.largest, limit });
     }
     Ok(())
 }
 
 /// The names of the program's pictures, with their paths on both drivers.
-fn pairs(
-    drivers: &[Driver; 2],
-    command: &[OsString],
-) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
+fn pairs(drivers: &[Driver; 2], command: &[OsString]) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
     compare::pairs(&drivers[0].folder, &drivers[1].folder).map_err(|error| match error {
-        compare::Error::NoPicture { .. } => Error::NoPicture {
-            program: command
-                .first()
-                .map_or_else(String::new, |it| it.to_string_lossy().into()),
-        },
+        compare::Error::NoPicture { .. } => {
+            Error::NoPicture { program: command.first().map_or_else(String::new, |it| it.to_string_lossy().into()) }
+        }
         other => other.into(),
     })
 }
 
 /// Creates the folder. It must be empty, unless `--force` is given.
 fn prepare(arguments: &CompareDriversArguments) -> Result<(), Error> {
-    let io = |source| Error::Io {
-        path: arguments.out.clone(),
-        source,
-    };
+    let io = |source| Error::Io { path: arguments.out.clone(), source };
     std::fs::create_dir_all(&arguments.out).map_err(io)?;
     if !arguments.force && arguments.out.read_dir().map_err(io)?.next().is_some() {
-        return Err(Error::NotEmpty {
-            path: arguments.out.clone(),
-        });
+        return Err(Error::NotEmpty { path: arguments.out.clone() });
     }
     Ok(())
 }
 
 fn absolute(path: &Path) -> Result<PathBuf, Error> {
-    path.canonicalize().map_err(|source| Error::Io {
-        path: path.to_owned(),
-        source,
-    })
+    path.canonicalize().map_err(|source| Error::Io { path: path.to_owned(), source })
 }
 
 /// Writes a manifest of the library that is next to this program.
 fn manifest_of_library(folder: &Path) -> Result<PathBuf, Error> {
-    let beside = std::env::current_exe().map_err(|source| Error::Io {
-        path: PathBuf::from(LIBRARY),
-        source,
-    })?;
+    let beside = std::env::current_exe().map_err(|source| Error::Io { path: PathBuf::from(LIBRARY), source })?;
     let library = beside.with_file_name(LIBRARY);
     if !library.is_file() {
         return Err(Error::NoLibrary { path: library });
@@ -267,10 +213,7 @@ fn manifest_of_library(folder: &Path) -> Result<PathBuf, Error> {
         "file_format_version": "1.0.0",
         "ICD": {"library_path": library, "api_version": "1.3.281"},
     });
-    std::fs::write(&manifest, text.to_string()).map_err(|source| Error::Io {
-        path: manifest.clone(),
-        source,
-    })?;
+    std::fs::write(&manifest, text.to_string()).map_err(|source| Error::Io { path: manifest.clone(), source })?;
     Ok(manifest)
 }
 
@@ -298,9 +241,7 @@ fn installed(name: &str) -> Result<PathBuf, Error> {
     // A manifest for this processor comes before those for others, which Debian installs in the same folder.
     let suits = |path: &&PathBuf| path.to_string_lossy().contains(std::env::consts::ARCH);
     let suitable = found.iter().find(suits).or(found.first());
-    suitable.cloned().ok_or_else(|| Error::NoDriver {
-        name: name.to_owned(),
-    })
+    suitable.cloned().ok_or_else(|| Error::NoDriver { name: name.to_owned() })
 }
 
 /// Runs the program on a driver and waits for its end.
@@ -318,9 +259,7 @@ fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
     let name = program.to_string_lossy().into_owned();
     // A path is relative to the caller's folder; a bare name is searched on the PATH.
     let program = match Path::new(&program) {
-        path if path.components().count() > 1 => {
-            path.canonicalize().unwrap_or_else(|_| path.into())
-        }
+        path if path.components().count() > 1 => path.canonicalize().unwrap_or_else(|_| path.into()),
         path => path.to_owned(),
     };
     let words = &command[1.min(command.len())..];
@@ -335,16 +274,9 @@ fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
     if !words.iter().any(has_placeholder) {
         process.current_dir(&driver.folder);
     }
-    let status = process.status().map_err(|source| Error::Start {
-        program: name.clone(),
-        source,
-    })?;
+    let status = process.status().map_err(|source| Error::Start { program: name.clone(), source })?;
     if !status.success() {
-        return Err(Error::Failed {
-            program: name,
-            driver: driver.name.clone(),
-            status,
-        });
+        return Err(Error::Failed { program: name, driver: driver.name.clone(), status });
     }
     Ok(())
 }
@@ -365,20 +297,14 @@ fn compare_pictures(name: &str, [a, b]: &[Picture; 2]) -> (Compared, Picture) {
     };
     let is_edge = |index: usize| {
         let (x, y) = (index % width, index / width);
-        let neighbours = (y.saturating_sub(1)..=(y + 1).min(height - 1)).flat_map(|y| {
-            (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |x| y * width + x)
-        });
-        [a, b].into_iter().any(|picture| {
-            (neighbours.clone())
-                .any(|near| apart(picture.pixels[index], picture.pixels[near]) >= EDGE)
-        })
+        let neighbours = (y.saturating_sub(1)..=(y + 1).min(height - 1))
+            .flat_map(|y| (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |x| y * width + x));
+        [a, b]
+            .into_iter()
+            .any(|picture| (neighbours.clone()).any(|near| apart(picture.pixels[index], picture.pixels[near]) >= EDGE))
     };
-    let differences: Vec<f32> = (a.pixels.iter().zip(&b.pixels))
-        .map(|(a, b)| apart(*a, *b))
-        .collect();
-    let differing: Vec<usize> = (0..differences.len())
-        .filter(|&index| differences[index] > 0.0)
-        .collect();
+    let differences: Vec<f32> = (a.pixels.iter().zip(&b.pixels)).map(|(a, b)| apart(*a, *b)).collect();
+    let differing: Vec<usize> = (0..differences.len()).filter(|&index| differences[index] > 0.0).collect();
     let largest = differences.iter().copied().fold(0.0, f32::max);
     let statistics = Statistics::new(&a.pixels, &b.pixels, a.width);
     let scale = 1.0 / largest.max(f32::MIN_POSITIVE);
@@ -392,27 +318,18 @@ fn compare_pictures(name: &str, [a, b]: &[Picture; 2]) -> (Compared, Picture) {
         height: a.height,
         equal: differing.is_empty(),
         differing_pixels: differing.len(),
-        differing_on_edges: differing
-            .into_iter()
-            .filter(|&index| is_edge(index))
-            .count(),
+        differing_on_edges: differing.into_iter().filter(|&index| is_edge(index)).count(),
         largest: 255.0 * f64::from(largest),
         psnr: statistics.psnr.is_finite().then_some(statistics.psnr),
         flip: statistics.flip,
     };
-    let picture = Picture {
-        pixels: differences.iter().map(grey).collect(),
-        ..*a
-    };
+    let picture = Picture { pixels: differences.iter().map(grey).collect(), ..*a };
     (compared, picture)
 }
 
 fn write_picture(path: &Path, picture: &Picture) -> Result<(), Error> {
     let folder = gaurast_picture::folder(path);
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
-        path: folder.to_owned(),
-        source,
-    })?;
+    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
     Ok(gaurast_picture::write(path, picture, Some([0.0; 3]))?)
 }
 
@@ -427,19 +344,14 @@ fn sentence(one: &Compared) -> String {
         u64::from(one.width) * u64::from(one.height),
         one.differing_on_edges,
         one.largest,
-        one.psnr
-            .map_or_else(|| "infinite".to_owned(), |psnr| format!("{psnr:.2} dB")),
+        one.psnr.map_or_else(|| "infinite".to_owned(), |psnr| format!("{psnr:.2} dB")),
         one.flip
     )
 }
 
 /// A page that shows the pictures side by side, and their differences.
 fn page_of(drivers: &[Driver; 2], compared: &[Compared]) -> String {
-    let text = |text: &str| {
-        text.replace('&', "&amp;")
-            .replace('<', "&lt;")
-            .replace('"', "&quot;")
-    };
+    let text = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
     let [ours, theirs] = [0, 1].map(|index| text(&drivers[index].name));
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{ours} and {theirs}</title>\n\
@@ -461,22 +373,14 @@ fn page_of(drivers: &[Driver; 2], compared: &[Compared]) -> String {
         figure(format!("shown/{name}-{theirs}.png"), &theirs);
         figure(
             format!("differences/{name}.png"),
-            if one.equal {
-                "no difference"
-            } else {
-                "difference, the largest being white"
-            },
+            if one.equal { "no difference" } else { "difference, the largest being white" },
         );
     }
     page.push_str("</body></html>\n");
     page
 }
 
-fn print(
-    arguments: &CompareDriversArguments,
-    compared: &[Compared],
-    page: &Path,
-) -> std::io::Result<()> {
+fn print(arguments: &CompareDriversArguments, compared: &[Compared], page: &Path) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
     if arguments.json {
         let report = json!({"pictures": compared, "page": page});
@@ -502,17 +406,12 @@ mod tests {
                 [grey, grey, grey, 1.0]
             })
             .collect();
-        Picture {
-            width: 16,
-            height: 16,
-            pixels,
-        }
+        Picture { width: 16, height: 16, pixels }
     }
 
     #[test]
     fn differences_on_edges_are_told_from_others() {
-        let square =
-            |x: u32, y: u32| f32::from(u8::from((4..12).contains(&x) && (4..12).contains(&y)));
+        let square = |x: u32, y: u32| f32::from(u8::from((4..12).contains(&x) && (4..12).contains(&y)));
         let a = picture(square);
         let same = compare_pictures("same", &[a.clone(), a.clone()]).0;
         assert!(same.equal && same.psnr.is_none() && same.largest == 0.0);

@@ -42,12 +42,8 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         Antialiasing::Compensated => true,
     };
     let order = match modes.order {
-        Order::Auto if modes.renderer.is_some() => modes
-            .renderer
-            .map_or_else(Default::default, OtherRenderer::order),
-        Order::Auto if metadata_order(scene) == SortOrder::Distance => {
-            gaurast_render::Order::Distance
-        }
+        Order::Auto if modes.renderer.is_some() => modes.renderer.map_or_else(Default::default, OtherRenderer::order),
+        Order::Auto if metadata_order(scene) == SortOrder::Distance => gaurast_render::Order::Distance,
         Order::Auto | Order::Depth => gaurast_render::Order::Depth,
         Order::Distance => gaurast_render::Order::Distance,
         Order::PerPixel => gaurast_render::Order::PerPixel,
@@ -55,11 +51,7 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     let settings = Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
         order,
-        geometry: if surfels {
-            gaurast_render::Geometry::Surfel
-        } else {
-            gaurast_render::Geometry::Volume
-        },
+        geometry: if surfels { gaurast_render::Geometry::Surfel } else { gaurast_render::Geometry::Volume },
         antialiasing: if compensated {
             gaurast_render::Antialiasing::Compensated
         } else {
@@ -93,22 +85,16 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     if modes.geometry == Geometry::Auto && scene.geometry() == gaurast_scene::Geometry::Surfel {
         notes.push("flat Gaussians are drawn (--geometry 2d), as the file says".to_owned());
     }
-    if modes.antialiasing == Antialiasing::Auto
-        && scene.antialiasing() == gaurast_scene::Antialiasing::Compensated
-    {
+    if modes.antialiasing == Antialiasing::Auto && scene.antialiasing() == gaurast_scene::Antialiasing::Compensated {
         let note = "opacity makes up for dilation (--antialiasing compensated), as the file says";
         notes.push(note.to_owned());
     }
     if metadata.color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display) {
-        let note =
-            "the file's colours are linear light, and are written without a transfer function";
+        let note = "the file's colours are linear light, and are written without a transfer function";
         notes.push(note.to_owned());
     }
     if let Some(degree) = modes.sh_degree.filter(|degree| *degree > scene.sh_degree()) {
-        notes.push(format!(
-            "--sh-degree {degree} is of no account: the scene has degree {}",
-            scene.sh_degree()
-        ));
+        notes.push(format!("--sh-degree {degree} is of no account: the scene has degree {}", scene.sh_degree()));
     }
     notes
 }
@@ -143,10 +129,7 @@ impl Drawing {
         let mut uploaded = renderer.upload(&scene, Some(settings.sh_degree))?;
         drop(scene);
         renderer.set(&mut uploaded, settings)?;
-        Ok(Self {
-            renderer,
-            scene: uploaded,
-        })
+        Ok(Self { renderer, scene: uploaded })
     }
 
     /// Draws one view.
@@ -185,9 +168,7 @@ impl Drawing {
                 }
                 writer.finish()
             };
-            let writing = std::thread::Builder::new()
-                .spawn_scoped(scope, write)
-                .map_err(DrawError::Thread)?;
+            let writing = std::thread::Builder::new().spawn_scoped(scope, write).map_err(DrawError::Thread)?;
             let mut failed = None;
             for &index in indices {
                 let frame = match self.frame(&views[index]) {
@@ -202,25 +183,9 @@ impl Drawing {
                     failed = Some(DrawError::Nothing(reason));
                     break;
                 }
-                let Frame {
-                    picture,
-                    time,
-                    counters,
-                    depth,
-                    ..
-                } = frame;
-                drawn.push(Drawn {
-                    index,
-                    time,
-                    counters,
-                    nothing,
-                });
-                let finished = Finished {
-                    index,
-                    view: &views[index],
-                    picture,
-                    depth,
-                };
+                let Frame { picture, time, counters, depth, .. } = frame;
+                drawn.push(Drawn { index, time, counters, nothing });
+                let finished = Finished { index, view: &views[index], picture, depth };
                 // The writer reports the error that ended it.
                 if send.send(finished).is_err() {
                     break;
@@ -228,9 +193,7 @@ impl Drawing {
                 bar.inc(1);
             }
             drop(send);
-            let written = writing
-                .join()
-                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            let written = writing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             bar.finish_and_clear();
             written?;
             failed.map_or(Ok(()), Err)
@@ -266,13 +229,6 @@ fn reasons(frame: &Frame, view: &View) -> Option<String> {
         parts.push(format!("{reached} too faint at every pixel"));
     }
     let read = counted("gaussians read");
-    let parts = if parts.is_empty() {
-        "none is in the picture".to_owned()
-    } else {
-        parts.join(", ")
-    };
-    Some(format!(
-        "there is nothing in the picture: of {read} Gaussian{}: {parts}",
-        if read == 1.0 { "" } else { "s" }
-    ))
+    let parts = if parts.is_empty() { "none is in the picture".to_owned() } else { parts.join(", ") };
+    Some(format!("there is nothing in the picture: of {read} Gaussian{}: {parts}", if read == 1.0 { "" } else { "s" }))
 }

@@ -50,10 +50,7 @@ impl Quantity {
 #[derive(Debug, Error)]
 pub enum HeatmapError {
     #[error("{}: {source}", path.display())]
-    Trace {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Trace { path: PathBuf, source: std::io::Error },
     #[error("{}: the device left no trace of its work, which --heatmap is made of", path.display())]
     NoTrace { path: PathBuf },
     #[error("{}: it is there already: --force replaces it", path.display())]
@@ -81,28 +78,15 @@ pub fn trace_from_now_on() -> std::io::Result<Option<TempDir>> {
 ///
 /// # Errors
 /// See [`HeatmapError`].
-pub fn write(
-    path: &Path,
-    quantity: Quantity,
-    camera: &Camera,
-    force: bool,
-) -> Result<f64, HeatmapError> {
+pub fn write(path: &Path, quantity: Quantity, camera: &Camera, force: bool) -> Result<f64, HeatmapError> {
     if path.is_file() && !force {
-        return Err(HeatmapError::There {
-            path: path.to_owned(),
-        });
+        return Err(HeatmapError::There { path: path.to_owned() });
     }
     let file = PathBuf::from(std::env::var_os(TRACE).unwrap_or_default());
-    let failed = |source| HeatmapError::Trace {
-        path: file.clone(),
-        source,
-    };
+    let failed = |source| HeatmapError::Trace { path: file.clone(), source };
     let text = std::fs::read_to_string(&file).map_err(failed)?;
     let trace: Trace = serde_json::from_str(&text).map_err(|error| failed(error.into()))?;
-    let frame = trace
-        .frames
-        .last()
-        .ok_or_else(|| HeatmapError::NoTrace { path: file.clone() })?;
+    let frame = trace.frames.last().ok_or_else(|| HeatmapError::NoTrace { path: file.clone() })?;
     let size = [camera.width, camera.height];
     let (picture, greatest) = match quantity {
         Quantity::Gaussians => picture(size, true, contributions(frame)),
@@ -115,19 +99,14 @@ pub fn write(
 /// The pairs of a pixel and a Gaussian that changed it, by tile (column and row).
 fn contributions(frame: &FrameWork) -> Vec<([u32; 2], f64)> {
     let tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
-    tiles
-        .map(|tile| (tile.at, tile.contributions as f64))
-        .collect()
+    tiles.map(|tile| (tile.at, tile.contributions as f64)).collect()
 }
 
 /// The cycles that each tile spends in a module of the default hardware, by the timing model.
 fn cycles(frame: &FrameWork) -> Result<Vec<([u32; 2], f64)>, ConfigError> {
     let config = Config::preset(DEFAULT_PRESET, &[])?;
     let (_, spans) = fast::rasterize_tiles(frame, &config, 0.0);
-    Ok(spans
-        .iter()
-        .map(|span| (span.at, span.end - span.begin))
-        .collect())
+    Ok(spans.iter().map(|span| (span.at, span.end - span.begin)).collect())
 }
 
 /// The picture of values by tile (column and row), and the greatest value. With `per_pixel` a tile's sum is divided by
@@ -170,13 +149,8 @@ fn picture(
 
 /// The colour of a value from 0 to 1: black, blue, red, yellow, white, with increasing brightness.
 pub fn heat(part: f32) -> [f32; 3] {
-    const COLORS: [[f32; 3]; 5] = [
-        [0.0, 0.0, 0.0],
-        [0.15, 0.1, 0.6],
-        [0.85, 0.2, 0.25],
-        [1.0, 0.8, 0.2],
-        [1.0, 1.0, 1.0],
-    ];
+    const COLORS: [[f32; 3]; 5] =
+        [[0.0, 0.0, 0.0], [0.15, 0.1, 0.6], [0.85, 0.2, 0.25], [1.0, 0.8, 0.2], [1.0, 1.0, 1.0]];
     let at = part.clamp(0.0, 1.0) * (COLORS.len() - 1) as f32;
     let below = (at as usize).min(COLORS.len() - 2);
     let share = at - below as f32;
@@ -192,8 +166,7 @@ mod tests {
     fn tiles_are_as_bright_as_they_are_full() {
         // Two tiles of 16x16 and two of 4x16: 256 and 64 pixels.
         let tiles = [([0, 0], 512.0), ([1, 1], 640.0)];
-        let [(means, ten), (sums, all)] =
-            [true, false].map(|per_pixel| picture([20, 32], per_pixel, tiles));
+        let [(means, ten), (sums, all)] = [true, false].map(|per_pixel| picture([20, 32], per_pixel, tiles));
         assert_eq!([ten, all], [10.0, 640.0]);
         for (picture, share) in [(means, 0.2), (sums, 0.8)] {
             assert_eq!(picture.pixels[20 * 31 + 19], [1.0; 4]);
@@ -209,37 +182,19 @@ mod tests {
         let tile = |column: u32, primitives: u32| TileWork {
             at: [column, 0],
             listed: primitives,
-            runs: vec![Run {
-                primitives,
-                rows: 16,
-                blocks: 16,
-                reached: 16 * primitives,
-                ..Run::default()
-            }],
+            runs: vec![Run { primitives, rows: 16, blocks: 16, reached: 16 * primitives, ..Run::default() }],
             ..TileWork::default()
         };
-        let draw = DrawWork {
-            tiles: vec![tile(0, 1000), tile(1, 3000)],
-            ..DrawWork::default()
-        };
-        let frame = FrameWork {
-            size: [48, 16],
-            draws: vec![draw],
-            ..FrameWork::default()
-        };
+        let draw = DrawWork { tiles: vec![tile(0, 1000), tile(1, 3000)], ..DrawWork::default() };
+        let frame = FrameWork { size: [48, 16], draws: vec![draw], ..FrameWork::default() };
         let tiles = cycles(&frame).expect("the default hardware");
         let of = |column: u32| {
             let found = tiles.iter().find(|(at, _)| *at == [column, 0]);
             found.map_or(0.0, |(_, cycles)| *cycles)
         };
-        let rasterizer = Config::preset(DEFAULT_PRESET, &[])
-            .expect("the default hardware")
-            .rasterizer;
+        let rasterizer = Config::preset(DEFAULT_PRESET, &[]).expect("the default hardware").rasterizer;
         let busy = rasterizer.busy_cycles(Mode::Gaussian, 16) as f64;
-        assert!(
-            of(0) >= 1000.0 * busy && of(1) >= 3000.0 * busy,
-            "{tiles:?}"
-        );
+        assert!(of(0) >= 1000.0 * busy && of(1) >= 3000.0 * busy, "{tiles:?}");
         assert!((of(1) - of(0)) < 2100.0 * busy, "{tiles:?}");
         assert_eq!(of(2), 0.0);
     }
@@ -247,9 +202,7 @@ mod tests {
     #[test]
     fn more_is_brighter() {
         let brightness = |part: f32| heat(part).iter().sum::<f32>();
-        let steps: Vec<f32> = (0..=20_u8)
-            .map(|i| brightness(f32::from(i) / 20.0))
-            .collect();
+        let steps: Vec<f32> = (0..=20_u8).map(|i| brightness(f32::from(i) / 20.0)).collect();
         assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
     }
 }

@@ -39,22 +39,14 @@ pub struct InfoArguments {
 /// Reads the scene and prints its contents.
 pub fn run(arguments: &InfoArguments) -> Result<(), Error> {
     let source = Source::of(&arguments.scene)?;
-    let progress = Progress {
-        quiet: arguments.json,
-    };
+    let progress = Progress { quiet: arguments.json };
     let (scene, _) = source.load(progress)?;
     let (info, extent) = (Info::new(&scene), Extent::of(&scene));
     let mut stdout = std::io::stdout().lock();
     if arguments.json {
         let mut value = serde_json::to_value(&info).map_err(std::io::Error::from)?;
         value["framed"] = json!({"centre": extent.centre, "half": extent.half});
-        value["files"] = json!(
-            source
-                .files
-                .iter()
-                .map(|(file, _)| file)
-                .collect::<Vec<_>>()
-        );
+        value["files"] = json!(source.files.iter().map(|(file, _)| file).collect::<Vec<_>>());
         value["notes"] = json!(source.notes);
         write_json(&mut stdout, &value)?;
     } else {
@@ -89,39 +81,18 @@ fn text(info: &Info, extent: &Extent) -> String {
         line("x, y, z", &[axis(0), axis(1), axis(2)].join(", "));
     }
     let [x, y, z] = extent.centre;
-    line(
-        "middle",
-        &format!("{x:.4}, {y:.4}, {z:.4} of what is opaque"),
-    );
+    line("middle", &format!("{x:.4}, {y:.4}, {z:.4} of what is opaque"));
     let [x, y, z] = extent.half.map(|half| 2.0 * half);
-    line(
-        "size",
-        &format!("{x:.4} x {y:.4} x {z:.4} of what is opaque"),
-    );
+    line("size", &format!("{x:.4} x {y:.4} x {z:.4} of what is opaque"));
     let metadata = &info.metadata;
     let said = [
-        (
-            "antialiasing",
-            metadata.antialiasing.map(|said| format!("{said:?}")),
-        ),
-        (
-            "geometry",
-            metadata.geometry.map(|said| format!("{said:?}")),
-        ),
-        (
-            "colour space",
-            metadata.color_space.map(|said| format!("{said:?}")),
-        ),
+        ("antialiasing", metadata.antialiasing.map(|said| format!("{said:?}"))),
+        ("geometry", metadata.geometry.map(|said| format!("{said:?}"))),
+        ("colour space", metadata.color_space.map(|said| format!("{said:?}"))),
         ("order", metadata.order.map(|said| format!("{said:?}"))),
     ];
-    let said: Vec<String> = (said.into_iter())
-        .filter_map(|(name, value)| Some(format!("{name} {}", value?)))
-        .collect();
-    let said = if said.is_empty() {
-        "nothing of how it is drawn".to_owned()
-    } else {
-        said.join(", ")
-    };
+    let said: Vec<String> = (said.into_iter()).filter_map(|(name, value)| Some(format!("{name} {}", value?))).collect();
+    let said = if said.is_empty() { "nothing of how it is drawn".to_owned() } else { said.join(", ") };
     line("says", &said);
     for (title, bars) in [("opacity", &info.opacities), ("scale", &info.scales)] {
         text += &histogram(title, bars);
@@ -141,11 +112,7 @@ fn histogram(title: &str, bars: &[Bar]) -> String {
             let title = if index == 0 { title } else { "" };
             let length = (BAR * bar.count).div_ceil(greatest);
             let line = "#".repeat(length);
-            format!(
-                "{title:<11} from {:<7} {line:<BAR$} {}\n",
-                bar.from,
-                grouped(bar.count as f64)
-            )
+            format!("{title:<11} from {:<7} {line:<BAR$} {}\n", bar.from, grouped(bar.count as f64))
         })
         .collect()
 }
@@ -156,16 +123,12 @@ mod tests {
 
     #[test]
     fn bars_are_as_long_as_they_are_large() {
-        let bars = [(0.0, 0), (0.1, 10), (0.2, 0), (0.3, 40), (0.4, 0)]
-            .map(|(from, count)| Bar { from, count });
+        let bars = [(0.0, 0), (0.1, 10), (0.2, 0), (0.3, 40), (0.4, 0)].map(|(from, count)| Bar { from, count });
         let text = histogram("opacity", &bars);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         let length = |line: &str| line.chars().filter(|c| *c == '#').count();
-        assert_eq!(
-            [length(lines[0]), length(lines[1]), length(lines[2])],
-            [10, 0, 40]
-        );
+        assert_eq!([length(lines[0]), length(lines[1]), length(lines[2])], [10, 0, 40]);
         assert!(lines[0].starts_with("opacity     from 0.1"), "{}", lines[0]);
     }
 }

@@ -12,10 +12,7 @@ const THREADS: usize = 64;
 /// # Errors
 /// A sentence about the limit.
 pub fn check_threads() -> Result<(), String> {
-    let Some(wanted) = std::env::var("GAURAST_THREADS")
-        .ok()
-        .and_then(|value| value.parse::<usize>().ok())
-    else {
+    let Some(wanted) = std::env::var("GAURAST_THREADS").ok().and_then(|value| value.parse::<usize>().ok()) else {
         return Ok(());
     };
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
@@ -32,20 +29,14 @@ pub fn check_threads() -> Result<(), String> {
 ///
 /// # Errors
 /// A sentence about the limit.
-pub fn check_memory(
-    camera: &Camera,
-    depth: bool,
-    encoding: u64,
-    views: usize,
-) -> Result<(), String> {
+pub fn check_memory(camera: &Camera, depth: bool, encoding: u64, views: usize) -> Result<(), String> {
     let Some(available) = available_memory() else {
         return Ok(());
     };
     let pixel = 16 + if depth { 8 } else { 0 };
     // The attachment, the buffer that the host reads, and pictures: one is drawn while another is written.
     let pictures = if views > 1 { 2 } else { 1 };
-    let needed =
-        u64::from(camera.width) * u64::from(camera.height) * ((2 + pictures) * pixel + encoding);
+    let needed = u64::from(camera.width) * u64::from(camera.height) * ((2 + pictures) * pixel + encoding);
     if needed > available {
         let gibibytes = |bytes: u64| bytes as f64 / (1_u64 << 30) as f64;
         return Err(format!(
@@ -63,16 +54,8 @@ pub fn check_memory(
 /// limited.
 fn available_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let machine = line
-        .trim()
-        .strip_suffix(" kB")?
-        .trim()
-        .parse::<u64>()
-        .ok()?
-        * 1024;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let machine = line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()? * 1024;
     let number = |file: &str| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
     let group = number("/sys/fs/cgroup/memory.max")
         .zip(number("/sys/fs/cgroup/memory.current"))
@@ -91,9 +74,6 @@ mod tests {
         assert_eq!(check_memory(&camera, false, 8, 1), Ok(()));
         [camera.width, camera.height] = [1 << 20, 1 << 20];
         let refused = check_memory(&camera, false, 8, 1).expect_err("48 TiB");
-        assert!(
-            refused.contains("1048576x1048576") && refused.contains("GiB"),
-            "{refused}"
-        );
+        assert!(refused.contains("1048576x1048576") && refused.contains("GiB"), "{refused}");
     }
 }

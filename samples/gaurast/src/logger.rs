@@ -6,10 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
 /// The messages logged so far.
-static LOGGED: Mutex<Logged> = Mutex::new(Logged {
-    errors: Vec::new(),
-    seen: None,
-});
+static LOGGED: Mutex<Logged> = Mutex::new(Logged { errors: Vec::new(), seen: None });
 
 struct Logged {
     errors: Vec<String>,
@@ -38,10 +35,7 @@ pub fn start() {
 /// The last error that was logged, without the parts that are meant for programs.
 pub fn last_error() -> Option<String> {
     let logged = LOGGED.lock().unwrap_or_else(PoisonError::into_inner);
-    logged
-        .errors
-        .last()
-        .map(|message| plain(message).to_owned())
+    logged.errors.last().map(|message| plain(message).to_owned())
 }
 
 /// A message without the kind in brackets at its end and without the call at its beginning.

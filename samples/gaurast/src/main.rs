@@ -51,15 +51,9 @@ fn main() -> ExitCode {
     let logged = logger::last_error();
     let failure = match (result, logged) {
         (Ok(()), None) => return ExitCode::SUCCESS,
-        (Ok(()), Some(sentence)) => Failure {
-            sentence,
-            code: FAILED,
-        },
+        (Ok(()), Some(sentence)) => Failure { sentence, code: FAILED },
         // The driver's message has more information than the name of a call and its result.
-        (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure {
-            sentence,
-            ..failure
-        },
+        (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure { sentence, ..failure },
         (Err(failure), _) => failure,
     };
     eprintln!("gaurast: {}", failure.sentence);
@@ -67,10 +61,8 @@ fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> Result<(), Failure> {
-    let failure = |sentence: String, is_misuse: bool| Failure {
-        sentence,
-        code: if is_misuse { MISUSE } else { FAILED },
-    };
+    let failure =
+        |sentence: String, is_misuse: bool| Failure { sentence, code: if is_misuse { MISUSE } else { FAILED } };
     match command {
         Command::Render(arguments) => {
             let traced = (arguments.output.heatmap.is_some())
@@ -81,21 +73,15 @@ fn run(command: Command) -> Result<(), Failure> {
             drop(traced);
             result.map_err(|error| failure(error.to_string(), error.is_misuse()))
         }
-        Command::Views(arguments) => {
-            sheet::run(&arguments).map_err(|error| failure(error.to_string(), false))
-        }
+        Command::Views(arguments) => sheet::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         Command::Compare(arguments) => {
             compare::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
         }
         Command::CompareDrivers(arguments) => {
             compare_drivers::run(&arguments).map_err(|error| failure(error.to_string(), false))
         }
-        Command::Info(arguments) => {
-            info::run(&arguments).map_err(|error| failure(error.to_string(), false))
-        }
-        Command::Simulate(arguments) => {
-            simulate::run(&arguments).map_err(|error| failure(error.to_string(), false))
-        }
+        Command::Info(arguments) => info::run(&arguments).map_err(|error| failure(error.to_string(), false)),
+        Command::Simulate(arguments) => simulate::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         #[cfg(feature = "completions")]
         Command::Completions { shell } => {
             use clap::CommandFactory;

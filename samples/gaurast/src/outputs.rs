@@ -13,10 +13,7 @@ use crate::sources::stem;
 
 /// File extensions of videos, and ffmpeg's arguments for them.
 const VIDEOS: [(&str, &[&str]); 4] = [
-    (
-        "mp4",
-        &["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"],
-    ),
+    ("mp4", &["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"]),
     ("mov", &["-c:v", "libx264", "-crf", "18"]),
     ("mkv", &["-c:v", "libx264", "-crf", "18"]),
     ("webm", &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"]),
@@ -91,9 +88,7 @@ impl Place {
         let Some((before, rest)) = text.split_once('%') else {
             return Ok(Self::File(path.to_owned()));
         };
-        let wrong = || WriteError::Pattern {
-            path: path.to_owned(),
-        };
+        let wrong = || WriteError::Pattern { path: path.to_owned() };
         let (digits, after) = rest.split_once('d').ok_or_else(wrong)?;
         let digits = match digits.strip_prefix('0') {
             Some(digits) => digits.parse().ok().filter(|digits| *digits < 20),
@@ -102,22 +97,14 @@ impl Place {
         if after.contains('%') {
             return Err(wrong());
         }
-        Ok(Self::Numbered {
-            before: before.to_owned(),
-            digits: digits.ok_or_else(wrong)?,
-            after: after.to_owned(),
-        })
+        Ok(Self::Numbered { before: before.to_owned(), digits: digits.ok_or_else(wrong)?, after: after.to_owned() })
     }
 
     /// The file of view `index`, if each view has one.
     fn file(&self, index: usize, view: &View) -> Option<PathBuf> {
         match self {
             Self::File(path) => Some(path.clone()),
-            Self::Numbered {
-                before,
-                digits,
-                after,
-            } => Some(format!("{before}{index:0digits$}{after}").into()),
+            Self::Numbered { before, digits, after } => Some(format!("{before}{index:0digits$}{after}").into()),
             Self::Folder(folder) => {
                 let name = match &view.name {
                     Some(name) => stem(Path::new(name)),
@@ -175,22 +162,11 @@ impl Outputs {
     ///
     /// # Errors
     /// Errors that can be found before there are pictures.
-    pub fn new(
-        arguments: &OutputArguments,
-        default: &str,
-        trained: Option<Background>,
-    ) -> Result<Self, WriteError> {
+    pub fn new(arguments: &OutputArguments, default: &str, trained: Option<Background>) -> Result<Self, WriteError> {
         let default = [PathBuf::from(format!("{default}.png"))];
-        let paths = if arguments.output.is_empty() {
-            &default[..]
-        } else {
-            &arguments.output
-        };
+        let paths = if arguments.output.is_empty() { &default[..] } else { &arguments.output };
         let outputs = Self {
-            places: paths
-                .iter()
-                .map(|path| Place::of(path))
-                .collect::<Result<_, _>>()?,
+            places: paths.iter().map(|path| Place::of(path)).collect::<Result<_, _>>()?,
             background: arguments.background.or(trained),
             quality: arguments.quality,
             linear: arguments.linear,
@@ -200,9 +176,7 @@ impl Outputs {
         };
         let exr = |path: &PathBuf| matches!(PictureFormat::of(path), Ok(PictureFormat::Exr));
         if (arguments.depth || arguments.linear) && !paths.iter().any(exr) {
-            return Err(WriteError::NoExr {
-                path: paths[0].clone(),
-            });
+            return Err(WriteError::NoExr { path: paths[0].clone() });
         }
         for (path, place) in paths.iter().zip(&outputs.places) {
             match place {
@@ -329,11 +303,7 @@ impl Outputs {
                     file.display().to_string()
                 };
                 let (first, last) = (of(first), of(last));
-                if first == last {
-                    first
-                } else {
-                    format!("{first} to {last}")
-                }
+                if first == last { first } else { format!("{first} to {last}") }
             }
         };
         self.places.iter().map(told).collect::<Vec<_>>().join(", ")
@@ -348,19 +318,14 @@ impl Outputs {
         for place in &self.places {
             match place {
                 Place::Folder(folder) => {
-                    std::fs::create_dir_all(folder).map_err(|source| OutputError::Io {
-                        path: folder.clone(),
-                        source,
-                    })?;
+                    std::fs::create_dir_all(folder)
+                        .map_err(|source| OutputError::Io { path: folder.clone(), source })?;
                 }
                 Place::Video(path) => videos.push(Video::start(path, size, self.fps)?),
                 _ => {}
             }
         }
-        Ok(Writer {
-            outputs: self,
-            videos,
-        })
+        Ok(Writer { outputs: self, videos })
     }
 }
 
@@ -416,32 +381,20 @@ impl Video {
     fn start(path: &Path, [width, height]: [u32; 2], fps: f64) -> Result<Self, WriteError> {
         let options = video_options(path).unwrap_or_default();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let temporary =
-            gaurast_picture::folder(path).join(format!(".gaurast-{}-{name}", std::process::id()));
+        let temporary = gaurast_picture::folder(path).join(format!(".gaurast-{}-{name}", std::process::id()));
         let failed = |source: std::io::Error| {
             let path = path.to_owned();
             if source.kind() == std::io::ErrorKind::NotFound {
                 WriteError::NoFfmpeg { path }
             } else {
-                WriteError::Ffmpeg {
-                    path,
-                    reason: source.to_string(),
-                }
+                WriteError::Ffmpeg { path, reason: source.to_string() }
             }
         };
         let mut child = Command::new("ffmpeg")
-            .args([
-                "-nostdin", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
-            ])
+            .args(["-nostdin", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             .args(["-s", &format!("{width}x{height}"), "-r", &fps.to_string()])
             // Chroma has half the resolution, so the sides must be even.
-            .args([
-                "-i",
-                "pipe:0",
-                "-an",
-                "-vf",
-                "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-            ])
+            .args(["-i", "pipe:0", "-an", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
             .args(options)
             .args(["-pix_fmt", "yuv420p", "-y"])
             .arg(&temporary)
@@ -450,16 +403,11 @@ impl Video {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(failed)?;
-        let input = child.stdin.take().ok_or_else(|| WriteError::Ffmpeg {
-            path: path.to_owned(),
-            reason: "it has no input".to_owned(),
-        })?;
-        Ok(Self {
-            path: path.to_owned(),
-            temporary,
-            child,
-            input,
-        })
+        let input = child
+            .stdin
+            .take()
+            .ok_or_else(|| WriteError::Ffmpeg { path: path.to_owned(), reason: "it has no input".to_owned() })?;
+        Ok(Self { path: path.to_owned(), temporary, child, input })
     }
 
     fn finish(self) -> Result<(), WriteError> {
@@ -467,10 +415,7 @@ impl Video {
         let failed = |reason: String| {
             // The file may not exist.
             let _ = std::fs::remove_file(&self.temporary);
-            WriteError::Ffmpeg {
-                path: self.path.clone(),
-                reason,
-            }
+            WriteError::Ffmpeg { path: self.path.clone(), reason }
         };
         let output = (self.child.wait_with_output()).map_err(|error| failed(error.to_string()))?;
         if !output.status.success() {
@@ -485,9 +430,7 @@ impl Video {
 /// The program `name` on the `PATH`.
 fn program(name: &str) -> Option<PathBuf> {
     let paths = std::env::var_os("PATH")?;
-    std::env::split_paths(&paths)
-        .map(|folder| folder.join(name))
-        .find(|path| path.is_file())
+    std::env::split_paths(&paths).map(|folder| folder.join(name)).find(|path| path.is_file())
 }
 
 #[cfg(test)]
@@ -495,10 +438,7 @@ mod tests {
     use super::*;
 
     fn view(name: Option<&str>) -> View {
-        View {
-            name: name.map(str::to_owned),
-            camera: gaurast_scene::garden::camera(None, [8, 8]).expect("a camera"),
-        }
+        View { name: name.map(str::to_owned), camera: gaurast_scene::garden::camera(None, [8, 8]).expect("a camera") }
     }
 
     #[test]

@@ -13,11 +13,7 @@ pub struct Progress {
 impl Progress {
     /// A bar of `length` bytes.
     pub fn bytes(self, message: &'static str, length: u64) -> ProgressBar {
-        self.bar(
-            ProgressBar::new(length),
-            message,
-            "{msg:>10} [{bar:40}] {bytes}/{total_bytes}",
-        )
+        self.bar(ProgressBar::new(length), message, "{msg:>10} [{bar:40}] {bytes}/{total_bytes}")
     }
 
     /// A bar of `count` pictures, with the estimated remaining time.
@@ -25,22 +21,14 @@ impl Progress {
         if count == 1 {
             return self.step("drawing");
         }
-        let bar = self.bar(
-            ProgressBar::new(count),
-            "drawing",
-            "{msg:>10} [{bar:40}] {pos}/{len}, {eta} left",
-        );
+        let bar = self.bar(ProgressBar::new(count), "drawing", "{msg:>10} [{bar:40}] {pos}/{len}, {eta} left");
         bar.enable_steady_tick(Duration::from_millis(500));
         bar
     }
 
     /// A spinner for a step of unknown length.
     pub fn step(self, message: &'static str) -> ProgressBar {
-        let bar = self.bar(
-            ProgressBar::new_spinner(),
-            message,
-            "{msg:>10} {spinner} {elapsed}",
-        );
+        let bar = self.bar(ProgressBar::new_spinner(), message, "{msg:>10} {spinner} {elapsed}");
         bar.enable_steady_tick(Duration::from_millis(100));
         bar
     }

@@ -62,11 +62,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
     let garden = source.is_garden();
     let camera = arguments.modes.cameras(&arguments.camera);
-    let Views {
-        views,
-        mut notes,
-        framing,
-    } = cameras::of_scene(known, &camera, &scene, garden)?;
+    let Views { views, mut notes, framing } = cameras::of_scene(known, &camera, &scene, garden)?;
     if arguments.camera.frame {
         return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }
@@ -82,17 +78,14 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;
         if !scene.mesh().is_empty() {
-            settings
-                .check_mesh(&view.camera)
-                .map_err(DrawError::Render)?;
+            settings.check_mesh(&view.camera).map_err(DrawError::Render)?;
         }
     }
     let indices = chosen(&views, arguments, &outputs)?;
     let largest = indices.iter().map(|index| &views[*index].camera);
     if let Some(camera) = largest.max_by_key(|c| u64::from(c.width) * u64::from(c.height)) {
         let encoding = outputs.bytes_per_pixel();
-        limits::check_memory(camera, settings.depth, encoding, indices.len())
-            .map_err(Error::Limit)?;
+        limits::check_memory(camera, settings.depth, encoding, indices.len()).map_err(Error::Limit)?;
     }
     if arguments.output.heatmap.is_some() && indices.len() != 1 {
         return Err(Error::HeatmapViews(indices.len()));
@@ -106,21 +99,12 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         let step = progress.step("uploading");
         let mut drawing = Drawing::new(scene, settings, arguments.report.counters)?;
         step.finish_and_clear();
-        drawing.all(
-            &views,
-            &indices,
-            &outputs,
-            arguments.report.strict,
-            progress,
-        )?
+        drawing.all(&views, &indices, &outputs, arguments.report.strict, progress)?
     };
     let heat = match (&arguments.output.heatmap, indices.first()) {
-        (Some(path), Some(index)) => Some(heatmap::write(
-            path,
-            arguments.output.heatmap_of,
-            &views[*index].camera,
-            arguments.output.force,
-        )?),
+        (Some(path), Some(index)) => {
+            Some(heatmap::write(path, arguments.output.heatmap_of, &views[*index].camera, arguments.output.force)?)
+        }
         _ => None,
     };
     let summary = Summary {
@@ -143,10 +127,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     }
     for drawn in &drawn {
         if let Some(reason) = drawn.nothing.as_deref().filter(|_| !quiet) {
-            let files = outputs.told(
-                (drawn.index, &views[drawn.index]),
-                (drawn.index, &views[drawn.index]),
-            );
+            let files = outputs.told((drawn.index, &views[drawn.index]), (drawn.index, &views[drawn.index]));
             eprintln!("gaurast: {files}: {reason}");
         }
     }
@@ -166,9 +147,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         return Ok(());
     }
     let mut stdout = stdout().lock();
-    (stdout.write_all(text.as_bytes()))
-        .and_then(|()| stdout.flush())
-        .map_err(Error::Report)
+    (stdout.write_all(text.as_bytes())).and_then(|()| stdout.flush()).map_err(Error::Report)
 }
 
 /// The indices of the views in this process's share.
@@ -181,11 +160,7 @@ fn views_of_shard(views: &[View], arguments: &RenderArguments) -> Vec<usize> {
 }
 
 /// The indices of the views that must be drawn.
-fn chosen(
-    views: &[View],
-    arguments: &RenderArguments,
-    outputs: &Outputs,
-) -> Result<Vec<usize>, WriteError> {
+fn chosen(views: &[View], arguments: &RenderArguments, outputs: &Outputs) -> Result<Vec<usize>, WriteError> {
     let wanted = views_of_shard(views, arguments);
     outputs.missing(views, wanted, &arguments.output)
 }

@@ -27,11 +27,7 @@ pub struct Contents {
 impl Contents {
     /// The contents of `scene`.
     pub fn of(scene: &Scene) -> Self {
-        Self {
-            gaussians: scene.len(),
-            sh_degree: scene.sh_degree(),
-            triangles: scene.mesh().triangles(),
-        }
+        Self { gaussians: scene.len(), sh_degree: scene.sh_degree(), triangles: scene.mesh().triangles() }
     }
 }
 
@@ -72,11 +68,7 @@ impl Summary<'_> {
         }
         text.push('\n');
         if let Some((path, quantity, greatest)) = self.heatmap {
-            text += &format!(
-                "wrote {}: 0 (black) to {greatest:.1} (white) {}\n",
-                path.display(),
-                quantity.unit()
-            );
+            text += &format!("wrote {}: 0 (black) to {greatest:.1} (white) {}\n", path.display(), quantity.unit());
         }
         text
     }
@@ -106,16 +98,9 @@ impl Summary<'_> {
         let time = if self.drawn.len() == 1 {
             format!("drawn in {}", duration(first.time))
         } else {
-            format!(
-                "{} pictures in {}",
-                self.drawn.len(),
-                duration(self.drawing)
-            )
+            format!("{} pictures in {}", self.drawn.len(), duration(self.drawing))
         };
-        format!(
-            "wrote {places}: {size}, {contents} read in {}, {time}{kept}",
-            duration(self.loading)
-        )
+        format!("wrote {places}: {size}, {contents} read in {}, {time}{kept}", duration(self.loading))
     }
 
     /// The table of a view: the host's values, then the device's counters in their groups.
@@ -133,16 +118,8 @@ impl Summary<'_> {
             }
         };
         let camera = &self.views[drawn.index].camera;
-        row(
-            "picture",
-            "size",
-            format!("{} x {}", camera.width, camera.height),
-        );
-        row(
-            "scene",
-            "Gaussians",
-            grouped(self.contents.gaussians as f64),
-        );
+        row("picture", "size", format!("{} x {}", camera.width, camera.height));
+        row("scene", "Gaussians", grouped(self.contents.gaussians as f64));
         row("scene", "SH degree", self.contents.sh_degree.to_string());
         for counter in drawn.counters.iter().filter(|counter| counter.value != 0.0) {
             row(&counter.category, &counter.name, value(counter));
@@ -211,11 +188,7 @@ pub fn write_json(writer: &mut dyn Write, value: &impl serde::Serialize) -> std:
 /// A time for people.
 pub fn duration(time: Duration) -> String {
     let seconds = time.as_secs_f64();
-    if seconds < 1.0 {
-        milliseconds(seconds * 1e3)
-    } else {
-        format!("{seconds:.2} s")
-    }
+    if seconds < 1.0 { milliseconds(seconds * 1e3) } else { format!("{seconds:.2} s") }
 }
 
 fn value(counter: &Counter) -> String {
@@ -249,11 +222,7 @@ pub fn grouped(value: f64) -> String {
         }
         text.push(digit);
     }
-    if value < 0.0 {
-        format!("-{text}")
-    } else {
-        text
-    }
+    if value < 0.0 { format!("-{text}") } else { text }
 }
 
 #[cfg(test)]

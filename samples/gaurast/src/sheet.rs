@@ -86,9 +86,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     if path.is_file() && !arguments.force {
         return Err(Error::There { path });
     }
-    let progress = Progress {
-        quiet: arguments.quiet,
-    };
+    let progress = Progress { quiet: arguments.quiet };
     let (scene, _) = source.load(progress)?;
     let extent = Extent::of(&scene);
     let size = arguments.size.map_or(CELL, |size| size.0);
@@ -109,10 +107,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     let mut sheet = Sheet::new(size, [4, 2]);
     for (row, azimuths) in AZIMUTHS.iter().enumerate() {
         for (column, azimuth) in azimuths.iter().enumerate() {
-            let view = View {
-                name: None,
-                camera: camera(*azimuth)?,
-            };
+            let view = View { name: None, camera: camera(*azimuth)? };
             let frame = drawing.frame(&view)?;
             let cell = [column as u32, row as u32];
             sheet.put(cell, &frame.picture.over(behind));
@@ -124,9 +119,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     gaurast_picture::write(&path, &sheet.picture, None)?;
     if !arguments.quiet {
         let scenes = arguments.scene.scenes.iter();
-        let scene: String = scenes
-            .map(|scene| format!(" {}", scene.display()))
-            .collect();
+        let scene: String = scenes.map(|scene| format!(" {}", scene.display())).collect();
         let mut stdout = std::io::stdout().lock();
         writeln!(
             stdout,
@@ -150,14 +143,7 @@ const DOT: u32 = 2;
 impl Sheet {
     fn new(cell: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
         let (width, height) = (cell[0] * columns, cell[1] * rows);
-        Self {
-            cell,
-            picture: Picture {
-                width,
-                height,
-                pixels: vec![[0.0, 0.0, 0.0, 1.0]; (width * height) as usize],
-            },
-        }
+        Self { cell, picture: Picture { width, height, pixels: vec![[0.0, 0.0, 0.0, 1.0]; (width * height) as usize] } }
     }
 
     fn put(&mut self, cell: [u32; 2], picture: &Picture) {
@@ -178,15 +164,10 @@ impl Sheet {
             for x in 0..size[0].min(self.cell[0]) {
                 let (column, row) = (x / DOT, y / DOT);
                 let letter = column.checked_sub(1).map(|column| (column / 6, column % 6));
-                let dot = letter
-                    .zip(row.checked_sub(1))
-                    .is_some_and(|((index, dot), row)| {
-                        let glyph = text.chars().nth(index as usize).map_or([0; 7], glyph);
-                        dot < 5
-                            && glyph
-                                .get(row as usize)
-                                .is_some_and(|r| r >> (4 - dot) & 1 == 1)
-                    });
+                let dot = letter.zip(row.checked_sub(1)).is_some_and(|((index, dot), row)| {
+                    let glyph = text.chars().nth(index as usize).map_or([0; 7], glyph);
+                    dot < 5 && glyph.get(row as usize).is_some_and(|r| r >> (4 - dot) & 1 == 1)
+                });
                 let shade = if dot { 1.0 } else { 0.0 };
                 let at = (top + y) * self.picture.width + left + x;
                 self.picture.pixels[at as usize] = [shade, shade, shade, 1.0];
@@ -198,57 +179,23 @@ impl Sheet {
 /// A letter of the labels: seven rows of five dots.
 fn glyph(letter: char) -> [u8; 7] {
     match letter {
-        '0' => [
-            0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110,
-        ],
-        '1' => [
-            0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110,
-        ],
-        '2' => [
-            0b01110, 0b10001, 0b00001, 0b00110, 0b01000, 0b10000, 0b11111,
-        ],
-        '3' => [
-            0b01110, 0b10001, 0b00001, 0b00110, 0b00001, 0b10001, 0b01110,
-        ],
-        '4' => [
-            0b00010, 0b00110, 0b01010, 0b10010, 0b11111, 0b00010, 0b00010,
-        ],
-        '5' => [
-            0b11111, 0b10000, 0b11110, 0b00001, 0b00001, 0b10001, 0b01110,
-        ],
-        '6' => [
-            0b00110, 0b01000, 0b10000, 0b11110, 0b10001, 0b10001, 0b01110,
-        ],
-        '7' => [
-            0b11111, 0b00001, 0b00010, 0b00100, 0b01000, 0b01000, 0b01000,
-        ],
-        '8' => [
-            0b01110, 0b10001, 0b10001, 0b01110, 0b10001, 0b10001, 0b01110,
-        ],
-        '9' => [
-            0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100,
-        ],
-        'a' => [
-            0b00000, 0b00000, 0b01110, 0b00001, 0b01111, 0b10001, 0b01111,
-        ],
-        'h' => [
-            0b10000, 0b10000, 0b10110, 0b11001, 0b10001, 0b10001, 0b10001,
-        ],
-        'i' => [
-            0b00100, 0b00000, 0b01100, 0b00100, 0b00100, 0b00100, 0b01110,
-        ],
-        'm' => [
-            0b00000, 0b00000, 0b11010, 0b10101, 0b10101, 0b10101, 0b10101,
-        ],
-        't' => [
-            0b01000, 0b01000, 0b11100, 0b01000, 0b01000, 0b01001, 0b00110,
-        ],
-        'u' => [
-            0b00000, 0b00000, 0b10001, 0b10001, 0b10001, 0b10011, 0b01101,
-        ],
-        'z' => [
-            0b00000, 0b00000, 0b11111, 0b00010, 0b00100, 0b01000, 0b11111,
-        ],
+        '0' => [0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110],
+        '1' => [0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110],
+        '2' => [0b01110, 0b10001, 0b00001, 0b00110, 0b01000, 0b10000, 0b11111],
+        '3' => [0b01110, 0b10001, 0b00001, 0b00110, 0b00001, 0b10001, 0b01110],
+        '4' => [0b00010, 0b00110, 0b01010, 0b10010, 0b11111, 0b00010, 0b00010],
+        '5' => [0b11111, 0b10000, 0b11110, 0b00001, 0b00001, 0b10001, 0b01110],
+        '6' => [0b00110, 0b01000, 0b10000, 0b11110, 0b10001, 0b10001, 0b01110],
+        '7' => [0b11111, 0b00001, 0b00010, 0b00100, 0b01000, 0b01000, 0b01000],
+        '8' => [0b01110, 0b10001, 0b10001, 0b01110, 0b10001, 0b10001, 0b01110],
+        '9' => [0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100],
+        'a' => [0b00000, 0b00000, 0b01110, 0b00001, 0b01111, 0b10001, 0b01111],
+        'h' => [0b10000, 0b10000, 0b10110, 0b11001, 0b10001, 0b10001, 0b10001],
+        'i' => [0b00100, 0b00000, 0b01100, 0b00100, 0b00100, 0b00100, 0b01110],
+        'm' => [0b00000, 0b00000, 0b11010, 0b10101, 0b10101, 0b10101, 0b10101],
+        't' => [0b01000, 0b01000, 0b11100, 0b01000, 0b01000, 0b01001, 0b00110],
+        'u' => [0b00000, 0b00000, 0b10001, 0b10001, 0b10001, 0b10011, 0b01101],
+        'z' => [0b00000, 0b00000, 0b11111, 0b00010, 0b00100, 0b01000, 0b11111],
         _ => [0; 7],
     }
 }
@@ -269,11 +216,7 @@ mod tests {
     #[test]
     fn labels_stay_in_their_cells() {
         let mut sheet = Sheet::new([40, 12], [4, 2]);
-        let grey = Picture {
-            width: 40,
-            height: 12,
-            pixels: vec![[0.5; 4]; 480],
-        };
+        let grey = Picture { width: 40, height: 12, pixels: vec![[0.5; 4]; 480] };
         for column in 0..4 {
             for row in 0..2 {
                 sheet.put([column, row], &grey);

@@ -30,24 +30,16 @@ pub enum Error {
     #[error(transparent)]
     Config(#[from] ConfigError),
     #[error("{}: {source}", path.display())]
-    File {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
     #[error("{}: not a trace of work: {source}", path.display())]
-    Trace {
-        path: PathBuf,
-        source: serde_json::Error,
-    },
+    Trace { path: PathBuf, source: serde_json::Error },
     #[error("{}: {source}", path.display())]
     Work { path: PathBuf, source: TraceError },
     #[error("{0}: there is no frame in the trace")]
     Empty(String),
     #[error("{0}: the last frame has no work, so there is nothing to simulate")]
     NoWork(String),
-    #[error(
-        "--stepped takes at most {MAX_STEPPED_PAIRS} pairs of a tile and a primitive, and the trace has {0}"
-    )]
+    #[error("--stepped takes at most {MAX_STEPPED_PAIRS} pairs of a tile and a primitive, and the trace has {0}")]
     TooLong(u64),
     #[error("drawing the scene: {0}")]
     Draw(String),
@@ -166,10 +158,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         });
     }
     if let Some(folder) = &arguments.emit_rtl {
-        return rtl::write(folder).map_err(|source| Error::File {
-            path: folder.clone(),
-            source,
-        });
+        return rtl::write(folder).map_err(|source| Error::File { path: folder.clone(), source });
     }
     // Errors of the command line are reported before a large scene is drawn.
     let config = config(arguments)?;
@@ -178,17 +167,10 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     } else {
         let named = |settings: Vec<String>| Ok((settings.join(" "), config.with(&settings)?));
         let grid = grid(&arguments.sweep)?;
-        grid.into_iter()
-            .map(named)
-            .collect::<Result<Vec<_>, Error>>()?
+        grid.into_iter().map(named).collect::<Result<Vec<_>, Error>>()?
     };
     let trace = work(arguments)?;
-    let name = || {
-        arguments
-            .scene
-            .as_ref()
-            .map_or("the garden".to_owned(), |path| path.display().to_string())
-    };
+    let name = || arguments.scene.as_ref().map_or("the garden".to_owned(), |path| path.display().to_string());
     let frame = trace.frames.last().ok_or_else(|| Error::Empty(name()))?;
     if frame.pairs() == 0 && frame.shader().iter().all(|work| work.operations() == 0.0) {
         return Err(Error::NoWork(name()));
@@ -201,12 +183,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         return print(&report::compared(&models(&trace, &config)?));
     }
     let results = if arguments.every_frame {
-        let named = |(number, frame)| {
-            (
-                format!("frame {number}"),
-                simulate::simulate(frame, &config),
-            )
-        };
+        let named = |(number, frame)| (format!("frame {number}"), simulate::simulate(frame, &config));
         trace.frames.iter().enumerate().map(named).collect()
     } else {
         simulate_all(frame, &machines)
@@ -216,21 +193,14 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         write_timeline(path, &trace, config, arguments.frames)?;
     }
     if let Some(path) = &arguments.plot {
-        let swept: Vec<_> = arguments
-            .sweep
-            .iter()
-            .filter_map(|sweep| sweep.split('=').next())
-            .collect();
+        let swept: Vec<_> = arguments.sweep.iter().filter_map(|sweep| sweep.split('=').next()).collect();
         replace(path, plot::svg(&swept.join(", "), &results).as_bytes())?;
     }
     if let Some(path) = &arguments.pareto {
         replace(path, plot::pareto(&machines, &results).as_bytes())?;
     }
     if let (Some(path), Some((_, result))) = (&arguments.roofline, results.first()) {
-        replace(
-            path,
-            plot::roofline(frame, result, &machines[0].1).as_bytes(),
-        )?;
+        replace(path, plot::roofline(frame, result, &machines[0].1).as_bytes())?;
     }
     if let Some(path) = &arguments.tiles {
         let spans = tile_spans(frame, &machines[0].1);
@@ -312,10 +282,7 @@ fn models(trace: &Trace, config: &Config) -> Result<Vec<report::Compared>, Error
 }
 
 fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {
-    let named: Vec<_> = variants
-        .iter()
-        .map(|variant| (variant.name.to_owned(), variant.simulation.clone()))
-        .collect();
+    let named: Vec<_> = variants.iter().map(|variant| (variant.name.to_owned(), variant.simulation.clone())).collect();
     Ok(match format {
         Format::Table => report::many(&named),
         Format::Json => serde_json::to_string_pretty(variants)? + "\n",
@@ -345,10 +312,7 @@ fn config(arguments: &SimulateArguments) -> Result<Config, Error> {
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::File {
-        path: path.to_owned(),
-        source,
-    })
+    std::fs::read_to_string(path).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
 /// The greatest number of machines of a range.
@@ -368,9 +332,7 @@ fn grid(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
         }
         let with = |settings: &Vec<String>| {
             let settings = settings.clone();
-            values
-                .iter()
-                .map(move |value| [settings.as_slice(), std::slice::from_ref(value)].concat())
+            values.iter().map(move |value| [settings.as_slice(), std::slice::from_ref(value)].concat())
         };
         grid = grid.iter().flat_map(with).collect();
     }
@@ -382,10 +344,7 @@ fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
     let wrong = || Error::Sweep(sweep.to_owned());
     let (name, values) = sweep.split_once('=').ok_or_else(wrong)?;
     let Some((first, last)) = values.split_once("..") else {
-        return Ok(values
-            .split(',')
-            .map(|value| format!("{name}={value}"))
-            .collect());
+        return Ok(values.split(',').map(|value| format!("{name}={value}")).collect());
     };
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
     let (first, last) = (number(first)?, number(last)?);
@@ -393,22 +352,13 @@ fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
         return Err(wrong());
     }
     let step = ((last - first) / MAX_MACHINES + 1) as usize;
-    Ok((first..=last)
-        .step_by(step)
-        .map(|value| format!("{name}={value}"))
-        .collect())
+    Ok((first..=last).step_by(step).map(|value| format!("{name}={value}")).collect())
 }
 
 /// The work of the scene, from drawing it or from a file.
 fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     match &arguments.scene {
-        Some(path)
-            if path
-                .extension()
-                .is_some_and(|extension| extension == "json") =>
-        {
-            load(path)
-        }
+        Some(path) if path.extension().is_some_and(|extension| extension == "json") => load(path),
         _ => {
             let folder = tempfile::tempdir()?;
             draw(arguments, folder.path())
@@ -417,14 +367,9 @@ fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
 }
 
 fn load(path: &Path) -> Result<Trace, Error> {
-    let trace: Trace = serde_json::from_str(&read(path)?).map_err(|source| Error::Trace {
-        path: path.to_owned(),
-        source,
-    })?;
-    trace.check().map_err(|source| Error::Work {
-        path: path.to_owned(),
-        source,
-    })?;
+    let trace: Trace =
+        serde_json::from_str(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })?;
+    trace.check().map_err(|source| Error::Work { path: path.to_owned(), source })?;
     Ok(trace)
 }
 
@@ -432,18 +377,10 @@ fn load(path: &Path) -> Result<Trace, Error> {
 fn draw(arguments: &SimulateArguments, folder: &Path) -> Result<Trace, Error> {
     let (trace, picture) = (folder.join("work.json"), folder.join("picture.png"));
     let mut command = Command::new(std::env::current_exe()?);
-    command
-        .arg("render")
-        .arg("--quiet")
-        .arg("--output")
-        .arg(picture);
+    command.arg("render").arg("--quiet").arg("--output").arg(picture);
     command.env("GAURAST_TRACE", &trace);
     if let Some(cameras) = &arguments.cameras {
-        command
-            .arg("--cameras")
-            .arg(cameras)
-            .arg("--view")
-            .arg(arguments.view.to_string());
+        command.arg("--cameras").arg(cameras).arg("--view").arg(arguments.view.to_string());
     }
     if let Some(Size([width, height])) = arguments.size {
         command.arg("--size").arg(format!("{width}x{height}"));
@@ -455,9 +392,7 @@ fn draw(arguments: &SimulateArguments, folder: &Path) -> Result<Trace, Error> {
     if !output.status.success() {
         let message = String::from_utf8_lossy(&output.stderr);
         let message = message.trim().trim_start_matches("gaurast: ");
-        return Err(Error::Draw(
-            message.lines().next().unwrap_or_default().to_owned(),
-        ));
+        return Err(Error::Draw(message.lines().next().unwrap_or_default().to_owned()));
     }
     load(&trace)
 }
@@ -474,12 +409,7 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
 }
 
 /// The tiles of each frame in the modules, within the frame's time in the rasterizer.
-fn module_spans(
-    trace: &Trace,
-    frames: &[Simulation],
-    spans: &[Span],
-    config: &Config,
-) -> Vec<ModuleSpan> {
+fn module_spans(trace: &Trace, frames: &[Simulation], spans: &[Span], config: &Config) -> Vec<ModuleSpan> {
     let tiles: Vec<_> = trace
         .frames
         .iter()
@@ -490,9 +420,7 @@ fn module_spans(
         })
         .collect();
     let to_ms = 1e-6 / config.rasterizer.clock_ghz;
-    let rasters = spans
-        .iter()
-        .filter(|span| span.engine == Engine::Rasterizer);
+    let rasters = spans.iter().filter(|span| span.engine == Engine::Rasterizer);
     rasters
         .flat_map(|span| {
             let tiles = &tiles[span.frame % tiles.len()];
@@ -508,10 +436,7 @@ fn module_spans(
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    gaurast_picture::write_atomically(path, bytes).map_err(|source| Error::File {
-        path: path.to_owned(),
-        source,
-    })
+    gaurast_picture::write_atomically(path, bytes).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
 #[cfg(test)]
@@ -521,14 +446,8 @@ mod tests {
     #[test]
     fn sweeps() {
         let values = |text: &str| sweep_values(text).unwrap_or_default();
-        assert_eq!(
-            values("modules=2..4"),
-            ["modules=2", "modules=3", "modules=4"]
-        );
-        assert_eq!(
-            values("saturation=none,tile"),
-            ["saturation=none", "saturation=tile"]
-        );
+        assert_eq!(values("modules=2..4"), ["modules=2", "modules=3", "modules=4"]);
+        assert_eq!(values("saturation=none,tile"), ["saturation=none", "saturation=tile"]);
         assert!(values("batch=1..1000").len() <= 64);
         for bad in ["modules", "modules=4..2", "modules=a..b"] {
             assert!(sweep_values(bad).is_err(), "{bad}");
@@ -562,10 +481,7 @@ mod tests {
         let all = simulate_all(&frame, &machines);
         assert_eq!(all.len(), machines.len());
         for ((name, result), (machine, config)) in all.iter().zip(&machines) {
-            assert_eq!(
-                (name, result),
-                (machine, &simulate::simulate(&frame, config))
-            );
+            assert_eq!((name, result), (machine, &simulate::simulate(&frame, config)));
         }
     }
 }

@@ -22,10 +22,7 @@ const COLORS: [&str; 3] = ["#0072b2", "#d55e00", "#009e73"];
 /// A number of a simulation: its name and its function.
 type Number = (&'static str, fn(&Simulation) -> f64);
 
-const SPEED: [Number; 2] = [
-    ("raster stage", |result| result.raster_speedup),
-    ("whole frame", |result| result.speedup),
-];
+const SPEED: [Number; 2] = [("raster stage", |result| result.raster_speedup), ("whole frame", |result| result.speedup)];
 const ENERGY: [Number; 3] = [
     ("all", |result| result.energy.total()),
     ("modules", |result| result.energy.modules()),
@@ -41,11 +38,7 @@ pub fn svg(swept: &str, results: &[(String, Simulation)]) -> String {
 }
 
 fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) -> Chart {
-    let value = |name: &str| {
-        name.split_once('=')
-            .map_or(name, |(_, value)| value)
-            .to_owned()
-    };
+    let value = |name: &str| name.split_once('=').map_or(name, |(_, value)| value).to_owned();
     let curve = |(&(label, of), color): (&Number, &'static str)| Curve {
         label,
         color,
@@ -73,27 +66,14 @@ pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -
         at: places[index],
         name: format!("{name}: {:.2} mJ", result.energy.total()),
         labelled: front.contains(&index) && front.len() <= 12,
-        color: if front.contains(&index) {
-            COLORS[1]
-        } else {
-            "#bbb"
-        },
+        color: if front.contains(&index) { COLORS[1] } else { "#bbb" },
     };
-    let line = Line {
-        through: front.iter().map(|&index| places[index]).collect(),
-        name: String::new(),
-        color: COLORS[1],
-    };
-    let axis = |name: &str| Axis {
-        name: name.to_owned(),
-        logarithmic: false,
-    };
+    let line =
+        Line { through: front.iter().map(|&index| places[index]).collect(), name: String::new(), color: COLORS[1] };
+    let axis = |name: &str| Axis { name: name.to_owned(), logarithmic: false };
     let plot = Plot {
         size: [760, 480],
-        axes: [
-            axis("mm2 that Gaussians add, arithmetic alone"),
-            axis("raster stage, ms"),
-        ],
+        axes: [axis("mm2 that Gaussians add, arithmetic alone"), axis("raster stage, ms")],
         points: results.iter().enumerate().map(point).collect(),
         lines: vec![line],
     };
@@ -105,11 +85,8 @@ pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -
 pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
     let bandwidth = config.memory.bandwidth_gb_s * config.memory.efficiency;
     let shader = &config.shader;
-    let cores =
-        f64::from(shader.sms) * shader.float_per_cycle * shader.clock_ghz * shader.efficiency;
-    let of = |operations: Operations| {
-        (operations.add + operations.mul + operations.div + operations.exp) as f64
-    };
+    let cores = f64::from(shader.sms) * shader.float_per_cycle * shader.clock_ghz * shader.efficiency;
+    let of = |operations: Operations| (operations.add + operations.mul + operations.div + operations.exp) as f64;
     let raster = &config.rasterizer;
     let pes = f64::from(raster.pes()) * raster.clock_ghz * of(Operations::GAUSSIAN);
     let mut points = Vec::new();
@@ -125,41 +102,20 @@ pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> Stri
     };
     let stages = frame.shader();
     let names = ["dispatches", "stage 1", "stage 2", "fragment programs"];
-    let rooflines = [
-        &result.compute,
-        &result.preprocess,
-        &result.sort,
-        &result.shade,
-    ];
+    let rooflines = [&result.compute, &result.preprocess, &result.sort, &result.shade];
     for ((name, work), roofline) in names.iter().zip(&stages).zip(rooflines) {
-        point(
-            name,
-            work.operations(),
-            work.bytes,
-            roofline.milliseconds(),
-            COLORS[0],
-        );
+        point(name, work.operations(), work.bytes, roofline.milliseconds(), COLORS[0]);
     }
     let report = &result.raster_alone;
-    let operations = report.gaussian_evaluations * of(Operations::GAUSSIAN)
-        + report.triangle_evaluations * of(Operations::TRIANGLE);
+    let operations =
+        report.gaussian_evaluations * of(Operations::GAUSSIAN) + report.triangle_evaluations * of(Operations::TRIANGLE);
     let bytes = report.bytes_in + report.bytes_out;
-    point(
-        "stage 3",
-        operations,
-        bytes,
-        result.stages_alone.raster,
-        COLORS[1],
-    );
+    point("stage 3", operations, bytes, result.stages_alone.raster, COLORS[1]);
     // From the slope of memory to the limit of the units, and beyond the points.
     let most = points.iter().map(|point| point.at[0]).fold(100.0, f64::max);
     let least = points.iter().map(|point| point.at[0]).fold(0.1, f64::min);
     let roof = |name: &str, peak: f64, color| Line {
-        through: vec![
-            [least, least * bandwidth],
-            [peak / bandwidth, peak],
-            [(peak / bandwidth).max(most) * 2.0, peak],
-        ],
+        through: vec![[least, least * bandwidth], [peak / bandwidth, peak], [(peak / bandwidth).max(most) * 2.0, peak]],
         name: format!("{name}: {peak:.0} G operations/s"),
         color,
     };
@@ -167,16 +123,11 @@ pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> Stri
     if raster.modules > 0 {
         lines.push(roof("rasterizer", pes, COLORS[1]));
     }
-    let axis = |name: String| Axis {
-        name,
-        logarithmic: true,
-    };
+    let axis = |name: String| Axis { name, logarithmic: true };
     let plot = Plot {
         size: [760, 480],
         axes: [
-            axis(format!(
-                "operations a byte of main memory ({bandwidth:.0} GB/s)"
-            )),
+            axis(format!("operations a byte of main memory ({bandwidth:.0} GB/s)")),
             axis("G operations/s".to_owned()),
         ],
         points,
@@ -193,11 +144,7 @@ const CAPTION: f64 = 24.0;
 
 /// The colour of a share of the most cycles: from white over orange to dark red.
 fn heat(share: f64) -> String {
-    let [r, g, b] = [
-        255.0 - 120.0 * share.powi(3),
-        255.0 * (1.0 - share),
-        220.0 * (1.0 - share).powi(2),
-    ];
+    let [r, g, b] = [255.0 - 120.0 * share.powi(3), 255.0 * (1.0 - share), 220.0 * (1.0 - share).powi(2)];
     format!("rgb({r:.0},{g:.0},{b:.0})")
 }
 
@@ -206,10 +153,7 @@ pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
     let [width, height] = frame.size.map(f64::from);
     let scale = (WIDEST / width.max(1.0)).min(1.0);
     let side = f64::from(config.rasterizer.tile_side) * scale;
-    let most = spans
-        .iter()
-        .map(|span| span.end - span.begin)
-        .fold(1.0, f64::max);
+    let most = spans.iter().map(|span| span.end - span.begin).fold(1.0, f64::max);
     let [width, height] = [width * scale, height * scale];
     let whole = height + CAPTION;
     let mut out = String::new();
@@ -231,23 +175,14 @@ pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
         );
     }
     // Tiles at the edge may reach beyond the picture.
-    let _ = writeln!(
-        out,
-        "<rect y=\"{height:.1}\" width=\"100%\" height=\"{CAPTION}\" fill=\"white\"/>"
-    );
+    let _ = writeln!(out, "<rect y=\"{height:.1}\" width=\"100%\" height=\"{CAPTION}\" fill=\"white\"/>");
     let (top, base) = (height + 6.0, height + 17.0);
     let _ = writeln!(out, "<text x=\"4\" y=\"{base:.1}\">0</text>");
     for step in 0..=10 {
         let (x, color) = (16 + 12 * step, heat(f64::from(step) / 10.0));
-        let _ = writeln!(
-            out,
-            "<rect x=\"{x}\" y=\"{top:.1}\" width=\"12\" height=\"12\" fill=\"{color}\"/>"
-        );
+        let _ = writeln!(out, "<rect x=\"{x}\" y=\"{top:.1}\" width=\"12\" height=\"12\" fill=\"{color}\"/>");
     }
-    let _ = writeln!(
-        out,
-        "<text x=\"154\" y=\"{base:.1}\">{most:.0} cycles a tile</text>"
-    );
+    let _ = writeln!(out, "<text x=\"154\" y=\"{base:.1}\">{most:.0} cycles a tile</text>");
     out + "</svg>\n"
 }
 
@@ -268,10 +203,7 @@ mod tests {
             })
             .into();
         let svg = svg("saturation", &results);
-        assert_eq!(
-            svg.matches("<circle").count(),
-            3 * (SPEED.len() + ENERGY.len())
-        );
+        assert_eq!(svg.matches("<circle").count(), 3 * (SPEED.len() + ENERGY.len()));
         for word in ["none", "tile", "row", "modules", "whole frame"] {
             assert!(svg.contains(&format!(">{word}</text>")), "{word}");
         }
@@ -280,11 +212,7 @@ mod tests {
     #[test]
     fn other_plots_show_every_machine_stage_and_tile() {
         let mut frame = even_frame([320, 200], 20_000, 0.3);
-        frame.draws[0].sort = timing::work::ShaderWork {
-            integer: 1e6,
-            bytes: 1e6,
-            ..Default::default()
-        };
+        frame.draws[0].sort = timing::work::ShaderWork { integer: 1e6, bytes: 1e6, ..Default::default() };
         let machines: Vec<_> = ["modules=2", "modules=4", "modules=8"]
             .map(|setting| {
                 let config = Config::preset("paper-15x16", &[setting.to_owned()]);

@@ -25,11 +25,7 @@ fn right(table: &mut Table, columns: std::ops::Range<usize>) {
 }
 
 fn share(part: f64, whole: f64) -> String {
-    let percent = if whole == 0.0 {
-        0.0
-    } else {
-        part / whole * 100.0
-    };
+    let percent = if whole == 0.0 { 0.0 } else { part / whole * 100.0 };
     format!("{percent:.1} %")
 }
 
@@ -45,32 +41,12 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
     };
     let none = String::new;
     let ms = |value: f64| format!("{value:.3} ms");
-    row(
-        "work",
-        "size",
-        format!("{} x {}", frame.size[0], frame.size[1]),
-        none(),
-    );
+    row("work", "size", format!("{} x {}", frame.size[0], frame.size[1]), none());
     row("work", "pairs listed", frame.pairs().to_string(), none());
-    row(
-        "work",
-        "pairs taken",
-        format!("{:.0}", result.raster.pairs),
-        none(),
-    );
+    row("work", "pairs taken", format!("{:.0}", result.raster.pairs), none());
     let evaluated = [
-        (
-            "blended",
-            result.blended,
-            result.raster.gaussian_evaluations,
-            "Gaussians'",
-        ),
-        (
-            "covered",
-            result.covered,
-            result.raster.triangle_evaluations,
-            "triangles'",
-        ),
+        ("blended", result.blended, result.raster.gaussian_evaluations, "Gaussians'"),
+        ("covered", result.covered, result.raster.triangle_evaluations, "triangles'"),
     ];
     for (name, changed, evaluations, whose) in evaluated {
         if evaluations > 0.0 {
@@ -100,18 +76,10 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         if !always(name) && roofline.milliseconds() == 0.0 {
             continue;
         }
-        let note = format!(
-            "compute {:.3}, memory {:.3} ms",
-            roofline.compute_ms, roofline.memory_ms
-        );
+        let note = format!("compute {:.3}, memory {:.3} ms", roofline.compute_ms, roofline.memory_ms);
         row("time", name, ms(roofline.milliseconds()), note);
     }
-    row(
-        "time",
-        "stage 3, raster",
-        ms(stages.raster),
-        format!("{:.0} cycles", result.raster.cycles),
-    );
+    row("time", "stage 3, raster", ms(stages.raster), format!("{:.0} cycles", result.raster.cycles));
     row(
         "time",
         "stage 3, a frame alone",
@@ -131,12 +99,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         share(result.raster.bytes_wasted, result.raster.bytes_in) + " in vain",
     );
     row("memory", "pixels", gb_s(result.raster.bytes_out), none());
-    row(
-        "memory",
-        "shader cores meanwhile",
-        format!("{:.1} GB/s", result.contention_gb_s),
-        none(),
-    );
+    row("memory", "shader cores meanwhile", format!("{:.1} GB/s", result.contention_gb_s), none());
     if let Some(longest) = longest(spans) {
         let cycles = longest.end - longest.begin;
         let part = cycles / result.raster_alone.cycles.max(1.0);
@@ -148,83 +111,36 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
             row("tiles", "warning", format!("tile {x},{y}"), note);
         }
     }
-    row(
-        "memory",
-        "not counted",
-        none(),
-        "copies, clears, loads and stores of attachments, depth".to_owned(),
-    );
-    row(
-        "frames",
-        "collaborative",
-        format!("{:.1} FPS", result.fps_collaborative),
-        none(),
-    );
-    row(
-        "frames",
-        "serial",
-        format!("{:.1} FPS", result.fps_serial),
-        none(),
-    );
+    row("memory", "not counted", none(), "copies, clears, loads and stores of attachments, depth".to_owned());
+    row("frames", "collaborative", format!("{:.1} FPS", result.fps_collaborative), none());
+    row("frames", "serial", format!("{:.1} FPS", result.fps_serial), none());
     row(
         "frames",
         "baseline",
         format!("{:.1} FPS", result.baseline_fps),
         format!("raster {}", ms(result.baseline_raster_ms)),
     );
-    row(
-        "frames",
-        "speed-up",
-        format!("{:.2}x", result.speedup),
-        none(),
-    );
+    row("frames", "speed-up", format!("{:.2}x", result.speedup), none());
     if result.raster.gaussian_evaluations > 0.0 {
         let squares = frame.with_squares();
         let threads = simt::simulate(&squares, config);
-        let note = format!(
-            "{} of the warps blend; tail {}",
-            share(threads.blended, 1.0),
-            ms(threads.tail_ms)
-        );
-        row(
-            "baseline",
-            "as a SIMT machine",
-            ms(threads.milliseconds()),
-            note,
-        );
+        let note = format!("{} of the warps blend; tail {}", share(threads.blended, 1.0), ms(threads.tail_ms));
+        row("baseline", "as a SIMT machine", ms(threads.milliseconds()), note);
         let quads = rivals::quads(frame, config);
         let note = format!("{:.0} fragments; {} limits", quads.fragments, quads.limit());
-        row(
-            "baseline",
-            "as blended quads",
-            ms(quads.milliseconds()),
-            note,
-        );
+        row("baseline", "as blended quads", ms(quads.milliseconds()), note);
     }
     let gains = &result.gains;
     for (name, factor, note) in [
         ("raster speed-up", result.raster_speedup, "product of:"),
-        (
-            "hardware",
-            gains.hardware,
-            "on the same lists, without stalls",
-        ),
-        (
-            "lists",
-            gains.lists,
-            "the rasterizer's instead of the baseline's",
-        ),
+        ("hardware", gains.hardware, "on the same lists, without stalls"),
+        ("lists", gains.lists, "the rasterizer's instead of the baseline's"),
         ("stalls", gains.stalls, "PEs busy while they are theirs"),
     ] {
         row("raster", name, format!("{factor:.2}x"), note.to_owned());
     }
     for (name, millijoules) in result.energy.by_component() {
-        row(
-            "energy",
-            name,
-            format!("{millijoules:.2} mJ"),
-            share(millijoules, result.energy.total()),
-        );
+        row("energy", name, format!("{millijoules:.2} mJ"), share(millijoules, result.energy.total()));
     }
     row(
         "energy",
@@ -239,12 +155,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         format!("{:.3} mm2", area.added),
         share(area.ratio, 1.0) + " of the enhanced units",
     );
-    row(
-        "area",
-        "of the SoC",
-        share(area.share_of_soc, 1.0),
-        format!("{:.3} mm2 there", area.added_in_soc),
-    );
+    row("area", "of the SoC", share(area.share_of_soc, 1.0), format!("{:.3} mm2 there", area.added_in_soc));
     right(&mut table, 2..3);
     format!("{table}\n")
 }
@@ -264,11 +175,7 @@ fn summary(result: &Simulation) -> [(&'static str, f64, usize); 14] {
         ("cycles", result.raster.cycles, 0),
         ("raster ms", result.stages.raster, 3),
         ("utilization", result.raster.utilization(), 3),
-        (
-            "memory stall",
-            result.raster.modules.memory / result.raster.modules.total().max(1.0),
-            3,
-        ),
+        ("memory stall", result.raster.modules.memory / result.raster.modules.total().max(1.0), 3),
         ("FPS", result.fps, 1),
         ("FPS serial", result.fps_serial, 1),
         ("raster speed-up", result.raster_speedup, 2),
@@ -291,9 +198,7 @@ pub fn many(results: &[(String, Simulation)]) -> String {
             let names = summary.iter().map(|(name, ..)| *name);
             table.set_header(std::iter::once("machine").chain(names));
         }
-        let values = summary
-            .iter()
-            .map(|(_, value, decimals)| format!("{value:.decimals$}"));
+        let values = summary.iter().map(|(_, value, decimals)| format!("{value:.decimals$}"));
         table.add_row(std::iter::once(name.clone()).chain(values));
     }
     right(&mut table, 1..15);
@@ -317,11 +222,7 @@ pub fn compared(frames: &[Compared]) -> String {
     table.set_header(["frame", "", "", "fast", "stepped", "difference"]);
     for frame in frames {
         let (fast, stepped) = (&frame.fast, &frame.stepped);
-        let difference = if stepped.cycles == 0.0 {
-            0.0
-        } else {
-            (fast.cycles / stepped.cycles - 1.0) * 100.0
-        };
+        let difference = if stepped.cycles == 0.0 { 0.0 } else { (fast.cycles / stepped.cycles - 1.0) * 100.0 };
         table.add_row([
             frame.frame.to_string(),
             frame.how.to_owned(),
@@ -353,11 +254,7 @@ pub fn compared(frames: &[Compared]) -> String {
 
 /// A field of a CSV line, quoted if necessary.
 fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 /// A CSV line for each machine, with its area in mm2 if there is one for each.
@@ -370,10 +267,7 @@ pub fn csv(results: &[(String, Simulation)], areas: &[f64]) -> String {
             let names: Vec<_> = summary.iter().map(|(name, ..)| *name).collect();
             out += &format!("machine,{}\n", names.join(","));
         }
-        let values: Vec<_> = summary
-            .iter()
-            .map(|(_, value, _)| value.to_string())
-            .collect();
+        let values: Vec<_> = summary.iter().map(|(_, value, _)| value.to_string()).collect();
         out += &format!("{},{}\n", field(name), values.join(","));
     }
     out
@@ -387,14 +281,7 @@ pub fn paper(sections: &[Section]) -> String {
         table.set_content_arrangement(ContentArrangement::Dynamic);
         table.set_header(["", "paper", "model", "difference", "label", "how"]);
         for row in &section.rows {
-            table.add_row([
-                &row.item,
-                &row.paper,
-                &row.model,
-                &row.difference,
-                row.label.name(),
-                &row.note,
-            ]);
+            table.add_row([&row.item, &row.paper, &row.model, &row.difference, row.label.name(), &row.note]);
         }
         right(&mut table, 1..4);
         out += &format!("{}\n{}\n{table}\n\n", section.title, section.text);
@@ -407,15 +294,8 @@ pub fn paper_csv(sections: &[Section]) -> String {
     let mut out = "section,item,paper,model,difference,label,how\n".to_owned();
     for section in sections {
         for row in &section.rows {
-            let fields = [
-                section.title,
-                &row.item,
-                &row.paper,
-                &row.model,
-                &row.difference,
-                row.label.name(),
-                &row.note,
-            ];
+            let fields =
+                [section.title, &row.item, &row.paper, &row.model, &row.difference, row.label.name(), &row.note];
             out += &(fields.map(field).join(",") + "\n");
         }
     }
@@ -435,37 +315,18 @@ mod tests {
         let (_, spans) = timing::fast::rasterize_tiles(&frame, &config, 0.0);
         let text = one(&frame, &result, &config, &spans);
         assert!(!text.contains("warning"), "{text}");
-        let alone = [TileSpan {
-            end: result.raster_alone.cycles,
-            ..spans[0]
-        }];
+        let alone = [TileSpan { end: result.raster_alone.cycles, ..spans[0] }];
         assert!(one(&frame, &result, &config, &alone).contains("takes most of the stage"));
         let result_gains = result.gains;
-        for part in [
-            "320 x 200",
-            "50000",
-            "stage 3, raster",
-            "mode switch",
-            "FPS",
-            "mJ",
-            "mm2",
-        ] {
+        for part in ["320 x 200", "50000", "stage 3, raster", "mode switch", "FPS", "mJ", "mm2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         let results = [("a,b".to_owned(), result.clone()), ("c".to_owned(), result)];
         // Compares whole rows.
         let cell = |row: &str, column: usize| -> String {
-            let line = text.lines().find(|line| {
-                line.split('┆')
-                    .nth(1)
-                    .is_some_and(|name| name.trim() == row)
-            });
+            let line = text.lines().find(|line| line.split('┆').nth(1).is_some_and(|name| name.trim() == row));
             let line = line.unwrap_or_else(|| panic!("{row}: {text}"));
-            line.split('┆')
-                .nth(column)
-                .unwrap_or_default()
-                .trim_matches([' ', '│'])
-                .to_owned()
+            line.split('┆').nth(column).unwrap_or_default().trim_matches([' ', '│']).to_owned()
         };
         assert_eq!(cell("lists", 2), "1.00x");
         let gains = result_gains.hardware * result_gains.stalls;

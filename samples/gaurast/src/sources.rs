@@ -27,10 +27,7 @@ pub enum SourceError {
     #[error("{}: the folder holds several scenes, of which one must be named: {names}", path.display())]
     Several { path: PathBuf, names: String },
     #[error("{}: {source}", path.display())]
-    Io {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     #[error(
         "{}: the folder holds no scene: neither 3DGS's point_cloud/iteration_N/point_cloud.ply, nor nerfstudio's \
          splat.ply, nor one scene file alone",
@@ -78,27 +75,13 @@ impl Source {
     pub fn of(arguments: &SceneArguments) -> Result<Self, SourceError> {
         let (scenes, transforms) = (&arguments.scenes, &arguments.transform);
         if transforms.len() > scenes.len() {
-            return Err(SourceError::Transforms {
-                scenes: scenes.len(),
-                transforms: transforms.len(),
-            });
+            return Err(SourceError::Transforms { scenes: scenes.len(), transforms: transforms.len() });
         }
-        let mut source = Self {
-            name: DEFAULT_NAME.to_owned(),
-            level: arguments.level,
-            ..Self::default()
-        };
+        let mut source = Self { name: DEFAULT_NAME.to_owned(), level: arguments.level, ..Self::default() };
         let given = transforms.iter().map(|placement| placement.0);
         let given = given.chain(std::iter::repeat(Transform::default()));
         for (path, transform) in scenes.iter().zip(given) {
-            let Part {
-                name,
-                file,
-                cameras,
-                dataparser,
-                background,
-                notes,
-            } = part(path)?;
+            let Part { name, file, cameras, dataparser, background, notes } = part(path)?;
             if source.files.is_empty() {
                 (source.name, source.cameras) = (name, cameras);
                 (source.dataparser, source.background) = (dataparser, background);
@@ -161,28 +144,15 @@ fn part(path: &Path) -> Result<Part, SourceError> {
         return folder(path);
     }
     // Standard input has no name.
-    let name = if path == Path::new("-") {
-        DEFAULT_NAME.to_owned()
-    } else {
-        stem(path)
-    };
-    Ok(Part {
-        name,
-        file: path.to_owned(),
-        dataparser: beside(path, "dataparser_transforms.json"),
-        ..Part::default()
-    })
+    let name = if path == Path::new("-") { DEFAULT_NAME.to_owned() } else { stem(path) };
+    Ok(Part { name, file: path.to_owned(), dataparser: beside(path, "dataparser_transforms.json"), ..Part::default() })
 }
 
 /// A file's name without its folder and its extensions.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.split('.').next().unwrap_or_default();
-    if stem.is_empty() {
-        DEFAULT_NAME.to_owned()
-    } else {
-        stem.to_owned()
-    }
+    if stem.is_empty() { DEFAULT_NAME.to_owned() } else { stem.to_owned() }
 }
 
 fn beside(path: &Path, name: &str) -> Option<PathBuf> {
@@ -190,14 +160,9 @@ fn beside(path: &Path, name: &str) -> Option<PathBuf> {
 }
 
 fn folder(path: &Path) -> Result<Part, SourceError> {
-    let io = |source| SourceError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = |source| SourceError::Io { path: path.to_owned(), source };
     let whole = path.canonicalize().map_err(io)?;
-    let name = whole.file_name().map_or(DEFAULT_NAME.to_owned(), |name| {
-        name.to_string_lossy().into_owned()
-    });
+    let name = whole.file_name().map_or(DEFAULT_NAME.to_owned(), |name| name.to_string_lossy().into_owned());
     let there = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
     let mut part = Part {
         name,
@@ -210,10 +175,7 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
         file
     } else if let Some(file) = there("point_cloud.ply").or_else(|| there("splat.ply")) {
         file
-    } else if there("meta.json")
-        .or_else(|| there("lod-meta.json"))
-        .is_some()
-    {
+    } else if there("meta.json").or_else(|| there("lod-meta.json")).is_some() {
         // A SOG scene of several files.
         path.to_owned()
     } else {
@@ -224,8 +186,7 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
         && text.contains("white_background=True")
     {
         part.background = Some(Background::Color([1.0; 3]));
-        part.notes
-            .push("the background is white, as cfg_args says".to_owned());
+        part.notes.push("the background is white, as cfg_args says".to_owned());
     }
     Ok(part)
 }
@@ -249,9 +210,7 @@ fn scenes(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in folder.read_dir()? {
         let path = entry?.path();
-        let extension = path
-            .extension()
-            .map(|e| format!(".{}", e.to_string_lossy()));
+        let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy()));
         // A .json file may be of any kind.
         let is_scene = |e: String| e != ".json" && known.split(", ").any(|k| k == e);
         if path.is_file() && extension.is_some_and(is_scene) {
@@ -265,27 +224,16 @@ fn scenes(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 /// The only scene file in `folder`.
 fn only_scene(folder: &Path) -> Result<PathBuf, SourceError> {
     let path = || folder.to_owned();
-    let mut found = scenes(folder).map_err(|source| SourceError::Io {
-        path: path(),
-        source,
-    })?;
+    let mut found = scenes(folder).map_err(|source| SourceError::Io { path: path(), source })?;
     if found.len() < 2 {
         return found.pop().ok_or_else(|| why_none(folder));
     }
-    let name = |file: &PathBuf| {
-        file.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
+    let name = |file: &PathBuf| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut names: Vec<String> = found.iter().take(NAMED).map(name).collect();
     if found.len() > NAMED {
         names.push(format!("and {} more", found.len() - NAMED));
     }
-    Err(SourceError::Several {
-        path: path(),
-        names: names.join(", "),
-    })
+    Err(SourceError::Several { path: path(), names: names.join(", ") })
 }
 
 fn why_none(path: &Path) -> SourceError {
@@ -311,34 +259,20 @@ mod tests {
     }
 
     fn of(folder: &Path) -> Result<Source, SourceError> {
-        Source::of(&SceneArguments {
-            scenes: vec![folder.to_owned()],
-            ..SceneArguments::default()
-        })
+        Source::of(&SceneArguments { scenes: vec![folder.to_owned()], ..SceneArguments::default() })
     }
 
     #[test]
     fn inrias_output_is_its_highest_iteration() {
         let folder = tempfile::tempdir().expect("a folder");
         for iteration in [7000, 30_000, 900] {
-            touch(
-                folder.path(),
-                &format!("point_cloud/iteration_{iteration}/point_cloud.ply"),
-                "",
-            );
+            touch(folder.path(), &format!("point_cloud/iteration_{iteration}/point_cloud.ply"), "");
         }
         touch(folder.path(), "cameras.json", "[]");
-        touch(
-            folder.path(),
-            "cfg_args",
-            "Namespace(sh_degree=3, white_background=True)",
-        );
+        touch(folder.path(), "cfg_args", "Namespace(sh_degree=3, white_background=True)");
         let source = of(folder.path()).expect("a scene");
         let (file, _) = &source.files[0];
-        assert!(
-            file.ends_with("iteration_30000/point_cloud.ply"),
-            "{file:?}"
-        );
+        assert!(file.ends_with("iteration_30000/point_cloud.ply"), "{file:?}");
         assert!(source.cameras.is_some());
         assert_eq!(source.background, Some(Background::Color([1.0; 3])));
         assert_eq!(source.notes.len(), 2);
@@ -359,11 +293,7 @@ mod tests {
         touch(folder.path(), "a.ply", "");
         assert!(of(folder.path()).is_ok());
         touch(folder.path(), "b.spz", "");
-        assert!(
-            refused().contains("one must be named: a.ply, b.spz"),
-            "{}",
-            refused()
-        );
+        assert!(refused().contains("one must be named: a.ply, b.spz"), "{}", refused());
         touch(folder.path(), "splat.ply", "");
         let source = of(folder.path()).expect("nerfstudio's");
         assert!(source.files[0].0.ends_with("splat.ply"));

@@ -38,15 +38,12 @@ impl OutOfMemory {
 /// # Errors
 /// Returns [`OutOfMemory`] if an allocation in `body` failed.
 pub fn catch<R>(body: impl FnOnce() -> R) -> Result<R, OutOfMemory> {
-    catch_unwind(AssertUnwindSafe(body)).map_err(|payload| {
-        OutOfMemory::of_panic(payload.as_ref()).unwrap_or_else(|| resume_unwind(payload))
-    })
+    catch_unwind(AssertUnwindSafe(body))
+        .map_err(|payload| OutOfMemory::of_panic(payload.as_ref()).unwrap_or_else(|| resume_unwind(payload)))
 }
 
 fn refused<T>(count: usize) -> OutOfMemory {
-    OutOfMemory {
-        bytes: (count as u64).saturating_mul(size_of::<T>() as u64),
-    }
+    OutOfMemory { bytes: (count as u64).saturating_mul(size_of::<T>() as u64) }
 }
 
 /// Reserves memory in `items` for `additional` more.
@@ -60,11 +57,7 @@ pub fn reserve<T>(items: &mut Vec<T>, additional: usize) {
 #[cold]
 fn grow<T>(items: &mut Vec<T>, additional: usize) {
     // An empty vector is rarely grown again.
-    let reserved = if items.is_empty() {
-        items.try_reserve_exact(additional)
-    } else {
-        items.try_reserve(additional)
-    };
+    let reserved = if items.is_empty() { items.try_reserve_exact(additional) } else { items.try_reserve(additional) };
     if injection::fails() || reserved.is_err() {
         refused::<T>(additional).unwind();
     }

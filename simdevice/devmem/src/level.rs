@@ -17,19 +17,12 @@ pub enum SimdLevel {
 
 impl SimdLevel {
     /// Every level with the name that selects it.
-    pub const NAMES: &[(&str, Self)] = &[
-        ("best", Self::Best),
-        ("sse2", Self::Baseline),
-        ("avx2", Self::Avx2),
-        ("avx512", Self::Avx512),
-    ];
+    pub const NAMES: &[(&str, Self)] =
+        &[("best", Self::Best), ("sse2", Self::Baseline), ("avx2", Self::Avx2), ("avx512", Self::Avx512)];
 
     /// The level of that name, in any case.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES
-            .iter()
-            .find(|(known, _)| known.eq_ignore_ascii_case(name))
-            .map(|&(_, level)| level)
+        Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, level)| level)
     }
 
     /// The level's token, if this processor supports it.
@@ -49,11 +42,7 @@ impl SimdLevel {
 
     /// The levels that this processor supports, without repetition.
     pub fn supported() -> Vec<(&'static str, Self)> {
-        Self::NAMES
-            .iter()
-            .filter(|(_, level)| *level != Self::Best && level.resolve().is_some())
-            .copied()
-            .collect()
+        Self::NAMES.iter().filter(|(_, level)| *level != Self::Best && level.resolve().is_some()).copied().collect()
     }
 }
 

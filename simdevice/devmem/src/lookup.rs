@@ -37,23 +37,15 @@ pub fn places(level: Level) -> Option<usize> {
 
 /// The words of a table at sixteen indices, modulo its length. It is fast if the length is that of [`places`].
 #[inline(always)]
-pub fn look_up<S: Simd, const PLACES: usize>(
-    simd: S,
-    table: &[u32; PLACES],
-    places: u32x16<S>,
-) -> u32x16<S> {
+pub fn look_up<S: Simd, const PLACES: usize>(simd: S, table: &[u32; PLACES], places: u32x16<S>) -> u32x16<S> {
     #[cfg(target_arch = "x86_64")]
     match (table.as_chunks::<16>().0, table.as_chunks::<8>().0) {
         ([low, high], _) => {
             if let Some(avx512) = simd.level().as_avx512() {
                 let vector = |words: [u32; 16]| u32x16::simd_from(avx512, words);
                 let of = vector(places.into());
-                let found =
-                    permute_32(avx512, vector(*low).into(), of.into(), vector(*high).into());
-                return u32x16::simd_from(
-                    simd,
-                    <[u32; 16]>::from(u32x16::simd_from(avx512, found)),
-                );
+                let found = permute_32(avx512, vector(*low).into(), of.into(), vector(*high).into());
+                return u32x16::simd_from(simd, <[u32; 16]>::from(u32x16::simd_from(avx512, found)));
             }
         }
         (_, [words]) => {

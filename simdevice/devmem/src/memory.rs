@@ -89,21 +89,11 @@ impl Allocation {
         if host::injection::fails() {
             return Err(refuse(std::io::ErrorKind::OutOfMemory.into()));
         }
-        let map = MmapOptions::new()
-            .len(bytes)
-            .no_reserve_swap()
-            .map_anon()
-            .map_err(refuse)?;
+        let map = MmapOptions::new().len(bytes).no_reserve_swap().map_anon().map_err(refuse)?;
         let map = MmapRaw::from(map);
         // SAFETY: the mapping is new and belongs to this function.
         unsafe { hints::prefer_huge(map.as_mut_ptr(), bytes) };
-        Ok(Arc::new(Self {
-            map,
-            len,
-            generation: AtomicU64::new(0),
-            host_visible,
-            derived: Derived::default(),
-        }))
+        Ok(Arc::new(Self { map, len, generation: AtomicU64::new(0), host_visible, derived: Derived::default() }))
     }
 
     /// The length in bytes.
@@ -191,13 +181,7 @@ impl Allocation {
     ///
     /// # Errors
     /// [`OutOfBounds`], and nothing is written, if either range does not lie inside its allocation.
-    pub fn copy_from(
-        &self,
-        offset: u64,
-        source: &Self,
-        source_offset: u64,
-        size: u64,
-    ) -> Result<(), OutOfBounds> {
+    pub fn copy_from(&self, offset: u64, source: &Self, source_offset: u64, size: u64) -> Result<(), OutOfBounds> {
         let bytes = usize::try_from(size).unwrap_or(usize::MAX);
         let from = source.checked(source_offset, bytes)?;
         let to = self.checked(offset, bytes)?;
@@ -229,11 +213,7 @@ impl Allocation {
     /// The address of byte `offset`, if `size` bytes from there on lie inside the allocation.
     #[inline]
     fn checked(&self, offset: u64, size: usize) -> Result<*mut u8, OutOfBounds> {
-        let out_of_bounds = OutOfBounds {
-            offset,
-            size: size as u64,
-            len: self.len,
-        };
+        let out_of_bounds = OutOfBounds { offset, size: size as u64, len: self.len };
         let end = offset.checked_add(size as u64).ok_or(out_of_bounds)?;
         if end > self.len {
             return Err(out_of_bounds);

@@ -11,21 +11,9 @@ fn what_has_no_memory_unwinds_to_where_it_is_caught() {
         resize(&mut items, 5, 1u32);
         push(&mut items, 2);
         let zeros: Vec<u64> = zeroed(10);
-        (
-            items,
-            zeros.len(),
-            copied(&[3u8, 4]),
-            collect(0..3u8),
-            filled('x', 2),
-        )
+        (items, zeros.len(), copied(&[3u8, 4]), collect(0..3u8), filled('x', 2))
     };
-    let expected = (
-        vec![1, 1, 1, 1, 1, 2],
-        10,
-        vec![3, 4],
-        vec![0, 1, 2],
-        vec!['x', 'x'],
-    );
+    let expected = (vec![1, 1, 1, 1, 1, 2], 10, vec![3, 4], vec![0, 1, 2], vec!['x', 'x']);
     assert_eq!(catch(all), Ok(expected.clone()));
     let mut failed = 0;
     loop {

@@ -40,10 +40,7 @@ fn arithmetic() -> Program {
     let next = b.compute(Op::IAdd, &[i, one]);
     b.assign(i, next);
     b.end();
-    let total = sums
-        .into_iter()
-        .reduce(|a, c| b.compute(Op::FAdd, &[a, c]))
-        .unwrap_or(x);
+    let total = sums.into_iter().reduce(|a, c| b.compute(Op::FAdd, &[a, c])).unwrap_or(x);
     b.assign(out, total);
     b.finish().expect("a valid program")
 }
@@ -87,58 +84,28 @@ fn mandelbrot() -> Program {
 
 /// Runs batches for a while. Returns lanes a second and the work of one pass.
 fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f64, f64)> {
-    let options = Options {
-        lanes,
-        count_work: false,
-        ..Options::new(level.resolve()?)
-    };
-    let counting = Options {
-        count_work: true,
-        ..options
-    };
+    let options = Options { lanes, count_work: false, ..Options::new(level.resolve()?) };
+    let counting = Options { count_work: true, ..options };
     let resources = Resources::default();
     let run = |machine: &mut Machine, start: usize| {
         for lane in 0..lanes {
             let pixel = start + lane;
             machine.set_input(0, lane, ((pixel % 512) as f32 / 200.0 - 2.0).to_bits());
-            machine.set_input(
-                1,
-                lane,
-                ((pixel / 512 % 512) as f32 / 256.0 - 1.0).to_bits(),
-            );
+            machine.set_input(1, lane, ((pixel / 512 % 512) as f32 / 256.0 - 1.0).to_bits());
         }
-        machine
-            .run(
-                &LaneMask::first(lanes),
-                &LaneMask::none(),
-                &resources,
-                Watchdog::default(),
-            )
-            .expect("it ends");
+        machine.run(&LaneMask::first(lanes), &LaneMask::none(), &resources, Watchdog::default()).expect("it ends");
     };
-    let mut machine = Machine::new(Arc::new(
-        Executable::new(program.clone(), &counting).expect("a valid program"),
-    ));
-    (0..512 * 512)
-        .step_by(lanes)
-        .for_each(|start| run(&mut machine, start));
+    let mut machine = Machine::new(Arc::new(Executable::new(program.clone(), &counting).expect("a valid program")));
+    (0..512 * 512).step_by(lanes).for_each(|start| run(&mut machine, start));
     let work = machine.take_work();
     let instructions = work.lanes as f64 / (512.0 * 512.0);
-    let mut machine = Machine::new(Arc::new(
-        Executable::new(program.clone(), &options).expect("a valid program"),
-    ));
+    let mut machine = Machine::new(Arc::new(Executable::new(program.clone(), &options).expect("a valid program")));
     let (begin, mut done) = (Instant::now(), 0u32);
     while begin.elapsed() < Duration::from_millis(800) {
-        (0..512 * 512)
-            .step_by(lanes)
-            .for_each(|start| run(&mut machine, start));
+        (0..512 * 512).step_by(lanes).for_each(|start| run(&mut machine, start));
         done += 512 * 512;
     }
-    Some((
-        f64::from(done) / begin.elapsed().as_secs_f64(),
-        instructions,
-        work.occupancy(),
-    ))
+    Some((f64::from(done) / begin.elapsed().as_secs_f64(), instructions, work.occupancy()))
 }
 
 fn main() {

@@ -21,12 +21,7 @@ pub struct Resources<'a> {
 
 impl Default for Resources<'_> {
     fn default() -> Self {
-        Self {
-            buffers: &[],
-            push_constants: &[],
-            images: &NoImages,
-            global: &NoGlobalMemory,
-        }
+        Self { buffers: &[], push_constants: &[], images: &NoImages, global: &NoGlobalMemory }
     }
 }
 
@@ -62,16 +57,11 @@ impl GlobalMemory for NoGlobalMemory {
 /// empty.
 pub(crate) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
     let memory = range.memory.words();
-    let end = range
-        .offset
-        .checked_add(range.size)
-        .filter(|end| *end <= range.memory.len());
+    let end = range.offset.checked_add(range.size).filter(|end| *end <= range.memory.len());
     match end {
         Some(end) if range.offset.is_multiple_of(4) => {
             let last = (end.div_ceil(4) as usize).min(memory.len());
-            let words = memory
-                .get((range.offset / 4) as usize..last)
-                .unwrap_or_default();
+            let words = memory.get((range.offset / 4) as usize..last).unwrap_or_default();
             (words, u32::try_from(range.size).unwrap_or(u32::MAX))
         }
         _ => (&[], 0),
@@ -89,10 +79,7 @@ pub type LaneWords = [u32; VECTOR_LANES];
 
 /// The level of detail of a sample for 16 lanes; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "one lives on the stack for each sample"
-)]
+#[allow(clippy::large_enum_variant, reason = "one lives on the stack for each sample")]
 pub enum LodRequest {
     /// Computed from differences within each quad of lanes, and nothing else: as [`LodRequest::Implicit`] with zeros.
     Automatic,

@@ -18,10 +18,7 @@ pub(crate) struct Block {
 impl Block {
     fn of<T: bytemuck::NoUninit>(texels: &[T]) -> Self {
         let bytes: &[u8] = bytemuck::cast_slice(texels);
-        let mut block = Self {
-            bytes: [0; TEXELS * 8],
-            texel_size: bytes.len() / TEXELS,
-        };
+        let mut block = Self { bytes: [0; TEXELS * 8], texel_size: bytes.len() / TEXELS };
         block.bytes[..bytes.len()].copy_from_slice(bytes);
         block
     }
@@ -146,14 +143,11 @@ mod tests {
     fn colours_are_those_of_exact_arithmetic_but_for_a_code() {
         let mut state = 1u64;
         for _ in 0..2000 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let block = (state ^ state >> 29).to_le_bytes();
             let ends = [0, 2].map(|at| u16::from_le_bytes([block[at], block[at + 1]]));
             let exact = ends.map(|end| {
-                [(end >> 11, 31.0), (end >> 5 & 63, 63.0), (end & 31, 31.0)]
-                    .map(|(code, max)| f64::from(code) / max)
+                [(end >> 11, 31.0), (end >> 5 & 63, 63.0), (end & 31, 31.0)].map(|(code, max)| f64::from(code) / max)
             });
             let weight = |code: usize| match (ends[0] > ends[1], code) {
                 (_, 0) => 0.0,
@@ -167,11 +161,7 @@ mod tests {
                 let is_black = ends[0] <= ends[1] && code == 3;
                 for channel in 0..3 {
                     let [a, b] = exact.map(|end| end[channel]);
-                    let expected = if is_black {
-                        0.0
-                    } else {
-                        a + weight(code) * (b - a)
-                    };
+                    let expected = if is_black { 0.0 } else { a + weight(code) * (b - a) };
                     let error = (f64::from(texel[channel]) - expected).abs() * 255.0;
                     assert!(error < 1.0, "{block:?} {index}: {error}");
                 }

@@ -39,8 +39,7 @@ pub(super) fn encode(numeric: Numeric, component: Component, value: f32) -> u32 
         Numeric::Uscaled => (round_ties_even(f64::from(value).clamp(0.0, f64::from(mask)))) as u32,
         Numeric::Sscaled => {
             let max = f64::from(signed_max(bits));
-            round_ties_even(zero_if_nan(f64::from(value).clamp(-max - 1.0, max))) as i32 as u32
-                & mask
+            round_ties_even(zero_if_nan(f64::from(value).clamp(-max - 1.0, max))) as i32 as u32 & mask
         }
         Numeric::Uint => value.to_bits().min(mask),
         Numeric::Sint => {
@@ -172,13 +171,7 @@ pub(super) fn from_shared_exponent(code: u32) -> [f32; 4] {
 /// Encodes a shared-exponent texel (Vulkan 1.3, "RGB to Shared Exponent Conversion").
 pub(super) fn to_shared_exponent(texel: &[f32; 4]) -> u32 {
     const MAX: f32 = 65_408.0;
-    let [r, g, b, _] = texel.map(|component| {
-        if component > 0.0 {
-            component.min(MAX)
-        } else {
-            0.0
-        }
-    });
+    let [r, g, b, _] = texel.map(|component| if component > 0.0 { component.min(MAX) } else { 0.0 });
     let greatest = r.max(g).max(b);
     let floor_log2 = (greatest.to_bits() >> 23) as i32 - 127;
     let preliminary = floor_log2.max(-SHARED_BIAS - 1) + 1 + SHARED_BIAS;
@@ -188,10 +181,7 @@ pub(super) fn to_shared_exponent(texel: &[f32; 4]) -> u32 {
     };
     let carries = mantissa(greatest, preliminary) == 1 << SHARED_MANTISSA;
     let exponent = preliminary + i32::from(carries);
-    mantissa(r, exponent)
-        | mantissa(g, exponent) << 9
-        | mantissa(b, exponent) << 18
-        | (exponent as u32) << 27
+    mantissa(r, exponent) | mantissa(g, exponent) << 9 | mantissa(b, exponent) << 18 | (exponent as u32) << 27
 }
 
 /// Tables of the sRGB transfer function and its inverse for 8-bit codes.
@@ -208,27 +198,17 @@ static SRGB: LazyLock<Srgb> = LazyLock::new(Srgb::new);
 
 /// The sRGB transfer function from linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.2).
 pub(super) fn srgb_from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// The sRGB transfer function to linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.1).
 pub(super) fn linear_from_srgb(encoded: f64) -> f64 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 impl Srgb {
     fn new() -> Self {
-        let nearest = |bits: u32| {
-            (srgb_from_linear(f64::from(f32::from_bits(bits))) * 255.0).round_ties_even() as u8
-        };
+        let nearest = |bits: u32| (srgb_from_linear(f64::from(f32::from_bits(bits))) * 255.0).round_ties_even() as u8;
         let one = 1f32.to_bits();
         // Positive floats have the same order as their bits, and so have their codes.
         let threshold = std::array::from_fn(|code| {

@@ -57,9 +57,7 @@ impl DepthEncoding {
                 // more.
                 let nearest = scaled.round_ties_even();
                 let excess = (scaled - nearest + 0.5) - depth;
-                let one = excess
-                    .simd_lt(0.0)
-                    .select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+                let one = excess.simd_lt(0.0).select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
                 (nearest - one).to_int::<u32x16<S>>()
             }
         }

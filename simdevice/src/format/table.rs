@@ -248,9 +248,7 @@ impl Format {
             Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
                 decode_each(bytes, out, |texel: [u8; 4]| texel.map(convert::from_unorm8));
             }
-            Self::B8G8R8A8Unorm => decode_each(bytes, out, |[b, g, r, a]| {
-                [r, g, b, a].map(convert::from_unorm8)
-            }),
+            Self::B8G8R8A8Unorm => decode_each(bytes, out, |[b, g, r, a]| [r, g, b, a].map(convert::from_unorm8)),
             Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
                 decode_each(bytes, out, convert::from_srgb8);
             }
@@ -261,9 +259,7 @@ impl Format {
                 let (texels, _) = bytes.as_chunks::<8>();
                 convert::from_halves(texels.as_flattened(), out.as_flattened_mut());
             }
-            Self::R32Sfloat => decode_each(bytes, out, |texel: [u8; 4]| {
-                [f32::from_le_bytes(texel), 0.0, 0.0, 1.0]
-            }),
+            Self::R32Sfloat => decode_each(bytes, out, |texel: [u8; 4]| [f32::from_le_bytes(texel), 0.0, 0.0, 1.0]),
             Self::R32G32Sfloat => decode_each(bytes, out, |texel: [u8; 8]| {
                 let [x, y] = bytemuck::cast(texel);
                 [x, y, 0.0, 1.0]
@@ -275,9 +271,9 @@ impl Format {
             Self::R32G32B32A32Sfloat => {
                 decode_each(bytes, out, bytemuck::cast::<[u8; 16], _>);
             }
-            Self::E5B9G9R9UfloatPack32 => decode_each(bytes, out, |texel| {
-                convert::from_shared_exponent(u32::from_le_bytes(texel))
-            }),
+            Self::E5B9G9R9UfloatPack32 => {
+                decode_each(bytes, out, |texel| convert::from_shared_exponent(u32::from_le_bytes(texel)))
+            }
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());
                 for (texel, out) in bytes.chunks_exact(self.texel_size()).zip(out) {
@@ -293,9 +289,7 @@ impl Format {
             Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
                 encode_each(texels, out, |texel| texel.map(convert::to_unorm8));
             }
-            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| {
-                [b, g, r, a].map(convert::to_unorm8)
-            }),
+            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| [b, g, r, a].map(convert::to_unorm8)),
             Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
                 encode_each(texels, out, convert::to_srgb8);
             }
@@ -310,9 +304,9 @@ impl Format {
             Self::R32G32B32A32Sfloat => {
                 encode_each(texels, out, bytemuck::cast::<_, [u8; 16]>);
             }
-            Self::E5B9G9R9UfloatPack32 => encode_each(texels, out, |texel| {
-                convert::to_shared_exponent(&texel).to_le_bytes()
-            }),
+            Self::E5B9G9R9UfloatPack32 => {
+                encode_each(texels, out, |texel| convert::to_shared_exponent(&texel).to_le_bytes())
+            }
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());
                 for (out, texel) in out.chunks_exact_mut(self.texel_size()).zip(texels) {
@@ -342,11 +336,7 @@ impl Format {
 }
 
 /// Decodes texels of `N` bytes.
-fn decode_each<const N: usize>(
-    bytes: &[u8],
-    out: &mut [[f32; 4]],
-    decode: impl Fn([u8; N]) -> [f32; 4],
-) {
+fn decode_each<const N: usize>(bytes: &[u8], out: &mut [[f32; 4]], decode: impl Fn([u8; N]) -> [f32; 4]) {
     let (texels, _) = bytes.as_chunks();
     for (&texel, out) in texels.iter().zip(out) {
         *out = decode(texel);
@@ -354,22 +344,14 @@ fn decode_each<const N: usize>(
 }
 
 /// Encodes texels of `N` bytes.
-fn encode_each<const N: usize>(
-    texels: &[[f32; 4]],
-    out: &mut [u8],
-    encode: impl Fn([f32; 4]) -> [u8; N],
-) {
+fn encode_each<const N: usize>(texels: &[[f32; 4]], out: &mut [u8], encode: impl Fn([f32; 4]) -> [u8; N]) {
     let (out, _) = out.as_chunks_mut();
     for (&texel, out) in texels.iter().zip(out) {
         *out = encode(texel);
     }
 }
 
-pub(super) fn decode_components(
-    numeric: Numeric,
-    components: &[Component],
-    bytes: &[u8],
-) -> [f32; 4] {
+pub(super) fn decode_components(numeric: Numeric, components: &[Component], bytes: &[u8]) -> [f32; 4] {
     let mut texel = [0; MAX_TEXEL_SIZE];
     texel[..bytes.len()].copy_from_slice(bytes);
     let mut rest = u128::from_le_bytes(texel);
@@ -387,12 +369,7 @@ pub(super) fn decode_components(
     out
 }
 
-pub(super) fn encode_components(
-    numeric: Numeric,
-    components: &[Component],
-    texel: &[f32; 4],
-    out: &mut [u8],
-) {
+pub(super) fn encode_components(numeric: Numeric, components: &[Component], texel: &[f32; 4], out: &mut [u8]) {
     let (mut bits, mut shift) = (0u128, 0);
     for component in components {
         if let Some(register) = component.channel.register() {
@@ -407,11 +384,7 @@ pub(super) fn encode_components(
 impl Format {
     /// The number of texels along the side of a storage unit: 4 for compressed formats, otherwise 1.
     pub const fn block_side(self) -> u32 {
-        if self.decompressed().is_some() {
-            block::SIDE as u32
-        } else {
-            1
-        }
+        if self.decompressed().is_some() { block::SIDE as u32 } else { 1 }
     }
 
     /// The uncompressed format that holds a compressed format's texels without loss; `None` if this format is not

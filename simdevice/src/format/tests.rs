@@ -10,10 +10,7 @@ fn first<const N: usize>(texel: &[u8; MAX_TEXEL_SIZE]) -> [u8; N] {
 /// The formats whose components are decoded and encoded independently of each other.
 fn simple() -> impl Iterator<Item = Format> {
     Format::ALL.iter().copied().filter(|format| {
-        !matches!(
-            format.numeric(),
-            Numeric::SharedExponent | Numeric::DepthStencil
-        ) && format.decompressed().is_none()
+        !matches!(format.numeric(), Numeric::SharedExponent | Numeric::DepthStencil) && format.decompressed().is_none()
     })
 }
 
@@ -36,11 +33,7 @@ fn every_code_survives_a_round_trip() {
         for component in format.components() {
             let codes = 1u64 << component.bits;
             // Every code of up to 16 bits is tested, and a sample of the wider ones.
-            let step = if component.bits <= 16 {
-                1
-            } else {
-                codes / 65_521
-            };
+            let step = if component.bits <= 16 { 1 } else { codes / 65_521 };
             for code in (0..codes).step_by(step as usize) {
                 let texel = (u128::from(code) << shift).to_le_bytes();
                 let size = format.texel_size();
@@ -111,18 +104,7 @@ fn unorm_rounds_to_nearest_even_and_clamps() {
 
 #[gaurast_runner::test]
 fn fast_rows_agree_with_single_components() {
-    let values = [
-        -0.5,
-        0.0,
-        1e-9,
-        0.001,
-        0.25,
-        0.5,
-        0.7,
-        1.0,
-        1.5,
-        f32::INFINITY,
-    ];
+    let values = [-0.5, 0.0, 1e-9, 0.001, 0.25, 0.5, 0.7, 1.0, 1.5, f32::INFINITY];
     for format in [
         Format::R8G8B8A8Unorm,
         Format::B8G8R8A8Unorm,
@@ -137,12 +119,7 @@ fn fast_rows_agree_with_single_components() {
             let size = format.texel_size();
             let fast = format.encode(texel);
             let mut slow = [0; MAX_TEXEL_SIZE];
-            encode_components(
-                format.numeric(),
-                format.components(),
-                &texel,
-                &mut slow[..size],
-            );
+            encode_components(format.numeric(), format.components(), &texel, &mut slow[..size]);
             assert_eq!(fast, slow, "{format:?} {texel:?}");
             let decoded = decode_components(format.numeric(), format.components(), &slow[..size]);
             assert_eq!(format.decode(&slow), decoded, "{format:?}");
@@ -166,10 +143,7 @@ fn srgb_follows_its_definition() {
         let code = format.encode([linear; 4])[0];
         assert_eq!(code, exact.round_ties_even() as u8, "{linear}");
     }
-    assert_eq!(
-        format.encode([1e-7, -1.0, f32::NAN, 2.0])[..4],
-        [0, 0, 0, 255]
-    );
+    assert_eq!(format.encode([1e-7, -1.0, f32::NAN, 2.0])[..4], [0, 0, 0, 255]);
 }
 
 /// The components of an integer format's texel.
@@ -184,56 +158,25 @@ fn encode_integer(format: Format, texel: [u32; 4]) -> [u8; MAX_TEXEL_SIZE] {
 
 #[gaurast_runner::test]
 fn integers_are_sign_extended_and_clamped() {
-    assert_eq!(
-        decode_integer(Format::R8G8Sint, [0xFF, 0x7F]),
-        [u32::MAX, 127, 0, 1]
-    );
-    assert_eq!(
-        decode_integer(Format::R8G8Uint, [0xFF, 0x7F]),
-        [255, 127, 0, 1]
-    );
-    assert_eq!(
-        encode_integer(Format::R8G8Uint, [300, 7, 0, 0])[..2],
-        [255, 7]
-    );
+    assert_eq!(decode_integer(Format::R8G8Sint, [0xFF, 0x7F]), [u32::MAX, 127, 0, 1]);
+    assert_eq!(decode_integer(Format::R8G8Uint, [0xFF, 0x7F]), [255, 127, 0, 1]);
+    assert_eq!(encode_integer(Format::R8G8Uint, [300, 7, 0, 0])[..2], [255, 7]);
     let low = -300i32 as u32;
-    assert_eq!(
-        encode_integer(Format::R8G8Sint, [low, 300, 0, 0])[..2],
-        [0x80, 0x7F]
-    );
-    assert_eq!(
-        decode_integer(Format::R32Uint, [1, 0, 0x80, 0x7F])[0],
-        0x7F80_0001
-    );
+    assert_eq!(encode_integer(Format::R8G8Sint, [low, 300, 0, 0])[..2], [0x80, 0x7F]);
+    assert_eq!(decode_integer(Format::R32Uint, [1, 0, 0x80, 0x7F])[0], 0x7F80_0001);
 }
 
 #[gaurast_runner::test]
 fn scaled_and_signed_normalised_components() {
-    assert_eq!(
-        Format::R8G8Uscaled.decode(&[200, 3]),
-        [200.0, 3.0, 0.0, 1.0]
-    );
-    assert_eq!(
-        Format::R8G8Sscaled.decode(&[0x80, 3]),
-        [-128.0, 3.0, 0.0, 1.0]
-    );
-    assert_eq!(
-        Format::R8G8Snorm.decode(&[0x80, 0x81]),
-        [-1.0, -1.0, 0.0, 1.0]
-    );
-    assert_eq!(
-        Format::R8G8Snorm.encode([-2.0, f32::NAN, 0.0, 0.0])[..2],
-        [0x81, 0]
-    );
+    assert_eq!(Format::R8G8Uscaled.decode(&[200, 3]), [200.0, 3.0, 0.0, 1.0]);
+    assert_eq!(Format::R8G8Sscaled.decode(&[0x80, 3]), [-128.0, 3.0, 0.0, 1.0]);
+    assert_eq!(Format::R8G8Snorm.decode(&[0x80, 0x81]), [-1.0, -1.0, 0.0, 1.0]);
+    assert_eq!(Format::R8G8Snorm.encode([-2.0, f32::NAN, 0.0, 0.0])[..2], [0x81, 0]);
 }
 
 #[gaurast_runner::test]
 fn unsigned_floats_round_to_nearest() {
-    let encode = |x| {
-        u32::from_le_bytes(first(
-            &Format::B10G11R11UfloatPack32.encode([x, 0.0, 0.0, 0.0]),
-        ))
-    };
+    let encode = |x| u32::from_le_bytes(first(&Format::B10G11R11UfloatPack32.encode([x, 0.0, 0.0, 0.0])));
     assert_eq!(encode(1.0), 15 << 6);
     assert_eq!(encode(1.0 + 1.0 / 128.0), 15 << 6, "a tie goes to even");
     assert_eq!(encode(1.0 + 3.0 / 128.0), (15 << 6) + 2);
@@ -247,20 +190,13 @@ fn unsigned_floats_round_to_nearest() {
 #[gaurast_runner::test]
 fn shared_exponents() {
     let format = Format::E5B9G9R9UfloatPack32;
-    for texel in [
-        [1.0, 0.5, 0.25, 1.0],
-        [65_408.0, 0.0, 128.0, 1.0],
-        [0.0, 0.0, 0.0, 1.0],
-    ] {
+    for texel in [[1.0, 0.5, 0.25, 1.0], [65_408.0, 0.0, 128.0, 1.0], [0.0, 0.0, 0.0, 1.0]] {
         assert_eq!(format.decode(&format.encode(texel)), texel);
     }
     let largest = format.decode(&format.encode([1e9, -3.0, f32::NAN, 1.0]));
     assert_eq!(largest, [65_408.0, 0.0, 0.0, 1.0]);
     let [r, ..] = format.decode(&format.encode([0.999_99, 0.1, 0.1, 1.0]));
-    assert_eq!(
-        r, 1.0,
-        "a mantissa that rounds up carries into the exponent"
-    );
+    assert_eq!(r, 1.0, "a mantissa that rounds up carries into the exponent");
 }
 
 #[gaurast_runner::test]
@@ -271,34 +207,19 @@ fn planes_of_depth_and_stencil() {
     assert_eq!(format.plane(Aspect::Stencil), Some(Format::S8Uint));
     assert_eq!(format.plane(Aspect::Color), None);
     assert_eq!(Format::R8Unorm.plane(Aspect::Depth), None);
-    assert_eq!(
-        Format::D32Sfloat.plane(Aspect::Depth),
-        Some(Format::D32Sfloat)
-    );
+    assert_eq!(Format::D32Sfloat.plane(Aspect::Depth), Some(Format::D32Sfloat));
 }
 
 #[gaurast_runner::test]
 fn clear_values_follow_the_format() {
-    let value = ClearValue::DepthStencil {
-        depth: 1.0,
-        stencil: 0x1FE,
-    };
+    let value = ClearValue::DepthStencil { depth: 1.0, stencil: 0x1FE };
     let format = Format::D24UnormS8Uint;
-    assert_eq!(
-        format.encode_clear(Aspect::Depth, value)[..4],
-        [0xFF, 0xFF, 0xFF, 0]
-    );
+    assert_eq!(format.encode_clear(Aspect::Depth, value)[..4], [0xFF, 0xFF, 0xFF, 0]);
     assert_eq!(format.encode_clear(Aspect::Stencil, value)[0], 0xFE);
     let value = ClearValue::Int([-1, 2, 0, 0]);
-    assert_eq!(
-        Format::R8G8Sint.encode_clear(Aspect::Color, value)[..2],
-        [0xFF, 2]
-    );
+    assert_eq!(Format::R8G8Sint.encode_clear(Aspect::Color, value)[..2], [0xFF, 2]);
     let value = ClearValue::Float([1.0, 0.5, 0.0, 1.0]);
-    assert_eq!(
-        Format::B8G8R8A8Unorm.encode_clear(Aspect::Color, value)[..4],
-        [0, 128, 255, 255]
-    );
+    assert_eq!(Format::B8G8R8A8Unorm.encode_clear(Aspect::Color, value)[..4], [0, 128, 255, 255]);
 }
 
 #[gaurast_runner::test]
@@ -317,11 +238,7 @@ fn rows_stop_where_either_slice_does() {
         assert_eq!(out[6..], [[9.0; 4]; 3], "{format:?}");
         let one = format.decode(&bytes);
         assert_eq!(
-            out[..6]
-                .as_flattened()
-                .iter()
-                .map(|x| x.to_bits())
-                .collect::<Vec<_>>(),
+            out[..6].as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
             one.map(f32::to_bits).repeat(6)
         );
         let mut back = vec![0xEE; 9 * size];

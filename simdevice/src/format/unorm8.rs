@@ -17,11 +17,7 @@ macro_rules! unorm8_fraction {
         /// One byte of each word divided by 255, correctly rounded.
         #[inline(always)]
         pub fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
-            let code = if shift == 24 {
-                word >> 24
-            } else {
-                (word >> shift) & 0xFF
-            };
+            let code = if shift == 24 { word >> 24 } else { (word >> shift) & 0xFF };
             let code = $floats::float_from(code.bitcast::<$integers<S>>());
             code * INV_255[0] + code * INV_255[1]
         }
@@ -102,9 +98,5 @@ pub fn unpack_unorm8<S: Simd>(_: S, texels: u32x16<S>, bgra: bool) -> Colors<S> 
     let second = unorm8_fraction(texels, 8);
     let third = unorm8_fraction(texels, 16);
     let fourth = unorm8_fraction(texels, 24);
-    if bgra {
-        [third, second, first, fourth]
-    } else {
-        [first, second, third, fourth]
-    }
+    if bgra { [third, second, first, fourth] } else { [first, second, third, fourth] }
 }

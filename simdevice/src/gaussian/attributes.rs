@@ -3,9 +3,7 @@
 use super::lanes::F32_LANES;
 use super::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use crate::format::Format;
-use crate::packet::{
-    Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream,
-};
+use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
 use devmem::Allocation;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Weak};
@@ -84,12 +82,7 @@ impl<'a> Group<'a> {
             None => Vertices::From(first),
             Some(stream) => Vertices::Listed(read_indices(stream, first, len)),
         };
-        Self {
-            vertices,
-            instance,
-            first_instance: append.first_instance,
-            len,
-        }
+        Self { vertices, instance, first_instance: append.first_instance, len }
     }
 
     /// The vertices of `append` with these numbers, relative to its first vertex, for `instance`.
@@ -107,8 +100,7 @@ impl<'a> Group<'a> {
         match stream.instance_divisor {
             Some(0) => u64::from(self.first_instance),
             Some(divisor) => {
-                u64::from(self.first_instance)
-                    + u64::from((self.instance - self.first_instance) / divisor)
+                u64::from(self.first_instance) + u64::from((self.instance - self.first_instance) / divisor)
             }
             None => match &self.vertices {
                 Vertices::From(first) => first + lane as u64,
@@ -140,10 +132,7 @@ fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
 fn layout(format: Format) -> (usize, bool) {
     let floats = matches!(
         format,
-        Format::R32Sfloat
-            | Format::R32G32Sfloat
-            | Format::R32G32B32Sfloat
-            | Format::R32G32B32A32Sfloat
+        Format::R32Sfloat | Format::R32G32Sfloat | Format::R32G32B32Sfloat | Format::R32G32B32A32Sfloat
     );
     (format.texel_size(), floats)
 }
@@ -192,12 +181,7 @@ impl Fetcher {
 
     /// Reads a group's positions, scales, rotations and opacities, without the model's transform, and applies the
     /// activations.
-    pub(super) fn read_own(
-        &mut self,
-        streams: &GaussianAttributes,
-        group: &Group<'_>,
-        out: &mut Attributes,
-    ) {
+    pub(super) fn read_own(&mut self, streams: &GaussianAttributes, group: &Group<'_>, out: &mut Attributes) {
         self.read(&streams.position, group, out.position.each_mut());
         self.read(&streams.scale, group, out.scale.each_mut());
         self.read(&streams.rotation, group, out.rotation.each_mut());
@@ -208,12 +192,7 @@ impl Fetcher {
     }
 
     /// Multiplies a group's opacities by the model's opacities, if the model has any.
-    pub(super) fn fade(
-        &mut self,
-        streams: &GaussianAttributes,
-        group: &Group<'_>,
-        out: &mut Attributes,
-    ) {
+    pub(super) fn fade(&mut self, streams: &GaussianAttributes, group: &Group<'_>, out: &mut Attributes) {
         if let Some(stream) = &streams.model.opacity {
             let mut factor = [0.0; F32_LANES];
             self.read(stream, group, [&mut factor]);
@@ -234,11 +213,7 @@ impl Fetcher {
     /// Copies the group's elements into `bytes` and returns the distance in bytes from one to the next.
     fn read_bytes(&mut self, stream: &AttributeStream, group: &Group<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
-        if group.is_consecutive(stream)
-            && stream.stride <= WHOLE_SPAN_STRIDE
-            && stride >= size
-            && group.len > 0
-        {
+        if group.is_consecutive(stream) && stream.stride <= WHOLE_SPAN_STRIDE && stride >= size && group.len > 0 {
             let span = stride * (group.len - 1) + size;
             self.grow(span);
             let first = group.element(stream, 0);
@@ -283,10 +258,7 @@ fn activate(activations: Activations, len: usize, out: &mut Attributes) {
 
 /// The byte offset in `stream`'s buffer of the element that lane `lane` reads.
 fn at(stream: &AttributeStream, group: &Group<'_>, lane: usize) -> u64 {
-    group
-        .element(stream, lane)
-        .saturating_mul(u64::from(stream.stride))
-        .saturating_add(u64::from(stream.offset))
+    group.element(stream, lane).saturating_mul(u64::from(stream.stride)).saturating_add(u64::from(stream.offset))
 }
 
 /// Reads the spherical harmonics of single lanes.
@@ -308,9 +280,7 @@ impl<'a> CoefficientReader<'a> {
                 && b.format == Format::R32G32B32Sfloat
                 && a.offset.checked_add(12) == Some(b.offset)
         };
-        let packed = streams
-            .first()
-            .is_some_and(|s| s.format == Format::R32G32B32Sfloat)
+        let packed = streams.first().is_some_and(|s| s.format == Format::R32G32B32Sfloat)
             && streams.windows(2).all(|pair| follows(&pair[0], &pair[1]));
         Self { streams, packed }
     }
@@ -339,16 +309,8 @@ impl<'a> CoefficientReader<'a> {
             let stream = &self.streams[0];
             let start = at(stream);
             let size = size_of_val(out) as u64;
-            let inside = start
-                .checked_add(size)
-                .is_some_and(|end| end <= stream.buffer.size);
-            if inside
-                && stream
-                    .buffer
-                    .memory
-                    .read(stream.buffer.offset.saturating_add(start), out)
-                    .is_ok()
-            {
+            let inside = start.checked_add(size).is_some_and(|end| end <= stream.buffer.size);
+            if inside && stream.buffer.memory.read(stream.buffer.offset.saturating_add(start), out).is_ok() {
                 return;
             }
         }
@@ -393,9 +355,7 @@ impl<'a> Harmonics<'a> {
     pub(super) fn of_all(&self, lanes: RangeInclusive<usize>, most: usize) -> Option<&'a [f32]> {
         let (first, end) = (*lanes.start(), *lanes.end() + 1);
         let are_there = (1..=most).contains(&self.stride);
-        self.floats
-            .get(first * self.stride..end * self.stride)
-            .filter(|_| are_there)
+        self.floats.get(first * self.stride..end * self.stride).filter(|_| are_there)
     }
 }
 
@@ -416,12 +376,7 @@ impl SourceFingerprint {
         Self {
             memory: Arc::downgrade(&buffer.memory),
             generation: buffer.memory.generation(),
-            place: [
-                buffer.offset,
-                buffer.size,
-                stream.stride.into(),
-                stream.offset.into(),
-            ],
+            place: [buffer.offset, buffer.size, stream.stride.into(), stream.offset.into()],
             format: stream.format,
             instance_divisor: stream.instance_divisor,
         }

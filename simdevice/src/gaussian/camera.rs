@@ -8,8 +8,7 @@ use super::footprint::Visible;
 use crate::mistakes::Mistake;
 use crate::state::Viewport;
 use crate::state::gaussian::{
-    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
-    GaussianState,
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
 };
 use crate::stats::optimizations::Optimizations;
 
@@ -72,11 +71,7 @@ impl ViewConstants {
         let size = [viewport.width, viewport.height].map(f64::from);
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
         #[cfg(feature = "mistakes")]
-        let margin = if Mistake::SlopesUnclamped.is_made() {
-            [f64::INFINITY; 2]
-        } else {
-            margin
-        };
+        let margin = if Mistake::SlopesUnclamped.is_made() { [f64::INFINITY; 2] } else { margin };
         Self {
             model: camera.model,
             unscented: state.linearization == GaussianLinearization::Unscented,
@@ -86,15 +81,11 @@ impl ViewConstants {
             rotation: camera.rotation.map(f64::from),
             eye: camera.eye,
             focal,
-            center: [
-                principal[0] + f64::from(viewport.x),
-                principal[1] + f64::from(viewport.y),
-            ],
+            center: [principal[0] + f64::from(viewport.x), principal[1] + f64::from(viewport.y)],
             // Discs are not drawn by panoramas.
             period: period(camera).filter(|_| state.geometry == GaussianGeometry::Volume),
             slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
-            slope_max: [0, 1]
-                .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
+            slope_max: [0, 1].map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
             near: camera.near_plane,
             far: camera.far_plane,
             low_pass: f64::from(state.low_pass_variance),
@@ -124,14 +115,9 @@ impl ViewConstants {
 }
 
 /// The cut-off that lists of tiles see to alone: one in the device's own tiles, of pictures that do not repeat.
-pub(super) fn list_cut_off(
-    state: &GaussianState,
-    camera: &Camera,
-    viewport: &Viewport,
-) -> Option<TileCutOff> {
+pub(super) fn list_cut_off(state: &GaussianState, camera: &Camera, viewport: &Viewport) -> Option<TileCutOff> {
     let corner = [viewport.x, viewport.y].map(f64::from);
-    TileCutOff::of(state, corner)
-        .filter(|cut_off| cut_off.is_in_device_tiles() && period(camera).is_none())
+    TileCutOff::of(state, corner).filter(|cut_off| cut_off.is_in_device_tiles() && period(camera).is_none())
 }
 
 /// After how many pixels a camera's picture repeats to the right and to the left, if it does.
@@ -147,11 +133,7 @@ pub(super) fn period(camera: &Camera) -> Option<f64> {
 /// A point's position in the picture relative to the principal point, and the two rows of the projection's Jacobian,
 /// both for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
 /// least and the greatest of `slopes`. Points that have no position give NaN.
-pub(super) fn linearize(
-    model: CameraModel,
-    slopes: [[f64; 2]; 2],
-    t: [f64; 3],
-) -> ([f64; 2], [[f64; 3]; 2]) {
+pub(super) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     match model {
         CameraModel::Pinhole => pinhole(slopes, t),
         CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
@@ -202,10 +184,7 @@ fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let (rise, run) = (y / length, r / length);
     (
         [x.atan2(z), y.atan2(r)],
-        [
-            [cos * across, 0.0, -sin * across],
-            [-sin * rise / length, run / length, -cos * rise / length],
-        ],
+        [[cos * across, 0.0, -sin * across], [-sin * rise / length, run / length, -cos * rise / length]],
     )
 }
 
@@ -226,12 +205,8 @@ mod tests {
     /// Bounds beyond every slope in these tests.
     const SLOPES: [[f64; 2]; 2] = [[-1e3; 2], [1e3; 2]];
 
-    const MODELS: [CameraModel; 4] = [
-        CameraModel::Pinhole,
-        CameraModel::Orthographic,
-        CameraModel::Fisheye,
-        CameraModel::Equirectangular,
-    ];
+    const MODELS: [CameraModel; 4] =
+        [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye, CameraModel::Equirectangular];
 
     /// The Jacobian by central differences.
     fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
@@ -274,10 +249,7 @@ mod tests {
     #[gaurast_runner::test]
     fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
         let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
-        assert_eq!(
-            (place, rows),
-            linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0])
-        );
+        assert_eq!((place, rows), linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0]));
         let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
         assert!((rows[1][1] - 0.25).abs() < 1e-12);
         let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);

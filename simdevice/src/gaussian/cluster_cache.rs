@@ -89,9 +89,7 @@ impl Entry {
             let how = (entry.is_flat, entry.activations);
             (entry.first, entry.count, how)
         };
-        what(self) == what(other)
-            && self.streams.len() >= other.streams.len()
-            && streams.all(|(a, b)| a.is_same(b))
+        what(self) == what(other) && self.streams.len() >= other.streams.len() && streams.all(|(a, b)| a.is_same(b))
     }
 
     /// The bytes that its clusters take: zero if none were begun.
@@ -104,10 +102,7 @@ impl Entry {
 
     /// Frees its clusters.
     fn release(&self) {
-        let memory = self
-            .streams
-            .first()
-            .and_then(|positions| positions.memory());
+        let memory = self.streams.first().and_then(|positions| positions.memory());
         let Some(memory) = memory else {
             return;
         };
@@ -206,11 +201,7 @@ impl ClusterCache {
             entries.entries.push(drawn);
             building
         };
-        let source = ClusterSource {
-            append,
-            is_flat,
-            with_harmonics,
-        };
+        let source = ClusterSource { append, is_flat, with_harmonics };
         let clusters = {
             let mut builder = building.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::new(advance(&mut builder, source)?)
@@ -245,8 +236,7 @@ pub(super) fn find(
     for (append, found) in set.appends.iter().zip(&mut found) {
         let advance = |builder: &mut ClusterBuilder, source: ClusterSource<'_>| {
             let started = Instant::now();
-            let (made, clusters) =
-                runtime.install(|| (builder.advance(source), builder.finish(source)));
+            let (made, clusters) = runtime.install(|| (builder.advance(source), builder.finish(source)));
             counters.add(Counter::ClustersBuilt, made as u64);
             counters.add(Counter::ClusterTime, started.elapsed().as_nanos() as u64);
             clusters
@@ -259,12 +249,7 @@ pub(super) fn find(
 /// The attributes that every cluster holds.
 fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     let attributes = &append.attributes;
-    [
-        &attributes.position,
-        &attributes.scale,
-        &attributes.rotation,
-        &attributes.opacity,
-    ]
+    [&attributes.position, &attributes.scale, &attributes.rotation, &attributes.opacity]
 }
 
 /// True if a stream lies in memory that only the device writes and is read per vertex.

@@ -5,9 +5,7 @@
 //! They are derived from memory that only the device can write, and never change an image. The clusters of a large draw
 //! are built over several pictures, a piece each, so that none waits for all of them.
 
-use super::attributes::{
-    Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
-};
+use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint};
 use super::frustum::Bounds;
 use super::lanes::GROUP;
 use super::sort;
@@ -116,9 +114,7 @@ impl ClusterBuilder {
         let mut clusters = host::with_capacity(piece.len().div_ceil(GROUP));
         piece
             .par_chunks(GROUP)
-            .map_init(Fetcher::default, |fetcher, numbers| {
-                Cluster::read(source, fetcher, numbers)
-            })
+            .map_init(Fetcher::default, |fetcher, numbers| Cluster::read(source, fetcher, numbers))
             .collect_into_vec(&mut clusters);
         host::reserve(&mut self.clusters, count.div_ceil(GROUP) - done);
         self.clusters.extend(clusters);
@@ -134,13 +130,8 @@ impl ClusterBuilder {
         let clusters = std::mem::take(self).clusters;
         let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
         let occluders = occluders(&clusters, max_occluders(count));
-        let shapes = ClusterSource {
-            with_harmonics: false,
-            ..source
-        };
-        let occluders = occluders
-            .chunks(GROUP)
-            .map(|numbers| Cluster::read(shapes, &mut Fetcher::default(), numbers));
+        let shapes = ClusterSource { with_harmonics: false, ..source };
+        let occluders = occluders.chunks(GROUP).map(|numbers| Cluster::read(shapes, &mut Fetcher::default(), numbers));
         let harmonics = &source.append.attributes.spherical_harmonics;
         Some(Clusters {
             harmonics: match source.with_harmonics {
@@ -159,8 +150,7 @@ impl Clusters {
     pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
         let drawn = &append.attributes.spherical_harmonics;
         let mut both = drawn.iter().zip(&self.harmonics);
-        drawn.len() <= self.harmonics.len()
-            && both.all(|(a, b)| SourceFingerprint::new(a).is_same(b))
+        drawn.len() <= self.harmonics.len() && both.all(|(a, b)| SourceFingerprint::new(a).is_same(b))
     }
 }
 
@@ -185,23 +175,14 @@ fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
 
 impl Cluster {
     fn read(source: ClusterSource<'_>, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
-        let ClusterSource {
-            append,
-            is_flat,
-            with_harmonics,
-        } = source;
+        let ClusterSource { append, is_flat, with_harmonics } = source;
         let group = Group::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_own(&append.attributes, &group, &mut attributes);
         if is_flat {
             attributes.scale[2].fill(0.0);
         }
-        let mut bounds = Bounds {
-            low: [f32::INFINITY; 3],
-            high: [f32::NEG_INFINITY; 3],
-            scale: 0.0,
-            opacity: 0.0,
-        };
+        let mut bounds = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], scale: 0.0, opacity: 0.0 };
         let mut is_sound = true;
         for lane in 0..numbers.len() {
             let at = |lanes: &[f32; GROUP]| lanes[lane];
@@ -237,13 +218,7 @@ impl Cluster {
                 harmonics.extend(&coefficients[..reader.floats()]);
             }
         }
-        Self {
-            numbers: numbers.to_vec(),
-            attributes,
-            harmonics,
-            bounds,
-            is_sound,
-        }
+        Self { numbers: numbers.to_vec(), attributes, harmonics, bounds, is_sound }
     }
 }
 
@@ -269,8 +244,7 @@ impl Cluster {
 
     /// Adds a lane of another cluster. `bounds` stays as it is.
     pub(super) fn push(&mut self, from: &Self, lane: usize) {
-        self.attributes
-            .copy_lane(self.numbers.len(), &from.attributes, lane);
+        self.attributes.copy_lane(self.numbers.len(), &from.attributes, lane);
         host::push(&mut self.numbers, from.numbers[lane]);
         self.is_sound &= from.is_sound;
     }
@@ -279,21 +253,18 @@ impl Cluster {
 /// The numbers of the draw's vertices in Morton order, in which neighbours are mostly near one another in space.
 fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     let mut positions: Vec<[f32; 3]> = host::zeroed(append.count as usize);
-    positions
-        .par_chunks_mut(GROUP)
-        .zip((0..append.count).into_par_iter().step_by(GROUP))
-        .for_each_init(
-            || (Fetcher::default(), Attributes::default()),
-            |(fetcher, attributes), (positions, start)| {
-                let group = Group::new(append, append.first_instance, start, positions.len());
-                let streams = &append.attributes;
-                fetcher.read(&streams.position, &group, attributes.position.each_mut());
-                let [x, y, z] = &attributes.position;
-                for (at, position) in positions.iter_mut().enumerate() {
-                    *position = [x[at], y[at], z[at]];
-                }
-            },
-        );
+    positions.par_chunks_mut(GROUP).zip((0..append.count).into_par_iter().step_by(GROUP)).for_each_init(
+        || (Fetcher::default(), Attributes::default()),
+        |(fetcher, attributes), (positions, start)| {
+            let group = Group::new(append, append.first_instance, start, positions.len());
+            let streams = &append.attributes;
+            fetcher.read(&streams.position, &group, attributes.position.each_mut());
+            let [x, y, z] = &attributes.position;
+            for (at, position) in positions.iter_mut().enumerate() {
+                *position = [x[at], y[at], z[at]];
+            }
+        },
+    );
     let (low, per_cell) = grid(&positions);
     let cells = 1.0 / per_cell;
     let code = |&[x, y, z]: &[f32; 3]| {
@@ -330,10 +301,7 @@ fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
     }
     let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();
     let half = (3.0 * deviation).clamp(f64::MIN_POSITIVE * 1e9, f64::MAX / 4.0);
-    (
-        mean.map(|mean| mean - half),
-        2.0 * half / f64::from(1u32 << AXIS_BITS),
-    )
+    (mean.map(|mean| mean - half), 2.0 * half / f64::from(1u32 << AXIS_BITS))
 }
 
 /// Puts two zeros after each of the [`AXIS_BITS`] bits of a number.
@@ -363,11 +331,7 @@ mod tests {
         let memory = Allocation::new(size, false).unwrap();
         memory.write(0, &floats).unwrap();
         let stream = |float: u32, format| AttributeStream {
-            buffer: BufferRange {
-                memory: Arc::clone(&memory),
-                offset: 0,
-                size,
-            },
+            buffer: BufferRange { memory: Arc::clone(&memory), offset: 0, size },
             stride: 4 * FLOATS as u32,
             offset: 4 * float,
             format,
@@ -393,11 +357,7 @@ mod tests {
 
     /// The number of clusters that each piece made, and all clusters.
     fn pieces(append: &GaussianAppend) -> (Vec<usize>, Clusters) {
-        let source = ClusterSource {
-            append,
-            is_flat: false,
-            with_harmonics: true,
-        };
+        let source = ClusterSource { append, is_flat: false, with_harmonics: true };
         let (mut builder, mut made) = (ClusterBuilder::default(), Vec::new());
         loop {
             made.push(builder.advance(source));
@@ -409,11 +369,9 @@ mod tests {
 
     #[gaurast_runner::test]
     fn pieces_make_a_cluster_of_every_gaussian() {
-        for (count, expected) in [
-            (700, vec![3]),
-            (AT_ONCE, vec![AT_ONCE / GROUP]),
-            (140_000, vec![0, 128, 128, 128, 128, 35]),
-        ] {
+        for (count, expected) in
+            [(700, vec![3]), (AT_ONCE, vec![AT_ONCE / GROUP]), (140_000, vec![0, 128, 128, 128, 128, 35])]
+        {
             let append = append(count);
             let (made, clusters) = pieces(&append);
             assert_eq!(made, expected);
@@ -446,9 +404,7 @@ mod tests {
     #[gaurast_runner::test]
     fn bits_are_spread() {
         for value in 0..1 << AXIS_BITS {
-            let expected: u32 = (0..AXIS_BITS)
-                .map(|bit| (value >> bit & 1) << (3 * bit))
-                .sum();
+            let expected: u32 = (0..AXIS_BITS).map(|bit| (value >> bit & 1) << (3 * bit)).sum();
             assert_eq!(spread(value), expected, "{value:#b}");
         }
     }

@@ -33,11 +33,7 @@ impl TileCutOff {
             GaussianCutOff::TileRectangle => false,
             GaussianCutOff::None | GaussianCutOff::Ellipse => return None,
         };
-        Some(Self {
-            is_square,
-            deviations: footprint.deviations.into(),
-            corner: viewport_corner,
-        })
+        Some(Self { is_square, deviations: footprint.deviations.into(), corner: viewport_corner })
     }
 
     /// True if its tiles are the device's.
@@ -64,19 +60,13 @@ impl TileCutOff {
             let radius = (self.deviations * greatest.sqrt()).ceil();
             return from_corner.map(|mean| {
                 let mean = mean - 0.5;
-                [
-                    ((mean - radius) / CUT_TILE).floor(),
-                    ((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE).floor(),
-                ]
+                [((mean - radius) / CUT_TILE).floor(), ((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE).floor()]
             });
         }
         let radii = [xx, yy].map(|variance| (self.deviations * variance.sqrt()).ceil());
         [0, 1].map(|axis| {
             let (mean, radius) = (from_corner[axis], radii[axis]);
-            [
-                ((mean - radius) / CUT_TILE).floor(),
-                ((mean + radius) / CUT_TILE).ceil(),
-            ]
+            [((mean - radius) / CUT_TILE).floor(), ((mean + radius) / CUT_TILE).ceil()]
         })
     }
 
@@ -107,11 +97,7 @@ impl TileCutOff {
                 };
                 let is_empty = clipped.first >= clipped.end;
                 any |= !is_empty;
-                let clipped = if is_empty {
-                    TileSpan::default()
-                } else {
-                    clipped
-                };
+                let clipped = if is_empty { TileSpan::default() } else { clipped };
                 reach.set(others, number, clipped);
             }
             scratch.reaches.set(at, &reach);

@@ -31,12 +31,7 @@ pub(crate) struct CenterDepth {
 
 impl CenterDepth {
     /// Of a camera, a viewport and the depths before it, for an attachment of `format`.
-    pub(crate) fn new(
-        camera: &Camera,
-        viewport: &Viewport,
-        negative_one_to_one: bool,
-        format: Format,
-    ) -> Self {
+    pub(crate) fn new(camera: &Camera, viewport: &Viewport, negative_one_to_one: bool, format: Format) -> Self {
         Self {
             #[cfg(feature = "mistakes")]
             is_linear: camera.model == CameraModel::Orthographic
@@ -44,11 +39,7 @@ impl CenterDepth {
             #[cfg(not(feature = "mistakes"))]
             is_linear: camera.model == CameraModel::Orthographic,
             coefficients: camera.depth_coefficients.map(f64::from),
-            to_unit: if negative_one_to_one {
-                [0.5, 0.5]
-            } else {
-                [1.0, 0.0]
-            },
+            to_unit: if negative_one_to_one { [0.5, 0.5] } else { [1.0, 0.0] },
             range: [viewport.min_depth, viewport.max_depth].map(f64::from),
             code: DepthEncoding::of(format),
         }
@@ -95,11 +86,7 @@ impl CenterDepth {
         let [near, far] = self.range;
         let slope = self.coefficients[1] * (far - near);
         let slope = if self.is_linear { slope } else { -slope };
-        if slope < 0.0 {
-            DepthTrend::Falling
-        } else {
-            DepthTrend::Rising
-        }
+        if slope < 0.0 { DepthTrend::Falling } else { DepthTrend::Rising }
     }
 }
 
@@ -112,12 +99,7 @@ fn clamp(depth: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn depth(
-        model: CameraModel,
-        coefficients: [f32; 2],
-        range: [f32; 2],
-        format: Format,
-    ) -> CenterDepth {
+    fn depth(model: CameraModel, coefficients: [f32; 2], range: [f32; 2], format: Format) -> CenterDepth {
         let camera = Camera {
             model,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
@@ -128,28 +110,14 @@ mod tests {
             far_plane: 100.0,
             depth_coefficients: coefficients,
         };
-        let viewport = Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: 8.0,
-            height: 8.0,
-            min_depth: range[0],
-            max_depth: range[1],
-        };
+        let viewport = Viewport { x: 0.0, y: 0.0, width: 8.0, height: 8.0, min_depth: range[0], max_depth: range[1] };
         CenterDepth::new(&camera, &viewport, false, format)
     }
 
     #[gaurast_runner::test]
     fn depths_are_the_projection_matrix_s() {
         // Near 1, far 4: depth (4 / 3) (1 - 1 / z).
-        let of = |format| {
-            depth(
-                CameraModel::Pinhole,
-                [4.0 / 3.0, -4.0 / 3.0],
-                [0.0, 1.0],
-                format,
-            )
-        };
+        let of = |format| depth(CameraModel::Pinhole, [4.0 / 3.0, -4.0 / 3.0], [0.0, 1.0], format);
         let float = of(Format::D32Sfloat);
         let at = |z| float.unit().decode(float.code(z));
         assert_eq!(at(1.0), 0.0);
@@ -165,17 +133,8 @@ mod tests {
     fn depths_from_minus_one_are_taken_to_the_unit() {
         let format = Format::D32Sfloat;
         let unit = depth(CameraModel::Orthographic, [0.0, 1.0], [0.25, 0.75], format);
-        let both = CenterDepth {
-            to_unit: [0.5, 0.5],
-            ..unit
-        };
-        for (z, expected) in [
-            (-2.0, 0.25),
-            (-1.0, 0.25),
-            (0.0, 0.5),
-            (0.5, 0.625),
-            (3.0, 0.75),
-        ] {
+        let both = CenterDepth { to_unit: [0.5, 0.5], ..unit };
+        for (z, expected) in [(-2.0, 0.25), (-1.0, 0.25), (0.0, 0.5), (0.5, 0.625), (3.0, 0.75)] {
             assert_eq!(both.unit().decode(both.code(z)), expected, "{z}");
         }
         assert_eq!(unit.unit().decode(unit.code(0.5)), 0.5);
@@ -184,65 +143,24 @@ mod tests {
     #[gaurast_runner::test]
     fn the_viewport_maps_depths_and_trends_are_true() {
         let cases = [
-            (
-                CameraModel::Pinhole,
-                [1.0, -1.0],
-                [0.25, 0.75],
-                DepthTrend::Rising,
-            ),
-            (
-                CameraModel::Pinhole,
-                [0.0, 1.0],
-                [0.0, 1.0],
-                DepthTrend::Falling,
-            ),
-            (
-                CameraModel::Fisheye,
-                [0.0, 1.0],
-                [1.0, 0.5],
-                DepthTrend::Rising,
-            ),
-            (
-                CameraModel::Orthographic,
-                [0.5, 0.01],
-                [0.0, 1.0],
-                DepthTrend::Rising,
-            ),
-            (
-                CameraModel::Orthographic,
-                [0.5, 0.01],
-                [1.0, 0.0],
-                DepthTrend::Falling,
-            ),
-            (
-                CameraModel::Pinhole,
-                [1.0, -1.0],
-                [-3.0, 2.0],
-                DepthTrend::Rising,
-            ),
+            (CameraModel::Pinhole, [1.0, -1.0], [0.25, 0.75], DepthTrend::Rising),
+            (CameraModel::Pinhole, [0.0, 1.0], [0.0, 1.0], DepthTrend::Falling),
+            (CameraModel::Fisheye, [0.0, 1.0], [1.0, 0.5], DepthTrend::Rising),
+            (CameraModel::Orthographic, [0.5, 0.01], [0.0, 1.0], DepthTrend::Rising),
+            (CameraModel::Orthographic, [0.5, 0.01], [1.0, 0.0], DepthTrend::Falling),
+            (CameraModel::Pinhole, [1.0, -1.0], [-3.0, 2.0], DepthTrend::Rising),
         ];
         for (model, coefficients, range, trend) in cases {
-            for format in [
-                Format::D16Unorm,
-                Format::X8D24UnormPack32,
-                Format::D32Sfloat,
-            ] {
+            for format in [Format::D16Unorm, Format::X8D24UnormPack32, Format::D32Sfloat] {
                 let depth = depth(model, coefficients, range, format);
                 assert_eq!(depth.trend(), trend);
-                let first = if model == CameraModel::Orthographic {
-                    -40
-                } else {
-                    1
-                };
+                let first = if model == CameraModel::Orthographic { -40 } else { 1 };
                 let codes: Vec<u32> = (first..200).map(|z| depth.code(0.3 * z as f32)).collect();
                 let ordered = match trend {
                     DepthTrend::Falling => codes.is_sorted_by(|a, b| a >= b),
                     _ => codes.is_sorted(),
                 };
-                assert!(
-                    ordered && codes[0] != codes[codes.len() - 1],
-                    "{model:?} {format:?}"
-                );
+                assert!(ordered && codes[0] != codes[codes.len() - 1], "{model:?} {format:?}");
                 let [low, high] = [range[0].min(range[1]), range[0].max(range[1])];
                 if format == Format::D32Sfloat {
                     let inside = |&code: &u32| (low..=high).contains(&depth.unit().decode(code));

@@ -10,11 +10,7 @@ type Pair = (u32, u32);
 
 /// The projected Gaussians in depth order: key, and group number times `GROUP` plus lane. The memory comes from
 /// `buffers`.
-pub(super) fn sorted(
-    groups: &[ProjectedGroup],
-    workers: usize,
-    buffers: &SortBuffers,
-) -> SortedPairs {
+pub(super) fn sorted(groups: &[ProjectedGroup], workers: usize, buffers: &SortBuffers) -> SortedPairs {
     let keys = keys_of(groups);
     let settle = |pairs: &mut [Pair]| settle_ties(&keys, pairs);
     sort::sort_lists(&keys, GROUP as u32, workers, buffers, settle)

@@ -56,10 +56,7 @@ impl From<PackedSpan> for TileSpan {
     #[inline(always)]
     fn from(span: PackedSpan) -> Self {
         let [first, end] = span.tiles();
-        Self {
-            first: first as u16,
-            end: end as u16,
-        }
+        Self { first: first as u16, end: end as u16 }
     }
 }
 
@@ -149,10 +146,7 @@ impl TileFootprint {
 
     /// The rows of the footprint, each with its span, which may be empty.
     #[inline(always)]
-    pub(crate) fn spans<'a>(
-        &'a self,
-        others: &'a [TileSpan],
-    ) -> impl Iterator<Item = (u32, TileSpan)> {
+    pub(crate) fn spans<'a>(&'a self, others: &'a [TileSpan]) -> impl Iterator<Item = (u32, TileSpan)> {
         (self.row()..).zip((0..self.len()).map(|number| self.span(others, number)))
     }
 
@@ -249,11 +243,7 @@ fn floor(value: f64) -> f64 {
     // At this magnitude binary64 has no bits for a fraction, so the addition rounds.
     const WHOLE: f64 = (3u64 << 51) as f64;
     let nearest = (value + WHOLE) - WHOLE;
-    if nearest > value {
-        nearest - 1.0
-    } else {
-        nearest
-    }
+    if nearest > value { nearest - 1.0 } else { nearest }
 }
 
 /// The larger of the two; `b` if either is NaN.
@@ -301,10 +291,7 @@ impl Ellipse {
             return None;
         };
         // Limits on the framebuffer's size make tile numbers fit into 16 bits.
-        let span = |[left, right]: [f64; 2]| TileSpan {
-            first: tile_of(left),
-            end: tile_of(right) + 1,
-        };
+        let span = |[left, right]: [f64; 2]| TileSpan { first: tile_of(left), end: tile_of(right) + 1 };
         let row = tile_of(top);
         let rows = tile_of(bottom) - row + 1;
         let clipped = left == first_x || right == last_x || top == first_y || bottom == last_y;
@@ -357,12 +344,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    const VISIBLE: Visible = Visible {
-        left: 3,
-        top: 0,
-        right: 200,
-        bottom: 150,
-    };
+    const VISIBLE: Visible = Visible { left: 3, top: 0, right: 200, bottom: 150 };
 
     /// A Gaussian with covariance `S = [a, b; b, c]`, cut off at `extent`.
     #[derive(Clone, Copy, Debug)]
@@ -388,13 +370,7 @@ mod tests {
         }
 
         fn ellipse(&self) -> Ellipse {
-            let Self {
-                mean,
-                a,
-                b,
-                c,
-                extent,
-            } = *self;
+            let Self { mean, a, b, c, extent } = *self;
             Ellipse {
                 mean,
                 half: [(a * extent).sqrt(), (c * extent).sqrt()],
@@ -410,10 +386,7 @@ mod tests {
             let mut others = vec![TileSpan::default(); 70_000];
             let reach = self.ellipse().reach(&VISIBLE, &mut others, Some(&mut 0));
             let spans = reach.iter().flat_map(|reach| reach.spans(&others));
-            spans
-                .filter(|(_, span)| span.first < span.end)
-                .map(|(row, span)| (row, span.first, span.end))
-                .collect()
+            spans.filter(|(_, span)| span.first < span.end).map(|(row, span)| (row, span.first, span.end)).collect()
         }
 
         /// The tiles that hold a visible pixel centre inside the ellipse, by testing every pixel.
@@ -441,16 +414,10 @@ mod tests {
 
     #[gaurast_runner::test]
     fn one_that_is_elsewhere_reaches_nothing() {
-        assert_eq!(
-            Gaussian::new([-10.0, 20.0], [2.0, 2.0], 0.3, 9.0).spans(),
-            []
-        );
+        assert_eq!(Gaussian::new([-10.0, 20.0], [2.0, 2.0], 0.3, 9.0).spans(), []);
         assert_eq!(Gaussian::new([50.0, 1e9], [2.0, 2.0], 0.3, 9.0).spans(), []);
         // Its bounding box reaches a corner of the visible pixels; the ellipse does not.
-        assert_eq!(
-            Gaussian::new([-22.5, -26.4], [42.0, 0.5], 2.33, 1.3).spans(),
-            []
-        );
+        assert_eq!(Gaussian::new([-22.5, -26.4], [42.0, 0.5], 2.33, 1.3).spans(), []);
     }
 
     proptest! {

@@ -83,10 +83,7 @@ impl Frustum {
     pub(super) fn new(projection: &ViewConstants, opacity: f32) -> Self {
         let r = &projection.rotation;
         let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
-        let is_along_axis = !matches!(
-            projection.model,
-            CameraModel::Fisheye | CameraModel::Equirectangular
-        );
+        let is_along_axis = !matches!(projection.model, CameraModel::Fisheye | CameraModel::Equirectangular);
         let (sides, small) = reach::sides(projection, opacity);
         Self {
             eye: projection.eye,
@@ -118,9 +115,7 @@ impl Frustum {
         };
         Some(Self {
             eye: multiply(inverse, [0, 1, 2].map(|axis| self.eye[axis] - b[axis])),
-            depth: self
-                .depth
-                .map(|(forward, near, far)| (multiply(transposed, forward), near, far)),
+            depth: self.depth.map(|(forward, near, far)| (multiply(transposed, forward), near, far)),
             sides: self.sides.iter().map(place).collect(),
             small: self.small.as_ref().map(place),
             alpha_floor: self.alpha_floor,
@@ -165,12 +160,7 @@ impl Frustum {
     /// The lanes that are outside, computed in binary32. Lanes whose result is within the rounding error count as
     /// inside.
     #[inline(always)]
-    pub(super) fn lanes_outside<S: Simd>(
-        &self,
-        simd: S,
-        attributes: &Attributes,
-        len: usize,
-    ) -> OutsideLanes {
+    pub(super) fn lanes_outside<S: Simd>(&self, simd: S, attributes: &Attributes, len: usize) -> OutsideLanes {
         let number = |value: f64| S::f32s::splat(simd, value as f32);
         let mut outside = OutsideLanes::default();
         let Some((forward, near, far)) = self.depth else {
@@ -181,8 +171,7 @@ impl Frustum {
         let rest = self.eye.map(|eye| eye - f64::from(eye as f32));
         let far_off = number(magnitude(rest));
         let rest = rest.map(number);
-        let error =
-            |normal: [f64; 3]| number(ERROR * normal.map(f64::abs).into_iter().sum::<f64>());
+        let error = |normal: [f64; 3]| number(ERROR * normal.map(f64::abs).into_iter().sum::<f64>());
         let depth = (forward.map(number), error(forward));
         let (near, far) = (number(near.into()), number(far.into()));
         let mut planes = [([number(0.0); 3], number(0.0), number(0.0), number(0.0)); 4];
@@ -193,8 +182,7 @@ impl Frustum {
         }
         let planes = &planes[..self.sides.len().min(4)];
         for at in (0..len).step_by(S::f32s::LEN) {
-            let load =
-                |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
+            let load = |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
             let [x, y, z] = &attributes.position;
             let (x, y, z) = (load(x) - eye[0], load(y) - eye[1], load(z) - eye[2]);
             let size = x.abs() + y.abs() + z.abs() + far_off;

@@ -71,10 +71,7 @@ pub(super) fn group_tasks<'a>(
             match clusters {
                 None => {
                     let starts = (0..append.count).step_by(GROUP);
-                    tasks.extend(starts.map(|start| GroupTask {
-                        part: GroupSource::From(start),
-                        ..task.clone()
-                    }));
+                    tasks.extend(starts.map(|start| GroupTask { part: GroupSource::From(start), ..task.clone() }));
                 }
                 Some(clusters) => tasks.extend(
                     clusters
@@ -84,10 +81,7 @@ pub(super) fn group_tasks<'a>(
                             !view.cull_cluster(cluster, counters)
                                 && !occlusion.is_some_and(|map| map.cull_cluster(cluster, counters))
                         })
-                        .map(|cluster| GroupTask {
-                            part: GroupSource::Cluster(cluster),
-                            ..task.clone()
-                        }),
+                        .map(|cluster| GroupTask { part: GroupSource::Cluster(cluster), ..task.clone() }),
                 ),
             }
             sequence = sequence.wrapping_add(append.count);
@@ -108,31 +102,18 @@ impl InstanceView {
     /// The view of instances without a model whose opacities are at most `opacity`.
     fn new(constants: &ViewConstants, opacity: f32) -> Self {
         let frustum = Arc::new(Frustum::new(constants, opacity));
-        Self {
-            own: Some(Arc::clone(&frustum)),
-            frustum,
-            model: InstanceTransform::default(),
-        }
+        Self { own: Some(Arc::clone(&frustum)), frustum, model: InstanceTransform::default() }
     }
 
     /// The view of an instance with a model, whose opacities without the model are at most `opacity`.
-    fn of_instance(
-        constants: &ViewConstants,
-        append: &GaussianAppend,
-        instance: u32,
-        opacity: f32,
-    ) -> Self {
+    fn of_instance(constants: &ViewConstants, append: &GaussianAppend, instance: u32, opacity: f32) -> Self {
         let model = InstanceTransform::read(append, instance);
         let frustum = Arc::new(Frustum::new(constants, model.greatest_opacity(opacity)));
         let own = match model.matrix {
             None => Some(Arc::clone(&frustum)),
             Some(matrix) => frustum.within(matrix).map(Arc::new),
         };
-        Self {
-            frustum,
-            own,
-            model,
-        }
+        Self { frustum, own, model }
     }
 
     /// True if a whole cluster is outside. Its Gaussians are then counted as skipped.

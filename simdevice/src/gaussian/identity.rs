@@ -45,13 +45,7 @@ impl Origins {
             (draw.first, draw.count, instances, draw.indices.clone())
         });
         for (first, count, [first_instance, instance_count], indices) in appends.chain(draws) {
-            origins.push(Origin {
-                start,
-                first,
-                count,
-                first_instance,
-                indices,
-            });
+            origins.push(Origin { start, first, count, first_instance, indices });
             start += u64::from(count) * u64::from(instance_count);
         }
         Self(origins)
@@ -92,36 +86,12 @@ mod tests {
         let memory = Allocation::new(16, true).expect("memory");
         let indices: [u32; 4] = [7, 5, 3, 1];
         memory.write(0, &indices).expect("it fits");
-        let stream = IndexStream {
-            buffer: BufferRange {
-                memory,
-                offset: 0,
-                size: 16,
-            },
-            index_size: 4,
-            vertex_offset: -1,
-        };
-        let origin = |start, first, count, first_instance, indices| Origin {
-            start,
-            first,
-            count,
-            first_instance,
-            indices,
-        };
-        let origins = Origins(vec![
-            origin(0, 10, 3, 4, None),
-            origin(6, 1, 2, 0, Some(stream)),
-        ]);
-        let expected = [
-            [10, 4],
-            [11, 4],
-            [12, 4],
-            [10, 5],
-            [11, 5],
-            [12, 5],
-            [4, 0],
-            [2, 0],
-        ];
+        let stream =
+            IndexStream { buffer: BufferRange { memory, offset: 0, size: 16 }, index_size: 4, vertex_offset: -1 };
+        let origin =
+            |start, first, count, first_instance, indices| Origin { start, first, count, first_instance, indices };
+        let origins = Origins(vec![origin(0, 10, 3, 4, None), origin(6, 1, 2, 0, Some(stream))]);
+        let expected = [[10, 4], [11, 4], [12, 4], [10, 5], [11, 5], [12, 5], [4, 0], [2, 0]];
         for (sequence, expected) in (0..).zip(expected) {
             assert_eq!(origins.locate(sequence), expected, "{sequence}");
         }

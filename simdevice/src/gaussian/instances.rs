@@ -69,21 +69,13 @@ const SINGULAR: f64 = 1.0 / (1u64 << 40) as f64;
 
 impl Default for Matrices {
     fn default() -> Self {
-        Self {
-            rows: [[[0.0; F32_LANES]; 4]; 3],
-            is_uniform: false,
-        }
+        Self { rows: [[[0.0; F32_LANES]; 4]; 3], is_uniform: false }
     }
 }
 
 impl Matrices {
     /// Reads a group's matrices.
-    pub(super) fn read(
-        &mut self,
-        fetcher: &mut Fetcher,
-        rows: &[AttributeStream; 3],
-        group: &Group<'_>,
-    ) {
+    pub(super) fn read(&mut self, fetcher: &mut Fetcher, rows: &[AttributeStream; 3], group: &Group<'_>) {
         self.is_uniform = rows.iter().all(|stream| stream.instance_divisor.is_some());
         for (stream, row) in rows.iter().zip(&mut self.rows) {
             fetcher.read(stream, group, row.each_mut());
@@ -94,8 +86,7 @@ impl Matrices {
     pub(super) fn uniform(&self) -> Option<(Linear, [f64; 3])> {
         let element = |row: usize, column: usize| f64::from(self.rows[row][column][0]);
         let linear = [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column)));
-        self.is_uniform
-            .then(|| (linear, [0, 1, 2].map(|row| element(row, 3))))
+        self.is_uniform.then(|| (linear, [0, 1, 2].map(|row| element(row, 3))))
     }
 
     /// The lanes among the first `len` whose matrices are finite.
@@ -127,8 +118,7 @@ impl Placed {
         if is_singular(a) {
             return [f64::NAN; 3];
         }
-        [0, 1, 2]
-            .map(|column| row[0] * a[0][column] + row[1] * a[1][column] + row[2] * a[2][column])
+        [0, 1, 2].map(|column| row[0] * a[0][column] + row[1] * a[1][column] + row[2] * a[2][column])
     }
 }
 
@@ -159,11 +149,7 @@ pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]
@@ -172,11 +158,7 @@ mod tests {
 
     #[gaurast_runner::test]
     fn matrices_that_flatten_space_are_singular() {
-        assert!(!is_singular([
-            [1e-9, 0.0, 0.0],
-            [0.0, 1e9, 0.0],
-            [3.0, 0.0, -2.0]
-        ]));
+        assert!(!is_singular([[1e-9, 0.0, 0.0], [0.0, 1e9, 0.0], [3.0, 0.0, -2.0]]));
         assert!(is_singular([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]]));
         let third = 1.0f32 / 3.0;
         let row = [0.1f32, 0.7, third].map(f64::from);

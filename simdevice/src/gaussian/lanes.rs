@@ -29,11 +29,7 @@ impl Bits {
         let mut bits = Self::default();
         for (number, word) in bits.0.iter_mut().enumerate() {
             let from = len.saturating_sub(64 * number);
-            *word = if from >= 64 {
-                u64::MAX
-            } else {
-                (1 << from) - 1
-            };
+            *word = if from >= 64 { u64::MAX } else { (1 << from) - 1 };
         }
         bits
     }
@@ -132,8 +128,7 @@ mod tests {
     #[gaurast_runner::test(each = simd_levels())]
     fn the_logarithm_is_exact_enough(case: &Case) {
         let level = token_of(case);
-        let of =
-            |x: f64| dispatch!(level, simd => log2(simd, SimdBase::splat(simd, x)).as_slice()[0]);
+        let of = |x: f64| dispatch!(level, simd => log2(simd, SimdBase::splat(simd, x)).as_slice()[0]);
         let mut x = 1e-45f64;
         while x < 4e38 {
             let error = (of(x) - x.log2()).abs();

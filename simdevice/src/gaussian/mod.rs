@@ -88,8 +88,7 @@ pub fn sort_and_bin(
     }
     // All of it runs on the workers, because each change from this thread to them and back puts threads to sleep and
     // wakes them.
-    let (sorted, record) =
-        runtime.install(|| sort(&set, &clusters, runtime, &caches.sort_buffers, counters))?;
+    let (sorted, record) = runtime.install(|| sort(&set, &clusters, runtime, &caches.sort_buffers, counters))?;
     let sorted = Arc::new(sorted);
     if let Some(key) = key {
         let bytes = sorted.memory_bytes();
@@ -135,24 +134,11 @@ fn sort(
     let mut sorted_set = SortedSet::new(set, preprocessed.groups, tiles);
     let record = runtime.recorder().map(|_| {
         let (of_device, of_programs) = sorted_set.splats.split_at(fixed);
-        let of_device = recording::Projected {
-            counters: &by_device,
-            splats: of_device,
-        };
-        let of_programs = recording::Projected {
-            counters: &by_programs,
-            splats: of_programs,
-        };
+        let of_device = recording::Projected { counters: &by_device, splats: of_device };
+        let of_programs = recording::Projected { counters: &by_programs, splats: of_programs };
         let bytes = set.draws.iter().map(vertex_projection::vertex_bytes).sum();
         let (pairs, degree) = (sorted_set.tiles.pairs(), set.begin.state.sh_degree);
-        DrawRecord::new(recording::gaussian_draw(
-            &of_device,
-            &of_programs,
-            bytes,
-            pairs,
-            degree,
-            set.bounds,
-        ))
+        DrawRecord::new(recording::gaussian_draw(&of_device, &of_programs, bytes, pairs, degree, set.bounds))
     });
     let work = &mut sorted_set.counters;
     work.add_all(&by_device);
@@ -186,17 +172,12 @@ fn preprocess_set(
             optimizations,
         )
     };
-    let preprocessor = Preprocessor {
-        runtime,
-        constants: &constants,
-        is_flat: set.is_flat(),
-    };
+    let preprocessor = Preprocessor { runtime, constants: &constants, is_flat: set.is_flat() };
     let mut by_device = Counters::default();
     let map = occlusion::find(set, &preprocessor, clusters);
     let tasks = group_tasks::group_tasks(set, clusters, &constants, map.as_ref(), &mut by_device)?;
     if optimizations.has(Optimization::Harmonics) {
-        let unread =
-            by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
+        let unread = by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
         by_device.add(Counter::HarmonicsUnread, unread);
     }
     let mut groups = preprocessor.run(&tasks);
@@ -206,12 +187,7 @@ fn preprocess_set(
     host::reserve(&mut groups, shaded.len());
     groups.extend(shaded);
     by_device.add_all(&counted(&groups[..fixed]));
-    Ok(Preprocessed {
-        by_programs: counted(&groups[fixed..]),
-        groups,
-        fixed,
-        by_device,
-    })
+    Ok(Preprocessed { by_programs: counted(&groups[fixed..]), groups, fixed, by_device })
 }
 
 /// The sum of all groups' counters.

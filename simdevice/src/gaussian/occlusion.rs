@@ -112,10 +112,7 @@ pub(super) fn find(
 /// True if, in this mode, a finished pixel hides everything that is farther away.
 fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
     let state = &set.begin.state;
-    let is_along_axis = matches!(
-        preprocessor.constants.model,
-        CameraModel::Pinhole | CameraModel::Orthographic
-    );
+    let is_along_axis = matches!(preprocessor.constants.model, CameraModel::Pinhole | CameraModel::Orthographic);
     preprocessor.constants.optimizations.has(Optimization::OcclusionCulling)
         // A recording describes hardware without this optimization.
         && preprocessor.runtime.recorder().is_none()
@@ -139,11 +136,7 @@ fn least_light(state: &GaussianState) -> f32 {
 }
 
 /// The clusters' occluders that may be wide enough in the picture, packed into new clusters.
-fn large_occluders(
-    constants: &ViewConstants,
-    frustum: &Frustum,
-    clusters: &Clusters,
-) -> Vec<Cluster> {
+fn large_occluders(constants: &ViewConstants, frustum: &Frustum, clusters: &Clusters) -> Vec<Cluster> {
     let mut packed: Vec<Cluster> = Vec::new();
     for cluster in &clusters.occluders {
         if frustum.excludes(&cluster.bounds).is_some() {
@@ -200,10 +193,8 @@ impl TileTransmittance {
     fn new(bounds: Rect, state: &GaussianState) -> Self {
         let [x, y] = [bounds.x.max(0) as u32, bounds.y.max(0) as u32];
         let first = [x / TILE_SIZE, y / TILE_SIZE];
-        let count = [
-            (x + bounds.width).div_ceil(TILE_SIZE) - first[0],
-            (y + bounds.height).div_ceil(TILE_SIZE) - first[1],
-        ];
+        let count =
+            [(x + bounds.width).div_ceil(TILE_SIZE) - first[0], (y + bounds.height).div_ceil(TILE_SIZE) - first[1]];
         let tiles = count[0] as usize * count[1] as usize;
         Self {
             bounds,
@@ -212,10 +203,7 @@ impl TileTransmittance {
             left: host::filled(1.0, tiles),
             depth: host::filled(f32::INFINITY, tiles),
             floor: f64::from(least_light(state)) * (1.0 - MARGIN),
-            alphas: [
-                f64::from(state.alpha_ceiling),
-                LEAST_ALPHA.max(f64::from(state.alpha_floor) * (1.0 + MARGIN)),
-            ],
+            alphas: [f64::from(state.alpha_ceiling), LEAST_ALPHA.max(f64::from(state.alpha_floor) * (1.0 + MARGIN))],
         }
     }
 
@@ -289,11 +277,7 @@ impl TileTransmittance {
 
     /// The map of the hidden space, if any region is finished. It is valid for clusters of at most these clusters'
     /// opacities.
-    fn occlusion(
-        &self,
-        constants: &ViewConstants,
-        clusters: &[Option<Arc<Clusters>>],
-    ) -> Option<OcclusionMap> {
+    fn occlusion(&self, constants: &ViewConstants, clusters: &[Option<Arc<Clusters>>]) -> Option<OcclusionMap> {
         let opacities = clusters.iter().flatten().map(|clusters| clusters.opacity);
         let opacity = opacities.fold(0.0, f32::max);
         let frustum_up_to = |farthest: f32, visible: Visible| {
@@ -322,9 +306,8 @@ impl TileTransmittance {
                     }
                 }
                 any |= farthest < f32::INFINITY;
-                let edge = |axis: usize, tile: usize| {
-                    i64::from(TILE_SIZE) * (i64::from(self.first[axis]) + tile as i64)
-                };
+                let edge =
+                    |axis: usize, tile: usize| i64::from(TILE_SIZE) * (i64::from(self.first[axis]) + tile as i64);
                 let whole = Visible::from(self.bounds);
                 let visible = Visible {
                     left: edge(0, columns.start).max(whole.left),
@@ -336,10 +319,7 @@ impl TileTransmittance {
             }
         }
         let farthest = self.depth.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        any.then(|| OcclusionMap {
-            whole: frustum_up_to(farthest, self.bounds.into()),
-            regions,
-        })
+        any.then(|| OcclusionMap { whole: frustum_up_to(farthest, self.bounds.into()), regions })
     }
 }
 

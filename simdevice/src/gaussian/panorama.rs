@@ -19,11 +19,7 @@ fn near(visible: &Visible, x: f64, period: f64) -> Visible {
     let half = 0.5 * period + 1.0;
     // Outside of the visible range there are no pixels, however far `x` is.
     let pixel = |x: f64| (x as i64).clamp(visible.left, visible.right);
-    Visible {
-        left: pixel((x - half).floor()),
-        right: pixel((x + half).ceil()),
-        ..*visible
-    }
+    Visible { left: pixel((x - half).floor()), right: pixel((x + half).ceil()), ..*visible }
 }
 
 /// The tiles that a Gaussian and its copies reach, or `None` if there are none. Copies that reach tiles are added to
@@ -42,10 +38,7 @@ pub(super) fn reach(
     let before = copies.len();
     for (side, direction) in SIDES.into_iter().enumerate() {
         let x = x + direction * period;
-        let copy = Ellipse {
-            mean: [x, y],
-            ..*ellipse
-        };
+        let copy = Ellipse { mean: [x, y], ..*ellipse };
         let spans = &mut out.copies[side].spans;
         let visible = near(visible, x, period);
         if let Some(reach) = copy.reach(&visible, spans, beside.as_deref_mut()) {
@@ -68,8 +61,7 @@ pub(super) fn copy_last(
     while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
         *copies = rest;
         let last = out.splats.last().zip(out.keys.last());
-        let Some((mut splat, &key)) = last.map(|(splat, key)| (*splat, key)).filter(|_| of == at)
-        else {
+        let Some((mut splat, &key)) = last.map(|(splat, key)| (*splat, key)).filter(|_| of == at) else {
             continue;
         };
         splat.mean[0] += SIDES[side] * period;
@@ -99,36 +91,16 @@ pub(super) fn append_copies(groups: &mut Vec<ProjectedGroup>) {
 mod tests {
     use super::*;
 
-    const VISIBLE: Visible = Visible {
-        left: 0,
-        top: 0,
-        right: 100,
-        bottom: 50,
-    };
+    const VISIBLE: Visible = Visible { left: 0, top: 0, right: 100, bottom: 50 };
 
     fn tiles(x: f64, half: f64) -> [Vec<u32>; 3] {
-        let ellipse = Ellipse {
-            mean: [x, 20.0],
-            half: [half, 2.0],
-            slope: 0.0,
-            narrowing: (half / 2.0).powi(2),
-            peak: 0.0,
-        };
+        let ellipse =
+            Ellipse { mean: [x, 20.0], half: [half, 2.0], slope: 0.0, narrowing: (half / 2.0).powi(2), peak: 0.0 };
         let (mut out, mut copies) = (ProjectedGroup::default(), Vec::new());
-        let reach = reach(
-            0,
-            &ellipse,
-            100.0,
-            &VISIBLE,
-            &mut copies,
-            &mut out,
-            Some(&mut 0),
-        );
+        let reach = reach(0, &ellipse, 100.0, &VISIBLE, &mut copies, &mut out, Some(&mut 0));
         let columns = |reach: &TileFootprint, spans: &[_]| {
             let spans = reach.spans(spans);
-            spans
-                .flat_map(|(_, span)| span.first.into()..span.end.into())
-                .collect::<Vec<u32>>()
+            spans.flat_map(|(_, span)| span.first.into()..span.end.into()).collect::<Vec<u32>>()
         };
         let mut found: [Vec<u32>; 3] = Default::default();
         if let Some(reach) = reach {

@@ -17,9 +17,7 @@ use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
 use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
-use super::spherical_harmonics::{
-    Bases, COEFFICIENT_FLOATS, DIRECTIONS, MAX_COEFFICIENTS, coefficient_count,
-};
+use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, MAX_COEFFICIENTS, coefficient_count};
 use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
@@ -58,11 +56,7 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// Reads the spherical harmonics of a lane into `read`, and zeros where the draw has fewer, and returns `read`.
     #[inline(never)]
-    fn read_harmonics<'b>(
-        &self,
-        lane: usize,
-        read: &'b mut [f32; COEFFICIENT_FLOATS],
-    ) -> &'b [f32] {
+    fn read_harmonics<'b>(&self, lane: usize, read: &'b mut [f32; COEFFICIENT_FLOATS]) -> &'b [f32] {
         let floats = self.reader.floats();
         match self.harmonics.from(lane).get(..floats) {
             Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
@@ -147,12 +141,7 @@ fn find_colored<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>) -> 
 
 /// The lanes that no test culls. Counts the others by the first reason to skip them.
 #[inline(always)]
-fn cull<S: Simd>(
-    view: &ViewConstants,
-    simd: S,
-    source: &Source<'_>,
-    counters: &mut Counters,
-) -> Bits {
+fn cull<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, counters: &mut Counters) -> Bits {
     let len = source.group.len;
     let mut kept = Bits::first(len);
     let mut keep = |passed: &Bits, counter: Counter| {
@@ -190,12 +179,7 @@ fn cull<S: Simd>(
 
 /// The lanes whose opacities reach the alpha floor.
 #[inline(always)]
-fn find_bright<S: Simd>(
-    view: &ViewConstants,
-    simd: S,
-    attributes: &Attributes,
-    len: usize,
-) -> Bits {
+fn find_bright<S: Simd>(view: &ViewConstants, simd: S, attributes: &Attributes, len: usize) -> Bits {
     let mut bright = Bits::default();
     // The floor was binary32 originally.
     let floor = S::f32s::splat(simd, view.alpha_floor as f32);
@@ -251,8 +235,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
     }
     let moments = &*scratch.moments;
     let number = |value: f64| S::f64s::splat(simd, value);
-    let load =
-        |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+    let load = |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
     #[cfg(feature = "mistakes")]
     let rotation = &mistaken_rotation(rotation);
@@ -279,11 +262,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
             [xy - wz, one - (xx + zz), yz + wx],
             [xz + wy, yz - wx, one - (xx + yy)],
         ];
-        let scale = [
-            load(&scale[0], at),
-            load(&scale[1], at),
-            load(&scale[2], at),
-        ];
+        let scale = [load(&scale[0], at), load(&scale[1], at), load(&scale[2], at)];
         let per_depth = one / load(&scratch.camera[2], at);
         let mut m = [[one; 3]; 2];
         for axis in 0..2 {
@@ -316,11 +295,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
             bz.mul_add(bz, by.mul_add(by, bx * bx)),
         ];
         if unscented {
-            covariance = [
-                load(&moments[0], at),
-                load(&moments[1], at),
-                load(&moments[2], at),
-            ];
+            covariance = [load(&moments[0], at), load(&moments[1], at), load(&moments[2], at)];
             area2 = load(&moments[3], at);
         }
         shape(view, simd, at, covariance, area2, load(opacity, at), flat);
@@ -331,11 +306,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
 #[cfg(feature = "mistakes")]
 fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
     let [w, x, y, z] = *rotation;
-    if Mistake::QuaternionScalarLast.is_made() {
-        [z, w, x, y]
-    } else {
-        [w, x, y, z]
-    }
+    if Mistake::QuaternionScalarLast.is_made() { [z, w, x, y] } else { [w, x, y, z] }
 }
 
 /// Computes the numbers that rasterization and the search for tiles need, for Gaussians from lane `at` on. The inputs
@@ -413,8 +384,7 @@ pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
     for at in 0..scratch.lanes.len().min(GROUP) {
         let a = placed.linear(at);
         let p = scratch.position.each_ref().map(|lanes| lanes[at]);
-        let d =
-            [0, 1, 2].map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - view.eye[axis]));
+        let d = [0, 1, 2].map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - view.eye[axis]));
         let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
         // The columns of the inverse, times the determinant. Only its sign matters for directions.
         let columns = cofactors(a);
@@ -456,8 +426,7 @@ pub(super) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: 
 /// A kept lane's depth in the encoding of the depth attachment.
 #[inline(always)]
 fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
-    view.depth
-        .map_or(0, |depth| depth.code(scratch.depth[at] as f32))
+    view.depth.map_or(0, |depth| depth.code(scratch.depth[at] as f32))
 }
 
 /// Computes the sort key and the sequence number of each kept lane.
@@ -502,12 +471,7 @@ fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
     let [w, x, y, z] = &*scratch.rotation;
     let [sx, sy, sz] = &*scratch.scale;
     let [dx, dy, dz] = &*scratch.offset;
-    RayDepth::new(
-        &view.rotation,
-        [w[at], x[at], y[at], z[at]],
-        [sx[at], sy[at], sz[at]],
-        [dx[at], dy[at], dz[at]],
-    )
+    RayDepth::new(&view.rotation, [w[at], x[at], y[at], z[at]], [sx[at], sy[at], sz[at]], [dx[at], dy[at], dz[at]])
 }
 
 /// The vectors from the eye to the means of the kept Gaussians, in the axes of the Gaussians' own space.
@@ -530,9 +494,7 @@ const SQUARES: [f32; 2] = [1e-20, 1e20];
 /// [`SQUARES`].
 #[inline(always)]
 fn normalize<S: Simd>(simd: S, vectors: &mut [[f32; DIRECTIONS]; 3]) -> bool {
-    let [x, y, z] = vectors
-        .each_ref()
-        .map(|lanes| f32x16::from_slice(simd, lanes));
+    let [x, y, z] = vectors.each_ref().map(|lanes| f32x16::from_slice(simd, lanes));
     let square = z.mul_add(z, y.mul_add(y, x * x));
     let [least, greatest] = SQUARES;
     if !square.max(least).min(greatest).simd_eq(square).all_true() {
@@ -547,11 +509,7 @@ fn normalize<S: Simd>(simd: S, vectors: &mut [[f32; DIRECTIONS]; 3]) -> bool {
 
 /// Computes the directions of a batch of elements from the vectors `toward` them, whatever their lengths.
 #[cold]
-fn normalize_wide(
-    toward: &[GroupF64; 3],
-    batch: &[usize],
-    directions: &mut [[f32; DIRECTIONS]; 3],
-) {
+fn normalize_wide(toward: &[GroupF64; 3], batch: &[usize], directions: &mut [[f32; DIRECTIONS]; 3]) {
     for (number, &at) in batch.iter().enumerate() {
         let vector = toward.each_ref().map(|lanes| lanes[at % GROUP]);
         let [x, y, z] = vector.map(f64::abs);
@@ -579,11 +537,7 @@ pub(super) fn emit<S: Simd>(
     find_keys(view, sequence, scratch);
     let degree = view.sh_degree;
     #[cfg(feature = "mistakes")]
-    let degree = if Mistake::NoDegree4.is_made() {
-        degree.min(3)
-    } else {
-        degree
-    };
+    let degree = if Mistake::NoDegree4.is_made() { degree.min(3) } else { degree };
     let toward = toward(source, scratch);
     // Elements without a Gaussian have a direction too, so that they do not look like one without.
     let (mut directions, mut bases) = ([[1.0; DIRECTIONS]; 3], Bases::default());
@@ -614,8 +568,7 @@ pub(super) fn emit<S: Simd>(
             _ => color::<S, MAX_COEFFICIENTS>(simd, source, lanes, group, &bases, &mut read),
         };
         let uncolored = group.len() - colored.all().len();
-        out.counters
-            .add(Counter::SkippedNonFinite, uncolored as u64);
+        out.counters.add(Counter::SkippedNonFinite, uncolored as u64);
         let Some(period) = view.period else {
             append(view, colored.all(), scratch, out);
             continue;
@@ -635,12 +588,7 @@ pub(super) fn emit<S: Simd>(
 
 /// Appends kept lanes and their colours to `out`.
 #[inline(always)]
-fn append(
-    view: &ViewConstants,
-    lanes: &[ColoredLane],
-    scratch: &Scratch,
-    out: &mut ProjectedGroup,
-) {
+fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, out: &mut ProjectedGroup) {
     // Iterators of known length append without checking the capacity each time.
     let [keys, sequences] = &*scratch.keys;
     let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
@@ -651,23 +599,15 @@ fn append(
     );
     match view.period {
         None => out.splats.extend(splats),
-        Some(period) => out
-            .splats
-            .extend(lanes.iter().zip(splats).map(|(one, splat)| {
-                let wide = 2.0 * scratch.flat.ellipse(one.at).half[0] >= period;
-                Splat {
-                    needs_f64: wide || splat.needs_f64,
-                    exceeds_period: wide,
-                    ..splat
-                }
-            })),
+        Some(period) => out.splats.extend(lanes.iter().zip(splats).map(|(one, splat)| {
+            let wide = 2.0 * scratch.flat.ellipse(one.at).half[0] >= period;
+            Splat { needs_f64: wide || splat.needs_f64, exceeds_period: wide, ..splat }
+        })),
     }
     let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
     out.reaches.extend(reaches);
     if view.geometry == GaussianGeometry::Surfel {
-        let surfels = lanes
-            .iter()
-            .map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).0);
+        let surfels = lanes.iter().map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).0);
         out.surfels.extend(surfels);
     }
     if view.order == GaussianOrder::PerPixel {
@@ -675,10 +615,8 @@ fn append(
         out.ray_depths.extend(depths);
     }
     if view.is_tracked {
-        let identities = lanes.iter().map(|one| Identity {
-            z: scratch.depth[one.at] as f32,
-            sequence: sequences[one.at],
-        });
+        let identities =
+            lanes.iter().map(|one| Identity { z: scratch.depth[one.at] as f32, sequence: sequences[one.at] });
         out.identities.extend(identities);
     }
 }
@@ -730,11 +668,7 @@ fn color<S: Simd, const COUNT: usize>(
     let mut len = 0;
     // One more than there are, since vectors have four numbers and coefficients three.
     let needed = 3 * COUNT + 1;
-    let held = if source.reader.floats() + 1 >= needed {
-        source.harmonics
-    } else {
-        Harmonics::default()
-    };
+    let held = if source.reader.floats() + 1 >= needed { source.harmonics } else { Harmonics::default() };
     for (number, &at) in batch.iter().enumerate() {
         let lane = lanes[at % GROUP];
         let coefficients = match held.first(lane, needed) {
@@ -748,10 +682,7 @@ fn color<S: Simd, const COUNT: usize>(
             len += 1;
         }
     }
-    Colored {
-        lanes: colored,
-        len,
-    }
+    Colored { lanes: colored, len }
 }
 
 /// The lanes whose attributes are finite, those with a nonzero rotation, and those without a negative scale.
@@ -760,8 +691,7 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
     let mut sound = [Bits::default(); 3];
     let zero = S::f32s::splat(simd, 0.0);
     for at in (0..len).step_by(S::f32s::LEN) {
-        let load =
-            |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
+        let load = |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
         // Times zero, a number that is not finite becomes NaN, and sums stay NaN.
         let mut nothing = load(&attributes.opacity) * zero;
         let mut least = zero;
@@ -820,9 +750,7 @@ impl<'a> GroupTask<'a> {
                 let len = (self.append.count - start).min(GROUP as u32) as usize;
                 Group::new(self.append, self.instance, start, len)
             }
-            GroupSource::Cluster(cluster) => {
-                Group::of_cluster(self.append, self.instance, &cluster.numbers)
-            }
+            GroupSource::Cluster(cluster) => Group::of_cluster(self.append, self.instance, &cluster.numbers),
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
             let matrices = matrices.get_or_insert_default();
@@ -883,22 +811,13 @@ impl Preprocessor<'_> {
             self.task(worker.get_or_insert_with(Worker::new), task)
         };
         let mut groups = host::with_capacity(tasks.len());
-        tasks
-            .par_iter()
-            .with_max_len(GROUPS_PER_TASK)
-            .map(one)
-            .collect_into_vec(&mut groups);
+        tasks.par_iter().with_max_len(GROUPS_PER_TASK).map(one).collect_into_vec(&mut groups);
         groups
     }
 
     /// Projects one group.
     fn task(&self, worker: &mut Worker, task: &GroupTask<'_>) -> ProjectedGroup {
-        let Worker {
-            fetcher,
-            attributes,
-            matrices,
-            scratch,
-        } = worker;
+        let Worker { fetcher, attributes, matrices, scratch } = worker;
         let mut out = ProjectedGroup::default();
         let constants = self.constants;
         let source = task.read(fetcher, attributes, matrices, self.is_flat);
@@ -914,20 +833,14 @@ impl Preprocessor<'_> {
             }
         }
         let placed;
-        let mut bounds = constants
-            .optimizations
-            .has(Optimization::Bounds)
-            .then_some(frustum);
+        let mut bounds = constants.optimizations.has(Optimization::Bounds).then_some(frustum);
         if let Some(matrices) = source.matrices {
             // With one matrix for all lanes, the frustum is transformed to the space before it.
             let uniform = bounds.and(matrices.uniform());
             placed = uniform.and_then(|matrix| frustum.within(matrix));
             bounds = placed.as_ref();
         }
-        let source = Source {
-            frustum: bounds,
-            ..source
-        };
+        let source = Source { frustum: bounds, ..source };
         let sequence = match task.part {
             GroupSource::From(start) => Sequence::From(task.sequence + start),
             GroupSource::Cluster(cluster) => Sequence::Listed(task.sequence, &cluster.numbers),
@@ -948,11 +861,6 @@ struct Worker {
 
 impl Worker {
     fn new() -> Self {
-        Self {
-            fetcher: Fetcher::default(),
-            attributes: Box::default(),
-            matrices: None,
-            scratch: Scratch::new(),
-        }
+        Self { fetcher: Fetcher::default(), attributes: Box::default(), matrices: None, scratch: Scratch::new() }
     }
 }

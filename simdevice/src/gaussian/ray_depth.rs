@@ -29,22 +29,13 @@ impl RayDepth {
     /// The coefficients of a Gaussian with standard deviations `scale` along axes rotated by the quaternion `rotation`
     /// (w, x, y, z, any length but zero), whose centre is `offset` from the eye, in world axes. `camera` is the
     /// camera's rotation.
-    pub(crate) fn new(
-        camera: &[f64; 9],
-        rotation: [f64; 4],
-        scale: [f64; 3],
-        offset: [f64; 3],
-    ) -> Self {
+    pub(crate) fn new(camera: &[f64; 9], rotation: [f64; 4], scale: [f64; 3], offset: [f64; 3]) -> Self {
         let greatest = scale[0].max(scale[1]).max(scale[2]);
         let axes = axes(rotation);
         let mut depth = Self::default();
         for row in 0..3 {
             // A point has the depth of a ball.
-            let stretch = if greatest > 0.0 {
-                (greatest / scale[row]).min(1.0 / LEAST_RATIO)
-            } else {
-                1.0
-            };
+            let stretch = if greatest > 0.0 { (greatest / scale[row]).min(1.0 / LEAST_RATIO) } else { 1.0 };
             let axis = axes[row].map(|component| component * stretch);
             for column in 0..3 {
                 depth.columns[column][row] = dot(axis, row_of(camera, column));
@@ -59,11 +50,7 @@ impl RayDepth {
     pub(crate) fn along<S: Simd>(&self, simd: S, rays: &Rays, first: usize) -> f64x8<S> {
         let number = |value: f64| f64x8::splat(simd, value);
         let load = |lanes: &[f64; RAYS]| f64x8::from_slice(simd, &lanes[first..first + 8]);
-        let [x, y, z] = [
-            load(&rays.direction[0]),
-            load(&rays.direction[1]),
-            load(&rays.direction[2]),
-        ];
+        let [x, y, z] = [load(&rays.direction[0]), load(&rays.direction[1]), load(&rays.direction[2])];
         let [cx, cy, cz] = &self.columns;
         let (mut product, mut square) = (number(0.0), number(0.0));
         for row in 0..3 {
@@ -95,21 +82,9 @@ pub(super) fn axes(rotation: [f64; 4]) -> [[f64; 3]; 3] {
     let norm = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
     let [w, x, y, z] = scaled.map(|c| c / norm);
     [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y + w * z),
-            2.0 * (x * z - w * y),
-        ],
-        [
-            2.0 * (x * y - w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z + w * x),
-        ],
-        [
-            2.0 * (x * z + w * y),
-            2.0 * (y * z - w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)],
+        [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)],
+        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
 }
 
@@ -125,15 +100,9 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// by rounding errors are equal.
 pub(crate) fn ordered_key(depth: f64) -> u64 {
     // A carry into the exponent gives the correct next number. Negative zero becomes zero.
-    let bits = (depth + 0.0)
-        .to_bits()
-        .wrapping_add(1 << (ROUNDED_BITS - 1));
+    let bits = (depth + 0.0).to_bits().wrapping_add(1 << (ROUNDED_BITS - 1));
     let bits = bits >> ROUNDED_BITS << ROUNDED_BITS;
-    if bits >> 63 == 0 {
-        bits | 1 << 63
-    } else {
-        !bits
-    }
+    if bits >> 63 == 0 { bits | 1 << 63 } else { !bits }
 }
 
 /// The number of rays that are evaluated together: those of a block of 4x4 pixels.
@@ -163,10 +132,7 @@ impl PixelRays {
         Self {
             model: camera.model,
             focal: camera.focal_length.map(f64::from),
-            center: [
-                principal[0] + f64::from(viewport.x),
-                principal[1] + f64::from(viewport.y),
-            ],
+            center: [principal[0] + f64::from(viewport.x), principal[1] + f64::from(viewport.y)],
         }
     }
 
@@ -186,11 +152,7 @@ impl PixelRays {
                 CameraModel::Fisheye => {
                     let angle = (u * u + v * v).sqrt();
                     // The limit on the axis.
-                    let across = if angle == 0.0 {
-                        1.0
-                    } else {
-                        angle.sin() / angle
-                    };
+                    let across = if angle == 0.0 { 1.0 } else { angle.sin() / angle };
                     [u * across, v * across, angle.cos()]
                 }
                 CameraModel::Equirectangular => {
@@ -221,19 +183,14 @@ mod tests {
     const TURNED: [f64; 9] = [0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6];
 
     fn pixel_rays(model: CameraModel) -> PixelRays {
-        PixelRays {
-            model,
-            focal: [100.0, 90.0],
-            center: [50.0, 40.0],
-        }
+        PixelRays { model, focal: [100.0, 90.0], center: [50.0, 40.0] }
     }
 
     /// The depths along rays. Asserts that the level gives those of the simplest.
     fn along(level: Level, depth: &RayDepth, rays: &Rays, first: usize) -> Vec<f64> {
         let simplest = SimdLevel::Baseline.resolve().unwrap();
-        let [found, expected] = [level, simplest].map(
-            |level| dispatch!(level, simd => depth.along(simd, rays, first).as_slice().to_vec()),
-        );
+        let [found, expected] =
+            [level, simplest].map(|level| dispatch!(level, simd => depth.along(simd, rays, first).as_slice().to_vec()));
         assert_eq!(found, expected);
         found
     }
@@ -293,18 +250,7 @@ mod tests {
 
     #[gaurast_runner::test]
     fn keys_order_as_depths_do_and_forgive_their_rounding() {
-        let depths = [
-            -1e30,
-            -2.0,
-            -1.0,
-            -1e-300,
-            0.0,
-            1e-300,
-            1.0,
-            1.0 + 1e-10,
-            2.0,
-            1e30,
-        ];
+        let depths = [-1e30, -2.0, -1.0, -1e-300, 0.0, 1e-300, 1.0, 1.0 + 1e-10, 2.0, 1e30];
         assert!(depths.is_sorted());
         let keys = depths.map(ordered_key);
         assert!(keys.is_sorted_by(|a, b| a < b), "{keys:?}");

@@ -24,16 +24,8 @@ impl Projected<'_> {
 
     /// The number of Gaussians that are finite, bright enough and between the near and far planes.
     fn kept(&self) -> u64 {
-        let early = [
-            Counter::SkippedNonFinite,
-            Counter::SkippedFaint,
-            Counter::SkippedNear,
-            Counter::SkippedFar,
-        ];
-        let skipped: u64 = early
-            .iter()
-            .map(|&counter| self.counters.get(counter))
-            .sum();
+        let early = [Counter::SkippedNonFinite, Counter::SkippedFaint, Counter::SkippedNear, Counter::SkippedFar];
+        let skipped: u64 = early.iter().map(|&counter| self.counters.get(counter)).sum();
         self.read().saturating_sub(skipped)
     }
 
@@ -74,9 +66,7 @@ pub(crate) fn gaussian_draw(
         boxed_pairs: splats().map(|splat| boxed_tiles(splat, bounds)).sum(),
         sized_pairs: splats()
             .map(|splat| sized_boxes(splat, bounds))
-            .fold([0; TILE_SIDES.len()], |sum, tiles| {
-                std::array::from_fn(|index| sum[index] + tiles[index])
-            }),
+            .fold([0; TILE_SIDES.len()], |sum, tiles| std::array::from_fn(|index| sum[index] + tiles[index])),
         preprocess: preprocess.plus(&program),
         sort,
         ..DrawWork::default()
@@ -116,9 +106,7 @@ fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
         let (start, end) = (f64::from(start), f64::from(start) + f64::from(length));
         let (first, last) = ((start / size).floor(), (end / size).ceil());
         let low = ((mean - radius) / size).floor().clamp(first, last);
-        let high = ((mean + radius + size - 1.0) / size)
-            .floor()
-            .clamp(first, last);
+        let high = ((mean + radius + size - 1.0) / size).floor().clamp(first, last);
         (high - low) as u64
     };
     let [x, y] = splat.mean;
@@ -129,20 +117,11 @@ fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
 mod tests {
     use super::*;
 
-    const BOUNDS: Rect = Rect {
-        x: 0,
-        y: 0,
-        width: 160,
-        height: 80,
-    };
+    const BOUNDS: Rect = Rect { x: 0, y: 0, width: 160, height: 80 };
 
     fn splat(mean: [f64; 2], deviation: f64) -> Splat {
         let factor = 1.0 / (deviation * (2.0 * std::f64::consts::LN_2).sqrt());
-        Splat {
-            mean,
-            factor: [factor, 0.0, factor],
-            ..Splat::default()
-        }
+        Splat { mean, factor: [factor, 0.0, factor], ..Splat::default() }
     }
 
     #[gaurast_runner::test]

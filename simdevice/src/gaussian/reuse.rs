@@ -54,36 +54,18 @@ pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
 impl Key {
     /// The key of `set`; `None` if the driver does not see all writes to its inputs.
     pub(super) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
-        let seen = |append: &GaussianAppend| {
-            append.indices.is_none() && attributes(append).all(is_device_local)
-        };
+        let seen = |append: &GaussianAppend| append.indices.is_none() && attributes(append).all(is_device_local);
         if set.appends.is_empty() || !set.draws.is_empty() || !set.appends.iter().all(seen) {
             return None;
         }
-        let ranges = set.appends.iter().map(|append| {
-            [
-                append.first,
-                append.count,
-                append.first_instance,
-                append.instance_count,
-            ]
-        });
+        let ranges =
+            set.appends.iter().map(|append| [append.first, append.count, append.first_instance, append.instance_count]);
         let begin = &set.begin;
         Some(Self {
-            streams: set
-                .appends
-                .iter()
-                .flat_map(attributes)
-                .map(SourceFingerprint::new)
-                .collect(),
+            streams: set.appends.iter().flat_map(attributes).map(SourceFingerprint::new).collect(),
             ranges: ranges.collect(),
-            activations: (set.appends.iter())
-                .map(|append| append.attributes.activations)
-                .collect(),
-            clusters: clusters
-                .iter()
-                .map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade))
-                .collect(),
+            activations: (set.appends.iter()).map(|append| append.attributes.activations).collect(),
+            clusters: clusters.iter().map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade)).collect(),
             state: Arc::clone(&begin.state),
             camera: begin.camera,
             viewport: begin.viewport,
@@ -178,11 +160,7 @@ impl ReuseCache {
             entry.release();
         }
         memory.keep_derived(Arc::clone(set) as _);
-        entries.push(Entry {
-            key,
-            set: Arc::downgrade(set),
-            bytes,
-        });
+        entries.push(Entry { key, set: Arc::downgrade(set), bytes });
     }
 }
 
@@ -190,12 +168,7 @@ impl ReuseCache {
 fn attributes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
     let attributes = &append.attributes;
     let model = &attributes.model;
-    let shapes = [
-        &attributes.position,
-        &attributes.scale,
-        &attributes.rotation,
-        &attributes.opacity,
-    ];
+    let shapes = [&attributes.position, &attributes.scale, &attributes.rotation, &attributes.opacity];
     shapes
         .into_iter()
         .chain(&attributes.spherical_harmonics)

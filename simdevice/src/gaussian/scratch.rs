@@ -136,13 +136,7 @@ impl Scratch {
     /// Packs the kept lanes of `len` densely, as binary64. If `may_have_others` and few lanes were culled, all lanes
     /// are copied in place instead.
     #[inline(always)]
-    pub(super) fn gather(
-        &mut self,
-        attributes: &Attributes,
-        kept: &Bits,
-        len: usize,
-        may_have_others: bool,
-    ) {
+    pub(super) fn gather(&mut self, attributes: &Attributes, kept: &Bits, len: usize, may_have_others: bool) {
         self.lanes.clear();
         let count = kept.count() as usize;
         let whole = count == GROUP || may_have_others && MOST * count >= (MOST - 1) * len;
@@ -179,12 +173,9 @@ impl Scratch {
 
     /// Packs the kept lanes' matrices densely.
     pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
-        let placed = self.placed.get_or_insert_with(|| {
-            Box::new(Placed {
-                matrix: [[NO_GROUP_F64; 4]; 3],
-                toward: [NO_GROUP_F64; 3],
-            })
-        });
+        let placed = self
+            .placed
+            .get_or_insert_with(|| Box::new(Placed { matrix: [[NO_GROUP_F64; 4]; 3], toward: [NO_GROUP_F64; 3] }));
         let to = placed.matrix.as_flattened_mut().iter_mut();
         for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
             for (to, &lane) in to.iter_mut().zip(&self.lanes) {
@@ -201,10 +192,7 @@ mod tests {
     #[gaurast_runner::test]
     fn lanes_that_are_kept_are_the_same_among_others_and_alone() {
         let mut attributes = Attributes::default();
-        for (lane, (x, opacity)) in (attributes.position[0].iter_mut())
-            .zip(&mut attributes.opacity)
-            .enumerate()
-        {
+        for (lane, (x, opacity)) in (attributes.position[0].iter_mut()).zip(&mut attributes.opacity).enumerate() {
             (*x, *opacity) = (lane as f32, 0.5 + lane as f32);
         }
         for (len, left_out) in [(GROUP, 5), (GROUP, 3), (200, 5), (200, 3), (GROUP, GROUP)] {

@@ -32,9 +32,7 @@ pub struct GaussianSet {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SortError {
     /// The set has more Gaussians than one draw can sort.
-    #[error(
-        "a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold"
-    )]
+    #[error("a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold")]
     TooManyGaussians {
         /// The number of groups that it would take.
         groups: u64,
@@ -54,12 +52,7 @@ fn viewport_pixels(viewport: &Viewport) -> Rect {
     };
     let (x, width) = span(viewport.x, viewport.width);
     let (y, height) = span(viewport.y, viewport.height);
-    Rect {
-        x,
-        y,
-        width,
-        height,
-    }
+    Rect { x, y, width, height }
 }
 
 /// The depths of a set's centres, as an attachment of `format` holds them.
@@ -74,9 +67,7 @@ impl GaussianSet {
     pub fn begin(begin: &GaussianBegin, area: Rect, depth: Option<Format>) -> Self {
         #[cfg(feature = "mistakes")]
         let begin = &crate::mistakes::begin(begin);
-        let visible = area
-            .intersect(begin.scissor)
-            .intersect(viewport_pixels(&begin.viewport));
+        let visible = area.intersect(begin.scissor).intersect(viewport_pixels(&begin.viewport));
         Self {
             begin: begin.clone(),
             layer: 0,
@@ -92,12 +83,7 @@ impl GaussianSet {
     }
 
     /// Starts the set of view `layer`, with the camera of the pass's view number `number`.
-    pub fn begin_view(
-        begin: &GaussianBegin,
-        (number, layer): (usize, u32),
-        area: Rect,
-        depth: Option<Format>,
-    ) -> Self {
+    pub fn begin_view(begin: &GaussianBegin, (number, layer): (usize, u32), area: Rect, depth: Option<Format>) -> Self {
         let own = number.checked_sub(1);
         let camera = own.and_then(|number| begin.further_cameras.get(number));
         let begin = GaussianBegin {
@@ -105,10 +91,7 @@ impl GaussianSet {
             further_cameras: Vec::new(),
             ..begin.clone()
         };
-        Self {
-            layer,
-            ..Self::begin(&begin, area, depth)
-        }
+        Self { layer, ..Self::begin(&begin, area, depth) }
     }
 
     /// Adds the Gaussians of a packet to the set.

@@ -69,11 +69,7 @@ impl Digits {
         }
         let range = greatest.checked_sub(least).filter(|&range| range > 0)?;
         let first = (all ^ any).trailing_zeros();
-        Some(Self {
-            least,
-            first,
-            width: u32::BITS - range.leading_zeros() - first,
-        })
+        Some(Self { least, first, width: u32::BITS - range.leading_zeros() - first })
     }
 }
 
@@ -95,11 +91,7 @@ fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [
     }
     // The number of passes decides which buffer comes first, so that the last pass writes to `sorted`.
     let mut is_other = passes.is_multiple_of(2);
-    let to = if is_other {
-        &mut other[..]
-    } else {
-        &mut *sorted
-    };
+    let to = if is_other { &mut other[..] } else { &mut *sorted };
     scatter(slices, to, &digits, digits.first, bits);
     for pass in 1..passes {
         let shift = digits.first + pass * bits;
@@ -125,10 +117,7 @@ impl SortBuffers {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let places = 0..kept.len();
         let fits = |&place: &usize| kept[place].len() >= count;
-        let place = places
-            .clone()
-            .filter(fits)
-            .min_by_key(|&place| kept[place].len());
+        let place = places.clone().filter(fits).min_by_key(|&place| kept[place].len());
         if let Some(place) = place {
             return kept.swap_remove(place);
         }
@@ -192,10 +181,7 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
         for_pairs(lists, 0, stride, |pair| pairs.push(pair));
         sort_by_key(&mut pairs);
         settle(&mut pairs);
-        return SortedPairs {
-            buffer: pairs,
-            len: count,
-        };
+        return SortedPairs { buffer: pairs, len: count };
     }
     let parts = Parts::new(lists, count);
     let in_group = lists.len().div_ceil(GROUPS_PER_WORKER * workers.max(1));
@@ -214,29 +200,19 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
         rest = after;
         tasks.push((slices, sorted));
     }
-    tasks
-        .into_par_iter()
-        .for_each_init(Vec::new, |other, (slices, sorted)| {
-            sort_into(&slices, other, sorted);
-            settle(sorted);
-        });
+    tasks.into_par_iter().for_each_init(Vec::new, |other, (slices, sorted)| {
+        sort_into(&slices, other, sorted);
+        settle(sorted);
+    });
     for group in groups {
         buffers.keep(group.pairs);
     }
-    SortedPairs {
-        buffer: pairs,
-        len: count,
-    }
+    SortedPairs { buffer: pairs, len: count }
 }
 
 /// Calls `each` with all keys and payloads, in order. The first list has number `first`.
 #[inline(always)]
-fn for_pairs<L: AsRef<[[u32; 2]]>>(
-    lists: &[L],
-    first: usize,
-    stride: u32,
-    mut each: impl FnMut(SortEntry),
-) {
+fn for_pairs<L: AsRef<[[u32; 2]]>>(lists: &[L], first: usize, stride: u32, mut each: impl FnMut(SortEntry)) {
     for (number, list) in lists.iter().enumerate() {
         let first = (first + number) as u32 * stride;
         for (&[key, _], place) in list.as_ref().iter().zip(first..) {
@@ -275,10 +251,7 @@ impl Parts {
         let mut below = 0;
         for interval in 0..INTERVALS {
             let is_below = |key: &u32| parts.interval(*key) < interval;
-            below += sample[below..]
-                .iter()
-                .take_while(|key| is_below(key))
-                .count();
+            below += sample[below..].iter().take_while(|key| is_below(key)).count();
             let part = below * parts.count / sample.len().max(1);
             parts.of[interval] = part.min(parts.count - 1) as u8;
         }
@@ -308,13 +281,7 @@ struct Partition {
 
 impl Partition {
     /// The partition of lists of which the first has number `first`.
-    fn new<L: AsRef<[[u32; 2]]>>(
-        parts: &Parts,
-        lists: &[L],
-        first: usize,
-        stride: u32,
-        buffers: &SortBuffers,
-    ) -> Self {
+    fn new<L: AsRef<[[u32; 2]]>>(parts: &Parts, lists: &[L], first: usize, stride: u32, buffers: &SortBuffers) -> Self {
         let mut ends = Box::new([0; MAX_PARTS]);
         for item in lists.iter().flat_map(|list| list.as_ref()) {
             ends[parts.of(item[0]) % MAX_PARTS] += 1;
@@ -371,19 +338,8 @@ mod tests {
 
     #[gaurast_runner::test]
     fn bits_order_as_numbers_do() {
-        let ascending = [
-            f32::NEG_INFINITY,
-            -1e30,
-            -1.0,
-            -1e-45,
-            -0.0,
-            0.0,
-            1e-45,
-            0.2,
-            0.2f32.next_up(),
-            3e38,
-            f32::INFINITY,
-        ];
+        let ascending =
+            [f32::NEG_INFINITY, -1e30, -1.0, -1e-45, -0.0, 0.0, 1e-45, 0.2, 0.2f32.next_up(), 3e38, f32::INFINITY];
         for value in ascending {
             assert_eq!(value_of(ordered_bits(value)).to_bits(), value.to_bits());
         }

@@ -87,25 +87,14 @@ impl SortedSet {
                 (group.splats, more)
             })
             .unzip_into_vecs(&mut splats, &mut others);
-        let surfels = others
-            .iter_mut()
-            .map(|others| std::mem::take(&mut others.0));
+        let surfels = others.iter_mut().map(|others| std::mem::take(&mut others.0));
         let surfels = set.is_flat().then(|| host::collect(surfels));
         let is_per_pixel = set.begin.state.order == GaussianOrder::PerPixel;
-        let identities = others
-            .iter_mut()
-            .map(|others| std::mem::take(&mut others.2));
+        let identities = others.iter_mut().map(|others| std::mem::take(&mut others.2));
         let identities = set.is_tracked().then(|| host::collect(identities));
         let depths = others.into_iter().map(|others| others.1);
         let ray_depths = is_per_pixel.then(|| host::collect(depths));
-        Self {
-            splats,
-            tiles,
-            surfels,
-            ray_depths,
-            identities,
-            counters: Counters::default(),
-        }
+        Self { splats, tiles, surfels, ray_depths, identities, counters: Counters::default() }
     }
 
     /// Bytes of host memory that it holds.
@@ -174,10 +163,7 @@ impl BinnedDraw {
     /// The depths that pixels sort by, if each pixel sorts for itself.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
         let of = self.sorted.ray_depths.as_ref()?;
-        Some(RayDepths {
-            of,
-            rays: self.rays,
-        })
+        Some(RayDepths { of, rays: self.rays })
     }
 
     /// True if it may touch a pixel of `rect`.

@@ -10,22 +10,8 @@ pub(super) const COEFFICIENT_FLOATS: usize = 80;
 
 const C0: f32 = 0.282_094_79;
 const C1: f32 = 0.488_602_51;
-const C2: [f32; 5] = [
-    1.092_548_4,
-    -1.092_548_4,
-    0.315_391_57,
-    -1.092_548_4,
-    0.546_274_2,
-];
-const C3: [f32; 7] = [
-    -0.590_043_6,
-    2.890_611_4,
-    -0.457_045_8,
-    0.373_176_34,
-    -0.457_045_8,
-    1.445_305_7,
-    -0.590_043_6,
-];
+const C2: [f32; 5] = [1.092_548_4, -1.092_548_4, 0.315_391_57, -1.092_548_4, 0.546_274_2];
+const C3: [f32; 7] = [-0.590_043_6, 2.890_611_4, -0.457_045_8, 0.373_176_34, -0.457_045_8, 1.445_305_7, -0.590_043_6];
 
 const C4: [f32; 9] = [
     2.503_343,
@@ -60,12 +46,7 @@ impl Bases {
     /// Evaluates the functions of degrees 0 to `degree` (at most 4) in unit directions from the eye, given as arrays of
     /// x, y and z.
     #[inline(always)]
-    pub(super) fn find<S: Simd>(
-        &mut self,
-        simd: S,
-        degree: u32,
-        [x, y, z]: &[[f32; DIRECTIONS]; 3],
-    ) {
+    pub(super) fn find<S: Simd>(&mut self, simd: S, degree: u32, [x, y, z]: &[[f32; DIRECTIONS]; 3]) {
         let load = |lanes: &[f32; DIRECTIONS]| f32x16::from_slice(simd, lanes);
         let (x, y, z) = (load(x), load(y), load(z));
         let mut set = |k: usize, value: f32x16<S>| value.store_slice(&mut self.0[k]);
@@ -165,12 +146,7 @@ impl Bases {
 
     /// The sum of 0.5 and `COUNT` coefficients times their functions.
     #[inline(always)]
-    fn sum<S: Simd, const COUNT: usize>(
-        &self,
-        simd: S,
-        at: usize,
-        coefficients: &[f32],
-    ) -> f32x4<S> {
+    fn sum<S: Simd, const COUNT: usize>(&self, simd: S, at: usize, coefficients: &[f32]) -> f32x4<S> {
         let coefficients = &coefficients[..3 * COUNT + 1];
         // Two sums shorten the chain of dependent additions. The largest terms, the constant one and 0.5, are added
         // last.
@@ -189,14 +165,7 @@ impl Bases {
     /// The sum of `sum` and coefficient `k` times its function. A vector holds the coefficient's three components and
     /// the first one of the next coefficient, which is ignored.
     #[inline(always)]
-    fn term<S: Simd>(
-        &self,
-        simd: S,
-        at: usize,
-        coefficients: &[f32],
-        k: usize,
-        sum: f32x4<S>,
-    ) -> f32x4<S> {
+    fn term<S: Simd>(&self, simd: S, at: usize, coefficients: &[f32], k: usize, sum: f32x4<S>) -> f32x4<S> {
         let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
         coefficient.mul_add(f32x4::splat(simd, self.0[k][at]), sum)
     }
@@ -239,11 +208,7 @@ mod tests {
 
     #[gaurast_runner::test]
     fn degree_one_has_the_signs_of_3dgs() {
-        let sh = coefficients(&[
-            (1, [1.0, 0.0, 0.0]),
-            (2, [0.0, 1.0, 0.0]),
-            (3, [0.0, 0.0, 1.0]),
-        ]);
+        let sh = coefficients(&[(1, [1.0, 0.0, 0.0]), (2, [0.0, 1.0, 0.0]), (3, [0.0, 0.0, 1.0])]);
         let from = |direction| color(1, direction, &sh).unwrap();
         assert_eq!(from([0.0, 1.0, 0.0])[0], 0.5 - C1);
         assert_eq!(from([0.0, 0.0, 1.0])[1], 0.5 + C1);
@@ -262,19 +227,12 @@ mod tests {
     #[gaurast_runner::test]
     fn sums_beyond_the_greatest_number_are_that() {
         const MAX: f32 = f32::MAX;
-        let sh = coefficients(&[
-            (0, [MAX, -MAX, -MAX]),
-            (2, [MAX, MAX, -MAX]),
-            (6, [MAX, MAX, -MAX]),
-        ]);
+        let sh = coefficients(&[(0, [MAX, -MAX, -MAX]), (2, [MAX, MAX, -MAX]), (6, [MAX, MAX, -MAX])]);
         let [red, green, blue] = color(2, [0.0, 0.0, 1.0], &sh).unwrap();
         assert_eq!((red, blue), (MAX, 0.0));
         // Intermediate overflow does not matter.
         let expected = f64::from(C1) + 2.0 * f64::from(C2[2]) - f64::from(C0);
-        assert!(
-            (f64::from(green) / f64::from(MAX) - expected).abs() < 1e-6,
-            "{green:e}"
-        );
+        assert!((f64::from(green) / f64::from(MAX) - expected).abs() < 1e-6, "{green:e}");
     }
 
     #[gaurast_runner::test]
@@ -300,11 +258,7 @@ mod tests {
         for (i, row) in products.iter().enumerate() {
             for (j, product) in row.iter().enumerate() {
                 let expected = f64::from(u8::from(i == j));
-                assert!(
-                    (product * area - expected).abs() < 1e-3,
-                    "{i} {j}: {}",
-                    product * area
-                );
+                assert!((product * area - expected).abs() < 1e-3, "{i} {j}: {}", product * area);
             }
         }
     }

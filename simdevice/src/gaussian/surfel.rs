@@ -47,11 +47,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 impl Surfel {
@@ -61,20 +57,12 @@ impl Surfel {
         let [fx, fy] = placed.focal;
         let depth = placed.centre[2];
         let is_parallel = placed.model == CameraModel::Orthographic;
-        let ray = if is_parallel {
-            [0.0, 0.0, 1.0]
-        } else {
-            placed.centre.map(|c| c / depth)
-        };
+        let ray = if is_parallel { [0.0, 0.0, 1.0] } else { placed.centre.map(|c| c / depth) };
         let normal = cross(a, b);
         let distance = if is_parallel { 1.0 } else { depth };
-        let [u, v] =
-            [cross(b, ray), cross(ray, a)].map(|c| [distance * c[0] / fx, distance * c[1] / fy]);
-        let mut scale = if is_parallel {
-            [normal[2], 0.0, 0.0]
-        } else {
-            [dot(normal, ray), normal[0] / fx, normal[1] / fy]
-        };
+        let [u, v] = [cross(b, ray), cross(ray, a)].map(|c| [distance * c[0] / fx, distance * c[1] / fy]);
+        let mut scale =
+            if is_parallel { [normal[2], 0.0, 0.0] } else { [dot(normal, ray), normal[0] / fx, normal[1] / fy] };
         if scale[0] < 0.0 {
             scale = scale.map(|w| -w);
         }
@@ -95,11 +83,7 @@ impl Surfel {
                 depth * scale[0] / placed.near
             },
             #[cfg(not(feature = "mistakes"))]
-            limit: if is_parallel {
-                f64::INFINITY
-            } else {
-                depth * scale[0] / placed.near
-            },
+            limit: if is_parallel { f64::INFINITY } else { depth * scale[0] / placed.near },
             bounds: [0.0; 4],
         }
     }
@@ -117,26 +101,13 @@ impl Surfel {
         let determinant = p * q - xy * xy;
         let total = (xx[0] + xx[1]) * (yy[0] + yy[1]);
         if !(p > 0.0 && determinant > LEAST_DETERMINANT * total) {
-            return Ellipse {
-                mean,
-                half: [f64::INFINITY; 2],
-                slope: 0.0,
-                narrowing: 1.0,
-                peak: 0.0,
-            };
+            return Ellipse { mean, half: [f64::INFINITY; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
         }
         let force = [extent * w * wx, extent * w * wy];
-        let shift = [
-            (q * force[0] - xy * force[1]) / determinant,
-            (p * force[1] - xy * force[0]) / determinant,
-        ];
+        let shift = [(q * force[0] - xy * force[1]) / determinant, (p * force[1] - xy * force[0]) / determinant];
         let level = extent * w * w + shift[0] * force[0] + shift[1] * force[1];
         // The covariance: level P^-1.
-        let (a, b, c) = (
-            level * q / determinant,
-            -level * xy / determinant,
-            level * p / determinant,
-        );
+        let (a, b, c) = (level * q / determinant, -level * xy / determinant, level * p / determinant);
         Ellipse {
             mean: [mean[0] + shift[0], mean[1] + shift[1]],
             half: [a.sqrt(), c.sqrt()],
@@ -160,21 +131,10 @@ impl Surfel {
             return None;
         }
         let radius = (extent * low_pass).sqrt();
-        let circle = Ellipse {
-            mean,
-            half: [radius; 2],
-            slope: 0.0,
-            narrowing: 1.0,
-            peak: 0.0,
-        };
+        let circle = Ellipse { mean, half: [radius; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
         let disc = (self.scale[0] > 0.0).then(|| self.ellipse(mean, extent));
         let shapes = [disc, (low_pass > 0.0).then_some(circle)];
-        self.bounds = [
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ];
+        self.bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
         // Both shapes contain the mean, so that their union in a row of tiles is taken as one span.
         let mut rows: Vec<(u32, TileSpan)> = Vec::new();
         for shape in shapes.into_iter().flatten() {
@@ -211,17 +171,12 @@ impl Surfel {
     pub(crate) fn blocks(&self, corner: [u32; 2]) -> u64 {
         let axis = |axis: usize| {
             let corner = f64::from(corner[axis]);
-            let [low, high] = [
-                self.bounds[2 * axis] - corner,
-                self.bounds[2 * axis + 1] - corner,
-            ];
+            let [low, high] = [self.bounds[2 * axis] - corner, self.bounds[2 * axis + 1] - corner];
             let touched = |block: &usize| {
                 let first = (4 * block) as f64 + 0.5;
                 first + 3.0 >= low && first <= high
             };
-            (0..4)
-                .filter(touched)
-                .fold(0u64, |bits, block| bits | 1 << block)
+            (0..4).filter(touched).fold(0u64, |bits, block| bits | 1 << block)
         };
         let (columns, rows) = (axis(0), axis(1));
         let mut blocks = 0;
@@ -298,12 +253,7 @@ mod tests {
     use gaurast_runner::{Case, simd_levels};
     use proptest::prelude::*;
 
-    const VISIBLE: Visible = Visible {
-        left: 0,
-        top: 0,
-        right: 160,
-        bottom: 96,
-    };
+    const VISIBLE: Visible = Visible { left: 0, top: 0, right: 160, bottom: 96 };
     const FOCAL: [f64; 2] = [90.0, 80.0];
     const CENTER: [f64; 2] = [80.0, 48.0];
     const LOW_PASS: f64 = 0.5;

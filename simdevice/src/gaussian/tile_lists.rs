@@ -67,31 +67,19 @@ impl SortedWalk {
                 (primitive, seen[group].reaches[place])
             })
             .collect_into_vec(&mut sorted);
-        let taken = groups
-            .iter_mut()
-            .map(|group| std::mem::take(&mut group.spans));
+        let taken = groups.iter_mut().map(|group| std::mem::take(&mut group.spans));
         let spans = host::collect(taken);
         let tiles = |(primitive, reach): &Reaching| {
             let spans = reach.spans(&spans[locate(*primitive).0]);
             let lengths = spans.map(|(_, span)| u64::from(span.end - span.first));
             lengths.sum::<u64>()
         };
-        Self {
-            pairs: sorted.par_iter().with_min_len(RUN).map(tiles).sum(),
-            sorted,
-            spans,
-        }
+        Self { pairs: sorted.par_iter().with_min_len(RUN).map(tiles).sum(), sorted, spans }
     }
 
     /// Replaces `list` by the next primitives of a tile, at most `most`, from index `from` of the sequence on, and
     /// advances `from`. `list` is empty if there are no more.
-    pub(crate) fn next(
-        &self,
-        [x, y]: [u32; 2],
-        from: &mut usize,
-        most: usize,
-        list: &mut Vec<u32>,
-    ) {
+    pub(crate) fn next(&self, [x, y]: [u32; 2], from: &mut usize, most: usize, list: &mut Vec<u32>) {
         list.clear();
         while let Some((primitive, reach)) = self.sorted.get(*from) {
             if list.len() == most {
@@ -141,10 +129,7 @@ impl TileRun {
     /// The run of a span in the row whose first tile has number `row_start` in the band.
     #[inline(always)]
     fn new(row_start: u32, span: PackedSpan, primitive: u32) -> Self {
-        Self {
-            tiles: span.moved_by(row_start),
-            primitive,
-        }
+        Self { tiles: span.moved_by(row_start), primitive }
     }
 
     /// The number in the band of its first tile, and that after its last.
@@ -187,13 +172,7 @@ impl TileLists {
         most_pairs: u64,
     ) -> Self {
         if bounds.is_empty() || order.is_empty() {
-            return Self {
-                first_row: 0,
-                columns: 0,
-                band_rows: 1,
-                bands: Vec::new(),
-                walk: None,
-            };
+            return Self { first_row: 0, columns: 0, band_rows: 1, bands: Vec::new(), walk: None };
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
         let tile = |pixel: i64| (pixel.max(0) / i64::from(TILE_SIZE)) as u32;
@@ -217,17 +196,13 @@ impl TileLists {
             reaches: host::collect(groups.iter().map(|group| &*group.reaches)),
             spans: host::collect(groups.iter().map(|group| &*group.spans)),
         };
-        let runs: Option<Vec<Vec<TileRuns>>> = order
-            .par_chunks(order.len().div_ceil(threads))
-            .map(|run| grid.expand(&seen, run, bands, allow))
-            .collect();
+        let runs: Option<Vec<Vec<TileRuns>>> =
+            order.par_chunks(order.len().div_ceil(threads)).map(|run| grid.expand(&seen, run, bands, allow)).collect();
         let bands = runs.and_then(|runs| {
             let of_band = |band: usize| host::collect(runs.iter().map(|run| run[band].settled()));
             let tiles = (band_rows * columns) as usize;
-            let counted: Vec<TileCounts> = (0..bands)
-                .into_par_iter()
-                .map(|band| TileCounts::new(&of_band(band), tiles))
-                .collect();
+            let counted: Vec<TileCounts> =
+                (0..bands).into_par_iter().map(|band| TileCounts::new(&of_band(band), tiles)).collect();
             let pairs = counted.iter().map(|counts| counts.pairs).sum::<u64>();
             let place = |(band, counts)| RowBand::place(&of_band(band), counts);
             let place_all = || counted.into_par_iter().enumerate().map(place).collect();
@@ -242,13 +217,7 @@ impl TileLists {
                 walk: Some(SortedWalk::new(groups, order)),
             };
         };
-        Self {
-            first_row,
-            columns,
-            band_rows,
-            bands,
-            walk: None,
-        }
+        Self { first_row, columns, band_rows, bands, walk: None }
     }
 
     /// The primitives of a tile.
@@ -261,11 +230,7 @@ impl TileLists {
             let end = *band.ends.get(tile as usize)?;
             band.primitives.get(start as usize..end as usize)
         };
-        if tile_x < self.columns {
-            of().unwrap_or_default()
-        } else {
-            &[]
-        }
+        if tile_x < self.columns { of().unwrap_or_default() } else { &[] }
     }
 
     /// The sorted sequence that tiles search, if there are no lists.
@@ -292,14 +257,12 @@ impl TileLists {
             let size = i64::from(TILE_SIZE);
             (start / size) as u32..=((end - 1) / size) as u32
         };
-        tiles(rect.y, rect.height)
-            .any(|y| tiles(rect.x, rect.width).any(|x| !self.list(x, y).is_empty()))
+        tiles(rect.y, rect.height).any(|y| tiles(rect.x, rect.width).any(|x| !self.list(x, y).is_empty()))
     }
 
     /// The bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes =
-            |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
+        let bytes = |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
         let lists = self.bands.iter().map(|band| bytes(band) as u64);
         lists.sum::<u64>() + self.walk.as_ref().map_or(0, SortedWalk::memory_bytes)
     }
@@ -411,23 +374,13 @@ fn written(runs: &[TileRuns]) -> usize {
 impl TileRuns {
     /// Makes an empty list with capacity for about `count` runs.
     fn with_room(count: usize) -> Self {
-        Self {
-            runs: host::with_capacity(count),
-            waiting: Box::new([TileRun::default(); WAITING]),
-            len: 0,
-        }
+        Self { runs: host::with_capacity(count), waiting: Box::new([TileRun::default(); WAITING]), len: 0 }
     }
 
     /// Adds a run of `primitive` for each row that has tiles. The first tile of the first row has number `row_start`,
     /// and a row has `columns` tiles.
     #[inline(always)]
-    fn push_rows(
-        &mut self,
-        mut row_start: u32,
-        spans: [PackedSpan; HELD_ROWS],
-        columns: u32,
-        primitive: u32,
-    ) {
+    fn push_rows(&mut self, mut row_start: u32, spans: [PackedSpan; HELD_ROWS], columns: u32, primitive: u32) {
         if self.len > WAITING - HELD_ROWS {
             self.settle();
         }
@@ -521,11 +474,7 @@ impl RowBand {
                 }
             }
         }
-        Self {
-            starts,
-            ends,
-            primitives,
-        }
+        Self { starts, ends, primitives }
     }
 }
 
@@ -585,11 +534,7 @@ mod tests {
     #[gaurast_runner::test]
     fn lists_keep_the_sorted_order() {
         let mut group = ProjectedGroup::default();
-        for (row, spans) in [
-            (1, &[(0, 2)][..]),
-            (1, &[(1, 2), (0, 3), (0, 0), (0, 0), (0, 0)]),
-            (1, &[(0, 1)]),
-        ] {
+        for (row, spans) in [(1, &[(0, 2)][..]), (1, &[(1, 2), (0, 3), (0, 0), (0, 0), (0, 0)]), (1, &[(0, 1)])] {
             let mut reach = TileFootprint::new(row, spans.len() as u16, &mut group.spans);
             for (number, &(first, end)) in (0..).zip(spans) {
                 reach.set(&mut group.spans, number, TileSpan { first, end });
@@ -597,35 +542,16 @@ mod tests {
             group.reaches.push(reach);
         }
         let order = [(5, 2), (6, 0), (7, 1)];
-        let bounds = Rect {
-            x: 0,
-            y: 16,
-            width: 40,
-            height: 32,
-        };
+        let bounds = Rect { x: 0, y: 16, width: 40, height: 32 };
         let lists = TileLists::build(&mut [group], &order, bounds, 2, u64::MAX);
         assert_eq!(lists.list(0, 1), [2, 0]);
         assert_eq!(lists.list(1, 1), [0, 1]);
         assert_eq!(lists.list(2, 1), [0; 0]);
         assert_eq!(lists.list(2, 2), [1]);
-        assert_eq!(
-            lists.list(0, 0),
-            [0; 0],
-            "outside the bounds there is nothing"
-        );
+        assert_eq!(lists.list(0, 0), [0; 0], "outside the bounds there is nothing");
         assert_eq!(lists.list(9, 9), [0; 0]);
         assert_eq!(lists.pairs(), 7);
-        assert!(lists.any_in(Rect {
-            x: 33,
-            y: 40,
-            width: 1,
-            height: 1
-        }));
-        assert!(!lists.any_in(Rect {
-            x: 33,
-            y: 17,
-            width: 9,
-            height: 3
-        }));
+        assert!(lists.any_in(Rect { x: 33, y: 40, width: 1, height: 1 }));
+        assert!(!lists.any_in(Rect { x: 33, y: 17, width: 9, height: 3 }));
     }
 }

@@ -63,13 +63,7 @@ impl<S: Simd> Range<S> {
         let low = (low - 0.5).ceil().max(first);
         let high = (high - 0.5).floor().min(last);
         let per_pixel = 1.0 / TILE_SIZE as f32;
-        Self {
-            low,
-            high,
-            first: (low * per_pixel).floor(),
-            last: (high * per_pixel).floor(),
-            any: low.simd_le(high),
-        }
+        Self { low, high, first: (low * per_pixel).floor(), last: (high * per_pixel).floor(), any: low.simd_le(high) }
     }
 
     /// The number of tiles.
@@ -202,28 +196,15 @@ fn last_rounded_to(value: f32) -> f64 {
     }
     // Numbers round to infinity from half a unit above the greatest binary32 number on.
     let wide = |value: f32| {
-        if value.is_infinite() {
-            2f64.powi(128).copysign(value.into())
-        } else {
-            f64::from(value)
-        }
+        if value.is_infinite() { 2f64.powi(128).copysign(value.into()) } else { f64::from(value) }
     };
     let middle = 0.5 * (wide(value) + wide(value.next_up()));
-    if middle as f32 <= value {
-        middle
-    } else {
-        middle.next_down()
-    }
+    if middle as f32 <= value { middle } else { middle.next_down() }
 }
 
 /// Finds the kept Gaussians that reach a tile, and their footprints.
 #[inline(always)]
-pub(super) fn find_tiles<S: Simd>(
-    view: &ViewConstants,
-    simd: S,
-    scratch: &mut Scratch,
-    out: &mut ProjectedGroup,
-) {
+pub(super) fn find_tiles<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch, out: &mut ProjectedGroup) {
     let by_lanes = view.optimizations.has(Optimization::Ellipse)
         && view.period.is_none()
         && view.geometry == GaussianGeometry::Volume;
@@ -244,17 +225,9 @@ fn find_tiles_by<S: Simd>(
     let found = if by_lanes {
         reach_in_lanes(view, simd, &drawn, scratch, &mut beside)
     } else {
-        Found {
-            reached: Bits::default(),
-            tall: Bits::default(),
-            left: drawn,
-        }
+        Found { reached: Bits::default(), tall: Bits::default(), left: drawn }
     };
-    let Found {
-        mut reached,
-        tall,
-        left,
-    } = found;
+    let Found { mut reached, tall, left } = found;
     tall.for_each(
         #[inline(always)]
         |at| {
@@ -286,12 +259,7 @@ fn find_tiles_by<S: Simd>(
 /// The lanes that are between the near and far planes and have a positive definite covariance. Counts the reasons to
 /// skip the others.
 #[inline(always)]
-fn find_drawn<S: Simd>(
-    view: &ViewConstants,
-    simd: S,
-    scratch: &Scratch,
-    counters: &mut Counters,
-) -> Bits {
+fn find_drawn<S: Simd>(view: &ViewConstants, simd: S, scratch: &Scratch, counters: &mut Counters) -> Bits {
     let len = scratch.lanes.len();
     let number = |value: f64| S::f64s::splat(simd, value);
     let near = number(last_rounded_to(view.near));
@@ -306,10 +274,7 @@ fn find_drawn<S: Simd>(
         // Comparisons with NaN are false.
         beyond_near.set(at, depth.simd_gt(near));
         beyond_far.set(at, depth.simd_gt(before_far));
-        definite.set(
-            at,
-            determinant.simd_gt(least) & determinant.simd_le(greatest),
-        );
+        definite.set(at, determinant.simd_gt(least) & determinant.simd_le(greatest));
     }
     if is_flat {
         definite = Bits::first(len);
@@ -336,11 +301,7 @@ fn reach_in_lanes<S: Simd>(
 ) -> Found {
     let number = |value: f32| S::f32s::splat(simd, value);
     let (zero, one) = (number(0.0), number(1.0));
-    let mut found = Found {
-        reached: Bits::default(),
-        tall: Bits::default(),
-        left: Bits::default(),
-    };
+    let mut found = Found { reached: Bits::default(), tall: Bits::default(), left: Bits::default() };
     let mut apart = zero;
     for at in (0..scratch.lanes.len()).step_by(S::f32s::LEN) {
         let load = |lanes: &GroupF64| {
@@ -407,9 +368,7 @@ fn reach_in_lanes<S: Simd>(
 }
 
 /// The lane numbers of a vector.
-const NUMBERS: [f32; 16] = [
-    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
-];
+const NUMBERS: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 /// The footprint of a lane that [`reach_in_lanes`] found to be tall, if it reaches tiles: several rows at once, in the
 /// steps of [`Ellipse::reach`](super::footprint::Ellipse::reach).
@@ -443,11 +402,7 @@ fn reach_by_rows<S: Simd>(
         reached += tiles;
         row += S::f32s::LEN as f32;
     }
-    let reached = reached
-        .as_slice()
-        .iter()
-        .map(|&tiles| tiles as u64)
-        .sum::<u64>();
+    let reached = reached.as_slice().iter().map(|&tiles| tiles as u64).sum::<u64>();
     let all = count as u64 * whole(ellipses.across.tiles());
     *beside += all.saturating_sub(reached);
     (reached > 0).then_some(reach)
@@ -470,10 +425,7 @@ fn reach_of_one(
     if ellipse.half[1].is_nan() {
         return None;
     }
-    let beside = view
-        .optimizations
-        .has(Optimization::Ellipse)
-        .then_some(beside);
+    let beside = view.optimizations.has(Optimization::Ellipse).then_some(beside);
     match view.period {
         None => ellipse.reach(&view.visible, &mut out.spans, beside),
         Some(period) => {

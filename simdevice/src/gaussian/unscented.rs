@@ -44,10 +44,7 @@ pub(super) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut S
         let quaternion = scratch.rotation.each_ref().map(|lanes| lanes[at]);
         let scale = scratch.scale.each_ref().map(|lanes| lanes[at]);
         let own = axes(quaternion, scale);
-        let rows = scratch
-            .jacobian
-            .each_ref()
-            .map(|row| row.each_ref().map(|lanes| lanes[at]));
+        let rows = scratch.jacobian.each_ref().map(|row| row.each_ref().map(|lanes| lanes[at]));
         let t = scratch.camera.each_ref().map(|lanes| lanes[at]);
         let to_camera = |axis: [f64; 3]| {
             let axis = placed.map_or(axis, |placed| placed.to_world(at, axis));
@@ -110,21 +107,11 @@ fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) ->
     let deviations: [[f64; 2]; POINTS] = std::array::from_fn(|point| {
         let weight = if point == 0 { CENTER } else { OTHER };
         #[cfg(feature = "mistakes")]
-        let weight = if point == 0 && Mistake::MeanUnweighted.is_made() {
-            0.0
-        } else {
-            weight
-        };
+        let weight = if point == 0 && Mistake::MeanUnweighted.is_made() { 0.0 } else { weight };
         [0, 1].map(|axis| weight.sqrt() * (places[point][axis] - mean[axis]))
     });
     let (xx, xy, yy, determinant) = sums(&deviations);
-    Some(Moments {
-        mean,
-        xx,
-        xy,
-        yy,
-        determinant,
-    })
+    Some(Moments { mean, xx, xy, yy, determinant })
 }
 
 /// The sums xx, xy and yy of squares and products, and the determinant of their matrix. The determinant is itself
@@ -188,11 +175,7 @@ fn length(a: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]
@@ -208,10 +191,7 @@ mod tests {
         assert_eq!(moments.mean, [1.0, 2.0]);
         let expected = [0.01, 0.0, 0.04, 0.0004];
         let found = [moments.xx, moments.xy, moments.yy, moments.determinant];
-        let close = found
-            .iter()
-            .zip(expected)
-            .all(|(a, b)| (a - b).abs() < 1e-15);
+        let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15);
         assert!(close, "{found:?}");
     }
 

@@ -80,20 +80,14 @@ pub(super) fn groups(draw: &Draw) -> u64 {
 pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
     let attributes = draw.attributes.iter();
     let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
-    let index = draw
-        .indices
-        .as_ref()
-        .map_or(0, |indices| indices.index_size);
+    let index = draw.indices.as_ref().map_or(0, |indices| indices.index_size);
     let written = 4 * (4 + u64::from(gaussian::VARYINGS));
     let vertices = u64::from(draw.count) * u64::from(draw.instance_count);
     vertices * (read as u64 + u64::from(index) + written)
 }
 
 /// Shades and projects the Gaussians of a set that vertex programs project.
-pub(super) fn project_all(
-    set: &GaussianSet,
-    runtime: &Runtime,
-) -> Result<Vec<ProjectedGroup>, Stopped> {
+pub(super) fn project_all(set: &GaussianSet, runtime: &Runtime) -> Result<Vec<ProjectedGroup>, Stopped> {
     let mut sequence = 0u32;
     for append in &set.appends {
         let gaussians = append.count.wrapping_mul(append.instance_count);
@@ -114,12 +108,7 @@ pub(super) fn project_all(
 ///
 /// # Errors
 /// [`Stopped`] if the program ran for too long.
-fn project(
-    set: &GaussianSet,
-    draw: &Draw,
-    sequence: u32,
-    runtime: &Runtime,
-) -> Result<Vec<ProjectedGroup>, Stopped> {
+fn project(set: &GaussianSet, draw: &Draw, sequence: u32, runtime: &Runtime) -> Result<Vec<ProjectedGroup>, Stopped> {
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
     };
@@ -156,11 +145,7 @@ fn project(
     };
     let mut done = host::with_capacity(tasks.len());
     runtime.install(|| {
-        tasks
-            .par_iter()
-            .with_min_len(GROUPS_PER_TASK)
-            .map_init(worker, one)
-            .collect_into_vec(&mut done);
+        tasks.par_iter().with_min_len(GROUPS_PER_TASK).map_init(worker, one).collect_into_vec(&mut done);
     });
     draw.vertex_bindings.bump_generations();
     // The error of the program that failed is reported, not the cancellation of others.
@@ -176,8 +161,7 @@ impl Worker<'_> {
     fn run(&mut self, task: &GroupTask, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
         let mut out = ProjectedGroup::default();
         let (shading, outputs, scratch) = (&self.shading, &mut *self.outputs, &mut self.scratch);
-        self.shader
-            .shade(task.instance, task.first, end, &mut out.counters)?;
+        self.shader.shade(task.instance, task.first, end, &mut out.counters)?;
         shading.keep(&self.shader, outputs, scratch, &mut out);
         dispatch!(level, simd => shading.flatten(simd, outputs, scratch));
         shading.emit(level, outputs, scratch, task.sequence, &mut out);
@@ -198,20 +182,12 @@ impl Default for Outputs {
 }
 
 impl Shading {
-    fn new(
-        set: &GaussianSet,
-        viewport: &Viewport,
-        shader: &PointShader<'_>,
-        runtime: &Runtime,
-    ) -> Self {
+    fn new(set: &GaussianSet, viewport: &Viewport, shader: &PointShader<'_>, runtime: &Runtime) -> Self {
         let state = &set.begin.state;
         let visible = Visible::from(set.bounds);
         let optimizations = runtime.config().optimizations;
         // The clip volume replaces the camera's planes.
-        let camera = Camera {
-            near_plane: f32::NEG_INFINITY,
-            ..Camera::default()
-        };
+        let camera = Camera { near_plane: f32::NEG_INFINITY, ..Camera::default() };
         let half = [viewport.width, viewport.height].map(|size| 0.5 * f64::from(size));
         Self {
             constants: ViewConstants {
@@ -219,10 +195,7 @@ impl Shading {
                 ..ViewConstants::new(state, &camera, viewport, visible, None, optimizations)
             },
             half,
-            middle: [
-                half[0] + f64::from(viewport.x),
-                half[1] + f64::from(viewport.y),
-            ],
+            middle: [half[0] + f64::from(viewport.x), half[1] + f64::from(viewport.y)],
             near: if state.negative_one_to_one { -1.0 } else { 0.0 },
             order: state.order,
             writes_key: shader.writes(gaussian::DEPTH_KEY),
@@ -231,13 +204,7 @@ impl Shading {
     }
 
     /// Packs the Gaussians that no test culls, and counts the others by the first reason to skip them.
-    fn keep(
-        &self,
-        shader: &PointShader<'_>,
-        kept: &mut Outputs,
-        scratch: &mut Scratch,
-        out: &mut ProjectedGroup,
-    ) {
+    fn keep(&self, shader: &PointShader<'_>, kept: &mut Outputs, scratch: &mut Scratch, out: &mut ProjectedGroup) {
         scratch.lanes.clear();
         let counters = &mut out.counters;
         for (lane, (position, varyings)) in shader.points().enumerate() {
@@ -250,16 +217,9 @@ impl Shading {
             let (covariance, color) = (three(gaussian::COVARIANCE), three(gaussian::COLOR));
             let opacity = value(gaussian::OPACITY);
             let [_, _, z, w] = position;
-            let key = if self.writes_key {
-                value(gaussian::DEPTH_KEY)
-            } else {
-                w
-            };
+            let key = if self.writes_key { value(gaussian::DEPTH_KEY) } else { w };
             let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
-            let all_finite = finite(&position)
-                && finite(&covariance)
-                && finite(&color)
-                && finite(&[opacity, key]);
+            let all_finite = finite(&position) && finite(&covariance) && finite(&color) && finite(&[opacity, key]);
             let skipped = if !all_finite {
                 Some(Counter::SkippedNonFinite)
             } else if f64::from(opacity) < self.constants.alpha_floor {
@@ -305,10 +265,7 @@ impl Shading {
             let w = load(&kept.position[3]);
             for axis in 0..2 {
                 let place = load(&kept.position[axis]) / w;
-                store(
-                    place * self.half[axis] + self.middle[axis],
-                    &mut flat.mean[axis],
-                );
+                store(place * self.half[axis] + self.middle[axis], &mut flat.mean[axis]);
             }
             let [xx, xy, yy] = &kept.covariance;
             let (xx, xy, yy) = (load(xx), load(xy), load(yy));
@@ -316,15 +273,7 @@ impl Shading {
             // negative. Its square root is then NaN, and `log2` gives negative infinity.
             let area2 = xx * yy - xy * xy;
             let constants = &self.constants;
-            shape(
-                constants,
-                simd,
-                at,
-                [xx, xy, yy],
-                area2,
-                load(&kept.opacity),
-                flat,
-            );
+            shape(constants, simd, at, [xx, xy, yy], area2, load(&kept.opacity), flat);
             let determinant = load(&flat.determinant);
             // If the determinant is positive, the diagonal elements have the same sign.
             let definite = (xx + constants.low_pass).simd_gt(zero);
@@ -335,14 +284,7 @@ impl Shading {
     }
 
     /// Finds the tiles of the kept Gaussians and appends those that reach some to `out`.
-    fn emit(
-        &self,
-        level: Level,
-        kept: &Outputs,
-        scratch: &mut Scratch,
-        sequence: u32,
-        out: &mut ProjectedGroup,
-    ) {
+    fn emit(&self, level: Level, kept: &Outputs, scratch: &mut Scratch, sequence: u32, out: &mut ProjectedGroup) {
         out.reserve(scratch.lanes.len());
         let constants = &self.constants;
         dispatch!(level, simd => find_tiles(constants, simd, scratch, out));
@@ -350,9 +292,7 @@ impl Shading {
             let at = at % GROUP;
             let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);
             let key = match self.order {
-                GaussianOrder::ViewDepth | GaussianOrder::RadialDistance => {
-                    ordered_bits(kept.key[at])
-                }
+                GaussianOrder::ViewDepth | GaussianOrder::RadialDistance => ordered_bits(kept.key[at]),
                 GaussianOrder::Primitive | GaussianOrder::PerPixel => sequence,
             };
             let [_, _, z, w] = &kept.position;

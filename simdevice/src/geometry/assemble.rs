@@ -97,16 +97,10 @@ pub(super) fn corners(topology: Topology, last: bool, number: u32) -> Corners {
         LineListWithAdjacency => ([4 * i + 1, 4 * i + 2, 4 * i + 2], [0, 1]),
         LineStripWithAdjacency => ([i + 1, i + 2, i + 2], [0, 1]),
         TriangleListWithAdjacency => ([6 * i, 6 * i + 2, 6 * i + 4], [0, 2]),
-        TriangleStripWithAdjacency => (
-            [2 * i, 2 * i + 2 + 2 * odd, 2 * i + 4 - 2 * odd],
-            [0, 2 - odd as usize],
-        ),
+        TriangleStripWithAdjacency => ([2 * i, 2 * i + 2 + 2 * odd, 2 * i + 4 - 2 * odd], [0, 2 - odd as usize]),
         PatchList { control_points } => ([control_points * i; 3], [0, 0]),
     };
-    Corners {
-        places,
-        provoking: provoking[usize::from(last)],
-    }
+    Corners { places, provoking: provoking[usize::from(last)] }
 }
 
 /// The range of places that primitives `first..end` use; it may end beyond the run. A fan also uses place 0 ([`uses_pivot`]).

@@ -29,13 +29,7 @@ impl Grid {
         };
         let (column, columns) = span(area.x, area.width);
         let (row, rows) = span(area.y, area.height);
-        Self {
-            size: size as i32,
-            reciprocal: (1u64 << 32).div_ceil(size.into()),
-            first: [column, row],
-            columns,
-            rows,
-        }
+        Self { size: size as i32, reciprocal: (1u64 << 32).div_ceil(size.into()), first: [column, row], columns, rows }
     }
 
     fn tile(&self, column: u32, row: u32, layer: u32) -> u32 {
@@ -55,13 +49,7 @@ pub(super) struct Pixels {
 pub(super) type Pair = (u32, u32);
 
 /// Appends a pair for each macro-tile that a primitive may touch. The primitive covers nothing outside `pixels`.
-pub(super) fn bin(
-    grid: &Grid,
-    primitive: &Primitive,
-    number: u32,
-    pixels: Pixels,
-    pairs: &mut Vec<Pair>,
-) {
+pub(super) fn bin(grid: &Grid, primitive: &Primitive, number: u32, pixels: Pixels, pairs: &mut Vec<Pair>) {
     let tile = |pixel: i32| ((pixel.max(0) as u64 * grid.reciprocal) >> 32) as u32;
     let tiles = |[first, last]: [i32; 2]| tile(first)..=tile(last);
     let (columns, rows) = (tiles(pixels.x), tiles(pixels.y));
@@ -77,10 +65,7 @@ pub(super) fn bin(
     let outline = Outline::new(primitive);
     for row in rows {
         for column in columns.clone() {
-            if outline.touches(
-                both([column, row], |tile| i64::from(tile) * i64::from(grid.size)),
-                grid.size,
-            ) {
+            if outline.touches(both([column, row], |tile| i64::from(tile) * i64::from(grid.size)), grid.size) {
                 host::push(pairs, (grid.tile(column, row, layer), number));
             }
         }
@@ -111,8 +96,7 @@ impl Outline {
     fn touches(&self, corner: [i64; 2], size: i32) -> bool {
         let (low, side) = (both(corner, |c| 256 * c), 256 * i64::from(size));
         self.edges.iter().all(|&(at, along)| {
-            let greatest =
-                |axis: usize| along[axis] * (low[axis] + if along[axis] > 0 { side } else { 0 });
+            let greatest = |axis: usize| along[axis] * (low[axis] + if along[axis] > 0 { side } else { 0 });
             at + greatest(0) + greatest(1) >= 0
         })
     }
@@ -147,14 +131,8 @@ impl Bins {
             first = first.min(tile);
             last = last.max(tile);
         }
-        let mut bins = Self {
-            origin: grid.first,
-            columns: grid.columns,
-            rows: grid.rows,
-            layers,
-            first,
-            ..Self::default()
-        };
+        let mut bins =
+            Self { origin: grid.first, columns: grid.columns, rows: grid.rows, layers, first, ..Self::default() };
         if pairs.is_empty() {
             return bins;
         }
@@ -260,21 +238,11 @@ mod tests {
 
     #[gaurast_runner::test]
     fn few_pairs_far_apart_make_few_lists() {
-        let area = Rect {
-            x: 0,
-            y: 0,
-            width: 1024,
-            height: 1024,
-        };
+        let area = Rect { x: 0, y: 0, width: 1024, height: 1024 };
         let grid = Grid::new(area, 64);
         let layers = 2048;
         let at = |column, row, layer| tile_number(16, 16, [column, row, layer]);
-        let pairs = [
-            (at(3, 2, 1000), 0),
-            (at(0, 0, 0), 1),
-            (at(3, 2, 1000), 2),
-            (at(15, 15, 2047), 3),
-        ];
+        let pairs = [(at(3, 2, 1000), 0), (at(0, 0, 0), 1), (at(3, 2, 1000), 2), (at(15, 15, 2047), 3)];
         let bins = Bins::new(&grid, layers, &pairs);
         assert_eq!(bins.primitives_of([3, 2], 1000), [0, 2]);
         assert_eq!(bins.primitives_of([0, 0], 0), [1]);

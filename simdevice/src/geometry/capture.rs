@@ -44,11 +44,7 @@ impl<'a> Capture<'a> {
     }
 
     /// Captures primitives, in order.
-    pub(super) fn take(
-        &self,
-        shaded: &Shaded,
-        primitives: &[ListedPrimitive],
-    ) -> CapturedPrimitives {
+    pub(super) fn take(&self, shaded: &Shaded, primitives: &[ListedPrimitive]) -> CapturedPrimitives {
         let mut captured = CapturedPrimitives::default();
         for primitive in primitives {
             captured.counts[primitive.stream as usize] += 1;

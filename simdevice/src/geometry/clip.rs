@@ -39,15 +39,8 @@ enum Plane {
     User(usize),
 }
 
-const FRUSTUM: [Plane; PLANES] = [
-    Plane::Near,
-    Plane::Far,
-    Plane::LeastW,
-    Plane::Guard(0),
-    Plane::Guard(1),
-    Plane::Guard(2),
-    Plane::Guard(3),
-];
+const FRUSTUM: [Plane; PLANES] =
+    [Plane::Near, Plane::Far, Plane::LeastW, Plane::Guard(0), Plane::Guard(1), Plane::Guard(2), Plane::Guard(3)];
 
 /// The positions of a primitive's corners in clip space. All are binary32 numbers.
 type Corners = [[f64; 4]; 3];
@@ -66,8 +59,7 @@ impl Clipper<'_> {
         let depth = self.transform.clip_depth;
         let user = (0..self.distance_count).map(Plane::User);
         let frustum = FRUSTUM.into_iter();
-        let frustum =
-            frustum.filter(move |plane| depth || !matches!(plane, Plane::Near | Plane::Far));
+        let frustum = frustum.filter(move |plane| depth || !matches!(plane, Plane::Near | Plane::Far));
         frustum.chain(user)
     }
 
@@ -88,9 +80,7 @@ impl Clipper<'_> {
                 across * vertex.position[side / 2] + by_w * w
             }
             Plane::User(index) => {
-                let part = |corner: usize| {
-                    vertex.weights[corner] * f64::from(self.distances[corner][index])
-                };
+                let part = |corner: usize| vertex.weights[corner] * f64::from(self.distances[corner][index]);
                 part(0) + part(1) + part(2)
             }
         }
@@ -99,8 +89,7 @@ impl Clipper<'_> {
     /// The intersection of a plane with the edge between two vertices, of which `a` is inside and `b` outside.
     fn meet(&self, plane: Plane, corners: &Corners, a: &ClipVertex, b: &ClipVertex) -> ClipVertex {
         let of_primitive = (0..3).find(|&other| a.weights[other] == 0.0 && b.weights[other] == 0.0);
-        let on_edge = of_primitive
-            .map(|other| self.meet_edge(plane, corners, [(other + 1) % 3, (other + 2) % 3]));
+        let on_edge = of_primitive.map(|other| self.meet_edge(plane, corners, [(other + 1) % 3, (other + 2) % 3]));
         let is_finite = |it: &ClipVertex| it.position.into_iter().all(f64::is_finite);
         let mut new = on_edge.filter(is_finite).unwrap_or_else(|| {
             let (at_a, at_b) = (self.distance(plane, a), self.distance(plane, b));
@@ -135,8 +124,7 @@ impl Clipper<'_> {
     /// of the intersection. The remaining terms are differences of products of two binary32 numbers, and the products
     /// are exact here.
     fn meet_edge(&self, plane: Plane, corners: &Corners, [p, q]: [usize; 2]) -> ClipVertex {
-        let [at_p, at_q] =
-            [p, q].map(|corner| self.distance(plane, &ClipVertex::at(corners, corner)));
+        let [at_p, at_q] = [p, q].map(|corner| self.distance(plane, &ClipVertex::at(corners, corner)));
         let both = at_q - at_p;
         let (a, b) = (&corners[p], &corners[q]);
         let crossed = |i: usize, j: usize| a[i] * b[j] - b[i] * a[j];
@@ -153,11 +141,7 @@ impl Clipper<'_> {
         let mut weights = [0.0; 3];
         weights[p] = at_q / both;
         weights[q] = -at_p / both;
-        ClipVertex {
-            position: std::array::from_fn(|i| position(i) / both),
-            weights,
-            edge: false,
-        }
+        ClipVertex { position: std::array::from_fn(|i| position(i) / both), weights, edge: false }
     }
 
     /// Clips a triangle. Fewer than three vertices remain of an invisible one.

@@ -62,10 +62,7 @@ impl PrimitiveDraw {
 
     /// The bytes of host memory that it holds until it is rendered.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        self.segments
-            .iter()
-            .map(PrimitiveSegment::memory_bytes)
-            .sum()
+        self.segments.iter().map(PrimitiveSegment::memory_bytes).sum()
     }
 }
 

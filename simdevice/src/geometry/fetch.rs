@@ -41,15 +41,10 @@ impl<'a> Fetcher<'a> {
                         machine.fill_input(slot, 0);
                         continue;
                     };
-                    let known = attributes
-                        .iter_mut()
-                        .find(|attribute| std::ptr::eq(attribute.stream, stream));
+                    let known = attributes.iter_mut().find(|attribute| std::ptr::eq(attribute.stream, stream));
                     match known {
                         Some(attribute) => attribute.inputs.push((slot, component)),
-                        None => attributes.push(Attribute {
-                            stream,
-                            inputs: vec![(slot, component)],
-                        }),
+                        None => attributes.push(Attribute { stream, inputs: vec![(slot, component)] }),
                     }
                 }
                 VertexInput::VertexIndex
@@ -60,14 +55,7 @@ impl<'a> Fetcher<'a> {
                 | VertexInput::ViewIndex => numbers.push((slot, input)),
             }
         }
-        Self {
-            draw,
-            view,
-            attributes,
-            numbers,
-            bytes: Vec::new(),
-            packed: Vec::new(),
-        }
+        Self { draw, view, attributes, numbers, bytes: Vec::new(), packed: Vec::new() }
     }
 
     /// Sets the inputs of a batch of vertices, given their numbers and their instances, counted from the draw's first.
@@ -84,11 +72,7 @@ impl<'a> Fetcher<'a> {
                     vertices.len()
                 }
                 Some(divisor) => {
-                    let count = if one_instance || divisor == 0 {
-                        1
-                    } else {
-                        instances.len()
-                    };
+                    let count = if one_instance || divisor == 0 { 1 } else { instances.len() };
                     for (element, &instance) in elements.iter_mut().zip(&instances[..count]) {
                         *element = first + i64::from(instance.checked_div(divisor).unwrap_or(0));
                     }
@@ -97,11 +81,7 @@ impl<'a> Fetcher<'a> {
             };
             let source = Source::read(stream, &elements[..count], &mut self.bytes);
             let broadcast = count < vertices.len();
-            let out = Out {
-                machine,
-                inputs: &attribute.inputs,
-                broadcast,
-            };
+            let out = Out { machine, inputs: &attribute.inputs, broadcast };
             if is_words(stream.format) {
                 out.words(stream.format, &source, count);
             } else {
@@ -122,9 +102,9 @@ impl<'a> Fetcher<'a> {
                 VertexInput::VertexIndex => {
                     set_lanes(machine.input_mut(slot), vertices, |&number| number as u32);
                 }
-                VertexInput::InstanceIndex => set_lanes(machine.input_mut(slot), instances, |&i| {
-                    draw.first_instance.wrapping_add(i)
-                }),
+                VertexInput::InstanceIndex => {
+                    set_lanes(machine.input_mut(slot), instances, |&i| draw.first_instance.wrapping_add(i))
+                }
                 VertexInput::BaseVertex => machine.fill_input(slot, offset),
                 VertexInput::BaseInstance => machine.fill_input(slot, draw.first_instance),
                 VertexInput::DrawIndex => machine.fill_input(slot, draw.draw_index),
@@ -150,15 +130,8 @@ fn set_lanes<T>(chunks: &mut [Vector], values: &[T], bits: impl Fn(&T) -> u32) {
 
 /// True if components are whole 32-bit words that need no conversion.
 fn is_words(format: Format) -> bool {
-    let words = matches!(
-        format.numeric(),
-        Numeric::Sfloat | Numeric::Uint | Numeric::Sint
-    );
-    words
-        && format
-            .components()
-            .iter()
-            .all(|component| component.bits == 32)
+    let words = matches!(format.numeric(), Numeric::Sfloat | Numeric::Uint | Numeric::Sint);
+    words && format.components().iter().all(|component| component.bits == 32)
 }
 
 /// Elements that were read into host memory.
@@ -176,9 +149,7 @@ impl<'a> Source<'a> {
         let least = elements.iter().copied().min().unwrap_or(0);
         let greatest = elements.iter().copied().max().unwrap_or(0);
         let stride = u64::from(stream.stride);
-        let span = (greatest.abs_diff(least))
-            .saturating_mul(stride)
-            .saturating_add(size as u64);
+        let span = (greatest.abs_diff(least)).saturating_mul(stride).saturating_add(size as u64);
         if span <= SPAN_BYTES * elements.len() as u64
             && greatest.abs_diff(least) <= 4 * elements.len() as u64
             && let Some(offset) = place(stream, least, span)
@@ -188,10 +159,7 @@ impl<'a> Source<'a> {
                 for (start, &element) in starts.iter_mut().zip(elements) {
                     *start = (element.abs_diff(least) * stride) as u32;
                 }
-                return Self {
-                    bytes: scratch,
-                    starts,
-                };
+                return Self { bytes: scratch, starts };
             }
         }
         scratch.clear();
@@ -202,10 +170,7 @@ impl<'a> Source<'a> {
                 stream.read(element, bytes);
             }
         }
-        Self {
-            bytes: scratch,
-            starts,
-        }
+        Self { bytes: scratch, starts }
     }
 
     /// Splits elements of `N` words each into components.
@@ -243,11 +208,7 @@ struct Out<'a> {
 impl Out<'_> {
     /// Sets inputs from components that are words.
     fn words(self, format: Format, source: &Source, count: usize) {
-        let one = if format.is_integer() {
-            1
-        } else {
-            1f32.to_bits()
-        };
+        let one = if format.is_integer() { 1 } else { 1f32.to_bits() };
         let components = format.components();
         let mut words = [[0; VERTEX_BATCH]; 4];
         let starts = &source.starts[..count];

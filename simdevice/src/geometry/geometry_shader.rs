@@ -63,16 +63,12 @@ impl<'a> GeometryShader<'a> {
             let count = lanes.min(invocations - first);
             let ran = self.run_batch(vertices, primitives, first, count);
             pieces.counters.add_work(&self.runner.machine.take_work());
-            pieces
-                .counters
-                .add(Counter::GeometryInvocations, count as u64);
+            pieces.counters.add(Counter::GeometryInvocations, count as u64);
             ran?;
             let before = self.listed.len();
             self.take(primitives, first, count);
             let emitted = self.listed.len() - before;
-            pieces
-                .counters
-                .add(Counter::GeometryPrimitives, emitted as u64);
+            pieces.counters.add(Counter::GeometryPrimitives, emitted as u64);
             if self.shaded.vertices.len() >= ENOUGH_VERTICES || first + count == invocations {
                 set_up(&self.shaded, &self.listed, pieces);
                 self.shaded.clear();
@@ -133,8 +129,7 @@ impl<'a> GeometryShader<'a> {
         }
         let columns = &self.columns;
         let column = |number: u32| columns.get(number as usize).map_or(&[][..], Vec::as_slice);
-        self.reader
-            .take(vertices as usize, column, &mut self.shaded);
+        self.reader.take(vertices as usize, column, &mut self.shaded);
     }
 
     /// Adds a vertex to the strip of a stream, and lists the primitive that it completes, if there is one.
@@ -156,12 +151,7 @@ impl<'a> GeometryShader<'a> {
         };
         let found = corners(topology, self.provoking_last, number as u32);
         let slots = found.places.map(|place| strip[place as usize]);
-        let primitive = ListedPrimitive {
-            slots,
-            provoking: slots[found.provoking],
-            id,
-            stream,
-        };
+        let primitive = ListedPrimitive { slots, provoking: slots[found.provoking], id, stream };
         host::push(&mut self.listed, primitive);
     }
 }

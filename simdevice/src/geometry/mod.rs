@@ -125,12 +125,7 @@ pub(crate) struct FrontEnd<'a> {
 
 impl<'a> FrontEnd<'a> {
     /// Begins a draw: finds its runs, viewports and scissors.
-    pub(crate) fn new(
-        draw: &'a Draw,
-        surface: Surface,
-        runtime: &'a Runtime,
-        counters: &mut Counters,
-    ) -> Self {
+    pub(crate) fn new(draw: &'a Draw, surface: Surface, runtime: &'a Runtime, counters: &mut Counters) -> Self {
         let state = &draw.state;
         let (runs, vertices) = match draw.instance_count {
             0 => (Vec::new(), 0),
@@ -138,10 +133,7 @@ impl<'a> FrontEnd<'a> {
         };
         let instances = u64::from(draw.instance_count);
         counters.add(Counter::InputVertices, vertices.saturating_mul(instances));
-        let primitives = runs
-            .iter()
-            .map(|run| u64::from(run.primitives))
-            .sum::<u64>();
+        let primitives = runs.iter().map(|run| u64::from(run.primitives)).sum::<u64>();
         let mixes_instances = mixes_instances(draw);
         let segment = match (&draw.pipeline.tessellation, &draw.pipeline.geometry) {
             (Some(_), _) => SEGMENT_OF_PATCHES,
@@ -155,16 +147,10 @@ impl<'a> FrontEnd<'a> {
         };
         let viewports = state.viewports.iter();
         let clip_depth = state.depth_clip.unwrap_or(!state.depth_clamp);
-        let transforms = viewports
-            .clone()
-            .map(|viewport| Transform::new(viewport, clip_depth, state.negative_one_to_one));
-        let scissors = state
-            .scissors
-            .iter()
-            .map(|&scissor| surface.area.intersect(scissor));
-        let regions = scissors
-            .zip(viewports)
-            .map(|(region, viewport)| region.intersect(viewport::pixels(viewport)));
+        let transforms =
+            viewports.clone().map(|viewport| Transform::new(viewport, clip_depth, state.negative_one_to_one));
+        let scissors = state.scissors.iter().map(|&scissor| surface.area.intersect(scissor));
+        let regions = scissors.zip(viewports).map(|(region, viewport)| region.intersect(viewport::pixels(viewport)));
         Self {
             draw,
             runtime,
@@ -185,10 +171,7 @@ impl<'a> FrontEnd<'a> {
     }
 
     /// Processes the next part up to binning; `None` if there are no more.
-    pub(crate) fn next_segments(
-        &mut self,
-        counters: &mut Counters,
-    ) -> Result<Option<PrimitiveDraw>, Stopped> {
+    pub(crate) fn next_segments(&mut self, counters: &mut Counters) -> Result<Option<PrimitiveDraw>, Stopped> {
         if self.next >= self.segments {
             return Ok(None);
         }
@@ -237,11 +220,7 @@ impl<'a> FrontEnd<'a> {
     }
 
     /// Processes segments on all workers. The result is in the order of segments.
-    fn process(
-        &self,
-        range: std::ops::Range<u64>,
-        counters: &mut Counters,
-    ) -> Result<Vec<PrimitiveSegment>, Stopped> {
+    fn process(&self, range: std::ops::Range<u64>, counters: &mut Counters) -> Result<Vec<PrimitiveSegment>, Stopped> {
         let setup = Setup {
             state: &self.draw.state,
             outputs: self.draw.pipeline.last_outputs(),
@@ -289,22 +268,14 @@ impl<'a> FrontEnd<'a> {
 
     /// Calls `each` with the run, instance, and first and end primitive of each piece of a segment, in order.
     fn segment_ranges(&self, segment: u64, mut each: impl FnMut(&RestartRun, u32, u32, u32)) {
-        let total = self
-            .primitives
-            .saturating_mul(self.draw.instance_count.into());
+        let total = self.primitives.saturating_mul(self.draw.instance_count.into());
         let (mut at, end) = if self.mixes_instances {
-            (
-                segment * self.segment,
-                total.min((segment + 1) * self.segment),
-            )
+            (segment * self.segment, total.min((segment + 1) * self.segment))
         } else {
             let per_instance = self.primitives.div_ceil(self.segment);
             let start = segment / per_instance * self.primitives;
             let first = segment % per_instance * self.segment;
-            (
-                start + first,
-                start + self.primitives.min(first + self.segment),
-            )
+            (start + first, start + self.primitives.min(first + self.segment))
         };
         while at < end {
             let (instance, primitive) = (at / self.primitives, at % self.primitives);
@@ -332,9 +303,7 @@ fn mixes_instances(draw: &Draw) -> bool {
         _ => false,
     };
     let inputs = &draw.pipeline.vertex.inputs;
-    !inputs
-        .iter()
-        .any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
+    !inputs.iter().any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
 }
 
 /// The number of corners of the primitives that are drawn: 1 for points, 2 for lines, 3 for triangles.
@@ -370,26 +339,18 @@ impl<'a> Worker<'a> {
         let pipeline = &front.draw.pipeline;
         let mut machine = pipeline.vertex.machines.lend();
         let view = front.surface.view.unwrap_or(0);
-        let watchdog = Watchdog {
-            limit: front.runtime.config().shader_timeout,
-            cancel: Some(cancel),
-        };
+        let watchdog = Watchdog { limit: front.runtime.config().shader_timeout, cancel: Some(cancel) };
         let draws_points = setup.corners == 1 || setup.state.polygon_mode == PolygonMode::Point;
         let level = front.runtime.level();
         let transform = front.transforms.first().copied().unwrap_or(Transform::NONE);
         // Only the last program's outputs but varyings are needed.
         let reader = |outputs: &'a VertexOutputs| OutputReader {
             outputs,
-            takes_optional: std::ptr::eq(outputs, setup.outputs)
-                && outputs.has_optional(draws_points),
+            takes_optional: std::ptr::eq(outputs, setup.outputs) && outputs.has_optional(draws_points),
             level,
             transform,
         };
-        let environment = Environment {
-            watchdog,
-            view,
-            presented: front.presented.as_ref(),
-        };
+        let environment = Environment { watchdog, view, presented: front.presented.as_ref() };
         Self {
             front,
             shader: Shader {
@@ -426,12 +387,7 @@ impl<'a> Worker<'a> {
         }
         if front.capture.is_some() {
             let state = &front.draw.state;
-            list_corners(
-                state.topology,
-                state.provoking_last,
-                reuse,
-                &mut self.listed,
-            );
+            list_corners(state.topology, state.provoking_last, reuse, &mut self.listed);
             finished.set_up(&self.shaded, &self.listed, (segment, 0));
             return Ok(());
         }

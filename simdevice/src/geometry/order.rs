@@ -12,17 +12,9 @@ pub(super) const FEW: usize = if cfg!(test) { usize::MAX } else { 128 };
 
 /// The primitives and the varyings of a segment, in the order of its bins, whose entries are renumbered. A segment of
 /// fewer than `few` primitives is not reordered.
-pub(super) fn in_order(
-    output: &Output,
-    per_vertex: usize,
-    bins: &mut Bins,
-    few: usize,
-) -> (Vec<Primitive>, Vec<u32>) {
+pub(super) fn in_order(output: &Output, per_vertex: usize, bins: &mut Bins, few: usize) -> (Vec<Primitive>, Vec<u32>) {
     if output.primitives.len() < few {
-        return (
-            host::copied(&output.primitives),
-            host::copied(&output.varyings),
-        );
+        return (host::copied(&output.primitives), host::copied(&output.varyings));
     }
     let mut ordered = Ordered {
         output,
@@ -105,9 +97,7 @@ mod tests {
             let mut output = Output {
                 vertices: count + 2,
                 varyings: (0..2 * (count + 2)).map(|value| 1000 + value).collect(),
-                primitives: (0..count)
-                    .map(|id| primitive(id, [id, id + 1, (id * 7) % count]))
-                    .collect(),
+                primitives: (0..count).map(|id| primitive(id, [id, id + 1, (id * 7) % count])).collect(),
                 ..Output::default()
             };
             // Primitives are in up to three tiles; some are in none.
@@ -116,12 +106,7 @@ mod tests {
                     output.pairs.push(((id * 13 + tile * 5) % 16, id));
                 }
             }
-            let area = Rect {
-                x: 0,
-                y: 0,
-                width: 256,
-                height: 256,
-            };
+            let area = Rect { x: 0, y: 0, width: 256, height: 256 };
             let grid = Grid::new(area, 64);
             let before = Bins::new(&grid, 1, &output.pairs);
             let mut after = Bins::new(&grid, 1, &output.pairs);
@@ -133,19 +118,13 @@ mod tests {
                     [values[at], values[at + 1]]
                 })
             };
-            let old = Varyings {
-                values: output.varyings.clone(),
-                per_vertex: 2,
-            };
+            let old = Varyings { values: output.varyings.clone(), per_vertex: 2 };
             for tile in 0..16 {
                 let at = [tile % 4, tile / 4];
                 let (expected, found) = (before.primitives_of(at, 0), after.primitives_of(at, 0));
                 assert_eq!(expected.len(), found.len());
                 for (&expected, &found) in expected.iter().zip(found) {
-                    let (a, b) = (
-                        &output.primitives[expected as usize],
-                        &primitives[found as usize],
-                    );
+                    let (a, b) = (&output.primitives[expected as usize], &primitives[found as usize]);
                     assert_eq!(a.id, b.id);
                     assert_eq!(varyings(&old.values, a), varyings(&values, b));
                 }

@@ -48,12 +48,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// Captures listed primitives, and sets up those of the vertex stream that is rasterized.
-    pub(super) fn set_up(
-        &mut self,
-        shaded: &Shaded,
-        primitives: &[ListedPrimitive],
-        place: (u64, u32),
-    ) {
+    pub(super) fn set_up(&mut self, shaded: &Shaded, primitives: &[ListedPrimitive], place: (u64, u32)) {
         for (stream, &counter) in (0..).zip(&Counter::PRIMITIVES_OF_STREAMS) {
             let of_stream = primitives.iter().filter(|it| it.stream == stream);
             self.counters.add(counter, of_stream.count() as u64);
@@ -89,11 +84,7 @@ impl<'a> Pieces<'a> {
         counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;
         counters.add(Counter::BinningTime, elapsed);
-        let piece = PrimitiveSegment {
-            primitives,
-            varyings: Varyings { values, per_vertex },
-            bins,
-        };
+        let piece = PrimitiveSegment { primitives, varyings: Varyings { values, per_vertex }, bins };
         host::push(&mut self.segments, (place, piece));
     }
 }

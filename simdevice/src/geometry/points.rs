@@ -43,10 +43,7 @@ impl<'a> PointShader<'a> {
                     transform: Transform::NONE,
                 },
                 resources,
-                watchdog: Watchdog {
-                    limit: runtime.config().shader_timeout,
-                    cancel: Some(cancel),
-                },
+                watchdog: Watchdog { limit: runtime.config().shader_timeout, cancel: Some(cancel) },
             },
             reuse: VertexReuse::default(),
             shaded: Shaded::default(),
@@ -70,12 +67,7 @@ impl<'a> PointShader<'a> {
         end: u32,
         counters: &mut Counters,
     ) -> Result<(), Stopped> {
-        let run = RestartRun {
-            start: 0,
-            primitives_before: 0,
-            primitives: self.draw.count,
-            vertices: self.draw.count,
-        };
+        let run = RestartRun { start: 0, primitives_before: 0, primitives: self.draw.count, vertices: self.draw.count };
         self.reuse.clear();
         self.reuse.push(self.draw, &run, instance, first, end);
         let ran = self.shader.shade(&self.reuse, &mut self.shaded);
@@ -88,9 +80,8 @@ impl<'a> PointShader<'a> {
     /// The position in clip space and the varyings of each point that was shaded last, in order.
     pub(crate) fn points(&self) -> impl Iterator<Item = ([f32; 4], &[u32])> {
         let pieces = self.reuse.pieces.iter();
-        let slots = pieces.flat_map(|piece| {
-            (piece.first..piece.end).map(|place| self.reuse.slot(piece, place) as usize)
-        });
+        let slots =
+            pieces.flat_map(|piece| (piece.first..piece.end).map(|place| self.reuse.slot(piece, place) as usize));
         let per_vertex = self.shader.reader.outputs.varyings.len();
         slots.map(move |slot| {
             let varyings = &self.shaded.varyings[slot * per_vertex..(slot + 1) * per_vertex];

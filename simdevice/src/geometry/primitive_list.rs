@@ -89,11 +89,7 @@ impl PrimitiveList {
     /// The primitives for set-up, if no further program takes them.
     pub(super) fn list(&self, provoking_last: bool, into: &mut Vec<ListedPrimitive>) {
         into.clear();
-        for (vertices, &id) in self
-            .vertices
-            .chunks_exact(self.per_primitive.max(1))
-            .zip(&self.ids)
-        {
+        for (vertices, &id) in self.vertices.chunks_exact(self.per_primitive.max(1)).zip(&self.ids) {
             let (first, last) = (vertices[0], vertices[vertices.len() - 1]);
             let corner = |number: usize| vertices.get(number).copied().unwrap_or(last);
             let primitive = ListedPrimitive {

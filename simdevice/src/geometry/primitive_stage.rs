@@ -30,27 +30,13 @@ pub(super) struct StageRunner<'a> {
 }
 
 impl<'a> StageRunner<'a> {
-    pub(super) fn new(
-        stage: &'a PrimitiveStage,
-        resources: &'a Resources<'a>,
-        environment: Environment<'a>,
-    ) -> Self {
-        Self {
-            stage,
-            machine: stage.machines.lend(),
-            resources,
-            environment,
-        }
+    pub(super) fn new(stage: &'a PrimitiveStage, resources: &'a Resources<'a>, environment: Environment<'a>) -> Self {
+        Self { stage, machine: stage.machines.lend(), resources, environment }
     }
 
     /// Sets the vertices of primitive or patch number `group` of the batch, and the values of the patch. Each vertex has
     /// its values by number.
-    pub(super) fn take<'v>(
-        &mut self,
-        group: usize,
-        vertices: impl Iterator<Item = &'v [u32]>,
-        patch: &[u32],
-    ) {
+    pub(super) fn take<'v>(&mut self, group: usize, vertices: impl Iterator<Item = &'v [u32]>, patch: &[u32]) {
         let takes = &self.stage.takes;
         let first = takes.start as usize + group * takes.stride as usize;
         let of = |values: &[u32], number: u32| values.get(number as usize).copied().unwrap_or(0);
@@ -58,28 +44,19 @@ impl<'a> StageRunner<'a> {
             for value in &takes.values {
                 if let Some(stride) = value.vertex_stride {
                     let byte = first + value.offset as usize + number * stride as usize;
-                    self.machine
-                        .set_workgroup_word(byte / 4, of(vertex, value.number));
+                    self.machine.set_workgroup_word(byte / 4, of(vertex, value.number));
                 }
             }
         }
-        let of_patch = takes
-            .values
-            .iter()
-            .filter(|value| value.vertex_stride.is_none());
+        let of_patch = takes.values.iter().filter(|value| value.vertex_stride.is_none());
         for value in of_patch {
             let byte = first + value.offset as usize;
-            self.machine
-                .set_workgroup_word(byte / 4, of(patch, value.number));
+            self.machine.set_workgroup_word(byte / 4, of(patch, value.number));
         }
     }
 
     /// Runs the program in the first lanes. `input` gives the value of an input in a lane.
-    pub(super) fn run(
-        &mut self,
-        lanes: usize,
-        input: impl Fn(PrimitiveInput, usize) -> u32,
-    ) -> Result<(), Stopped> {
+    pub(super) fn run(&mut self, lanes: usize, input: impl Fn(PrimitiveInput, usize) -> u32) -> Result<(), Stopped> {
         for &(slot, meaning) in &self.stage.inputs {
             match meaning {
                 PrimitiveInput::ViewIndex => self.machine.fill_input(slot, self.environment.view),
@@ -87,21 +64,12 @@ impl<'a> StageRunner<'a> {
                 _ => {
                     let vectors = self.machine.input_mut(slot);
                     for (lane, bits) in vectors.iter_mut().flat_map(|it| &mut it.0).enumerate() {
-                        *bits = if lane < lanes {
-                            input(meaning, lane)
-                        } else {
-                            0
-                        };
+                        *bits = if lane < lanes { input(meaning, lane) } else { 0 };
                     }
                 }
             }
         }
-        self.machine.run(
-            &LaneMask::first(lanes),
-            &LaneMask::none(),
-            self.resources,
-            self.environment.watchdog,
-        )
+        self.machine.run(&LaneMask::first(lanes), &LaneMask::none(), self.resources, self.environment.watchdog)
     }
 
     /// A word that the program gave, by its first byte.

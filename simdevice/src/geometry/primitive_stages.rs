@@ -97,13 +97,7 @@ impl<'a> PrimitiveStages<'a> {
             }),
             geometry: pipeline.geometry.as_ref().map(|stage| {
                 let reader = reader(&stage.outputs);
-                GeometryShader::new(
-                    stage,
-                    reader,
-                    provoking_last,
-                    &resources.geometry,
-                    environment,
-                )
+                GeometryShader::new(stage, reader, provoking_last, &resources.geometry, environment)
             }),
             taken: PrimitiveList::default(),
             listed: Vec::new(),
@@ -120,26 +114,19 @@ impl<'a> PrimitiveStages<'a> {
     ) -> Result<(), Stopped> {
         self.taken.assemble(self.topology, reuse);
         let mut number = 0;
-        let mut set_up =
-            |shaded: &Shaded, primitives: &[ListedPrimitive], pieces: &mut Pieces<'_>| {
-                pieces.set_up(shaded, primitives, (segment, number));
-                number += 1;
-            };
-        let Self {
-            geometry,
-            listed,
-            provoking_last,
-            ..
-        } = self;
-        let mut next =
-            |shaded: &Shaded, primitives: &PrimitiveList, pieces: &mut Pieces<'_>| match geometry {
-                Some(geometry) => geometry.run(shaded.values(), primitives, pieces, &mut set_up),
-                None => {
-                    primitives.list(*provoking_last, listed);
-                    set_up(shaded, listed, pieces);
-                    Ok(())
-                }
-            };
+        let mut set_up = |shaded: &Shaded, primitives: &[ListedPrimitive], pieces: &mut Pieces<'_>| {
+            pieces.set_up(shaded, primitives, (segment, number));
+            number += 1;
+        };
+        let Self { geometry, listed, provoking_last, .. } = self;
+        let mut next = |shaded: &Shaded, primitives: &PrimitiveList, pieces: &mut Pieces<'_>| match geometry {
+            Some(geometry) => geometry.run(shaded.values(), primitives, pieces, &mut set_up),
+            None => {
+                primitives.list(*provoking_last, listed);
+                set_up(shaded, listed, pieces);
+                Ok(())
+            }
+        };
         match &mut self.tessellation {
             Some(tessellation) => tessellation.run(shaded.values(), &self.taken, pieces, &mut next),
             None => next(shaded, &self.taken, pieces),

@@ -111,12 +111,7 @@ impl<'a> SegmentSetup<'a> {
     ) -> Self {
         numbers.clear();
         numbers.resize(shaded.vertices.len(), NONE);
-        Self {
-            setup,
-            shaded,
-            numbers,
-            out,
-        }
+        Self { setup, shaded, numbers, out }
     }
 
     /// Sets up all primitives of a segment.
@@ -147,11 +142,7 @@ impl<'a> SegmentSetup<'a> {
         let names_primitives = self.setup.outputs.primitive_id.is_some();
         for primitive in primitives {
             let mut current = AssembledPrimitive {
-                id: if names_primitives {
-                    self.optional(primitive.provoking).primitive_id
-                } else {
-                    primitive.id
-                },
+                id: if names_primitives { self.optional(primitive.provoking).primitive_id } else { primitive.id },
                 slots: primitive.slots,
                 provoking: primitive.provoking,
                 viewport: 0,
@@ -175,10 +166,7 @@ impl<'a> SegmentSetup<'a> {
     }
 
     pub(super) fn optional(&self, slot: u32) -> &OptionalOutputs {
-        self.shaded
-            .optional
-            .get(slot as usize)
-            .unwrap_or(&NO_OPTIONAL_OUTPUTS)
+        self.shaded.optional.get(slot as usize).unwrap_or(&NO_OPTIONAL_OUTPUTS)
     }
 
     /// Sets the layer and viewport of a primitive, which the provoking vertex selects. A layer that does not exist
@@ -222,8 +210,7 @@ impl<'a> SegmentSetup<'a> {
     ) {
         let shaded = self.shaded;
         if current.viewport == 0 {
-            let vertices =
-                std::array::from_fn(|corner| &shaded.vertices[current.slots[corner] as usize]);
+            let vertices = std::array::from_fn(|corner| &shaded.vertices[current.slots[corner] as usize]);
             then(self, current, vertices);
         } else {
             let vertices: [Vertex; N] =
@@ -238,10 +225,7 @@ impl<'a> SegmentSetup<'a> {
         }
         self.out.clipped += 1;
         let slot = current.slots[0];
-        let place = CornerVertex {
-            projected: &vertex.projected,
-            origin: Origin::Slot(slot),
-        };
+        let place = CornerVertex { projected: &vertex.projected, origin: Origin::Slot(slot) };
         self.push_point(current, place, self.optional(slot).point_size, 0.0);
     }
 
@@ -266,21 +250,14 @@ impl<'a> SegmentSetup<'a> {
             }
         }
         self.out.clipped += 1;
-        let [from, to] = [0, 1].map(|end: usize| CornerVertex {
-            projected: &projected[end],
-            origin: origins[end],
-        });
+        let [from, to] = [0, 1].map(|end: usize| CornerVertex { projected: &projected[end], origin: origins[end] });
         self.push_line(current, from, to, 0.0);
     }
 
     fn clipper(&self, current: &AssembledPrimitive) -> Clipper<'a> {
         let count = self.setup.outputs.clip.iter().rposition(Option::is_some);
         let distances = current.slots.map(|slot| self.optional(slot).clip);
-        Clipper {
-            transform: self.transform(current),
-            distances,
-            distance_count: count.map_or(0, |last| last + 1),
-        }
+        Clipper { transform: self.transform(current), distances, distance_count: count.map_or(0, |last| last + 1) }
     }
 
     #[inline(always)]
@@ -335,10 +312,8 @@ impl<'a> SegmentSetup<'a> {
         if !self.faces(current, area) || (fills && area == 0) {
             return;
         }
-        let mut places = [CornerVertex {
-            projected: &projected[0],
-            origin: Origin::Slot(current.slots[0]),
-        }; MOST_VERTICES];
+        let mut places =
+            [CornerVertex { projected: &projected[0], origin: Origin::Slot(current.slots[0]) }; MOST_VERTICES];
         for (number, vertex) in clipped.iter().enumerate() {
             places[number] = CornerVertex {
                 projected: &projected[number],
@@ -368,20 +343,11 @@ impl<'a> SegmentSetup<'a> {
     fn faces(&self, current: &mut AssembledPrimitive, area: i64) -> bool {
         let state = self.setup.state;
         current.front = area != 0 && (area > 0) == state.front_clockwise;
-        !if current.front {
-            state.cull_front
-        } else {
-            state.cull_back
-        }
+        !if current.front { state.cull_front } else { state.cull_back }
     }
 
     /// Draws the edges of a polygon that belong to its outline, or the first vertex of each.
-    fn outline(
-        &mut self,
-        current: &AssembledPrimitive,
-        places: &[CornerVertex],
-        edge: impl Fn(usize) -> bool,
-    ) {
+    fn outline(&mut self, current: &AssembledPrimitive, places: &[CornerVertex], edge: impl Fn(usize) -> bool) {
         let bias = self.bias([places[0], places[1], places[2]]);
         let next = |place: usize| (place + 1) % places.len();
         for place in (0..places.len()).filter(|&place| edge(place)) {
@@ -440,12 +406,7 @@ struct Shape {
 
 impl SegmentSetup<'_> {
     #[inline(always)]
-    pub(super) fn push_triangle(
-        &mut self,
-        current: &AssembledPrimitive,
-        places: [CornerVertex; 3],
-        area: i64,
-    ) {
+    pub(super) fn push_triangle(&mut self, current: &AssembledPrimitive, places: [CornerVertex; 3], area: i64) {
         let [a, b, c] = places;
         let places = nearest_first(if area > 0 { [a, b, c] } else { [a, c, b] });
         let corners = three(places, |place| place.projected.snapped);
@@ -466,13 +427,7 @@ impl SegmentSetup<'_> {
         self.push(current, &shape, places);
     }
 
-    pub(super) fn push_line(
-        &mut self,
-        current: &AssembledPrimitive,
-        from: CornerVertex,
-        to: CornerVertex,
-        bias: f32,
-    ) {
+    pub(super) fn push_line(&mut self, current: &AssembledPrimitive, from: CornerVertex, to: CornerVertex, bias: f32) {
         let (a, b) = (from.projected.window, to.projected.window);
         let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
         let length = (dx * dx + dy * dy).sqrt();
@@ -482,11 +437,8 @@ impl SegmentSetup<'_> {
         let scale = 0.5 * self.setup.state.line_width.clamp(0.0, MAX_LINE_WIDTH) / length;
         let side = [snap_length(-dy * scale), snap_length(dx * scale)];
         let (a, b) = (a.map(snap_away), b.map(snap_away));
-        let corners = [
-            [a[0] - side[0], a[1] - side[1]],
-            [a[0] + side[0], a[1] + side[1]],
-            [b[0] + side[0], b[1] + side[1]],
-        ];
+        let corners =
+            [[a[0] - side[0], a[1] - side[1]], [a[0] + side[0], a[1] + side[1]], [b[0] + side[0], b[1] + side[1]]];
         if cross(corners) <= 0 {
             return;
         }
@@ -505,18 +457,8 @@ impl SegmentSetup<'_> {
         }
     }
 
-    pub(super) fn push_point(
-        &mut self,
-        current: &AssembledPrimitive,
-        place: CornerVertex,
-        size: f32,
-        bias: f32,
-    ) {
-        let size = if size.is_nan() {
-            1.0
-        } else {
-            size.clamp(0.0, MAX_POINT_SIZE)
-        };
+    pub(super) fn push_point(&mut self, current: &AssembledPrimitive, place: CornerVertex, size: f32, bias: f32) {
+        let size = if size.is_nan() { 1.0 } else { size.clamp(0.0, MAX_POINT_SIZE) };
         let side = snap_length(size).max(ONE);
         let [x, y] = place.projected.window.map(|at| snap_away(at) - side / 2);
         let corners = [[x, y], [x + side, y], [x + side, y + side]];
@@ -537,11 +479,7 @@ impl SegmentSetup<'_> {
     #[inline(always)]
     fn pixels(&self, current: &AssembledPrimitive, corners: &[[i32; 2]]) -> Option<Pixels> {
         // The least and the greatest coordinate of a sample within a pixel.
-        let (low, high) = if self.setup.state.samples == 1 {
-            (128, 128)
-        } else {
-            (32, 224)
-        };
+        let (low, high) = if self.setup.state.samples == 1 { (128, 128) } else { (32, 224) };
         let region = &self.setup.regions[usize::from(current.viewport)];
         let along = |axis: usize, start: i32, length: u32| {
             let (mut least, mut greatest) = (i32::MAX, i32::MIN);
@@ -556,10 +494,7 @@ impl SegmentSetup<'_> {
             let last = i64::from(last).min(end);
             [first.max(start), last as i32]
         };
-        let pixels = Pixels {
-            x: along(0, region.x, region.width),
-            y: along(1, region.y, region.height),
-        };
+        let pixels = Pixels { x: along(0, region.x, region.width), y: along(1, region.y, region.height) };
         (pixels.x[0] <= pixels.x[1] && pixels.y[0] <= pixels.y[1]).then_some(pixels)
     }
 
@@ -581,13 +516,7 @@ impl SegmentSetup<'_> {
             layer: current.layer,
         };
         let number = self.out.primitives.len() as u32;
-        bin(
-            &self.setup.grid,
-            &primitive,
-            number,
-            shape.pixels,
-            &mut self.out.pairs,
-        );
+        bin(&self.setup.grid, &primitive, number, shape.pixels, &mut self.out.pairs);
         host::push(&mut self.out.primitives, primitive);
     }
 
@@ -609,11 +538,7 @@ impl SegmentSetup<'_> {
     }
 
     /// Adds a vertex that clipping made, with its interpolated varyings, to the output.
-    pub(super) fn new_vertex(
-        &mut self,
-        current: &AssembledPrimitive,
-        vertex: &ClipVertex,
-    ) -> Origin {
+    pub(super) fn new_vertex(&mut self, current: &AssembledPrimitive, vertex: &ClipVertex) -> Origin {
         let number = self.out.vertices;
         self.out.vertices += 1;
         let weights = vertex.weights;
@@ -668,9 +593,7 @@ fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
 fn offsets(places: [CornerVertex; 3]) -> [[i16; 2]; 3] {
     let mut offsets = UNMOVED;
     for (offset, place) in offsets.iter_mut().zip(places) {
-        let WindowVertex {
-            window, snapped, ..
-        } = place.projected;
+        let WindowVertex { window, snapped, .. } = place.projected;
         for axis in 0..2 {
             let off = f64::from(window[axis]) - f64::from(snapped[axis]) / f64::from(ONE);
             offset[axis] = (off * OFFSET_UNITS) as i16;
@@ -691,9 +614,7 @@ fn covers_nothing(corners: &[[i32; 2]; 3], pixels: Pixels) -> bool {
         let [x, y] = both([x, y], |pixel| i64::from(pixel) * 256 + 128);
         let mut inside = true;
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let [[ax, ay], [bx, by]] = both([corners[from], corners[to]], |corner| {
-                both(corner, i64::from)
-            });
+            let [[ax, ay], [bx, by]] = both([corners[from], corners[to]], |corner| both(corner, i64::from));
             let (dx, dy) = (bx - ax, by - ay);
             let value = dx * (y - ay) - dy * (x - ax);
             // Points on an edge belong to it if it is a left or a top one.

@@ -76,10 +76,7 @@ impl<'a> Vertices<'a> {
 impl Shaded {
     /// The varyings.
     pub(super) fn values(&self) -> Vertices<'_> {
-        Vertices {
-            values: &self.varyings,
-            per_vertex: self.per_vertex,
-        }
+        Vertices { values: &self.varyings, per_vertex: self.per_vertex }
     }
 
     /// Removes all vertices.
@@ -111,24 +108,12 @@ pub(super) struct OutputReader<'a> {
 
 impl Shader<'_> {
     /// Shades all vertices of a segment.
-    pub(super) fn shade(
-        &mut self,
-        reuse: &VertexReuse,
-        shaded: &mut Shaded,
-    ) -> Result<(), Stopped> {
+    pub(super) fn shade(&mut self, reuse: &VertexReuse, shaded: &mut Shaded) -> Result<(), Stopped> {
         shaded.clear();
-        let batches = reuse
-            .vertices
-            .chunks(VERTEX_BATCH)
-            .zip(reuse.instances.chunks(VERTEX_BATCH));
+        let batches = reuse.vertices.chunks(VERTEX_BATCH).zip(reuse.instances.chunks(VERTEX_BATCH));
         for (vertices, instances) in batches {
             self.fetcher.fetch(&mut self.machine, vertices, instances);
-            self.machine.run(
-                &LaneMask::first(vertices.len()),
-                &LaneMask::none(),
-                self.resources,
-                self.watchdog,
-            )?;
+            self.machine.run(&LaneMask::first(vertices.len()), &LaneMask::none(), self.resources, self.watchdog)?;
             let machine = &self.machine;
             let output = |slot| machine.output_vectors(slot);
             self.reader.take(vertices.len(), output, shaded);
@@ -140,12 +125,7 @@ impl Shader<'_> {
 impl OutputReader<'_> {
     /// Appends the vertices of a batch to `shaded`. `output` gives the lanes of an output.
     #[inline]
-    pub(super) fn take<'v>(
-        &self,
-        count: usize,
-        output: impl Fn(u32) -> &'v [Vector],
-        shaded: &mut Shaded,
-    ) {
+    pub(super) fn take<'v>(&self, count: usize, output: impl Fn(u32) -> &'v [Vector], shaded: &mut Shaded) {
         let outputs = self.outputs;
         let first = shaded.vertices.len();
         host::resize(&mut shaded.vertices, first + count, Vertex::default());
@@ -161,12 +141,7 @@ impl OutputReader<'_> {
             let projections = self.project(&position);
             for (lane, vertex) in vertices.iter_mut().enumerate() {
                 *vertex = Vertex {
-                    position: [
-                        position[0][lane],
-                        position[1][lane],
-                        position[2][lane],
-                        position[3][lane],
-                    ],
+                    position: [position[0][lane], position[1][lane], position[2][lane], position[3][lane]],
                     projected: WindowVertex {
                         window: [projections.window[0][lane], projections.window[1][lane]],
                         snapped: [projections.snapped[0][lane], projections.snapped[1][lane]],
@@ -203,12 +178,7 @@ impl OutputReader<'_> {
         dispatch!(self.level, _ => transform.project_all(position))
     }
 
-    fn take_optional<'v>(
-        &self,
-        count: usize,
-        output: &impl Fn(u32) -> &'v [Vector],
-        shaded: &mut Shaded,
-    ) {
+    fn take_optional<'v>(&self, count: usize, output: &impl Fn(u32) -> &'v [Vector], shaded: &mut Shaded) {
         let outputs = self.outputs;
         let first = shaded.optional.len();
         shaded.optional.resize(first + count, NO_OPTIONAL_OUTPUTS);

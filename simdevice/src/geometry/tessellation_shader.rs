@@ -44,8 +44,7 @@ struct Batch {
 }
 
 /// The receiver of the vertices and primitives of tessellation.
-pub(super) type Receiver<'r> =
-    dyn FnMut(&Shaded, &PrimitiveList, &mut Pieces<'_>) -> Result<(), Stopped> + 'r;
+pub(super) type Receiver<'r> = dyn FnMut(&Shaded, &PrimitiveList, &mut Pieces<'_>) -> Result<(), Stopped> + 'r;
 
 impl<'a> TessellationShader<'a> {
     pub(super) fn new(
@@ -86,9 +85,7 @@ impl<'a> TessellationShader<'a> {
             let count = most.min(patches.len() - first);
             let ran = self.run_control(vertices, patches, first, count);
             pieces.counters.add_work(&self.control.machine.take_work());
-            pieces
-                .counters
-                .add(Counter::TessellationPatches, count as u64);
+            pieces.counters.add(Counter::TessellationPatches, count as u64);
             ran?;
             self.take_patches(count);
             for patch in 0..count {
@@ -104,11 +101,7 @@ impl<'a> TessellationShader<'a> {
         self.hand_over(pieces, receive)
     }
 
-    fn hand_over(
-        &mut self,
-        pieces: &mut Pieces<'_>,
-        receive: &mut Receiver<'_>,
-    ) -> Result<(), Stopped> {
+    fn hand_over(&mut self, pieces: &mut Pieces<'_>, receive: &mut Receiver<'_>) -> Result<(), Stopped> {
         if self.primitives.len() > 0 {
             receive(&self.shaded, &self.primitives, pieces)?;
         }
@@ -131,12 +124,11 @@ impl<'a> TessellationShader<'a> {
             self.control.take(patch, values, &[]);
         }
         let per_patch = self.stage.output_vertices;
-        self.control
-            .run(count * per_patch, |input, lane| match input {
-                PrimitiveInput::PrimitiveId => patches.ids[first + lane / per_patch],
-                PrimitiveInput::PatchVertices => patches.per_primitive as u32,
-                _ => 0,
-            })
+        self.control.run(count * per_patch, |input, lane| match input {
+            PrimitiveInput::PrimitiveId => patches.ids[first + lane / per_patch],
+            PrimitiveInput::PatchVertices => patches.per_primitive as u32,
+            _ => 0,
+        })
     }
 
     /// Copies what the control program gave, since its next batch replaces it.
@@ -149,9 +141,7 @@ impl<'a> TessellationShader<'a> {
                 let is_patch = row == self.stage.output_vertices;
                 for value in &gives.values {
                     let bits = match value.vertex_stride {
-                        Some(stride) if !is_patch => self
-                            .control
-                            .given(start + value.offset + row as u32 * stride),
+                        Some(stride) if !is_patch => self.control.given(start + value.offset + row as u32 * stride),
                         None if is_patch => self.control.given(start + value.offset),
                         _ => 0,
                     };
@@ -165,9 +155,7 @@ impl<'a> TessellationShader<'a> {
     fn divide(&mut self, patch: usize, id: u32, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
         let gives = &self.stage.gives;
         let start = gives.start + patch as u32 * gives.stride;
-        let level = |offset: Option<u32>| {
-            f32::from_bits(offset.map_or(0, |offset| self.control.given(start + offset)))
-        };
+        let level = |offset: Option<u32>| f32::from_bits(offset.map_or(0, |offset| self.control.given(start + offset)));
         let outer = self.stage.outer_levels.map(level);
         let inner = self.stage.inner_levels.map(level);
         let mut divided = std::mem::take(&mut self.divided);
@@ -181,9 +169,7 @@ impl<'a> TessellationShader<'a> {
         let lanes = self.evaluation.stage.lanes;
         let mut rest = &divided.points[..];
         while !rest.is_empty() {
-            if self.batch.points.len() == lanes
-                || self.batch.ids.len() == self.evaluation.stage.groups
-            {
+            if self.batch.points.len() == lanes || self.batch.ids.len() == self.evaluation.stage.groups {
                 self.evaluate(pieces)?;
             }
             let group = self.batch.ids.len();
@@ -195,9 +181,7 @@ impl<'a> TessellationShader<'a> {
             self.batch.ids.push(id);
             let part = rest.len().min(lanes - self.batch.points.len());
             self.batch.points.extend(&rest[..part]);
-            self.batch
-                .groups
-                .resize(self.batch.points.len(), group as u32);
+            self.batch.groups.resize(self.batch.points.len(), group as u32);
             rest = &rest[part..];
         }
         self.divided = divided;
@@ -237,16 +221,11 @@ impl<'a> TessellationShader<'a> {
             PrimitiveInput::PatchVertices => output_vertices,
             _ => 0,
         });
-        pieces
-            .counters
-            .add_work(&self.evaluation.machine.take_work());
-        pieces
-            .counters
-            .add(Counter::TessellationInvocations, count as u64);
+        pieces.counters.add_work(&self.evaluation.machine.take_work());
+        pieces.counters.add(Counter::TessellationInvocations, count as u64);
         ran?;
         let machine = &self.evaluation.machine;
-        self.reader
-            .take(count, |slot| machine.output_vectors(slot), &mut self.shaded);
+        self.reader.take(count, |slot| machine.output_vectors(slot), &mut self.shaded);
         self.batch.points.clear();
         self.batch.groups.clear();
         self.batch.ids.clear();

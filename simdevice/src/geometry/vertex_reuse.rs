@@ -25,12 +25,7 @@ const SCAN: u32 = 1 << 16;
 /// The runs of a draw that have primitives, and the number of vertices of all runs.
 pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
     let topology = draw.state.topology;
-    let mut gathered = Runs {
-        topology,
-        runs: Vec::new(),
-        primitives: 0,
-        vertices: 0,
-    };
+    let mut gathered = Runs { topology, runs: Vec::new(), primitives: 0, vertices: 0 };
     match &draw.indices {
         Some(stream) if draw.state.primitive_restart => {
             let restart = stream.restart_index();
@@ -68,12 +63,7 @@ impl Runs {
         let primitives = primitive_count(self.topology, vertices);
         self.vertices += u64::from(vertices);
         if primitives > 0 {
-            let run = RestartRun {
-                start,
-                primitives_before: self.primitives,
-                primitives,
-                vertices,
-            };
+            let run = RestartRun { start, primitives_before: self.primitives, primitives, vertices };
             host::push(&mut self.runs, run);
             self.primitives += primitives;
         }
@@ -131,14 +121,7 @@ impl VertexReuse {
     }
 
     /// Adds primitives `first..end` of a run.
-    pub(super) fn push(
-        &mut self,
-        draw: &Draw,
-        run: &RestartRun,
-        instance: u32,
-        first: u32,
-        end: u32,
-    ) {
+    pub(super) fn push(&mut self, draw: &Draw, run: &RestartRun, instance: u32, first: u32, end: u32) {
         let topology = draw.state.topology;
         let range = places(topology, first, end);
         let range = range.start..range.end.min(run.vertices);
@@ -189,11 +172,7 @@ impl VertexReuse {
             base: range.start,
             elements,
             first_vertex,
-            pivot: if pivot {
-                self.slots.last().copied().unwrap_or(0)
-            } else {
-                0
-            },
+            pivot: if pivot { self.slots.last().copied().unwrap_or(0) } else { 0 },
         });
     }
 
@@ -254,10 +233,7 @@ impl VertexReuse {
     /// Assigns slots with a hash table with open addressing, in the order of first use.
     fn place_sparse(&mut self, indices: &[u32], offset: i64) {
         const FREE: u32 = u32::MAX;
-        let bits = (2 * indices.len())
-            .next_power_of_two()
-            .trailing_zeros()
-            .max(1);
+        let bits = (2 * indices.len()).next_power_of_two().trailing_zeros().max(1);
         self.table.clear();
         host::resize(&mut self.table, 1 << bits, FREE);
         let mask = (1usize << bits) - 1;

@@ -105,12 +105,7 @@ impl Transform {
     }
 
     /// The transform of a draw without viewports.
-    pub(super) const NONE: Self = Self {
-        scale: [0.0; 3],
-        translate: [0.0; 3],
-        clip_depth: true,
-        near: 0.0,
-    };
+    pub(super) const NONE: Self = Self { scale: [0.0; 3], translate: [0.0; 3], clip_depth: true, near: 0.0 };
 
     pub(super) fn new(viewport: &Viewport, clip_depth: bool, negative_one_to_one: bool) -> Self {
         let (half_width, half_height) = (0.5 * viewport.width, 0.5 * viewport.height);
@@ -138,12 +133,7 @@ impl Transform {
             (f64::from(ndc) * f64::from(scale) + f64::from(translate)) as f32
         };
         let window = [map(x * inverse_w, 0), map(y * inverse_w, 1)];
-        WindowVertex {
-            window,
-            snapped: [snap(window[0]), snap(window[1])],
-            depth: map(z * inverse_w, 2),
-            inverse_w,
-        }
+        WindowVertex { window, snapped: [snap(window[0]), snap(window[1])], depth: map(z * inverse_w, 2), inverse_w }
     }
 
     /// The clip code of a vertex at this position. `projected` is its projection.
@@ -171,11 +161,7 @@ impl Transform {
     pub(super) fn guard_plane(&self, side: usize) -> [f64; 2] {
         let axis = side / 2;
         let (scale, translate) = (f64::from(self.scale[axis]), f64::from(self.translate[axis]));
-        if side.is_multiple_of(2) {
-            [scale, GUARD + translate]
-        } else {
-            [-scale, GUARD - translate]
-        }
+        if side.is_multiple_of(2) { [scale, GUARD + translate] } else { [-scale, GUARD - translate] }
     }
 }
 
@@ -189,10 +175,7 @@ const FARTHEST: f64 = 16_777_216.0;
 #[inline(always)]
 pub(super) fn snap(window: f32) -> i32 {
     let scaled = f64::from((window - 0.5) * ONE as f32);
-    #[expect(
-        clippy::manual_clamp,
-        reason = "it would leave what is no number as it is"
-    )]
+    #[expect(clippy::manual_clamp, reason = "it would leave what is no number as it is")]
     let scaled = scaled.max(-FARTHEST).min(FARTHEST);
     // The integer is in the sum's low bits.
     (scaled + ROUND).to_bits() as i32 + ONE / 2
@@ -219,10 +202,5 @@ pub(super) fn pixels(viewport: &Viewport) -> Rect {
     };
     let (x, width) = span(viewport.x, viewport.width);
     let (y, height) = span(viewport.y, viewport.height);
-    Rect {
-        x,
-        y,
-        width,
-        height,
-    }
+    Rect { x, y, width, height }
 }

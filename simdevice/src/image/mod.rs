@@ -83,8 +83,7 @@ pub enum ImageError {
 impl ImageDesc {
     /// The number of texels of a mip level in x, y and z.
     pub fn mip_extent(&self, level: u32) -> [u32; 3] {
-        self.extent
-            .map(|texels| texels.checked_shr(level).unwrap_or(0).max(1))
+        self.extent.map(|texels| texels.checked_shr(level).unwrap_or(0).max(1))
     }
 
     /// The bytes that the image takes, or `None` if it has no layout (see [`ImageError::Shape`]).
@@ -104,9 +103,7 @@ impl ImageDesc {
             return None;
         }
         let array_pitch = self.level_offset(aspect, self.mip_levels)?;
-        let offset = self.plane_offset(plane)?
-            + array_pitch * u64::from(layer)
-            + self.level_offset(aspect, level)?;
+        let offset = self.plane_offset(plane)? + array_pitch * u64::from(layer) + self.level_offset(aspect, level)?;
         let mut layout = self.level_layout(aspect, level)?;
         layout.offset = offset;
         layout.array_pitch = array_pitch;
@@ -115,19 +112,15 @@ impl ImageDesc {
 
     /// The bytes of the first `planes` aspects.
     fn plane_offset(&self, planes: usize) -> Option<u64> {
-        self.format.aspects()[..planes]
-            .iter()
-            .try_fold(0u64, |sum, &aspect| {
-                let layer = self.level_offset(aspect, self.mip_levels)?;
-                sum.checked_add(layer.checked_mul(self.array_layers.into())?)
-            })
+        self.format.aspects()[..planes].iter().try_fold(0u64, |sum, &aspect| {
+            let layer = self.level_offset(aspect, self.mip_levels)?;
+            sum.checked_add(layer.checked_mul(self.array_layers.into())?)
+        })
     }
 
     /// The bytes of the first `levels` mip levels of one layer.
     fn level_offset(&self, aspect: Aspect, levels: u32) -> Option<u64> {
-        (0..levels).try_fold(0u64, |sum, level| {
-            sum.checked_add(self.level_layout(aspect, level)?.size)
-        })
+        (0..levels).try_fold(0u64, |sum, level| sum.checked_add(self.level_layout(aspect, level)?.size))
     }
 
     /// The layout of a mip level. `offset` and `array_pitch` are zero.
@@ -157,9 +150,7 @@ impl SubresourceLayout {
     /// The layout of one sample: that of an image with a single sample.
     pub fn sample(&self, sample: u32) -> Self {
         Self {
-            offset: self
-                .offset
-                .saturating_add(self.sample_pitch.saturating_mul(sample.into())),
+            offset: self.offset.saturating_add(self.sample_pitch.saturating_mul(sample.into())),
             size: self.sample_pitch,
             ..*self
         }
@@ -175,13 +166,8 @@ impl SubresourceLayout {
         }
         let texel_size = self.format.texel_size() as u64;
         // Offsets in the subresource did not overflow when it was laid out.
-        let inside = u64::from(z) * self.depth_pitch
-            + u64::from(y) * self.row_pitch
-            + u64::from(x) * texel_size;
-        Some((
-            self.offset.checked_add(inside)?,
-            u64::from(width - x) * texel_size,
-        ))
+        let inside = u64::from(z) * self.depth_pitch + u64::from(y) * self.row_pitch + u64::from(x) * texel_size;
+        Some((self.offset.checked_add(inside)?, u64::from(width - x) * texel_size))
     }
 }
 
@@ -202,22 +188,10 @@ impl Image {
     /// Binds an image to byte `offset` of `memory`.
     pub fn new(desc: ImageDesc, memory: Arc<Allocation>, offset: u64) -> Result<Self, ImageError> {
         let size = desc.memory_size().ok_or(ImageError::Shape)?;
-        if offset
-            .checked_add(size)
-            .is_none_or(|end| end > memory.len())
-        {
-            return Err(ImageError::Memory(OutOfBounds {
-                offset,
-                size,
-                len: memory.len(),
-            }));
+        if offset.checked_add(size).is_none_or(|end| end > memory.len()) {
+            return Err(ImageError::Memory(OutOfBounds { offset, size, len: memory.len() }));
         }
-        Ok(Self {
-            desc,
-            memory,
-            offset,
-            decompressed: Arc::default(),
-        })
+        Ok(Self { desc, memory, offset, decompressed: Arc::default() })
     }
 
     /// The layout of a subresource, or `None` if the image does not have it.
@@ -230,9 +204,7 @@ impl Image {
     #[inline]
     pub(crate) fn row(&self, layout: &SubresourceLayout, at: [u32; 3], size: u64) -> Option<u64> {
         let (offset, rest) = layout.texel(at)?;
-        (size <= rest)
-            .then(|| self.offset.checked_add(offset))
-            .flatten()
+        (size <= rest).then(|| self.offset.checked_add(offset)).flatten()
     }
 
     /// Reads the bytes of consecutive texels of a row from texel `at` (x, y, z) on. Returns `None` and leaves `out`
@@ -281,11 +253,7 @@ impl Image {
             return self.decompress();
         }
         // A panic while the lock was held leaves a valid value. Decoding twice is harmless.
-        let mut kept = self
-            .decompressed
-            .0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.decompressed.0.lock().unwrap_or_else(PoisonError::into_inner);
         let generation = self.memory.generation();
         if let Some((known, image)) = &*kept
             && *known == generation
@@ -298,10 +266,7 @@ impl Image {
     }
 
     fn decompress(&self) -> Option<Arc<Self>> {
-        let desc = ImageDesc {
-            format: self.desc.format.decompressed()?,
-            ..self.desc
-        };
+        let desc = ImageDesc { format: self.desc.format.decompressed()?, ..self.desc };
         let memory = Allocation::new_zeroed(desc.memory_size()?).ok()?;
         let plain = Self::new(desc, memory, 0).ok()?;
         for layer in 0..desc.array_layers {
@@ -326,8 +291,7 @@ impl Image {
         let block_size = format.texel_size();
         let mut bytes: Vec<u8> = host::zeroed(columns as usize * block_size);
         let pitch = side as usize * texels.format.texel_size();
-        let mut decoded: Vec<Vec<u8>> =
-            host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
+        let mut decoded: Vec<Vec<u8>> = host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
         let row_size = texels.extent[0] as usize * texels.format.texel_size();
         for z in 0..slices {
             for row in 0..rows {
@@ -358,11 +322,7 @@ impl ImageView {
     pub(crate) fn decompressed(&self) -> Option<Self> {
         match self.format.decompressed() {
             None => Some(self.clone()),
-            Some(format) => Some(Self {
-                image: self.image.decompressed()?,
-                format,
-                ..self.clone()
-            }),
+            Some(format) => Some(Self { image: self.image.decompressed()?, format, ..self.clone() }),
         }
     }
 }
@@ -384,19 +344,9 @@ mod tests {
 
     #[gaurast_runner::test]
     fn subresources_tile_the_image_without_gaps() {
-        for format in [
-            Format::R8G8B8A8Unorm,
-            Format::D24UnormS8Uint,
-            Format::R32G32B32Sfloat,
-        ] {
+        for format in [Format::R8G8B8A8Unorm, Format::D24UnormS8Uint, Format::R32G32B32Sfloat] {
             for (kind, extent) in [(ImageKind::D2, [33, 7, 1]), (ImageKind::D3, [9, 5, 4])] {
-                let desc = ImageDesc {
-                    kind,
-                    format,
-                    extent,
-                    samples: 4,
-                    ..desc()
-                };
+                let desc = ImageDesc { kind, format, extent, samples: 4, ..desc() };
                 let mut end = 0;
                 for &aspect in format.aspects() {
                     for layer in 0..2 {
@@ -427,28 +377,11 @@ mod tests {
         assert_eq!(desc().subresource(Aspect::Color, 3, 0), None);
         assert_eq!(desc().subresource(Aspect::Color, 0, 2), None);
         assert_eq!(desc().subresource(Aspect::Depth, 0, 0), None);
-        let huge = ImageDesc {
-            extent: [u32::MAX; 3],
-            ..desc()
-        };
+        let huge = ImageDesc { extent: [u32::MAX; 3], ..desc() };
         assert_eq!(huge.memory_size(), None);
         assert_eq!(huge.subresource(Aspect::Color, 0, 0), None);
-        assert_eq!(
-            ImageDesc {
-                samples: 0,
-                ..desc()
-            }
-            .memory_size(),
-            None
-        );
-        assert_eq!(
-            ImageDesc {
-                mip_levels: u32::MAX,
-                ..desc()
-            }
-            .memory_size(),
-            None
-        );
+        assert_eq!(ImageDesc { samples: 0, ..desc() }.memory_size(), None);
+        assert_eq!(ImageDesc { mip_levels: u32::MAX, ..desc() }.memory_size(), None);
     }
 
     #[gaurast_runner::test]
@@ -456,10 +389,7 @@ mod tests {
         let size = desc().memory_size().unwrap();
         let memory = Allocation::new_zeroed(size).unwrap();
         assert!(Image::new(desc(), memory.clone(), 0).is_ok());
-        assert!(matches!(
-            Image::new(desc(), memory.clone(), 1),
-            Err(ImageError::Memory(_))
-        ));
+        assert!(matches!(Image::new(desc(), memory.clone(), 1), Err(ImageError::Memory(_))));
         assert!(Image::new(desc(), memory, u64::MAX).is_err());
     }
 
@@ -468,9 +398,7 @@ mod tests {
         let memory = Allocation::new_zeroed(desc().memory_size().unwrap()).unwrap();
         let image = Image::new(desc(), memory, 0).unwrap();
         let layout = image.subresource(Aspect::Color, 0, 1).unwrap();
-        image
-            .write_row(&layout, [31, 6, 0], &[1, 2, 3, 4, 5, 6, 7, 8])
-            .unwrap();
+        image.write_row(&layout, [31, 6, 0], &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         let mut out = [0; 4];
         image.read_row(&layout, [32, 6, 0], &mut out).unwrap();
         assert_eq!(out, [5, 6, 7, 8]);
@@ -536,10 +464,7 @@ mod decompression_tests {
 
     #[gaurast_runner::test]
     fn images_without_compression_stay_as_they_are() {
-        let desc = ImageDesc {
-            format: Format::R8Unorm,
-            ..image(false).desc
-        };
+        let desc = ImageDesc { format: Format::R8Unorm, ..image(false).desc };
         let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
         let image = Image::new(desc, memory, 0).unwrap();
         assert!(image.decompressed().is_none());

@@ -1,16 +1,11 @@
 //! Packets, and their representation as text.
 
 use super::display::{
-    By, buffer, clear_attachments, draw, gaussian_append, gaussian_append_draw, gaussian_begin,
-    image, layers, rendering,
+    By, buffer, clear_attachments, draw, gaussian_append, gaussian_append_draw, gaussian_begin, image, layers,
+    rendering,
 };
-use super::transfer::{
-    BlitImage, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ResolveImage,
-};
-use super::{
-    ClearAttachments, Dispatch, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage,
-    Rendering,
-};
+use super::transfer::{BlitImage, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ResolveImage};
+use super::{ClearAttachments, Dispatch, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage, Rendering};
 use crate::stats::query::QueryPool;
 use crate::transform_feedback::{CounterWords, TransformFeedback};
 use devmem::BufferRange;
@@ -129,13 +124,9 @@ impl Display for Packet {
             By(move |f: &mut Formatter<'_>| write!(f, "{width}x{height}x{depth}{x:+}{y:+}{z:+}"))
         };
         match self {
-            Self::CopyBuffer(copy) => write!(
-                f,
-                "copy {} to {}: {} regions",
-                buffer(&copy.source),
-                buffer(&copy.target),
-                copy.regions.len()
-            ),
+            Self::CopyBuffer(copy) => {
+                write!(f, "copy {} to {}: {} regions", buffer(&copy.source), buffer(&copy.target), copy.regions.len())
+            }
             Self::CopyBufferToImage(copy) | Self::CopyImageToBuffer(copy) => {
                 let (buffer, image) = (buffer(&copy.buffer), image(&copy.image));
                 match self {
@@ -144,12 +135,7 @@ impl Display for Packet {
                 }
                 for region in &copy.regions {
                     let place = boxed(region.image_offset, region.image_extent);
-                    write!(
-                        f,
-                        ", {place} {} at {}",
-                        layers(region.subresource),
-                        region.buffer_offset
-                    )?;
+                    write!(f, ", {place} {} at {}", layers(region.subresource), region.buffer_offset)?;
                 }
                 Ok(())
             }
@@ -210,11 +196,7 @@ impl Display for Packet {
             Self::BeginQuery { index, .. } => write!(f, "begin query {index}"),
             Self::EndQuery { index, .. } => write!(f, "end query {index}"),
             Self::ResetQueries { first, count, .. } => {
-                write!(
-                    f,
-                    "reset queries {first}..{}",
-                    u64::from(*first) + u64::from(*count)
-                )
+                write!(f, "reset queries {first}..{}", u64::from(*first) + u64::from(*count))
             }
             Self::WriteTimestamp { index, .. } => write!(f, "write timestamp {index}"),
         }

@@ -1,8 +1,8 @@
 //! Packets as text for people: one line each, with the most important state.
 
 use super::{
-    Attachment, AttachmentClear, BufferRange, ClearAttachments, GaussianAppend, GaussianBegin,
-    LoadOp, Rendering, SubresourceLayers,
+    Attachment, AttachmentClear, BufferRange, ClearAttachments, GaussianAppend, GaussianBegin, LoadOp, Rendering,
+    SubresourceLayers,
 };
 use crate::format::Aspect;
 use crate::image::{Image, ImageView};
@@ -20,10 +20,7 @@ impl<F: Fn(&mut Formatter<'_>) -> fmt::Result> Display for By<F> {
 }
 
 /// The items with `separator` between them.
-pub(super) fn joined<T: Display>(
-    items: impl IntoIterator<Item = T> + Clone,
-    separator: &str,
-) -> impl Display {
+pub(super) fn joined<T: Display>(items: impl IntoIterator<Item = T> + Clone, separator: &str) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
         for (index, item) in items.clone().into_iter().enumerate() {
             if index > 0 {
@@ -59,12 +56,7 @@ pub(super) fn buffer(range: &BufferRange) -> impl Display {
 
 pub(super) fn layers(layers: SubresourceLayers) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
-        let SubresourceLayers {
-            aspect,
-            mip_level,
-            base_layer,
-            layer_count,
-        } = layers;
+        let SubresourceLayers { aspect, mip_level, base_layer, layer_count } = layers;
         if aspect != Aspect::Color {
             write!(f, "{aspect:?} ")?;
         }
@@ -122,12 +114,7 @@ pub(super) fn clear_attachments(clear: &ClearAttachments) -> impl Display + '_ {
             })
         });
         let rects = clear.rects.iter().map(|(rect, ..)| rect);
-        write!(
-            f,
-            "clear attachments: {} in {}",
-            joined(what, ", "),
-            joined(rects, ", ")
-        )
+        write!(f, "clear attachments: {} in {}", joined(what, ", "), joined(rects, ", "))
     })
 }
 
@@ -159,13 +146,7 @@ pub(super) fn output<'a>(
             write!(f, ", depth within {least}..{greatest}")?;
         }
         if let Some([front, _]) = tests.stencil {
-            write!(
-                f,
-                ", stencil {} {} & {:#x}",
-                compare(front.compare),
-                front.reference,
-                front.compare_mask
-            )?;
+            write!(f, ", stencil {} {} & {:#x}", compare(front.compare), front.reference, front.compare_mask)?;
         }
         if let Some(logic) = logic {
             write!(f, ", logic {logic:?}")?;
@@ -174,17 +155,9 @@ pub(super) fn output<'a>(
             match blend.equations {
                 None => f.write_str(", replaced")?,
                 Some((color, alpha)) => {
-                    write!(
-                        f,
-                        ", {:?} {:?} {:?}",
-                        color.op, color.source, color.destination
-                    )?;
+                    write!(f, ", {:?} {:?} {:?}", color.op, color.source, color.destination)?;
                     if alpha != color {
-                        write!(
-                            f,
-                            ", alpha {:?} {:?} {:?}",
-                            alpha.op, alpha.source, alpha.destination
-                        )?;
+                        write!(f, ", alpha {:?} {:?} {:?}", alpha.op, alpha.source, alpha.destination)?;
                     }
                 }
             }
@@ -200,27 +173,14 @@ pub(super) fn draw(draw: &Draw) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         let state = &draw.state;
         write!(f, "draw {:?}", state.topology)?;
-        let what = if draw.indices.is_some() {
-            "indices"
-        } else {
-            "vertices"
-        };
-        write!(
-            f,
-            " {what} {}..{}",
-            draw.first,
-            u64::from(draw.first) + u64::from(draw.count)
-        )?;
+        let what = if draw.indices.is_some() { "indices" } else { "vertices" };
+        write!(f, " {what} {}..{}", draw.first, u64::from(draw.first) + u64::from(draw.count))?;
         if [draw.first_instance, draw.instance_count] != [0, 1] {
             let end = u64::from(draw.first_instance) + u64::from(draw.instance_count);
             write!(f, " instances {}..{end}", draw.first_instance)?;
         }
         write!(f, " in {}", joined(&state.scissors, ", "))?;
-        write!(
-            f,
-            "{}",
-            output(&state.depth_stencil, state.logic_op, &state.blend)
-        )
+        write!(f, "{}", output(&state.depth_stencil, state.logic_op, &state.blend))
     })
 }
 
@@ -232,37 +192,23 @@ pub(super) fn gaussian_begin(begin: &GaussianBegin) -> impl Display + '_ {
             "begin gaussians {:?} degree {} by {:?} in {}",
             begin.camera.model, state.sh_degree, state.order, begin.scissor,
         )?;
-        write!(
-            f,
-            "{}",
-            output(&state.depth_stencil, state.logic_op, &state.blend)
-        )
+        write!(f, "{}", output(&state.depth_stencil, state.logic_op, &state.blend))
     })
 }
 
 pub(super) fn gaussian_append(append: &GaussianAppend) -> impl Display {
-    let (vertices, instances) = (
-        [append.first, append.count],
-        [append.first_instance, append.instance_count],
-    );
+    let (vertices, instances) = ([append.first, append.count], [append.first_instance, append.instance_count]);
     appended(append.indices.is_some(), vertices, instances)
 }
 
 pub(super) fn gaussian_append_draw(draw: &Draw) -> impl Display {
-    let (vertices, instances) = (
-        [draw.first, draw.count],
-        [draw.first_instance, draw.instance_count],
-    );
+    let (vertices, instances) = ([draw.first, draw.count], [draw.first_instance, draw.instance_count]);
     let what = appended(draw.indices.is_some(), vertices, instances);
     By(move |f: &mut Formatter<'_>| write!(f, "{what}, shaded"))
 }
 
 /// The text of appended Gaussians. Vertices and instances are each given by their first number and their count.
-pub(super) fn appended(
-    indexed: bool,
-    [first, count]: [u32; 2],
-    instances: [u32; 2],
-) -> impl Display {
+pub(super) fn appended(indexed: bool, [first, count]: [u32; 2], instances: [u32; 2]) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
         let what = if indexed { "indices" } else { "gaussians" };
         let end = u64::from(first) + u64::from(count);

@@ -41,9 +41,7 @@ impl AttributeStream {
     /// The offset in memory of `bytes` bytes from an element on; `None` unless all of them are inside the buffer.
     #[inline]
     pub(crate) fn place(&self, element: u64, bytes: u64) -> Option<u64> {
-        let start = element
-            .checked_mul(self.stride.into())?
-            .checked_add(self.offset.into())?;
+        let start = element.checked_mul(self.stride.into())?.checked_add(self.offset.into())?;
         if start.checked_add(bytes)? > self.buffer.size {
             return None;
         }
@@ -96,16 +94,12 @@ impl IndexStream {
             1 => {
                 let mut bytes: Vec<u8> = host::zeroed(known);
                 let _ = memory.read(start, &mut bytes);
-                out.iter_mut()
-                    .zip(bytes)
-                    .for_each(|(out, byte)| *out = byte.into());
+                out.iter_mut().zip(bytes).for_each(|(out, byte)| *out = byte.into());
             }
             2 => {
                 let mut halves: Vec<u16> = host::zeroed(known);
                 let _ = memory.read(start, &mut halves);
-                out.iter_mut()
-                    .zip(halves)
-                    .for_each(|(out, half)| *out = half.into());
+                out.iter_mut().zip(halves).for_each(|(out, half)| *out = half.into());
             }
             _ => {
                 let _ = memory.read(start, out);

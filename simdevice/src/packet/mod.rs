@@ -10,11 +10,11 @@ mod transfer;
 pub use command::Packet;
 pub use devmem::BufferRange;
 pub use draw::{
-    Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes,
-    GaussianBegin, GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
+    Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
+    GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
 };
 pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 pub use transfer::{
-    BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage,
-    CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,
+    BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
+    ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,
 };

@@ -38,10 +38,6 @@ impl ComputeProgram {
             count_work: true,
             level,
         };
-        Ok(Self {
-            machines: MachinePool::new(Executable::new(program, &options)?),
-            inputs,
-            invocations,
-        })
+        Ok(Self { machines: MachinePool::new(Executable::new(program, &options)?), inputs, invocations })
     }
 }

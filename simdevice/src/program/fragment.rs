@@ -2,9 +2,7 @@
 
 use super::pool::{MachinePool, PooledMachine};
 use crate::limits::DRAW_SUBGROUP_SIZE;
-use crate::program::interface::{
-    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
-};
+use crate::program::interface::{FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve};
 use crate::stats::counters::Counters;
 use fearless_simd::Level;
 use isa::Options;
@@ -71,28 +69,17 @@ impl FragmentStage {
     /// [`InvalidProgram`] if it cannot run on the device.
     pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
         let executable = |lanes| {
-            let options = Options {
-                lanes,
-                subgroup_size: DRAW_SUBGROUP_SIZE as usize,
-                count_work: true,
-                level,
-            };
+            let options = Options { lanes, subgroup_size: DRAW_SUBGROUP_SIZE as usize, count_work: true, level };
             Executable::new(programs.program.clone(), &options)
         };
         let executables = [executable(BATCH_LANES[0])?, executable(BATCH_LANES[1])?];
         let interface = Interface::new(programs, &executables[0]);
-        Ok(Self {
-            machines: executables.map(MachinePool::new),
-            interface,
-        })
+        Ok(Self { machines: executables.map(MachinePool::new), interface })
     }
 
     /// Makes the machines of one worker.
     pub(crate) fn machines(&self) -> FragmentMachines<'_> {
-        FragmentMachines {
-            pools: &self.machines,
-            lent: [None, None],
-        }
+        FragmentMachines { pools: &self.machines, lent: [None, None] }
     }
 }
 
@@ -117,17 +104,10 @@ impl Interface {
             };
             let mut place = 0;
             match kind {
-                FragmentInput::Varying {
-                    index,
-                    interpolation,
-                    sampling,
-                } => {
+                FragmentInput::Varying { index, interpolation, sampling } => {
                     interface.per_sample |= sampling == Sampling::Sample;
                     let varying = (index, interpolation);
-                    let known = interface
-                        .varyings
-                        .iter()
-                        .position(|&other| other == varying);
+                    let known = interface.varyings.iter().position(|&other| other == varying);
                     place = known.unwrap_or(interface.varyings.len());
                     if known.is_none() {
                         interface.varyings.push(varying);
@@ -145,15 +125,9 @@ impl Interface {
                 continue;
             };
             match kind {
-                FragmentOutput::Color {
-                    attachment,
-                    component,
-                    index,
-                } => {
+                FragmentOutput::Color { attachment, component, index } => {
                     if interface.colors.len() <= attachment {
-                        interface
-                            .colors
-                            .resize(attachment + 1, ColorSlots::default());
+                        interface.colors.resize(attachment + 1, ColorSlots::default());
                     }
                     let sources = &mut interface.colors[attachment];
                     if let Some(slot) = sources.get_mut(index).and_then(|s| s.get_mut(component)) {
@@ -185,16 +159,12 @@ impl GaussianFragmentProgram {
     pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
         let stage = FragmentStage::new(level, programs)?;
         let is_depth = |input: FragmentInput| match input {
-            FragmentInput::Varying { index, .. } => {
-                (resolve::EXPECTED_DEPTH..=resolve::MEDIAN_DEPTH).contains(&index)
-            }
+            FragmentInput::Varying { index, .. } => (resolve::EXPECTED_DEPTH..=resolve::MEDIAN_DEPTH).contains(&index),
             FragmentInput::FragCoord(axis) => axis == 2,
             _ => false,
         };
         let is_tracked = |input: FragmentInput| match input {
-            FragmentInput::Varying { index, .. } => {
-                (resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA).contains(&index)
-            }
+            FragmentInput::Varying { index, .. } => (resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA).contains(&index),
             _ => false,
         };
         let inputs = &stage.interface.inputs;

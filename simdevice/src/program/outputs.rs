@@ -34,11 +34,7 @@ impl VertexOutputs {
         };
         let fragment_inputs = programs.fragment.iter().flat_map(|stage| &stage.inputs);
         for input in fragment_inputs.flatten() {
-            if let FragmentInput::Varying {
-                index,
-                interpolation,
-                ..
-            } = *input
+            if let FragmentInput::Varying { index, interpolation, .. } = *input
                 && let Some(entry) = this.interpolation.get_mut(index as usize)
             {
                 *entry = interpolation;

@@ -13,24 +13,14 @@ pub(crate) struct MachinePool {
 
 impl MachinePool {
     pub(crate) fn new(executable: Executable) -> Self {
-        Self {
-            executable: Arc::new(executable),
-            idle: Mutex::default(),
-        }
+        Self { executable: Arc::new(executable), idle: Mutex::default() }
     }
 
     /// Lends a machine. Its registers hold whatever an earlier run left.
     pub(crate) fn lend(&self) -> PooledMachine<'_> {
-        let idle = self
-            .idle
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .pop();
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let machine = idle.unwrap_or_else(|| Machine::new(Arc::clone(&self.executable)));
-        PooledMachine {
-            pool: self,
-            machine: Some(machine),
-        }
+        PooledMachine { pool: self, machine: Some(machine) }
     }
 }
 
@@ -62,9 +52,7 @@ impl Drop for PooledMachine<'_> {
     fn drop(&mut self) {
         if let Some(machine) = self.machine.take() {
             let idle = &self.pool.idle;
-            idle.lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(machine);
+            idle.lock().unwrap_or_else(PoisonError::into_inner).push(machine);
         }
     }
 }

@@ -37,11 +37,7 @@ enum Over {
 
 /// The equation `source * factor + destination * (1 - alpha)`.
 const fn over(source: BlendFactor) -> BlendEquation {
-    BlendEquation {
-        source,
-        destination: BlendFactor::OneMinusSrcAlpha,
-        op: BlendOp::Add,
-    }
+    BlendEquation { source, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add }
 }
 const PREMULTIPLIED: BlendEquation = over(BlendFactor::One);
 const STRAIGHT: BlendEquation = over(BlendFactor::SrcAlpha);
@@ -82,29 +78,18 @@ enum Codec {
 
 impl ColorOutput {
     /// The output to an attachment of `format`; `None` if the state never changes it.
-    pub fn new(
-        state: &BlendState,
-        logic: Option<LogicOp>,
-        constants: [f32; 4],
-        format: Format,
-    ) -> Option<Self> {
+    pub fn new(state: &BlendState, logic: Option<LogicOp>, constants: [f32; 4], format: Format) -> Option<Self> {
         let written = written_bits(format, state.write_mask);
         // An enabled logic operation disables blending even for formats to which it does not apply.
         let blends = logic.is_none() && !format.is_integer();
-        let logic = logic.filter(|_| {
-            matches!(
-                format.numeric(),
-                Numeric::Unorm | Numeric::Snorm | Numeric::Uint | Numeric::Sint
-            )
-        });
+        let logic = logic
+            .filter(|_| matches!(format.numeric(), Numeric::Unorm | Numeric::Snorm | Numeric::Uint | Numeric::Sint));
         let range = clamp_range(format);
         let codec = match format {
             _ if logic.is_some() => Codec::Other,
             Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 => Codec::Unorm8 { bgra: false },
             Format::B8G8R8A8Unorm => Codec::Unorm8 { bgra: true },
-            Format::R32G32B32A32Sfloat | Format::R32G32B32A32Uint | Format::R32G32B32A32Sint => {
-                Codec::Words
-            }
+            Format::R32G32B32A32Sfloat | Format::R32G32B32A32Uint | Format::R32G32B32A32Sint => Codec::Words,
             Format::R32Sfloat | Format::R32Uint | Format::R32Sint => Codec::Word,
             _ => Codec::Other,
         };
@@ -126,9 +111,7 @@ impl ColorOutput {
 
     /// True if every texel is replaced as a whole, independent of its old value.
     pub fn overwrites(&self) -> bool {
-        self.equations.is_none()
-            && self.logic.is_none()
-            && self.written == written_bits(self.format, 0xF)
+        self.equations.is_none() && self.logic.is_none() && self.written == written_bits(self.format, 0xF)
     }
 
     /// True if blending uses the second source.
@@ -143,9 +126,7 @@ impl ColorOutput {
             )
         };
         self.equations.is_some_and(|(color, alpha)| {
-            [color, alpha]
-                .iter()
-                .any(|equation| dual(equation.source) || dual(equation.destination))
+            [color, alpha].iter().any(|equation| dual(equation.source) || dual(equation.destination))
         })
     }
 
@@ -204,13 +185,7 @@ impl ColorOutput {
     /// Blends the fragments of a fully covered tile into its texels, from number `first` on in a tile buffer. `words`
     /// is its memory.
     #[inline(always)]
-    pub fn write_tile<S: Simd>(
-        &self,
-        simd: S,
-        sources: &[[&[Vector]; 4]; 2],
-        first: usize,
-        words: &mut [u32],
-    ) {
+    pub fn write_tile<S: Simd>(&self, simd: S, sources: &[[&[Vector]; 4]; 2], first: usize, words: &mut [u32]) {
         let dual = self.is_dual_source();
         if let Codec::Unorm8 { bgra } = self.codec
             && self.written as u32 == u32::MAX
@@ -247,9 +222,7 @@ impl ColorOutput {
     #[inline(always)]
     pub fn replacement<S: Simd>(&self, simd: S, source: &Colors<S>) -> Option<[u32; 16]> {
         match self.codec {
-            Codec::Unorm8 { bgra }
-                if self.equations.is_none() && self.written as u32 == u32::MAX =>
-            {
+            Codec::Unorm8 { bgra } if self.equations.is_none() && self.written as u32 == u32::MAX => {
                 Some(pack_unorm8(simd, source, bgra).into())
             }
             _ => None,
@@ -292,12 +265,7 @@ impl ColorOutput {
             return;
         }
         let [r, g, b, a] = blended;
-        let components: [[u32; 16]; 4] = [
-            bits_of(r).into(),
-            bits_of(g).into(),
-            bits_of(b).into(),
-            bits_of(a).into(),
-        ];
+        let components: [[u32; 16]; 4] = [bits_of(r).into(), bits_of(g).into(), bits_of(b).into(), bits_of(a).into()];
         for lane in 0..16 {
             if lanes >> lane & 1 == 1 {
                 let texel = &mut words[4 * quads.texel(lane)..][..4];
@@ -348,8 +316,7 @@ impl ColorOutput {
         size: usize,
     ) {
         let mut encoded = [0; 16 * MAX_TEXEL_SIZE];
-        let texels: [[f32; 4]; 16] =
-            std::array::from_fn(|lane| components.each_ref().map(|component| component[lane]));
+        let texels: [[f32; 4]; 16] = std::array::from_fn(|lane| components.each_ref().map(|component| component[lane]));
         self.format.encode_row(&texels, &mut encoded[..16 * size]);
         for lane in 0..16 {
             if lanes >> lane & 1 == 0 {
@@ -401,12 +368,7 @@ impl ColorOutput {
                         *component = clamp(simd, *component, low, high);
                     }
                 }
-                let operands = Operands {
-                    source,
-                    second,
-                    destination,
-                    constants: self.constants,
-                };
+                let operands = Operands { source, second, destination, constants: self.constants };
                 let (color, alpha) = equations;
                 let mut blended = source;
                 for (component, value) in blended.iter_mut().enumerate() {
@@ -470,16 +432,13 @@ impl<S: Simd> Operands<S> {
             BlendOp::Min => s.min(d),
             BlendOp::Max => s.max(d),
             BlendOp::Add => {
-                self.term(simd, s, equation.source, component)
-                    + self.term(simd, d, equation.destination, component)
+                self.term(simd, s, equation.source, component) + self.term(simd, d, equation.destination, component)
             }
             BlendOp::Subtract => {
-                self.term(simd, s, equation.source, component)
-                    - self.term(simd, d, equation.destination, component)
+                self.term(simd, s, equation.source, component) - self.term(simd, d, equation.destination, component)
             }
             BlendOp::ReverseSubtract => {
-                self.term(simd, d, equation.destination, component)
-                    - self.term(simd, s, equation.source, component)
+                self.term(simd, d, equation.destination, component) - self.term(simd, s, equation.source, component)
             }
         }
     }
@@ -526,12 +485,7 @@ impl<S: Simd> Operands<S> {
 /// Blends components, clamped to 0 to 1, by one of the usual equations. The result may exceed 1 by rounding only. Stored texels
 /// have the same bits as with [`ColorOutput::blend`].
 #[inline(always)]
-fn blend_over_in_range<S: Simd>(
-    simd: S,
-    over: Over,
-    source: &Colors<S>,
-    destination: &Colors<S>,
-) -> Colors<S> {
+fn blend_over_in_range<S: Simd>(simd: S, over: Over, source: &Colors<S>, destination: &Colors<S>) -> Colors<S> {
     let mut source = *source;
     for component in &mut source {
         *component = clamp(simd, *component, 0.0, 1.0);
@@ -548,12 +502,7 @@ fn blend_over_in_range<S: Simd>(
 
 /// Blends by one of the usual equations, without clamping.
 #[inline(always)]
-fn blend_over<S: Simd>(
-    simd: S,
-    over: Over,
-    source: &Colors<S>,
-    destination: &Colors<S>,
-) -> Colors<S> {
+fn blend_over<S: Simd>(simd: S, over: Over, source: &Colors<S>, destination: &Colors<S>) -> Colors<S> {
     let mut blended = *source;
     let alpha = source[3];
     let rest = f32x16::splat(simd, 1.0) - alpha;
@@ -586,14 +535,8 @@ fn transpose(texels: [[f32; 4]; 16]) -> [[f32; 16]; 4] {
 /// The bits of a texel that a write mask enables.
 fn written_bits(format: Format, write_mask: u8) -> u128 {
     let (mut bits, mut shift) = (0, 0);
-    for &Component {
-        channel,
-        bits: width,
-    } in format.components()
-    {
-        let written = channel
-            .register()
-            .is_some_and(|register| write_mask >> register & 1 == 1);
+    for &Component { channel, bits: width } in format.components() {
+        let written = channel.register().is_some_and(|register| write_mask >> register & 1 == 1);
         // The shared exponent belongs to all components, so that they can only be written together.
         if written || channel.register().is_none() && write_mask & 7 == 7 {
             bits |= (u128::MAX >> (128 - width)) << shift;

@@ -53,10 +53,9 @@ impl Tests {
     pub fn writes(&self) -> bool {
         self.depth.is_some_and(|(_, write)| write)
             || self.stencil.is_some_and(|faces| {
-                faces.iter().any(|face| {
-                    face.write_mask != 0
-                        && [face.fail, face.pass, face.depth_fail] != [StencilOp::Keep; 3]
-                })
+                faces
+                    .iter()
+                    .any(|face| face.write_mask != 0 && [face.fail, face.pass, face.depth_fail] != [StencilOp::Keep; 3])
             })
     }
 
@@ -66,16 +65,9 @@ impl Tests {
         let (compare, _) = self.depth?;
         let monotonic = matches!(
             compare,
-            CompareOp::Less
-                | CompareOp::LessOrEqual
-                | CompareOp::Greater
-                | CompareOp::GreaterOrEqual
+            CompareOp::Less | CompareOp::LessOrEqual | CompareOp::Greater | CompareOp::GreaterOrEqual
         );
-        (monotonic && self.stencil.is_none()).then_some(Self {
-            depth: Some((compare, false)),
-            bounds: None,
-            ..*self
-        })
+        (monotonic && self.stencil.is_none()).then_some(Self { depth: Some((compare, false)), bounds: None, ..*self })
     }
 
     /// True if no fragment depth passes against any stored depth. Both are given as the least and the greatest.
@@ -131,12 +123,7 @@ impl Tests {
 
 /// The lanes for which `fragment op stored` is true.
 #[inline(always)]
-fn compare_vectors<S: Simd>(
-    simd: S,
-    op: CompareOp,
-    fragment: u32x16<S>,
-    stored: u32x16<S>,
-) -> mask32x16<S> {
+fn compare_vectors<S: Simd>(simd: S, op: CompareOp, fragment: u32x16<S>, stored: u32x16<S>) -> mask32x16<S> {
     match op {
         CompareOp::Never => mask32x16::splat(simd, false),
         CompareOp::Less => fragment.simd_lt(stored),
@@ -161,13 +148,7 @@ fn test_stencil(face: &StencilFace, lanes: u16, stencils: &[u8; 16]) -> u16 {
 }
 
 /// Applies the stencil operations that the tests' results select.
-fn update_stencil(
-    face: &StencilFace,
-    lanes: u16,
-    stencil_passed: u16,
-    passed: u16,
-    stencils: &mut [u8; 16],
-) {
+fn update_stencil(face: &StencilFace, lanes: u16, stencil_passed: u16, passed: u16, stencils: &mut [u8; 16]) {
     for (lane, stencil) in stencils.iter_mut().enumerate() {
         let is = |set: u16| set >> lane & 1 == 1;
         let op = if !is(lanes) {

@@ -56,10 +56,7 @@ pub(super) fn color_outputs(
     logic: Option<LogicOp>,
     constants: [f32; 4],
 ) -> Vec<Option<ColorOutput>> {
-    const REPLACE: BlendState = BlendState {
-        equations: None,
-        write_mask: 0xF,
-    };
+    const REPLACE: BlendState = BlendState { equations: None, write_mask: 0xF };
     let color = |(index, target): (usize, &Option<Target>)| {
         let written = stage?.interface.colors.get(index)?;
         written.iter().flatten().flatten().next()?;

@@ -33,11 +33,7 @@ pub struct Tile {
 
 impl Tile {
     /// The tiles of macro-tile (`column`, `row`) of `size` pixels that have pixels of `area`.
-    pub fn of_macro_tile(
-        size: u32,
-        [column, row]: [u32; 2],
-        area: Rect,
-    ) -> impl Iterator<Item = Self> {
+    pub fn of_macro_tile(size: u32, [column, row]: [u32; 2], area: Rect) -> impl Iterator<Item = Self> {
         let side = size / TILE_SIZE;
         (0..side * side).filter_map(move |index| {
             let at = [column * side + index % side, row * side + index / side];
@@ -48,11 +44,7 @@ impl Tile {
                 height: TILE_SIZE,
             };
             let pixels = whole.intersect(area);
-            (!pixels.is_empty()).then_some(Self {
-                index: index as usize,
-                at,
-                pixels,
-            })
+            (!pixels.is_empty()).then_some(Self { index: index as usize, at, pixels })
         })
     }
 
@@ -67,10 +59,7 @@ impl Tile {
 
     /// The pixel of the framebuffer at (x, y) from the tile's corner.
     pub(super) fn pixel(&self, x: usize, y: usize) -> [u32; 2] {
-        [
-            self.at[0] * TILE_SIZE + x as u32,
-            self.at[1] * TILE_SIZE + y as u32,
-        ]
+        [self.at[0] * TILE_SIZE + x as u32, self.at[1] * TILE_SIZE + y as u32]
     }
 }
 
@@ -118,12 +107,7 @@ pub(super) fn block_corner([x, y]: [i32; 2], block: usize) -> [i32; 2] {
 mod tests {
     use super::*;
 
-    const AREA_20X17: Rect = Rect {
-        x: 3,
-        y: 0,
-        width: 17,
-        height: 17,
-    };
+    const AREA_20X17: Rect = Rect { x: 3, y: 0, width: 17, height: 17 };
 
     #[gaurast_runner::test]
     fn tiles_are_clipped_to_the_area() {
@@ -131,24 +115,11 @@ mod tests {
         let rects: Vec<_> = tiles
             .iter()
             .map(|tile| {
-                let Rect {
-                    x,
-                    y,
-                    width,
-                    height,
-                } = tile.pixels;
+                let Rect { x, y, width, height } = tile.pixels;
                 (tile.index, x, y, width, height)
             })
             .collect();
-        assert_eq!(
-            rects,
-            [
-                (0, 3, 0, 13, 16),
-                (1, 16, 0, 4, 16),
-                (2, 3, 16, 13, 1),
-                (3, 16, 16, 4, 1)
-            ]
-        );
+        assert_eq!(rects, [(0, 3, 0, 13, 16), (1, 16, 0, 4, 16), (2, 3, 16, 13, 1), (3, 16, 16, 4, 1)]);
         assert_eq!(tiles[3].rows(AREA_20X17).collect::<Vec<_>>(), [(0, 0..4)]);
         assert_eq!(Tile::of_macro_tile(32, [1, 0], AREA_20X17).count(), 0);
     }

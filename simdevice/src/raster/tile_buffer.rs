@@ -280,11 +280,7 @@ impl TileBuffer {
         let Some(resolved_rows) = resolve.sample(layer, 0) else {
             return;
         };
-        if samples == SAMPLES
-            && mode == ResolveMode::Average
-            && is_unorm8(format)
-            && resolve.format() == format
-        {
+        if samples == SAMPLES && mode == ResolveMode::Average && is_unorm8(format) && resolve.format() == format {
             let words = &self.words[tile.index * SAMPLES * AREA..][..SAMPLES * AREA];
             let mut means = [0; AREA];
             dispatch!(level, simd => unorm8_means(simd, words, &mut means));
@@ -345,10 +341,7 @@ impl TileBuffer {
 
 /// True if texels are four bytes from 0 to 1.
 fn is_unorm8(format: Format) -> bool {
-    matches!(
-        format,
-        Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 | Format::B8G8R8A8Unorm
-    )
+    matches!(format, Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 | Format::B8G8R8A8Unorm)
 }
 
 /// The means of a tile's samples of four bytes, with the same bits as from [`resolve_row`] and the format.
@@ -378,9 +371,7 @@ fn fill(bytes: &mut [u8], texel: &[u8]) {
         4 => fill_each::<4>(bytes, texel),
         8 => fill_each::<8>(bytes, texel),
         16 => fill_each::<16>(bytes, texel),
-        size => bytes
-            .chunks_exact_mut(size)
-            .for_each(|chunk| chunk.copy_from_slice(texel)),
+        size => bytes.chunks_exact_mut(size).for_each(|chunk| chunk.copy_from_slice(texel)),
     }
 }
 
@@ -464,10 +455,7 @@ impl QuadAddresses {
     /// The addresses of a block whose first texel is `first`.
     #[inline(always)]
     pub fn block(first: usize) -> Self {
-        Self {
-            first: [first, first + 4, first + 8, first + 12],
-            consecutive: true,
-        }
+        Self { first: [first, first + 4, first + 8, first + 12], consecutive: true }
     }
 
     /// The texel of a lane.
@@ -578,26 +566,16 @@ pub struct Target {
 
 impl Target {
     /// The target of the first `layer_count` layers of `view`, or of as many as the image has.
-    pub fn new(
-        view: &ImageView,
-        aspect: Aspect,
-        layer_count: u32,
-        store: StoreOp,
-    ) -> Result<Self, AttachmentError> {
+    pub fn new(view: &ImageView, aspect: Aspect, layer_count: u32, store: StoreOp) -> Result<Self, AttachmentError> {
         let (image, level) = (&view.image, view.base_mip_level);
-        let format = view
-            .format
-            .plane(aspect)
-            .ok_or(AttachmentError::Format(view.format))?;
+        let format = view.format.plane(aspect).ok_or(AttachmentError::Format(view.format))?;
         if ![1, MAX_SAMPLES].contains(&image.desc.samples) {
             return Err(AttachmentError::Samples(image.desc.samples));
         }
         let layer = |index: u32| {
             let layer = view.base_layer.checked_add(index)?;
             match image.desc.kind {
-                ImageKind::D1 | ImageKind::D2 => {
-                    Some((image.subresource(aspect, level, layer)?, 0))
-                }
+                ImageKind::D1 | ImageKind::D2 => Some((image.subresource(aspect, level, layer)?, 0)),
                 // The layers of a view of a 3D image are its slices.
                 ImageKind::D3 => {
                     let layout = image.subresource(aspect, level, 0)?;
@@ -607,10 +585,7 @@ impl Target {
         };
         let layers: Vec<_> = (0..layer_count.max(1)).map_while(layer).collect();
         let Some((layout, _)) = layers.first() else {
-            return Err(AttachmentError::Subresource {
-                level,
-                layer: view.base_layer,
-            });
+            return Err(AttachmentError::Subresource { level, layer: view.base_layer });
         };
         if layout.format.texel_size() != format.texel_size() {
             return Err(AttachmentError::Format(view.format));
@@ -619,13 +594,7 @@ impl Target {
         if width.max(height) > MAX_FRAMEBUFFER_SIZE {
             return Err(AttachmentError::Extent(width, height));
         }
-        Ok(Self {
-            image: image.clone(),
-            format,
-            layers,
-            clear: None,
-            store,
-        })
+        Ok(Self { image: image.clone(), format, layers, clear: None, store })
     }
 
     /// The format of its texels.
@@ -640,11 +609,7 @@ impl Target {
 
     /// The width and height of the attachment in pixels.
     pub fn extent(&self) -> [u32; 2] {
-        self.layers
-            .iter()
-            .map(|(layout, _)| [layout.extent[0], layout.extent[1]])
-            .next()
-            .unwrap_or_default()
+        self.layers.iter().map(|(layout, _)| [layout.extent[0], layout.extent[1]]).next().unwrap_or_default()
     }
 
     /// Marks the attachment's memory as changed.
@@ -660,11 +625,7 @@ impl Target {
     /// One sample of all texels of a layer, if the attachment has it.
     pub(super) fn sample(&self, layer: u32, sample: u32) -> Option<SampleRows<'_>> {
         let (layout, z) = self.layers.get(layer as usize)?;
-        Some(SampleRows {
-            image: &self.image,
-            layout: layout.sample(sample),
-            z: *z,
-        })
+        Some(SampleRows { image: &self.image, layout: layout.sample(sample), z: *z })
     }
 }
 

@@ -5,18 +5,8 @@ use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first. Its relative error is 9.2e-8.
-#[allow(
-    clippy::approx_constant,
-    reason = "the coefficients are fitted; one comes near ln 2"
-)]
-pub(crate) const POWER_OF_TWO: [f32; 6] = [
-    0.001_326_472_7,
-    0.009_671_513,
-    0.055_507_336,
-    0.240_222_42,
-    0.693_147,
-    1.0,
-];
+#[allow(clippy::approx_constant, reason = "the coefficients are fitted; one comes near ln 2")]
+pub(crate) const POWER_OF_TWO: [f32; 6] = [0.001_326_472_7, 0.009_671_513, 0.055_507_336, 0.240_222_42, 0.693_147, 1.0];
 
 /// A polynomial with fewer terms for powers of two.
 #[derive(Clone, Copy, Debug)]
@@ -28,16 +18,11 @@ pub(crate) struct Powers<const TERMS: usize> {
 }
 
 /// The polynomial of degree 3.
-pub(crate) const CUBIC: Powers<4> = Powers {
-    coefficients: [0.055_171_67, 0.242_611_13, 0.693_260_97, 0.999_928_06],
-    error: 7.6e-5,
-};
+pub(crate) const CUBIC: Powers<4> =
+    Powers { coefficients: [0.055_171_67, 0.242_611_13, 0.693_260_97, 0.999_928_06], error: 7.6e-5 };
 
 /// The polynomial of degree 2.
-pub(crate) const QUADRATIC: Powers<3> = Powers {
-    coefficients: [0.238_428_94, 0.703_448, 1.000_443_1],
-    error: 1.73e-3,
-};
+pub(crate) const QUADRATIC: Powers<3> = Powers { coefficients: [0.238_428_94, 0.703_448, 1.000_443_1], error: 1.73e-3 };
 
 impl<const TERMS: usize> Powers<TERMS> {
     /// The result of [`exp2_of_negated`] with this polynomial, for `x` up to 125.9. At the end of the range it may be
@@ -71,16 +56,7 @@ pub(crate) struct Table<const PLACES: usize, const TERMS: usize> {
 
 /// The table of 8 words. The relative error of the polynomial for 2^f is 2.7e-8.
 pub(crate) const EIGHTHS: Table<8, 3> = Table {
-    words: [
-        0x3f80_0000,
-        0x3f7b_95c2,
-        0x3f78_37f0,
-        0x3f75_fed7,
-        0x3f75_04f3,
-        0x3f75_672a,
-        0x3f77_44fd,
-        0x3f7a_c0c7,
-    ],
+    words: [0x3f80_0000, 0x3f7b_95c2, 0x3f78_37f0, 0x3f75_fed7, 0x3f75_04f3, 0x3f75_672a, 0x3f77_44fd, 0x3f7a_c0c7],
     growth: [0.055_496_22, 0.240_257_65, 0.693_147_24],
 };
 
@@ -148,11 +124,7 @@ fn by_table<S: Simd, const PLACES: usize, const TERMS: usize>(
 
 /// 2 to the power of `-x = n + f` with `f` in [-1/2, 1/2], by a polynomial for 2^f.
 #[inline(always)]
-fn by_polynomial<S: Simd, const TERMS: usize>(
-    simd: S,
-    x: f32x16<S>,
-    coefficients: &[f32; TERMS],
-) -> f32x16<S> {
+fn by_polynomial<S: Simd, const TERMS: usize>(simd: S, x: f32x16<S>, coefficients: &[f32; TERMS]) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);
     // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits.
     let shifter = constant(12_582_912.0);

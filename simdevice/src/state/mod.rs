@@ -347,12 +347,7 @@ impl DrawState {
                 min_depth: 0.0,
                 max_depth: 1.0,
             }],
-            scissors: vec![Rect {
-                x: 0,
-                y: 0,
-                width,
-                height,
-            }],
+            scissors: vec![Rect { x: 0, y: 0, width, height }],
             depth_clamp: false,
             unrestricted_depth: false,
             depth_clip: None,
@@ -372,11 +367,7 @@ impl DrawState {
             sample_shading: false,
             alpha_to_coverage: false,
             alpha_to_one: false,
-            depth_stencil: DepthStencil {
-                depth: None,
-                bounds: None,
-                stencil: None,
-            },
+            depth_stencil: DepthStencil { depth: None, bounds: None, stencil: None },
             logic_op: None,
             blend: Vec::new(),
             blend_constants: [0.0; 4],
@@ -387,12 +378,7 @@ impl DrawState {
 impl Display for Rect {
     /// Writes `widthxheight+x+y`.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self {
-            x,
-            y,
-            width,
-            height,
-        } = self;
+        let Self { x, y, width, height } = self;
         write!(f, "{width}x{height}{x:+}{y:+}")
     }
 }

@@ -171,28 +171,16 @@ counters! {
 
 impl Counter {
     /// The primitives of each vertex stream.
-    pub const PRIMITIVES_OF_STREAMS: [Self; MAX_VERTEX_STREAMS] = [
-        Self::PrimitivesOfStream0,
-        Self::PrimitivesOfStream1,
-        Self::PrimitivesOfStream2,
-        Self::PrimitivesOfStream3,
-    ];
+    pub const PRIMITIVES_OF_STREAMS: [Self; MAX_VERTEX_STREAMS] =
+        [Self::PrimitivesOfStream0, Self::PrimitivesOfStream1, Self::PrimitivesOfStream2, Self::PrimitivesOfStream3];
 
     /// The primitives of each vertex stream that transform feedback had to write.
-    pub const CAPTURE_NEEDED: [Self; MAX_VERTEX_STREAMS] = [
-        Self::CaptureNeeded0,
-        Self::CaptureNeeded1,
-        Self::CaptureNeeded2,
-        Self::CaptureNeeded3,
-    ];
+    pub const CAPTURE_NEEDED: [Self; MAX_VERTEX_STREAMS] =
+        [Self::CaptureNeeded0, Self::CaptureNeeded1, Self::CaptureNeeded2, Self::CaptureNeeded3];
 
     /// The primitives of each vertex stream that transform feedback wrote.
-    pub const CAPTURED: [Self; MAX_VERTEX_STREAMS] = [
-        Self::Captured0,
-        Self::Captured1,
-        Self::Captured2,
-        Self::Captured3,
-    ];
+    pub const CAPTURED: [Self; MAX_VERTEX_STREAMS] =
+        [Self::Captured0, Self::Captured1, Self::Captured2, Self::Captured3];
 
     /// True if the counter needs a model of the hardware to run.
     pub fn is_simulated(self) -> bool {
@@ -224,9 +212,7 @@ pub struct Counters {
 
 impl Default for Counters {
     fn default() -> Self {
-        Self {
-            values: [0; Counter::ALL.len()],
-        }
+        Self { values: [0; Counter::ALL.len()] }
     }
 }
 

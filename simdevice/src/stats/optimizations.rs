@@ -56,20 +56,14 @@ pub struct Optimizations(u32);
 
 /// A name that is not the name of an optimization.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{name:?} is neither all nor none nor an optimization, which are {}",
-    names()
-)]
+#[error("{name:?} is neither all nor none nor an optimization, which are {}", names())]
 pub struct UnknownOptimization {
     /// The name.
     pub name: String,
 }
 
 fn names() -> String {
-    let names: Vec<_> = Optimization::ALL
-        .iter()
-        .map(|optimization| optimization.name())
-        .collect();
+    let names: Vec<_> = Optimization::ALL.iter().map(|optimization| optimization.name()).collect();
     names.join(", ")
 }
 
@@ -109,27 +103,17 @@ impl FromStr for Optimizations {
     /// minus, which are left out: `all,-blocks`.
     fn from_str(text: &str) -> Result<Self, UnknownOptimization> {
         let known = |name: &str| {
-            let optimization = Optimization::ALL
-                .iter()
-                .find(|optimization| optimization.name() == name);
-            optimization.copied().ok_or_else(|| UnknownOptimization {
-                name: name.to_owned(),
-            })
+            let optimization = Optimization::ALL.iter().find(|optimization| optimization.name() == name);
+            optimization.copied().ok_or_else(|| UnknownOptimization { name: name.to_owned() })
         };
         match text.split_once(',') {
             None if text == "all" => Ok(Self::ALL),
             None if text == "none" => Ok(Self::NONE),
-            Some(("all", without)) => {
-                without
-                    .split(',')
-                    .try_fold(Self::ALL, |optimizations, name| {
-                        let name = name.strip_prefix('-').unwrap_or("");
-                        Ok(optimizations.without(known(name)?))
-                    })
-            }
-            _ => text.split(',').try_fold(Self::NONE, |optimizations, name| {
-                Ok(optimizations.with(known(name)?))
+            Some(("all", without)) => without.split(',').try_fold(Self::ALL, |optimizations, name| {
+                let name = name.strip_prefix('-').unwrap_or("");
+                Ok(optimizations.without(known(name)?))
             }),
+            _ => text.split(',').try_fold(Self::NONE, |optimizations, name| Ok(optimizations.with(known(name)?))),
         }
     }
 }
@@ -148,36 +132,20 @@ mod tests {
             assert_eq!(some.has(optimization), named, "{optimization:?}");
             assert!(Optimizations::default().has(optimization));
             assert!(!Optimizations::ALL.without(optimization).has(optimization));
-            assert_eq!(
-                optimization.name().parse(),
-                Ok(Optimizations::NONE.with(optimization))
-            );
+            assert_eq!(optimization.name().parse(), Ok(Optimizations::NONE.with(optimization)));
         }
-        let most = Optimizations::ALL
-            .without(Optimization::Blocks)
-            .without(Optimization::Affine);
+        let most = Optimizations::ALL.without(Optimization::Blocks).without(Optimization::Affine);
         assert_eq!("all,-blocks,-affine".parse(), Ok(most));
     }
 
     #[gaurast_runner::test]
     fn unknown_names_are_told() {
-        for text in [
-            "",
-            "blocks,",
-            "every",
-            "blocks,all",
-            "all,blocks",
-            "all,",
-            "-blocks",
-        ] {
+        for text in ["", "blocks,", "every", "blocks,all", "all,blocks", "all,", "-blocks"] {
             let error = text.parse::<Optimizations>().unwrap_err();
             assert!(error.to_string().contains("empty-tiles"), "{error}");
         }
         assert_eq!(
-            "blocks,everything"
-                .parse::<Optimizations>()
-                .unwrap_err()
-                .to_string(),
+            "blocks,everything".parse::<Optimizations>().unwrap_err().to_string(),
             "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, blocks, early-termination, \
              empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads, affine"
         );

@@ -49,11 +49,7 @@ pub struct QueryPool {
 impl QueryPool {
     /// Makes a pool of `count` unavailable queries.
     pub fn new(kind: QueryKind, count: u32) -> Self {
-        Self {
-            kind,
-            slots: Mutex::new(host::filled(Slot::Unavailable, count as usize)),
-            changed: Condvar::new(),
-        }
+        Self { kind, slots: Mutex::new(host::filled(Slot::Unavailable, count as usize)), changed: Condvar::new() }
     }
 
     /// The quantity that its queries measure.
@@ -80,12 +76,7 @@ impl QueryPool {
 
     /// Makes `count` queries from `first` on unavailable.
     pub fn reset(&self, first: u32, count: u32) {
-        for slot in self
-            .lock()
-            .iter_mut()
-            .skip(first as usize)
-            .take(count as usize)
-        {
+        for slot in self.lock().iter_mut().skip(first as usize).take(count as usize) {
             *slot = Slot::Unavailable;
         }
     }
@@ -103,10 +94,7 @@ impl QueryPool {
         };
         let mut counted = now.since(&begun);
         counted.derive();
-        self.set(
-            index,
-            Slot::Available(QueryResult::Performance(Box::new(counted))),
-        );
+        self.set(index, Slot::Available(QueryResult::Performance(Box::new(counted))));
     }
 
     /// Writes a timestamp.
@@ -124,11 +112,8 @@ impl QueryPool {
 
     /// As [`QueryPool::result`], but waits at most `timeout` for the query to become available.
     pub fn wait(&self, index: u32, timeout: std::time::Duration) -> Option<QueryResult> {
-        let pending = |slots: &mut Vec<Slot>| {
-            slots
-                .get(index as usize)
-                .is_some_and(|slot| !matches!(slot, Slot::Available(_)))
-        };
+        let pending =
+            |slots: &mut Vec<Slot>| slots.get(index as usize).is_some_and(|slot| !matches!(slot, Slot::Available(_)));
         let guard = self.lock();
         let waited = self.changed.wait_timeout_while(guard, timeout, pending);
         drop(waited);

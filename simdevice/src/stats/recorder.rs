@@ -9,9 +9,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use timing::work::TILE_SIDES;
-pub use timing::work::{
-    DrawWork, FrameWork, Mode, Run, ShaderWork, TRACE_VERSION, TileWork, Trace,
-};
+pub use timing::work::{DrawWork, FrameWork, Mode, Run, ShaderWork, TRACE_VERSION, TileWork, Trace};
 
 /// The number of render passes that are kept. A new pass then replaces the oldest.
 const MAX_FRAMES: usize = 64;
@@ -83,25 +81,15 @@ impl fmt::Debug for Recorder {
 impl Recorder {
     /// Makes a recorder that gives the whole trace to `sink` when it is dropped.
     pub fn new(sink: impl FnOnce(Trace) + Send + 'static) -> Self {
-        Self {
-            frames: Mutex::default(),
-            sink: Mutex::new(Some(Box::new(sink))),
-            listeners: AtomicU32::default(),
-        }
+        Self { frames: Mutex::default(), sink: Mutex::new(Some(Box::new(sink))), listeners: AtomicU32::default() }
     }
 
     /// The work so far. Passes that drew nothing are omitted.
     pub fn trace(&self) -> Trace {
         let frames = self.lock();
-        let last = frames.dispatched.values().map(|&before| Frame {
-            before,
-            ..Frame::default()
-        });
+        let last = frames.dispatched.values().map(|&before| Frame { before, ..Frame::default() });
         let kept = frames.kept.iter().filter_map(Frame::work);
-        Trace {
-            version: TRACE_VERSION,
-            frames: kept.chain(last.filter_map(|frame| frame.work())).collect(),
-        }
+        Trace { version: TRACE_VERSION, frames: kept.chain(last.filter_map(|frame| frame.work())).collect() }
     }
 
     /// The work of an owner in frames from number `from` on, as far as they are kept. `from` becomes the number of the
@@ -113,9 +101,7 @@ impl Recorder {
         }
         let first = std::mem::replace(from, frames.begun);
         let kept = frames.kept.iter();
-        kept.filter(|frame| frame.owner == owner && frame.number >= first)
-            .filter_map(Frame::work)
-            .collect()
+        kept.filter(|frame| frame.owner == owner && frame.number >= first).filter_map(Frame::work).collect()
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Frames> {
@@ -173,13 +159,7 @@ impl Frames {
             self.kept.pop_front();
         }
         let before = self.dispatched.remove(&owner).unwrap_or_default();
-        self.kept.push_back(Frame {
-            owner,
-            number: self.begun,
-            size,
-            before,
-            draws: Vec::new(),
-        });
+        self.kept.push_back(Frame { owner, number: self.begun, size, before, draws: Vec::new() });
         self.begun += 1;
     }
 }
@@ -217,11 +197,7 @@ pub(crate) fn shader_work(counters: &Counters) -> ShaderWork {
         wide: of(&[Counter::ShaderWide]),
         memory,
         image,
-        other: of(&[
-            Counter::ShaderMove,
-            Counter::ShaderCrossLane,
-            Counter::ShaderControl,
-        ]),
+        other: of(&[Counter::ShaderMove, Counter::ShaderCrossLane, Counter::ShaderControl]),
         bytes: 4.0 * (memory + image),
     }
 }
@@ -253,11 +229,7 @@ pub(crate) fn sized_tiles(low: [f64; 2], high: [f64; 2], bounds: Rect) -> [u64; 
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        let sink = self
-            .sink
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let sink = self.sink.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(sink) = sink {
             sink(self.trace());
         }
@@ -288,15 +260,10 @@ impl DrawRecord {
 
     /// The draw's work, with its tiles in order of rows, then columns.
     fn finished(&self) -> DrawWork {
-        let mut work = self
-            .0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone();
+        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let shading = self.1.lock().unwrap_or_else(PoisonError::into_inner);
         work.shade = work.shade.plus(&shader_work(&shading));
-        work.tiles
-            .sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
+        work.tiles.sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
         work
     }
 }
@@ -318,12 +285,7 @@ pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
 mod tests {
     use super::*;
 
-    const BOUNDS: Rect = Rect {
-        x: 0,
-        y: 0,
-        width: 160,
-        height: 80,
-    };
+    const BOUNDS: Rect = Rect { x: 0, y: 0, width: 160, height: 80 };
 
     #[gaurast_runner::test]
     fn boxes_touch_tiles_of_every_size() {
@@ -344,31 +306,19 @@ mod tests {
         let draw = DrawRecord::new(DrawWork::default());
         recorder.add_draw(0, &draw);
         for at in [[1, 1], [0, 1], [3, 0]] {
-            draw.add(TileWork {
-                at,
-                ..TileWork::default()
-            });
+            draw.add(TileWork { at, ..TileWork::default() });
         }
         drop(recorder);
         let trace = receive.recv().unwrap();
         assert_eq!((trace.version, trace.frames.len()), (TRACE_VERSION, 1));
-        let order: Vec<_> = trace.frames[0].draws[0]
-            .tiles
-            .iter()
-            .map(|tile| tile.at)
-            .collect();
+        let order: Vec<_> = trace.frames[0].draws[0].tiles.iter().map(|tile| tile.at).collect();
         assert_eq!(order, [[3, 0], [0, 1], [1, 1]]);
     }
 
     #[gaurast_runner::test]
     fn owners_have_frames_and_dispatches_of_their_own() {
         let recorder = Recorder::default();
-        let draw = |primitives| {
-            DrawRecord::new(DrawWork {
-                primitives,
-                ..DrawWork::default()
-            })
-        };
+        let draw = |primitives| DrawRecord::new(DrawWork { primitives, ..DrawWork::default() });
         recorder.begin_frame(1, BOUNDS);
         recorder.begin_frame(2, BOUNDS);
         recorder.add_dispatch(1, &Counters::default());
@@ -388,14 +338,7 @@ mod tests {
 
     #[gaurast_runner::test]
     fn runs_grow_until_something_finishes() {
-        let run = |rows, blocks| Run {
-            primitives: 32,
-            rows,
-            blocks,
-            reached: 5,
-            hidden: 2,
-            hidden_blocks: 1,
-        };
+        let run = |rows, blocks| Run { primitives: 32, rows, blocks, reached: 5, hidden: 2, hidden_blocks: 1 };
         let mut runs = Vec::new();
         for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8)] {
             push_run(&mut runs, next);

@@ -30,20 +30,12 @@ fn coordinates(point: Point) -> [f64; 3] {
 }
 
 fn how(domain: Domain, spacing: Spacing) -> Tessellation {
-    Tessellation {
-        domain,
-        spacing,
-        clockwise: true,
-        point_mode: false,
-    }
+    Tessellation { domain, spacing, clockwise: true, point_mode: false }
 }
 
 impl Patch {
     fn divide(&self) -> TessellatedPatch {
-        let mut out = TessellatedPatch {
-            points: vec![[7.0; 3]; 3],
-            indices: vec![9; 5],
-        };
+        let mut out = TessellatedPatch { points: vec![[7.0; 3]; 3], indices: vec![9; 5] };
         self.how.tessellate(self.outer, self.inner, &mut out);
         out
     }
@@ -52,8 +44,7 @@ impl Patch {
     fn triangles(&self) -> Vec<[Point; 3]> {
         let out = self.divide();
         let corners = out.indices.chunks_exact(3);
-        let triangle =
-            |it: &[u32]| [it[0], it[1], it[2]].map(|point| bits(out.points[point as usize]));
+        let triangle = |it: &[u32]| [it[0], it[1], it[2]].map(|point| bits(out.points[point as usize]));
         corners.map(triangle).collect()
     }
 
@@ -105,9 +96,7 @@ impl Patch {
         let inner = if self.how.domain == Triangles { 1 } else { 2 };
         let levels = self.outer[..self.edges()].iter();
         let levels = levels.chain(&self.inner[..inner]);
-        let mut segments: Vec<usize> = levels
-            .map(|&level| naive_segments(self.how.spacing, level))
-            .collect();
+        let mut segments: Vec<usize> = levels.map(|&level| naive_segments(self.how.spacing, level)).collect();
         if segments.iter().any(|&it| it > 1) {
             for it in &mut segments[self.edges()..] {
                 if *it == 1 {
@@ -135,10 +124,7 @@ fn random_patches(seed: u64, count: usize) -> impl Iterator<Item = Patch> {
         };
         let (outer, inner) = ([0; 4].map(|_| level()), [0; 2].map(|_| level()));
         Patch {
-            how: how(
-                [Triangles, Quads][random.random_range(0..2)],
-                SPACINGS[random.random_range(0..3)],
-            ),
+            how: how([Triangles, Quads][random.random_range(0..2)], SPACINGS[random.random_range(0..3)]),
             outer,
             inner,
         }
@@ -240,12 +226,8 @@ fn naive_points(patch: &Patch) -> Vec<[f64; 3]> {
     // The corners of an equilateral triangle whose edges have the length 1, and its altitude.
     let altitude = 0.75f64.sqrt();
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.5, altitude]];
-    let along = |from: [f64; 2], to: [f64; 2], t: f64| {
-        [
-            from[0] + t * (to[0] - from[0]),
-            from[1] + t * (to[1] - from[1]),
-        ]
-    };
+    let along =
+        |from: [f64; 2], to: [f64; 2], t: f64| [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])];
     let barycentric = |[x, y]: [f64; 2]| {
         let w = y / altitude;
         let v = x - w / 2.0;
@@ -265,10 +247,7 @@ fn naive_points(patch: &Patch) -> Vec<[f64; 3]> {
             let normal = [from[1] - to[1], to[0] - from[0]];
             for &t in &inner[ring..last - ring] {
                 let [x, y] = along(from, to, t);
-                points.push(barycentric([
-                    x + distance * normal[0],
-                    y + distance * normal[1],
-                ]));
+                points.push(barycentric([x + distance * normal[0], y + distance * normal[1]]));
             }
         }
     }
@@ -303,10 +282,7 @@ fn edges_are_divided_as_their_spacing_says() {
             assert_eq!(positions.len(), expected.len(), "{spacing:?} {level}");
             for (place, (&is, should)) in positions.iter().zip(expected).enumerate() {
                 let is = is as f32 / super::ONE as f32;
-                assert!(
-                    (f64::from(is) - should).abs() < 1e-7,
-                    "{spacing:?} {level}: {is} {should}"
-                );
+                assert!((f64::from(is) - should).abs() < 1e-7, "{spacing:?} {level}: {is} {should}");
                 assert_eq!(1.0 - (1.0 - is), is);
                 assert_eq!(is + (1.0 - is), 1.0);
                 let mirrored = positions[edge.segments - place];
@@ -394,11 +370,7 @@ fn triangles_cover_the_domain_once() {
                     *directed.entry(edge).or_insert(0) += 1;
                 }
             }
-            let whole = if patch.how.domain == Triangles {
-                1.0
-            } else {
-                2.0
-            };
+            let whole = if patch.how.domain == Triangles { 1.0 } else { 2.0 };
             assert!((sum - whole).abs() < 1e-9, "{patch:?} {sum}");
             let mut boundary = 0;
             for (&(from, to), &count) in &directed {
@@ -430,18 +402,12 @@ fn points_and_triangles_have_their_number() {
                 let sides: usize = rings.sum::<usize>() * 3;
                 let centre = usize::from(n % 2 == 0);
                 let innermost = if n % 2 == 1 { 3 } else { 0 };
-                (
-                    outer + sides + centre,
-                    outer + 2 * sides - innermost + innermost / 3,
-                )
+                (outer + sides + centre, outer + 2 * sides - innermost + innermost / 3)
             }
             (_, &[1, 1]) => (4, 2),
             (_, &[n, m]) => {
                 let around = 2 * (n - 2) + 2 * (m - 2);
-                (
-                    outer + (n - 1) * (m - 1),
-                    outer + around + 2 * (n - 2) * (m - 2),
-                )
+                (outer + (n - 1) * (m - 1), outer + around + 2 * (n - 2) * (m - 2))
             }
             _ => unreachable!(),
         };
@@ -504,8 +470,7 @@ fn a_strip_depends_on_the_levels_of_its_sides_alone() {
         for edge in 0..patch.edges() {
             let strip = |patch: &Patch| {
                 let mut triangles = patch.triangle_set();
-                triangles
-                    .retain(|it| it.iter().filter(|&&point| patch.is_on(edge, point)).count() == 2);
+                triangles.retain(|it| it.iter().filter(|&&point| patch.is_on(edge, point)).count() == 2);
                 triangles
             };
             let mut other = patch;
@@ -550,16 +515,9 @@ fn point_mode_gives_each_point_once() {
 #[gaurast_runner::test]
 fn undivided_patches_have_the_corners_of_the_domain() {
     for spacing in [Equal, FractionalOdd] {
-        let mut patch = Patch {
-            how: how(Triangles, spacing),
-            outer: [1.0, 0.5, 1.0, 1.0],
-            inner: [0.0, -3.0],
-        };
+        let mut patch = Patch { how: how(Triangles, spacing), outer: [1.0, 0.5, 1.0, 1.0], inner: [0.0, -3.0] };
         let out = patch.divide();
-        assert_eq!(
-            out.points,
-            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-        );
+        assert_eq!(out.points, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         assert_eq!(out.indices, [0, 1, 2]);
         patch.how.domain = Quads;
         let out = patch.divide();
@@ -572,20 +530,12 @@ fn undivided_patches_have_the_corners_of_the_domain() {
 #[gaurast_runner::test]
 fn an_inner_level_of_one_is_the_limit_of_those_above() {
     for domain in [Triangles, Quads] {
-        let patch = Patch {
-            how: how(domain, FractionalOdd),
-            outer: [2.5, 1.0, 1.0, 3.0],
-            inner: [1.0, 1.0],
-        };
+        let patch = Patch { how: how(domain, FractionalOdd), outer: [2.5, 1.0, 1.0, 3.0], inner: [1.0, 1.0] };
         let edges = patch.edges();
         let out = patch.divide();
         let count = out.points.len();
         // The ring inside is the domain's boundary.
-        let corners: BTreeSet<_> = out.points[count - edges..]
-            .iter()
-            .copied()
-            .map(bits)
-            .collect();
+        let corners: BTreeSet<_> = out.points[count - edges..].iter().copied().map(bits).collect();
         assert_eq!(corners.len(), edges);
         assert!(corners.iter().all(|&point| patch.is_on_boundary(point)));
         let areas = patch.triangles().into_iter().map(doubled_area);
@@ -601,11 +551,7 @@ fn patches_are_discarded_if_an_outer_level_is_not_positive() {
         for (domain, used) in [(Triangles, 3), (Quads, 4), (Isolines, 2)] {
             for level in bad {
                 for edge in 0..4 {
-                    let mut patch = Patch {
-                        how: how(domain, spacing),
-                        outer: [4.0; 4],
-                        inner: [level; 2],
-                    };
+                    let mut patch = Patch { how: how(domain, spacing), outer: [4.0; 4], inner: [level; 2] };
                     patch.outer[edge] = level;
                     let out = patch.divide();
                     assert_eq!(out.points.is_empty(), edge < used);
@@ -640,10 +586,7 @@ fn levels_are_limited_to_those_of_the_spacing() {
             };
             assert_eq!(points(one), points(other));
         }
-        assert_eq!(
-            spacing.divide(f32::NAN).positions(),
-            spacing.divide(-1.0).positions()
-        );
+        assert_eq!(spacing.divide(f32::NAN).positions(), spacing.divide(-1.0).positions());
     }
 }
 

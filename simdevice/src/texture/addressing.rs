@@ -30,20 +30,10 @@ pub(super) struct Taps {
 
 impl Taps {
     /// The taps of an axis that the image does not have.
-    pub const FLAT: Self = Self {
-        index: [Some(0); 2],
-        weight: 0.0,
-    };
+    pub const FLAT: Self = Self { index: [Some(0); 2], weight: 0.0 };
 
     /// The texels of coordinate `s` of an axis of `size` texels.
-    pub fn new(
-        mode: AddressMode,
-        filter: Filter,
-        s: f32,
-        normalized: bool,
-        size: u32,
-        offset: i32,
-    ) -> Self {
+    pub fn new(mode: AddressMode, filter: Filter, s: f32, normalized: bool, size: u32, offset: i32) -> Self {
         let offset = offset.clamp(-MAX_OFFSET, MAX_OFFSET);
         let (first, weight) = first_texel(filter, texel_coordinate(mode, s, normalized, size));
         let index = [0, 1].map(|step| wrap(mode, first + offset + step, size));
@@ -120,12 +110,8 @@ pub(super) struct Axis {
 
 impl Axis {
     /// The axis of coordinates that the image does not have.
-    pub const FLAT: Self = Self {
-        index: [[0; VECTOR_LANES]; 2],
-        inside: [u16::MAX; 2],
-        weight: [0.0; VECTOR_LANES],
-        has_outside: false,
-    };
+    pub const FLAT: Self =
+        Self { index: [[0; VECTOR_LANES]; 2], inside: [u16::MAX; 2], weight: [0.0; VECTOR_LANES], has_outside: false };
 }
 
 /// The texels along an axis of `size` texels, given the bits of `coordinate`. The kernel is compiled on its own.
@@ -170,18 +156,12 @@ fn vector_axis<S: Simd>(
     let first = whole + offset;
     let second = first + 1.0;
     let inside = if mode == AddressMode::ClampToBorder {
-        [
-            lanes_within(simd, first, size),
-            lanes_within(simd, second, size),
-        ]
+        [lanes_within(simd, first, size), lanes_within(simd, second, size)]
     } else {
         [u16::MAX; 2]
     };
     Axis {
-        index: [
-            wrap_lanes(simd, mode, first, size, far).into(),
-            wrap_lanes(simd, mode, second, size, far).into(),
-        ],
+        index: [wrap_lanes(simd, mode, first, size, far).into(), wrap_lanes(simd, mode, second, size, far).into()],
         inside,
         weight: weight.into(),
         has_outside: inside != [u16::MAX; 2],
@@ -199,12 +179,7 @@ pub(super) struct VectorTaps<S: Simd> {
 
 /// The results of [`axis`], for normalized coordinates and a linear filter.
 #[inline(always)]
-pub(super) fn taps<S: Simd>(
-    simd: S,
-    mode: AddressMode,
-    coordinate: &LaneWords,
-    size: f32x16<S>,
-) -> VectorTaps<S> {
+pub(super) fn taps<S: Simd>(simd: S, mode: AddressMode, coordinate: &LaneWords, size: f32x16<S>) -> VectorTaps<S> {
     let shifted = texel_coordinates(simd, mode, true, *coordinate, size) - 0.5;
     let whole = floor_lanes(simd, shifted);
     VectorTaps {
@@ -242,13 +217,7 @@ fn texel_coordinates<S: Simd>(
 
 /// The results of [`wrap`] for 16 lanes. Indices of the border are clamped.
 #[inline(always)]
-fn wrap_lanes<S: Simd>(
-    simd: S,
-    mode: AddressMode,
-    i: f32x16<S>,
-    size: f32x16<S>,
-    far: bool,
-) -> u32x16<S> {
+fn wrap_lanes<S: Simd>(simd: S, mode: AddressMode, i: f32x16<S>, size: f32x16<S>, far: bool) -> u32x16<S> {
     let zero = f32x16::splat(simd, 0.0);
     let wrapped = match mode {
         AddressMode::Repeat => reduce_lanes(simd, i, size, far),
@@ -267,11 +236,7 @@ fn wrap_lanes<S: Simd>(
 #[inline(always)]
 fn reduce_lanes<S: Simd>(simd: S, i: f32x16<S>, period: f32x16<S>, far: bool) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);
-    let i = if far {
-        i - floor_lanes(simd, i / period) * period
-    } else {
-        i
-    };
+    let i = if far { i - floor_lanes(simd, i / period) * period } else { i };
     let i = i + i.simd_lt(zero).select(period, zero);
     i - i.simd_ge(period).select(period, zero)
 }

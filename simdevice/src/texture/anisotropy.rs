@@ -76,11 +76,8 @@ pub(super) fn sample(
 
 /// The footprints of a request, computed from its derivatives.
 fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Footprints {
-    let mut footprints = Footprints {
-        counts: [1; VECTOR_LANES],
-        lod: [0; VECTOR_LANES],
-        length: [[0.0; VECTOR_LANES]; 2],
-    };
+    let mut footprints =
+        Footprints { counts: [1; VECTOR_LANES], lod: [0; VECTOR_LANES], length: [[0.0; VECTOR_LANES]; 2] };
     let extent = surface.levels[0].extent;
     let size = [extent[0] as f32, extent[1] as f32];
     let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
@@ -92,9 +89,7 @@ fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> 
             }
             _ => {
                 let first = lane & !3;
-                let to = |other: usize| {
-                    [0, 1].map(|axis| value(axis, first + other) - value(axis, first))
-                };
+                let to = |other: usize| [0, 1].map(|axis| value(axis, first + other) - value(axis, first));
                 (to(1), to(2))
             }
         };

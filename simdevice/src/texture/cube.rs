@@ -50,30 +50,19 @@ impl Hit {
         };
         let face = 2 * axis + u32::from(component < 0.0);
         let [sc, tc, major] = face_axes(face, direction);
-        Self {
-            face,
-            sc,
-            tc,
-            major,
-        }
+        Self { face, sc, tc, major }
     }
 
     /// The coordinates on the face, from 0 to 1.
     pub fn coordinates(&self) -> [f32; 2] {
-        [
-            0.5 * (self.sc / self.major) + 0.5,
-            0.5 * (self.tc / self.major) + 0.5,
-        ]
+        [0.5 * (self.sc / self.major) + 0.5, 0.5 * (self.tc / self.major) + 0.5]
     }
 
     /// The change of the coordinates on the face for a small change of the direction.
     pub fn derivative(&self, change: [f32; 3]) -> [f32; 2] {
         let [ds, dt, dm] = face_axes(self.face, change);
         let scale = 0.5 / (self.major * self.major);
-        [
-            scale * (self.major * ds - self.sc * dm),
-            scale * (self.major * dt - self.tc * dm),
-        ]
+        [scale * (self.major * ds - self.sc * dm), scale * (self.major * dt - self.tc * dm)]
     }
 }
 
@@ -84,11 +73,7 @@ fn across_edge(face: u32, [i, j]: [i32; 2], size: u32) -> (u32, [u32; 2]) {
     let n = size as f32;
     let [s, t] = [i, j].map(|index| (2 * index + 1) as f32 - n);
     // The part outside folds over to the neighbouring face, where the texel's centre is half a texel from the edge.
-    let around = if s.abs() > n {
-        [n.copysign(s), t, n - 1.0]
-    } else {
-        [s, n.copysign(t), n - 1.0]
-    };
+    let around = if s.abs() > n { [n.copysign(s), t, n - 1.0] } else { [s, n.copysign(t), n - 1.0] };
     let hit = Hit::new(from_face_axes(face, around));
     let index = |c: f32| (((c + n - 1.0) * 0.5) as u32).min(size.saturating_sub(1));
     (hit.face, [index(hit.sc), index(hit.tc)])
@@ -189,8 +174,7 @@ mod tests {
                 let moved = Hit::new(std::array::from_fn(|c| direction[c] + h * change[c]));
                 let derivative = hit.derivative(change);
                 let (from, to) = (hit.coordinates(), moved.coordinates());
-                for (derivative, (from, to)) in derivative.into_iter().zip(from.into_iter().zip(to))
-                {
+                for (derivative, (from, to)) in derivative.into_iter().zip(from.into_iter().zip(to)) {
                     assert!(((to - from) / h - derivative).abs() < 1e-3);
                 }
             }

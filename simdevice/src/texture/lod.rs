@@ -24,16 +24,8 @@ pub(super) struct QuadSelection {
 
 /// The result of [`select`] for requests of [`LodRequest::Automatic`] for images other than cubes, with one filter.
 #[inline(always)]
-pub(super) fn select_quads(
-    surface: &Surface,
-    sampler: &Sampler,
-    request: &SampleRequest,
-) -> QuadSelection {
-    let mut selection = QuadSelection {
-        high: [0; QUADS],
-        low: [0; QUADS],
-        weight: [0.0; QUADS],
-    };
+pub(super) fn select_quads(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> QuadSelection {
+    let mut selection = QuadSelection { high: [0; QUADS], low: [0; QUADS], weight: [0.0; QUADS] };
     let last = surface.levels.len() as u32 - 1;
     if last == 0 {
         return selection;
@@ -81,11 +73,7 @@ impl Selection {
 
 /// The filter that a sampler requests, or the nearest one for integers, which cannot be averaged.
 fn possible(surface: &Surface, filter: Filter) -> Filter {
-    if surface.is_integer() {
-        Filter::Nearest
-    } else {
-        filter
-    }
+    if surface.is_integer() { Filter::Nearest } else { filter }
 }
 
 /// The mip levels and filters for a request.
@@ -122,20 +110,12 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
 
 /// The results of a query: the level that would be read, relative to the view's first, and the level of detail before
 /// it is clamped.
-pub(super) fn query(
-    surface: &Surface,
-    sampler: &Sampler,
-    request: &SampleRequest,
-) -> [LaneWords; 2] {
+pub(super) fn query(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [LaneWords; 2] {
     let biased = biased(surface, sampler, request);
     let last = surface.levels.len() as f32 - 1.0;
     let level = clamped(sampler, request, &biased).map(|lambda| {
         let level = lambda.clamp(0.0, last);
-        if sampler.mipmap_mode == MipmapMode::Linear {
-            level
-        } else {
-            nearest_level(level) as f32
-        }
+        if sampler.mipmap_mode == MipmapMode::Linear { level } else { nearest_level(level) as f32 }
     });
     [level, biased].map(|lanes| lanes.map(f32::to_bits))
 }
@@ -231,13 +211,7 @@ fn of_quads(surface: &Surface, request: &SampleRequest) -> [f32; QUADS] {
 }
 
 /// The level of detail for given derivatives of the coordinates.
-fn scale_lod(
-    surface: &Surface,
-    request: &SampleRequest,
-    lane: usize,
-    dx: [f32; 3],
-    dy: [f32; 3],
-) -> f32 {
+fn scale_lod(surface: &Surface, request: &SampleRequest, lane: usize, dx: [f32; 3], dy: [f32; 3]) -> f32 {
     let extent = surface.levels[0].extent;
     let dimension = request.shape.dimension;
     let (dx, dy, axes) = if dimension == Dimension::Cube {

@@ -25,6 +25,4 @@ mod view;
 
 pub use sampler::{AddressMode, BorderColor, Filter, MipmapMode, Reduction, Sampler};
 pub use table::ImageTable;
-pub use view::{
-    ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,
-};
+pub use view::{ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer};

@@ -25,11 +25,7 @@ struct Reader<'a> {
 }
 
 /// Samples or gathers for every lane of the mask.
-pub(super) fn sample(
-    surface: &Surface,
-    sampler: &Sampler,
-    request: &SampleRequest,
-) -> [LaneWords; 4] {
+pub(super) fn sample(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [LaneWords; 4] {
     let selection = lod::select(surface, sampler, request);
     let border = border_texel(surface, sampler);
     let mut out = [[0; VECTOR_LANES]; 4];
@@ -44,9 +40,7 @@ pub(super) fn sample(
         };
         let texel = if let Some(component) = request.gather {
             reader.level = 0;
-            reader
-                .footprint(request, lane, Filter::Linear)
-                .gather(&reader, component)
+            reader.footprint(request, lane, Filter::Linear).gather(&reader, component)
         } else {
             let filter = selection.filter[lane];
             let mut texel = reader.footprint(request, lane, filter).filter(&reader);
@@ -66,12 +60,7 @@ pub(super) fn sample(
 }
 
 /// The reference value of a lane, if the sampler and the request compare.
-fn reference(
-    surface: &Surface,
-    sampler: &Sampler,
-    request: &SampleRequest,
-    lane: usize,
-) -> Option<f32> {
+fn reference(surface: &Surface, sampler: &Sampler, request: &SampleRequest, lane: usize) -> Option<f32> {
     sampler.compare_op?;
     let unorm = surface.format.numeric() == Numeric::Unorm;
     Some(reference_value(unorm, request.compare?[lane]))
@@ -81,11 +70,7 @@ fn reference(
 #[inline(always)]
 pub(super) fn reference_value(unorm: bool, bits: u32) -> f32 {
     let reference = f32::from_bits(bits);
-    if unorm {
-        reference.clamp(0.0, 1.0)
-    } else {
-        reference
-    }
+    if unorm { reference.clamp(0.0, 1.0) } else { reference }
 }
 
 /// The border colour in the form of a texel. Components that the format lacks are 0, and alpha is 1.
@@ -107,17 +92,9 @@ pub(super) fn border_texel(surface: &Surface, sampler: &Sampler) -> [u32; 4] {
 /// The texels around a point in one level.
 enum Footprint {
     /// The texels of an image with edges, along x, y and z.
-    Grid {
-        axes: [Taps; 3],
-        filters: [Filter; 3],
-    },
+    Grid { axes: [Taps; 3], filters: [Filter; 3] },
     /// The texels of a cube: the face, the first texel, and weights.
-    Cube {
-        face: u32,
-        first: [i32; 2],
-        weights: [f32; 2],
-        filter: Filter,
-    },
+    Cube { face: u32, first: [i32; 2], weights: [f32; 2], filter: Filter },
 }
 
 impl Reader<'_> {
@@ -128,11 +105,7 @@ impl Reader<'_> {
         let count = dimension.coordinates();
         let layers = self.surface.layers;
         let layer = |layers| {
-            if request.shape.arrayed {
-                addressing::layer(coordinate[count], layers)
-            } else {
-                0
-            }
+            if request.shape.arrayed { addressing::layer(coordinate[count], layers) } else { 0 }
         };
         let extent = self.surface.levels[self.level].extent;
         if dimension == Dimension::Cube {
@@ -176,21 +149,14 @@ impl Reader<'_> {
             (taps, filter)
         };
         let axes = [0, 1, 2].map(axis);
-        Footprint::Grid {
-            axes: axes.map(|(taps, _)| taps),
-            filters: axes.map(|(_, filter)| filter),
-        }
+        Footprint::Grid { axes: axes.map(|(taps, _)| taps), filters: axes.map(|(_, filter)| filter) }
     }
 
     /// A texel or the border colour. If a comparison is requested, red is its result.
     fn texel(&self, at: [Option<u32>; 3], layer: u32) -> [u32; 4] {
         let texel = match at {
             [Some(x), Some(y), Some(z)] => {
-                let place = Texel {
-                    at: [x, y, z],
-                    layer,
-                    sample: 0,
-                };
+                let place = Texel { at: [x, y, z], layer, sample: 0 };
                 self.surface.texel(self.level, place).unwrap_or_default()
             }
             _ => self.border,
@@ -209,9 +175,7 @@ impl Reader<'_> {
     fn cube_texel(&self, face: u32, at: [i32; 2]) -> [u32; 4] {
         let size = self.surface.levels[self.level].extent[0];
         let (texels, count) = cube::texels(face, at, size);
-        let texel = |(face, [x, y]): (u32, [u32; 2])| {
-            self.texel([Some(x), Some(y), Some(0)], self.layer + face)
-        };
+        let texel = |(face, [x, y]): (u32, [u32; 2])| self.texel([Some(x), Some(y), Some(0)], self.layer + face);
         if count == 1 || self.surface.is_integer() {
             return texel(texels[0]);
         }
@@ -221,9 +185,7 @@ impl Reader<'_> {
             Reduction::Min => |[a, b, c]| a.min(b).min(c),
             Reduction::Max => |[a, b, c]| a.max(b).max(c),
         };
-        std::array::from_fn(|component| {
-            reduce([a[component], b[component], c[component]]).to_bits()
-        })
+        std::array::from_fn(|component| reduce([a[component], b[component], c[component]]).to_bits())
     }
 }
 
@@ -235,19 +197,13 @@ impl Footprint {
             Self::Grid { axes, filters } => {
                 let [x, y, z] = axes;
                 let row = |j: usize, k: usize| {
-                    let texel =
-                        |i: usize| reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer);
+                    let texel = |i: usize| reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer);
                     along(reduction, filters[0], x.weight, texel)
                 };
                 let slice = |k: usize| along(reduction, filters[1], y.weight, |j| row(j, k));
                 along(reduction, filters[2], z.weight, slice)
             }
-            Self::Cube {
-                face,
-                first: [i, j],
-                weights,
-                filter: Filter::Linear,
-            } => {
+            Self::Cube { face, first: [i, j], weights, filter: Filter::Linear } => {
                 let row = |dj: usize| {
                     along(reduction, Filter::Linear, weights[0], |di| {
                         reader.cube_texel(*face, [i + di as i32, j + dj as i32])
@@ -270,11 +226,7 @@ impl Footprint {
                     let [x, y, z] = axes;
                     reader.texel([x.index[di], y.index[dj], z.index[0]], reader.layer)
                 }
-                Self::Cube {
-                    face,
-                    first: [i, j],
-                    ..
-                } => reader.cube_texel(*face, [i + di as i32, j + dj as i32]),
+                Self::Cube { face, first: [i, j], .. } => reader.cube_texel(*face, [i + di as i32, j + dj as i32]),
             };
             reader.surface.component(&texel, component)
         })
@@ -282,12 +234,7 @@ impl Footprint {
 }
 
 /// Filters two texels along an axis, or takes the first.
-fn along(
-    reduction: Reduction,
-    filter: Filter,
-    weight: f32,
-    texel: impl Fn(usize) -> [u32; 4],
-) -> [u32; 4] {
+fn along(reduction: Reduction, filter: Filter, weight: f32, texel: impl Fn(usize) -> [u32; 4]) -> [u32; 4] {
     match filter {
         Filter::Nearest => texel(0),
         Filter::Linear => mix(reduction, texel(0), texel(1), weight),
@@ -324,11 +271,7 @@ fn place(shape: ImageShape, request: &TexelRequest, lane: usize) -> Texel {
         (Dimension::D3, false) => ([x, y, z], 0),
         (Dimension::D3, true) => ([x, y, z], w),
     };
-    let sample = if shape.multisampled {
-        request.sample[lane]
-    } else {
-        0
-    };
+    let sample = if shape.multisampled { request.sample[lane] } else { 0 };
     Texel { at, layer, sample }
 }
 
@@ -363,9 +306,7 @@ pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] 
         }
     }
     let mut texels = [[0.0; 4]; VECTOR_LANES];
-    surface
-        .format
-        .decode_row(&bytes[..size * count], &mut texels);
+    surface.format.decode_row(&bytes[..size * count], &mut texels);
     for (lane, texel) in read[..count].iter().zip(texels) {
         put(*lane, texel.map(f32::to_bits));
     }
@@ -389,9 +330,7 @@ pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[LaneWord
     }
     let size = surface.texel_size;
     let mut bytes = [0; VECTOR_LANES * MAX_TEXEL_SIZE];
-    surface
-        .format
-        .encode_row(&texels[..count], &mut bytes[..size * count]);
+    surface.format.encode_row(&texels[..count], &mut bytes[..size * count]);
     for (offset, bytes) in offsets[..count].iter().zip(bytes.chunks_exact(size)) {
         store(surface, *offset, bytes);
     }
@@ -419,9 +358,7 @@ fn store(surface: &Surface, offset: u64, bytes: &[u8]) {
         [a] => memory.store_u8(offset, a),
         [a, b] => memory.store_u16(offset, u16::from_le_bytes([a, b])),
         [a, b, c, d] => memory.store_u32(offset, u32::from_le_bytes([a, b, c, d])),
-        [a, b, c, d, e, f, g, h] => {
-            memory.store_u64(offset, u64::from_le_bytes([a, b, c, d, e, f, g, h]))
-        }
+        [a, b, c, d, e, f, g, h] => memory.store_u64(offset, u64::from_le_bytes([a, b, c, d, e, f, g, h])),
         _ => None,
     };
     if stored.is_none() {

@@ -135,8 +135,7 @@ impl Surface {
         let size = self.texel_size as u64;
         let texels = |bytes: u64| u32::try_from(bytes / size).ok();
         let exact = |level: &Level| {
-            level.offset.is_multiple_of(ALIGNMENT)
-                && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
+            level.offset.is_multiple_of(ALIGNMENT) && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
         };
         if self.samples != 1 || !self.levels.iter().all(exact) || texels(end - begin).is_none() {
             return None;
@@ -159,12 +158,7 @@ impl Surface {
             codec,
             words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
             levels: levels.collect::<Option<_>>()?,
-            order: [
-                position(Channel::R, 0),
-                position(Channel::G, 1),
-                position(Channel::B, 2),
-                position(Channel::A, 3),
-            ],
+            order: [position(Channel::R, 0), position(Channel::G, 1), position(Channel::B, 2), position(Channel::A, 3)],
         })
     }
 
@@ -255,7 +249,6 @@ impl Surface {
     /// One component of a texel after swizzling.
     pub fn component(&self, texel: &[u32; 4], component: u8) -> u32 {
         let from = self.swizzle.get(usize::from(component));
-        from.unwrap_or(&ComponentSwizzle::Zero)
-            .pick(texel, 0, self.one())
+        from.unwrap_or(&ComponentSwizzle::Zero).pick(texel, 0, self.one())
     }
 }

@@ -56,12 +56,7 @@ impl ImageTable {
 
     /// Takes an isotropic sample.
     #[inline]
-    fn sample_once(
-        &self,
-        surface: &Surface,
-        sampler: &Sampler,
-        request: &SampleRequest,
-    ) -> [LaneWords; 4] {
+    fn sample_once(&self, surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [LaneWords; 4] {
         let has_seams = sampler.has_seams && request.shape.dimension == Dimension::Cube;
         let batched = if self.batched && !has_seams {
             dispatch!(self.level, simd => {
@@ -98,8 +93,7 @@ impl ImageUnit for ImageTable {
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
-        self.surface(image)
-            .map_or_else(Default::default, |surface| scalar::read(surface, request))
+        self.surface(image).map_or_else(Default::default, |surface| scalar::read(surface, request))
     }
 
     fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]) {
@@ -117,9 +111,7 @@ impl ImageUnit for ImageTable {
         comparator: &LaneWords,
     ) -> LaneWords {
         self.surface(image)
-            .map_or_else(Default::default, |surface| {
-                scalar::atomic(surface, request, op, value, comparator)
-            })
+            .map_or_else(Default::default, |surface| scalar::atomic(surface, request, op, value, comparator))
     }
 
     fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4] {
@@ -142,8 +134,7 @@ impl ImageUnit for ImageTable {
     }
 
     fn levels(&self, image: u32) -> u32 {
-        self.surface(image)
-            .map_or(0, |surface| surface.levels.len() as u32)
+        self.surface(image).map_or(0, |surface| surface.levels.len() as u32)
     }
 
     fn samples(&self, image: u32) -> u32 {
@@ -152,8 +143,6 @@ impl ImageUnit for ImageTable {
 
     fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 2] {
         self.pair(image, sampler)
-            .map_or_else(Default::default, |(surface, sampler)| {
-                lod::query(surface, sampler, request)
-            })
+            .map_or_else(Default::default, |(surface, sampler)| lod::query(surface, sampler, request))
     }
 }

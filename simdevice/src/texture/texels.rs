@@ -65,12 +65,8 @@ impl TexelCodec {
         Some(match format {
             Format::R8Unorm => Self::Unorm8,
             Format::R8G8Unorm => Self::Unorm8x2,
-            Format::R8G8B8A8Unorm | Format::B8G8R8A8Unorm | Format::A8B8G8R8UnormPack32 => {
-                Self::Unorm8x4
-            }
-            Format::R8G8B8A8Srgb | Format::B8G8R8A8Srgb | Format::A8B8G8R8SrgbPack32 => {
-                Self::Srgb8x4
-            }
+            Format::R8G8B8A8Unorm | Format::B8G8R8A8Unorm | Format::A8B8G8R8UnormPack32 => Self::Unorm8x4,
+            Format::R8G8B8A8Srgb | Format::B8G8R8A8Srgb | Format::A8B8G8R8SrgbPack32 => Self::Srgb8x4,
             Format::R16Unorm | Format::D16Unorm => Self::Unorm16,
             Format::R16G16B16A16Sfloat => Self::Float16x4,
             Format::R32Sfloat | Format::D32Sfloat => Self::Float32,
@@ -123,14 +119,7 @@ impl TexelCodec {
 
     /// The stored components of the texels in column `i` and row `j`, each 0 or 1.
     #[inline(always)]
-    pub fn load<S: Simd>(
-        self,
-        simd: S,
-        words: &[AtomicU32],
-        rows: &Rows<'_>,
-        i: usize,
-        j: usize,
-    ) -> [Floats; 4] {
+    pub fn load<S: Simd>(self, simd: S, words: &[AtomicU32], rows: &Rows<'_>, i: usize, j: usize) -> [Floats; 4] {
         for_codec!(simd, self, load(words, rows, i, j))
     }
 
@@ -149,13 +138,7 @@ impl TexelCodec {
 }
 
 #[inline(always)]
-fn load<S: Simd, T: Texels>(
-    simd: S,
-    words: &[AtomicU32],
-    rows: &Rows<'_>,
-    i: usize,
-    j: usize,
-) -> [Floats; 4] {
+fn load<S: Simd, T: Texels>(simd: S, words: &[AtomicU32], rows: &Rows<'_>, i: usize, j: usize) -> [Floats; 4] {
     let index = row_start(simd, rows, j) + u32x16::simd_from(simd, rows.x[i]);
     let (first, second) = index.split();
     let first = T::load(simd, words, first);
@@ -177,14 +160,8 @@ fn bilinear<S: Simd, T: Texels>(
 ) -> [Floats; 4] {
     let around = Footprint2x2 {
         rows: [row_start(simd, rows, 0), row_start(simd, rows, 1)],
-        columns: [
-            u32x16::simd_from(simd, rows.x[0]),
-            u32x16::simd_from(simd, rows.x[1]),
-        ],
-        weights: [
-            f32x16::simd_from(simd, *weight_x),
-            f32x16::simd_from(simd, *weight_y),
-        ],
+        columns: [u32x16::simd_from(simd, rows.x[0]), u32x16::simd_from(simd, rows.x[1])],
+        weights: [f32x16::simd_from(simd, *weight_x), f32x16::simd_from(simd, *weight_y)],
     };
     let texel = around.filter::<T>(simd, words);
     let mut out = [[0.0; VECTOR_LANES]; 4];
@@ -214,20 +191,9 @@ impl<S: Simd> Footprint2x2<S> {
         let (top, bottom) = (top.split(), bottom.split());
         let (left, right) = (left.split(), right.split());
         let (x, y) = (x.split(), y.split());
-        let first = Half {
-            rows: [top.0, bottom.0],
-            columns: [left.0, right.0],
-            weights: [x.0, y.0],
-        };
-        let second = Half {
-            rows: [top.1, bottom.1],
-            columns: [left.1, right.1],
-            weights: [x.1, y.1],
-        };
-        let (first, second) = (
-            first.filter::<T>(simd, words),
-            second.filter::<T>(simd, words),
-        );
+        let first = Half { rows: [top.0, bottom.0], columns: [left.0, right.0], weights: [x.0, y.0] };
+        let second = Half { rows: [top.1, bottom.1], columns: [left.1, right.1], weights: [x.1, y.1] };
+        let (first, second) = (first.filter::<T>(simd, words), second.filter::<T>(simd, words));
         let mut out = [f32x16::splat(simd, 0.0); 4];
         for c in 0..T::COMPONENTS {
             out[c] = first[c].combine(second[c]);
@@ -280,12 +246,7 @@ pub(super) trait Texels {
 
 /// Gathers the bits of texels smaller than a word, and shifts them to the low end.
 #[inline(always)]
-fn gather_narrow<S: Simd>(
-    simd: S,
-    words: &[AtomicU32],
-    index: u32x8<S>,
-    texels_per_word: u32,
-) -> u32x8<S> {
+fn gather_narrow<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>, texels_per_word: u32) -> u32x8<S> {
     let word = gather(simd, words, index >> texels_per_word.trailing_zeros());
     let shift = (index & (texels_per_word - 1)) * (32 / texels_per_word);
     word >> shift
@@ -317,12 +278,7 @@ impl Texels for Unorm8x2 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
         let word = gather_narrow(simd, words, index, 2);
-        [
-            unorm8_fraction_8(word, 0),
-            unorm8_fraction_8(word, 8),
-            zero,
-            zero,
-        ]
+        [unorm8_fraction_8(word, 0), unorm8_fraction_8(word, 8), zero, zero]
     }
 }
 
@@ -361,12 +317,7 @@ impl Texels for Srgb8x4 {
             values[2][lane] = linear[usize::from(b)];
         }
         let [r, g, b] = values;
-        [
-            f32x8::simd_from(simd, r),
-            f32x8::simd_from(simd, g),
-            f32x8::simd_from(simd, b),
-            unorm8_fraction_8(word, 24),
-        ]
+        [f32x8::simd_from(simd, r), f32x8::simd_from(simd, g), f32x8::simd_from(simd, b), unorm8_fraction_8(word, 24)]
     }
 }
 
@@ -415,12 +366,7 @@ impl Texels for Float16x4 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let low = gather(simd, words, index * 2);
         let high = gather(simd, words, index * 2 + 1);
-        [
-            float16(simd, low),
-            float16(simd, low >> 16),
-            float16(simd, high),
-            float16(simd, high >> 16),
-        ]
+        [float16(simd, low), float16(simd, low >> 16), float16(simd, high), float16(simd, high >> 16)]
     }
 }
 
@@ -479,10 +425,7 @@ mod tests {
                 let expected = format.decode(texel);
                 for component in 0..T::COMPONENTS {
                     let (a, b) = (found[component][lane], expected[component]);
-                    assert!(
-                        a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan(),
-                        "{format:?} {texel:?}: {a} {b}"
-                    );
+                    assert!(a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan(), "{format:?} {texel:?}: {a} {b}");
                 }
             }
         }
@@ -495,9 +438,7 @@ mod tests {
         agree::<Unorm8x2>(case, Format::R8G8Unorm, &bytes);
         agree::<Unorm8x4>(case, Format::R8G8B8A8Unorm, &bytes);
         agree::<Srgb8x4>(case, Format::R8G8B8A8Srgb, &bytes);
-        let halves: Vec<u32> = (0..1 << 16)
-            .map(|half| half << 16 | (half ^ 0xFFFF))
-            .collect();
+        let halves: Vec<u32> = (0..1 << 16).map(|half| half << 16 | (half ^ 0xFFFF)).collect();
         agree::<Unorm16>(case, Format::R16Unorm, &halves);
         agree::<Float16x4>(case, Format::R16G16B16A16Sfloat, &halves);
         agree::<Float32>(case, Format::R32Sfloat, &halves);

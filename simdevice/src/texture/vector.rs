@@ -19,9 +19,7 @@ use super::lod::{self, QUADS, Selection};
 use super::sampler::{AddressMode, Filter, Reduction, Sampler};
 use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
-use super::texels::{
-    Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout,
-};
+use super::texels::{Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout};
 use crate::format::Numeric;
 use crate::simd::spread;
 use crate::state::CompareOp;
@@ -54,25 +52,14 @@ pub(super) fn general<S: Simd>(
     let layout = surface.layout.as_ref()?;
     let shape = request.shape;
     let is_mean = sampler.reduction == Reduction::WeightedAverage;
-    if shape.multisampled
-        || shape.dimension == Dimension::Buffer
-        || request.gather.is_some()
-        || !is_mean
-    {
+    if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() || !is_mean {
         return None;
     }
     let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {
         let unorm = surface.format.numeric() == Numeric::Unorm;
         (op, bits.map(|bits| reference_value(unorm, bits)))
     });
-    let batch = Batch {
-        simd,
-        surface,
-        layout,
-        sampler,
-        request,
-        reference,
-    };
+    let batch = Batch { simd, surface, layout, sampler, request, reference };
     let selection = lod::select(surface, sampler, request);
     let texels = batch.select_filter(&selection)?;
     Some(batch.registers(&texels))
@@ -132,11 +119,7 @@ impl<S: Simd> Batch<'_, S> {
         for (texel, high) in texels.iter_mut().zip(&high) {
             for lane in 0..VECTOR_LANES {
                 // A level of weight zero is not read, so that infinities in it have no effect.
-                texel[lane] = if selection.weight[lane] > 0.0 {
-                    texel[lane]
-                } else {
-                    high[lane]
-                };
+                texel[lane] = if selection.weight[lane] > 0.0 { texel[lane] } else { high[lane] };
             }
         }
         Some(texels)
@@ -193,11 +176,7 @@ impl<S: Simd> Batch<'_, S> {
             y: &y.index,
         };
         if let Some(layers) = layers {
-            advance(
-                &mut rows.base,
-                &layers,
-                &sizes.of(|level| level.layer_pitch),
-            );
+            advance(&mut rows.base, &layers, &sizes.of(|level| level.layer_pitch));
         }
         if dimension != Dimension::D3 {
             return Some(self.filter_slice(&rows, [&x, y], [u16::MAX; 2], filter));
@@ -249,13 +228,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// The texels of the lanes' coordinates along an axis.
     #[inline(always)]
-    fn axis(
-        &self,
-        number: usize,
-        filter: Filter,
-        coordinate: &[LaneWords; 4],
-        sizes: &LevelSizes<'_>,
-    ) -> Axis {
+    fn axis(&self, number: usize, filter: Filter, coordinate: &[LaneWords; 4], sizes: &LevelSizes<'_>) -> Axis {
         let size = match number {
             0 => sizes.of(|level| level.extent[0]),
             1 => sizes.of(|level| level.extent[1]),
@@ -284,13 +257,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// Filters in one slice. Lanes outside of `within` read the border.
     #[inline(always)]
-    fn filter_slice(
-        &self,
-        rows: &Rows<'_>,
-        [x, y]: [&Axis; 2],
-        within: [u16; 2],
-        filter: Filter,
-    ) -> Components {
+    fn filter_slice(&self, rows: &Rows<'_>, [x, y]: [&Axis; 2], within: [u16; 2], filter: Filter) -> Components {
         let dimension = self.request.shape.dimension;
         let words = self.layout.words(&self.surface.memory);
         let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
@@ -315,13 +282,7 @@ impl<S: Simd> Batch<'_, S> {
     /// The components of texel (i, j) of those around each point. Lanes that are not `inside` get the border. If a
     /// comparison is requested, the first component is its result.
     #[inline(always)]
-    fn texels(
-        &self,
-        words: &[AtomicU32],
-        rows: &Rows<'_>,
-        [i, j]: [usize; 2],
-        inside: u16,
-    ) -> Components {
+    fn texels(&self, words: &[AtomicU32], rows: &Rows<'_>, [i, j]: [usize; 2], inside: u16) -> Components {
         let mut texels = self.layout.codec.load(self.simd, words, rows, i, j);
         if inside != u16::MAX {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
@@ -353,11 +314,7 @@ impl<'a> LevelSizes<'a> {
     fn new(table: &'a [PackedLevel], levels: &'a LaneWords) -> Self {
         let differences = levels.iter().map(|level| level ^ levels[0]);
         let uniform = differences.fold(0, |all, difference| all | difference) == 0;
-        Self {
-            table,
-            levels,
-            uniform: uniform.then(|| &table[levels[0] as usize]),
-        }
+        Self { table, levels, uniform: uniform.then(|| &table[levels[0] as usize]) }
     }
 
     /// A property of each lane's level.
@@ -393,11 +350,7 @@ fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
         CompareOp::GreaterOrEqual => each(|reference, depth| reference >= depth),
         _ => {
             for (depth, reference) in depths.iter_mut().zip(reference) {
-                *depth = if op.holds(*reference, *depth) {
-                    1.0
-                } else {
-                    0.0
-                };
+                *depth = if op.holds(*reference, *depth) { 1.0 } else { 0.0 };
             }
         }
     }
@@ -512,18 +465,8 @@ fn level<S: Simd, T: Texels>(
         base = spread_words(simd, of_each(each, |level| level.base));
         row_pitch = spread_words(simd, of_each(each, |level| level.row_pitch));
     }
-    let x = taps(
-        simd,
-        sampler.address_modes[0],
-        &request.coordinate[0],
-        width,
-    );
-    let y = taps(
-        simd,
-        sampler.address_modes[1],
-        &request.coordinate[1],
-        height,
-    );
+    let x = taps(simd, sampler.address_modes[0], &request.coordinate[0], width);
+    let y = taps(simd, sampler.address_modes[1], &request.coordinate[1], height);
     let around = Footprint2x2 {
         rows: [base + y.first * row_pitch, base + y.second * row_pitch],
         columns: [x.first, x.second],
@@ -534,10 +477,7 @@ fn level<S: Simd, T: Texels>(
 
 /// A property of each level. (The standard library's `map` is not always inlined.)
 #[inline(always)]
-fn of_each<T: Copy + Default>(
-    levels: [&PackedLevel; QUADS],
-    value: impl Fn(&PackedLevel) -> T,
-) -> [T; QUADS] {
+fn of_each<T: Copy + Default>(levels: [&PackedLevel; QUADS], value: impl Fn(&PackedLevel) -> T) -> [T; QUADS] {
     let mut values = [T::default(); QUADS];
     for quad in 0..QUADS {
         values[quad] = value(levels[quad]);
@@ -554,11 +494,7 @@ fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
 
 /// The result registers for four stored components: reordered and swizzled.
 #[inline(always)]
-fn registers<S: Simd>(
-    surface: &Surface,
-    layout: &VectorLayout,
-    texel: [f32x16<S>; 4],
-) -> [LaneWords; 4] {
+fn registers<S: Simd>(surface: &Surface, layout: &VectorLayout, texel: [f32x16<S>; 4]) -> [LaneWords; 4] {
     let mut stored = [[0.0; VECTOR_LANES]; 4];
     for c in 0..4 {
         stored[c] = texel[c].into();

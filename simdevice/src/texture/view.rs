@@ -40,12 +40,8 @@ impl ComponentSwizzle {
 pub type Swizzle = [ComponentSwizzle; 4];
 
 /// The swizzle that changes nothing.
-pub const IDENTITY: Swizzle = [
-    ComponentSwizzle::Red,
-    ComponentSwizzle::Green,
-    ComponentSwizzle::Blue,
-    ComponentSwizzle::Alpha,
-];
+pub const IDENTITY: Swizzle =
+    [ComponentSwizzle::Red, ComponentSwizzle::Green, ComponentSwizzle::Blue, ComponentSwizzle::Alpha];
 
 /// An image that is sampled or fetched from, or an input attachment. The instruction determines its kind
 /// ([`isa::ir::ImageShape`]). A cube's faces are six consecutive layers.

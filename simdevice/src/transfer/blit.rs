@@ -16,25 +16,16 @@ use std::ops::Range;
 /// Executes [`Packet::BlitImage`](crate::Packet::BlitImage).
 pub fn blit_image(blit: &BlitImage) {
     if let Some(source) = blit.source.decompressed() {
-        return blit_image(&BlitImage {
-            source,
-            ..blit.clone()
-        });
+        return blit_image(&BlitImage { source, ..blit.clone() });
     }
     for region in &blit.regions {
         let (source, target) = (&region.source, &region.target);
         let layers = |image: &Image, base: u32| image.desc.array_layers.saturating_sub(base);
         let count = source.layer_count.min(target.layer_count);
-        let count = count
-            .min(layers(&blit.source, source.base_layer))
-            .min(layers(&blit.target, target.base_layer));
+        let count = count.min(layers(&blit.source, source.base_layer)).min(layers(&blit.target, target.base_layer));
         for layer in 0..count {
-            let from =
-                blit.source
-                    .subresource(source.aspect, source.mip_level, source.base_layer + layer);
-            let to =
-                blit.target
-                    .subresource(target.aspect, target.mip_level, target.base_layer + layer);
+            let from = blit.source.subresource(source.aspect, source.mip_level, source.base_layer + layer);
+            let to = blit.target.subresource(target.aspect, target.mip_level, target.base_layer + layer);
             if let (Some(from), Some(to)) = (from, to) {
                 blit_layer(blit, region, from, to);
             }
@@ -61,13 +52,7 @@ struct Axis {
 
 impl Axis {
     /// Maps the corners `to` of the target to the corners `from` of the source. The sizes are those of the images.
-    fn new(
-        filter: Filter,
-        from: [i32; 2],
-        source_size: u32,
-        to: [i32; 2],
-        target_size: u32,
-    ) -> Self {
+    fn new(filter: Filter, from: [i32; 2], source_size: u32, to: [i32; 2], target_size: u32) -> Self {
         let clamped = |corner: i32| corner.max(0).cast_unsigned().min(target_size);
         let target = clamped(to[0].min(to[1]))..clamped(to[0].max(to[1]));
         let [from, to] = [from, to].map(|corners| corners.map(i128::from));
@@ -75,8 +60,7 @@ impl Axis {
         let tap = |i: u32| {
             // The centre's position in the source is `numerator / denominator` texels from its beginning.
             let mut denominator = 2 * target_length;
-            let mut numerator =
-                (2 * (i128::from(i) - to[0]) + 1) * source_length + from[0] * denominator;
+            let mut numerator = (2 * (i128::from(i) - to[0]) + 1) * source_length + from[0] * denominator;
             if filter == Filter::Linear {
                 // The centres of texels are half a texel from their edges.
                 numerator -= target_length;
@@ -86,8 +70,8 @@ impl Axis {
             }
             let whole = numerator.div_euclid(denominator);
             let rest = numerator.rem_euclid(denominator);
-            let index = [whole, whole + 1]
-                .map(|index| index.clamp(0, i128::from(source_size.saturating_sub(1))) as u32);
+            let index =
+                [whole, whole + 1].map(|index| index.clamp(0, i128::from(source_size.saturating_sub(1))) as u32);
             let weight = match filter {
                 Filter::Nearest => 0.0,
                 Filter::Linear => (rest as f64 / denominator as f64) as f32,
@@ -111,18 +95,9 @@ impl Axis {
     }
 }
 
-fn blit_layer(
-    blit: &BlitImage,
-    region: &ImageBlitRegion,
-    from: SubresourceLayout,
-    to: SubresourceLayout,
-) {
+fn blit_layer(blit: &BlitImage, region: &ImageBlitRegion, from: SubresourceLayout, to: SubresourceLayout) {
     let is_color = region.source.aspect == Aspect::Color;
-    let filter = if is_color && !from.format.is_integer() {
-        blit.filter
-    } else {
-        Filter::Nearest
-    };
+    let filter = if is_color && !from.format.is_integer() { blit.filter } else { Filter::Nearest };
     let [x, y, z] = [0, 1, 2].map(|axis| {
         let corners = |corners: &[[i32; 3]; 2]| corners.map(|corner| corner[axis]);
         Axis::new(
@@ -177,13 +152,7 @@ impl<'a> Rows<'a> {
     fn new(image: &'a Image, layout: SubresourceLayout, x: &Axis) -> Self {
         let columns = x.source();
         let bytes = host::zeroed(columns.len() * layout.format.texel_size());
-        Self {
-            image,
-            layout: layout.sample(0),
-            columns,
-            bytes,
-            decoded: Vec::new(),
-        }
+        Self { image, layout: layout.sample(0), columns, bytes, decoded: Vec::new() }
     }
 
     fn format(&self) -> Format {
@@ -242,11 +211,7 @@ impl<'a> Rows<'a> {
                 let row = self.decode([y, z])?;
                 for (tap, out) in x.taps.iter().zip(&mut *out) {
                     let [a, b] = tap.index.map(|index| row[(index - first_column) as usize]);
-                    let texel = if tap.weight > 0.0 {
-                        mix(a, b, tap.weight)
-                    } else {
-                        a
-                    };
+                    let texel = if tap.weight > 0.0 { mix(a, b, tap.weight) } else { a };
                     if is_first && weight == 1.0 {
                         // Integers must stay unchanged.
                         *out = texel;

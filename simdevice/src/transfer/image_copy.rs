@@ -40,9 +40,7 @@ impl Side<'_> {
             ImageKind::D3 => (self.layers.base_layer, z + i64::from(index)),
             ImageKind::D1 | ImageKind::D2 => (self.layers.base_layer.checked_add(index)?, z),
         };
-        let layout = self
-            .image
-            .subresource(self.layers.aspect, self.layers.mip_level, layer)?;
+        let layout = self.image.subresource(self.layers.aspect, self.layers.mip_level, layer)?;
         let z = u32::try_from(z).ok().filter(|&z| z < layout.extent[2])?;
         Some((layout, z))
     }
@@ -54,22 +52,9 @@ impl Side<'_> {
 }
 
 /// Calls `f` for every slice or layer of a region that both images have.
-pub(super) fn for_each_slice(
-    source: &Image,
-    target: &Image,
-    region: &ImageCopyRegion,
-    mut f: impl FnMut(&SlicePair),
-) {
-    let source = Side {
-        image: source,
-        layers: &region.source,
-        offset: region.source_offset,
-    };
-    let target = Side {
-        image: target,
-        layers: &region.target,
-        offset: region.target_offset,
-    };
+pub(super) fn for_each_slice(source: &Image, target: &Image, region: &ImageCopyRegion, mut f: impl FnMut(&SlicePair)) {
+    let source = Side { image: source, layers: &region.source, offset: region.source_offset };
+    let target = Side { image: target, layers: &region.target, offset: region.target_offset };
     let slices = region.extent[2].max(region.source.layer_count);
     // Offsets before the first slice are outside by at most this number of slices.
     for index in 0..slices.min(source.slices().max(target.slices())) {
@@ -86,17 +71,9 @@ fn overlap(
     (target, target_z): (SubresourceLayout, u32),
 ) -> SlicePair {
     let [(from_x, to_x, width), (from_y, to_y, height)] = [0, 1].map(|axis| {
-        let from = clip(
-            region.source_offset[axis],
-            region.extent[axis],
-            source.extent[axis],
-        );
+        let from = clip(region.source_offset[axis], region.extent[axis], source.extent[axis]);
         let offset = i64::from(region.target_offset[axis]) + i64::from(from.skipped);
-        let to = clip(
-            i32::try_from(offset).unwrap_or(i32::MAX),
-            from.count,
-            target.extent[axis],
-        );
+        let to = clip(i32::try_from(offset).unwrap_or(i32::MAX), from.count, target.extent[axis]);
         (from.first.saturating_add(to.skipped), to.first, to.count)
     });
     SlicePair {

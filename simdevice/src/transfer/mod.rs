@@ -25,9 +25,7 @@ use std::sync::Arc;
 /// The offset in the memory of bytes `offset..offset + size` of a range, if they lie in the range.
 fn within(range: &BufferRange, offset: u64, size: u64) -> Option<u64> {
     let end = offset.checked_add(size)?;
-    (end <= range.size)
-        .then(|| range.offset.checked_add(offset))
-        .flatten()
+    (end <= range.size).then(|| range.offset.checked_add(offset)).flatten()
 }
 
 /// Executes [`Packet::CopyBuffer`](crate::Packet::CopyBuffer).
@@ -64,8 +62,7 @@ pub fn fill_buffer(target: &BufferRange, word: u32) {
 
 /// Executes [`Packet::UpdateBuffer`](crate::Packet::UpdateBuffer).
 pub fn update_buffer(target: &BufferRange, data: &[u8]) {
-    let written =
-        within(target, 0, data.len() as u64).map(|offset| target.memory.write(offset, data));
+    let written = within(target, 0, data.len() as u64).map(|offset| target.memory.write(offset, data));
     if !matches!(written, Some(Ok(()))) {
         log::warn!("left out a buffer update that lies outside");
     }
@@ -91,9 +88,7 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, runtime: 
         let end = copy.image.desc.array_layers;
         let first = layers.base_layer.min(end);
         for index in 0..layers.layer_count.min(end - first) {
-            let layout = copy
-                .image
-                .subresource(layers.aspect, layers.mip_level, first + index);
+            let layout = copy.image.subresource(layers.aspect, layers.mip_level, first + index);
             if let Some(layout) = layout {
                 copy_layer(copy, direction, (region, index), &layout, runtime);
             }
@@ -118,27 +113,16 @@ fn copy_layer(
     let or_tight = |length: u32, tight: u32| u64::from(if length == 0 { tight } else { length });
     let row_length = or_tight(region.buffer_row_length, width);
     let image_height = or_tight(region.buffer_image_height, height);
-    let [x, y, z] = [0, 1, 2].map(|axis| {
-        clip(
-            region.image_offset[axis],
-            region.image_extent[axis],
-            layout.extent[axis],
-        )
-    });
+    let [x, y, z] =
+        [0, 1, 2].map(|axis| clip(region.image_offset[axis], region.image_extent[axis], layout.extent[axis]));
     let size = u64::from(x.count) * texel_size;
     // The offset of `size` bytes from a row's first copied texel on, in the buffer's memory; `None` if that overflows
     // or lies outside the buffer.
     let buffer_offset = |row: u32, slice: u32, size: u64| {
-        let slice = u64::from(index)
-            .checked_mul(depth.into())?
-            .checked_add(u64::from(z.skipped) + u64::from(slice))?;
-        let row = slice
-            .checked_mul(image_height)?
-            .checked_add(u64::from(y.skipped) + u64::from(row))?;
+        let slice = u64::from(index).checked_mul(depth.into())?.checked_add(u64::from(z.skipped) + u64::from(slice))?;
+        let row = slice.checked_mul(image_height)?.checked_add(u64::from(y.skipped) + u64::from(row))?;
         let texel = row.checked_mul(row_length)?.checked_add(x.skipped.into())?;
-        let offset = region
-            .buffer_offset
-            .checked_add(texel.checked_mul(texel_size)?)?;
+        let offset = region.buffer_offset.checked_add(texel.checked_mul(texel_size)?)?;
         within(&copy.buffer, offset, size)
     };
     let (image, buffer) = (&copy.image, &copy.buffer.memory);
@@ -147,35 +131,26 @@ fn copy_layer(
     let copy_rows = |row: u32, slice: u32, count: u32| {
         let all = size * u64::from(count);
         let at = [x.first, y.first + row, z.first + slice];
-        let copied = buffer_offset(row, slice, all)
-            .zip(image.row(layout, at, size))
-            .map(|(in_buffer, in_image)| match direction {
-                Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, all),
-                Direction::ToBuffer => buffer.copy_from(in_buffer, &image.memory, in_image, all),
-            });
+        let copied =
+            buffer_offset(row, slice, all).zip(image.row(layout, at, size)).map(
+                |(in_buffer, in_image)| match direction {
+                    Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, all),
+                    Direction::ToBuffer => buffer.copy_from(in_buffer, &image.memory, in_image, all),
+                },
+            );
         matches!(copied, Some(Ok(())))
     };
     // Rows that overlap in the buffer, or an image that does, keep their order.
-    let are_apart = row_length >= width.into()
-        && image_height >= height.into()
-        && !Arc::ptr_eq(&image.memory, buffer);
+    let are_apart = row_length >= width.into() && image_height >= height.into() && !Arc::ptr_eq(&image.memory, buffer);
     let threads = runtime.threads();
     let rows = y.count as usize * z.count as usize;
     let bytes = size.saturating_mul(rows as u64);
     let is_shared = are_apart && threads > 1 && bytes >= LEAST_SHARED;
-    let least = if is_shared {
-        rows.div_ceil(4 * threads)
-    } else {
-        rows
-    };
+    let least = if is_shared { rows.div_ceil(4 * threads) } else { rows };
     // Rows that follow one another without a gap, both in the image and in the buffer, are copied at once.
     let is_dense = are_apart && size == layout.row_pitch && u64::from(x.count) == row_length;
     let in_slice = y.count.max(1) as usize;
-    let run = if is_dense {
-        least.clamp(1, in_slice)
-    } else {
-        1
-    };
+    let run = if is_dense { least.clamp(1, in_slice) } else { 1 };
     let runs = in_slice.div_ceil(run);
     let copy_run = |number: usize| {
         let (slice, row) = ((number / runs) as u32, number % runs * run);
@@ -201,16 +176,8 @@ pub fn clear_image(clear: &ClearImage) {
     let (image, desc) = (&clear.image, &clear.image.desc);
     for range in &clear.ranges {
         let texel = desc.format.encode_clear(range.aspect, clear.value);
-        let levels = range.base_mip_level
-            ..range
-                .base_mip_level
-                .saturating_add(range.level_count)
-                .min(desc.mip_levels);
-        let layers = range.base_layer
-            ..range
-                .base_layer
-                .saturating_add(range.layer_count)
-                .min(desc.array_layers);
+        let levels = range.base_mip_level..range.base_mip_level.saturating_add(range.level_count).min(desc.mip_levels);
+        let layers = range.base_layer..range.base_layer.saturating_add(range.layer_count).min(desc.array_layers);
         for level in levels {
             for layer in layers.clone() {
                 if let Some(layout) = image.subresource(range.aspect, level, layer) {

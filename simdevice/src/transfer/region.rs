@@ -17,9 +17,5 @@ pub(super) fn clip(offset: i32, extent: u32, size: u32) -> Clipped {
     let first = offset.max(0);
     let end = (offset + i64::from(extent)).min(size.into());
     // Both values are in 0..=u32::MAX if the count is positive.
-    Clipped {
-        skipped: (first - offset) as u32,
-        first: first as u32,
-        count: (end - first).max(0) as u32,
-    }
+    Clipped { skipped: (first - offset) as u32, first: first as u32, count: (end - first).max(0) as u32 }
 }

@@ -29,9 +29,7 @@ fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
     for row in 0..height as u32 {
         for (sample, texels) in (0..).zip(&mut samples) {
             let layout = source.sample(sample);
-            let read = resolve
-                .source
-                .read_row(&layout, below(*from, row), &mut bytes);
+            let read = resolve.source.read_row(&layout, below(*from, row), &mut bytes);
             if read.is_none() {
                 return;
             }
@@ -41,11 +39,7 @@ fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
         resolve_row(source.format, resolve.mode, rows, &mut resolved);
         target.format.encode_row(&resolved, &mut encoded);
         let target = target.sample(0);
-        if resolve
-            .target
-            .write_row(&target, below(*to, row), &encoded)
-            .is_none()
-        {
+        if resolve.target.write_row(&target, below(*to, row), &encoded).is_none() {
             return;
         }
     }

@@ -2,9 +2,7 @@ use super::*;
 use crate::Format;
 use crate::format::{Aspect, ClearValue};
 use crate::image::{ImageDesc, ImageKind};
-use crate::packet::{
-    BufferCopyRegion, CopyImage, ImageCopyRegion, SubresourceLayers, SubresourceRange,
-};
+use crate::packet::{BufferCopyRegion, CopyImage, ImageCopyRegion, SubresourceLayers, SubresourceRange};
 use crate::runtime::Config;
 use devmem::Allocation;
 use std::sync::Arc;
@@ -13,11 +11,7 @@ fn buffer(bytes: &[u8]) -> BufferRange {
     let memory = Allocation::new_zeroed(bytes.len() as u64).unwrap();
     memory.write(0, bytes).unwrap();
     let size = bytes.len() as u64;
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 fn contents(range: &BufferRange) -> Vec<u8> {
@@ -27,25 +21,13 @@ fn contents(range: &BufferRange) -> Vec<u8> {
 }
 
 fn image(kind: ImageKind, format: Format, extent: [u32; 3], layers: u32) -> Arc<Image> {
-    let desc = ImageDesc {
-        kind,
-        format,
-        extent,
-        mip_levels: 1,
-        array_layers: layers,
-        samples: 1,
-    };
+    let desc = ImageDesc { kind, format, extent, mip_levels: 1, array_layers: layers, samples: 1 };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     Arc::new(Image::new(desc, memory, 0).unwrap())
 }
 
 fn color(base_layer: u32, layer_count: u32) -> SubresourceLayers {
-    SubresourceLayers {
-        aspect: Aspect::Color,
-        mip_level: 0,
-        base_layer,
-        layer_count,
-    }
+    SubresourceLayers { aspect: Aspect::Color, mip_level: 0, base_layer, layer_count }
 }
 
 /// The texels of an image with one byte per texel, of all layers and slices.
@@ -62,11 +44,7 @@ fn texels(image: &Arc<Image>) -> Vec<u8> {
         image_extent: image.desc.extent,
     };
     copy_buffer_image(
-        &CopyBufferImage {
-            buffer: out.clone(),
-            image: image.clone(),
-            regions: vec![region],
-        },
+        &CopyBufferImage { buffer: out.clone(), image: image.clone(), regions: vec![region] },
         Direction::ToBuffer,
         &runtime(1),
     );
@@ -79,11 +57,7 @@ fn buffers_are_copied_filled_and_updated_within_their_ranges() {
     let mut target = buffer(&[0; 16]);
     target.offset = 4;
     target.size = 8;
-    let region = |source_offset, target_offset, size| BufferCopyRegion {
-        source_offset,
-        target_offset,
-        size,
-    };
+    let region = |source_offset, target_offset, size| BufferCopyRegion { source_offset, target_offset, size };
     let before = target.memory.generation();
     copy_buffer(&CopyBuffer {
         source: source.clone(),
@@ -99,43 +73,15 @@ fn buffers_are_copied_filled_and_updated_within_their_ranges() {
     assert_ne!(target.memory.generation(), before);
     assert_eq!(contents(&target), [0, 0, 2, 3, 4, 0, 0, 0]);
 
-    fill_buffer(
-        &BufferRange {
-            offset: 8,
-            size: u64::MAX,
-            ..target.clone()
-        },
-        0x0403_0201,
-    );
-    let whole = BufferRange {
-        offset: 0,
-        size: 16,
-        ..target.clone()
-    };
-    assert_eq!(
-        contents(&whole),
-        [0, 0, 0, 0, 0, 0, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4]
-    );
+    fill_buffer(&BufferRange { offset: 8, size: u64::MAX, ..target.clone() }, 0x0403_0201);
+    let whole = BufferRange { offset: 0, size: 16, ..target.clone() };
+    assert_eq!(contents(&whole), [0, 0, 0, 0, 0, 0, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4]);
     update_buffer(&target, &[9; 9]);
     assert_eq!(contents(&target)[0], 0, "too long, hence left out");
     update_buffer(&target, &[9; 8]);
     assert_eq!(contents(&target), [9; 8]);
-    fill_buffer(
-        &BufferRange {
-            offset: u64::MAX,
-            size: 8,
-            ..target.clone()
-        },
-        1,
-    );
-    update_buffer(
-        &BufferRange {
-            offset: u64::MAX,
-            size: 8,
-            ..target
-        },
-        &[1; 8],
-    );
+    fill_buffer(&BufferRange { offset: u64::MAX, size: 8, ..target.clone() }, 1);
+    update_buffer(&BufferRange { offset: u64::MAX, size: 8, ..target }, &[1; 8]);
 }
 
 #[gaurast_runner::test]
@@ -157,16 +103,9 @@ fn rows_slices_and_layers_find_their_place() {
         image_offset: [1, 1, 0],
         image_extent: [3, 2, 1],
     };
-    let copy = CopyBufferImage {
-        buffer: source,
-        image: image.clone(),
-        regions: vec![region],
-    };
+    let copy = CopyBufferImage { buffer: source, image: image.clone(), regions: vec![region] };
     copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
-    let expected = [
-        [0, 0, 0, 0, 0, 2, 3, 4, 0, 7, 8, 9],
-        [0, 0, 0, 0, 0, 22, 23, 24, 0, 27, 28, 29],
-    ];
+    let expected = [[0, 0, 0, 0, 0, 2, 3, 4, 0, 7, 8, 9], [0, 0, 0, 0, 0, 22, 23, 24, 0, 27, 28, 29]];
     assert_eq!(texels(&image), expected.concat());
 }
 
@@ -182,11 +121,7 @@ fn what_lies_outside_the_image_is_clipped() {
         image_offset: [-1, -2, 0],
         image_extent: [8, 4, 1],
     };
-    let copy = CopyBufferImage {
-        buffer: source,
-        image: image.clone(),
-        regions: vec![region],
-    };
+    let copy = CopyBufferImage { buffer: source, image: image.clone(), regions: vec![region] };
     copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     assert_eq!(texels(&image), [17, 18, 19, 20, 25, 26, 27, 28, 0, 0, 0, 0]);
 }
@@ -214,11 +149,7 @@ fn hostile_regions_do_no_harm() {
                         image_offset: [offset, 0, offset],
                         image_extent: [other, value, other],
                     };
-                    let copy = CopyBufferImage {
-                        buffer: range.clone(),
-                        image: image.clone(),
-                        regions: vec![region],
-                    };
+                    let copy = CopyBufferImage { buffer: range.clone(), image: image.clone(), regions: vec![region] };
                     copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
                     copy_buffer_image(&copy, Direction::ToBuffer, &runtime(1));
                     let region = ImageCopyRegion {
@@ -228,11 +159,7 @@ fn hostile_regions_do_no_harm() {
                         target_offset: [0, offset, offset],
                         extent: [value, other, value],
                     };
-                    copy_image(&CopyImage {
-                        source: image.clone(),
-                        target: image.clone(),
-                        regions: vec![region],
-                    });
+                    copy_image(&CopyImage { source: image.clone(), target: image.clone(), regions: vec![region] });
                 }
             }
         }
@@ -253,11 +180,7 @@ fn layers_of_one_image_become_slices_of_another() {
         image_offset: [0; 3],
         image_extent: [2, 1, 1],
     };
-    let copy = CopyBufferImage {
-        buffer: buffer(&[1, 2, 3, 4, 5, 6]),
-        image: layered.clone(),
-        regions: vec![region],
-    };
+    let copy = CopyBufferImage { buffer: buffer(&[1, 2, 3, 4, 5, 6]), image: layered.clone(), regions: vec![region] };
     copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     let region = ImageCopyRegion {
         source: color(1, 2),
@@ -266,11 +189,7 @@ fn layers_of_one_image_become_slices_of_another() {
         target_offset: [2, 1, 0],
         extent: [2, 1, 2],
     };
-    copy_image(&CopyImage {
-        source: layered,
-        target: solid.clone(),
-        regions: vec![region],
-    });
+    copy_image(&CopyImage { source: layered, target: solid.clone(), regions: vec![region] });
     let expected = [[0, 0, 0, 0, 0, 3], [0, 0, 0, 0, 0, 5], [0; 6]];
     assert_eq!(texels(&solid), expected.concat());
 }
@@ -278,10 +197,7 @@ fn layers_of_one_image_become_slices_of_another() {
 #[gaurast_runner::test]
 fn clears_write_the_aspect_that_they_name() {
     let image = image(ImageKind::D2, Format::D32SfloatS8Uint, [3, 2, 1], 2);
-    let value = ClearValue::DepthStencil {
-        depth: 0.5,
-        stencil: 9,
-    };
+    let value = ClearValue::DepthStencil { depth: 0.5, stencil: 9 };
     let range = |aspect, base_layer| SubresourceRange {
         aspect,
         base_mip_level: 0,
@@ -289,16 +205,8 @@ fn clears_write_the_aspect_that_they_name() {
         base_layer,
         layer_count: u32::MAX,
     };
-    let ranges = vec![
-        range(Aspect::Depth, 1),
-        range(Aspect::Stencil, 0),
-        range(Aspect::Color, 0),
-    ];
-    clear_image(&ClearImage {
-        image: image.clone(),
-        value,
-        ranges,
-    });
+    let ranges = vec![range(Aspect::Depth, 1), range(Aspect::Stencil, 0), range(Aspect::Color, 0)];
+    clear_image(&ClearImage { image: image.clone(), value, ranges });
     let depth = |layer| {
         let layout = image.subresource(Aspect::Depth, 0, layer).unwrap();
         let mut out = [0; 4];
@@ -313,10 +221,7 @@ fn clears_write_the_aspect_that_they_name() {
 }
 
 fn runtime(threads: usize) -> Runtime {
-    let config = Config {
-        threads,
-        ..Config::default()
-    };
+    let config = Config { threads, ..Config::default() };
     Runtime::new(&config).unwrap()
 }
 
@@ -347,11 +252,7 @@ fn workers_copy_rows_of(width: u32) {
             image_extent: [size[0], size[1], 1],
         };
         let copy = |buffer: &BufferRange, direction, threads| {
-            let copy = CopyBufferImage {
-                buffer: buffer.clone(),
-                image: image.clone(),
-                regions: vec![region],
-            };
+            let copy = CopyBufferImage { buffer: buffer.clone(), image: image.clone(), regions: vec![region] };
             copy_buffer_image(&copy, direction, &runtime(threads));
         };
         copy(&source, Direction::ToImage, 3);
@@ -384,11 +285,7 @@ fn of_rows_without_a_gap_those_are_copied_that_fit_the_buffer() {
         image_offset: [0; 3],
         image_extent: [64, 8, 1],
     };
-    let copy = CopyBufferImage {
-        buffer: range,
-        image: image.clone(),
-        regions: vec![region],
-    };
+    let copy = CopyBufferImage { buffer: range, image: image.clone(), regions: vec![region] };
     copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     let mut copied = vec![0u32; 64 * 8];
     image.memory.read(0, &mut copied).unwrap();
@@ -399,15 +296,12 @@ fn of_rows_without_a_gap_those_are_copied_that_fit_the_buffer() {
 #[gaurast_runner::test]
 fn images_without_gaps_are_copied_as_others_are() {
     for width in [60, 64] {
-        let [source, target] =
-            [(); 2].map(|()| image(ImageKind::D2, Format::R32Uint, [width, 8, 1], 1));
+        let [source, target] = [(); 2].map(|()| image(ImageKind::D2, Format::R32Uint, [width, 8, 1], 1));
         let layout = source.subresource(Aspect::Color, 0, 0).unwrap();
         let row_of = |y: u32| (0..width).map(move |x| 1000 * (y + 1) + x);
         for y in 0..8 {
             let row: Vec<u32> = row_of(y).collect();
-            source
-                .write_row(&layout, [0, y, 0], bytemuck::cast_slice(&row))
-                .unwrap();
+            source.write_row(&layout, [0, y, 0], bytemuck::cast_slice(&row)).unwrap();
         }
         let region = ImageCopyRegion {
             source: color(0, 1),
@@ -416,11 +310,7 @@ fn images_without_gaps_are_copied_as_others_are() {
             target_offset: [0, 3, 0],
             extent: [width, 4, 1],
         };
-        copy_image(&CopyImage {
-            source,
-            target: target.clone(),
-            regions: vec![region],
-        });
+        copy_image(&CopyImage { source, target: target.clone(), regions: vec![region] });
         for y in 0..8 {
             let mut row = vec![0u32; width as usize];
             let bytes = bytemuck::cast_slice_mut(&mut row);

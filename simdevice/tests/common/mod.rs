@@ -15,23 +15,12 @@ pub const WIDTH: u32 = 150;
 pub const HEIGHT: u32 = 83;
 
 /// The rectangle of all pixels.
-pub const EVERYTHING: Rect = Rect {
-    x: 0,
-    y: 0,
-    width: WIDTH,
-    height: HEIGHT,
-};
+pub const EVERYTHING: Rect = Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT };
 
 /// Blending of premultiplied colours with the "over" operator.
-pub const OVER: BlendState = BlendState {
-    equations: Some((OVER_EQUATION, OVER_EQUATION)),
-    write_mask: 0xF,
-};
-const OVER_EQUATION: BlendEquation = BlendEquation {
-    source: BlendFactor::One,
-    destination: BlendFactor::OneMinusSrcAlpha,
-    op: BlendOp::Add,
-};
+pub const OVER: BlendState = BlendState { equations: Some((OVER_EQUATION, OVER_EQUATION)), write_mask: 0xF };
+const OVER_EQUATION: BlendEquation =
+    BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
 
 /// An image of `layers` layers whose memory holds `byte` everywhere.
 pub fn image(format: Format, layers: u32, byte: u8) -> ImageView {
@@ -65,24 +54,12 @@ pub fn bytes(view: &ImageView) -> Vec<u8> {
 
 /// An attachment that is stored.
 pub fn attachment(view: &ImageView, load: LoadOp) -> Attachment {
-    Attachment {
-        view: view.clone(),
-        load,
-        store: StoreOp::Store,
-        resolve: None,
-    }
+    Attachment { view: view.clone(), load, store: StoreOp::Store, resolve: None }
 }
 
 /// A pass over one colour attachment.
 pub fn rendering(color: Attachment) -> Rendering {
-    Rendering {
-        area: EVERYTHING,
-        layer_count: 1,
-        view_mask: 0,
-        color: vec![Some(color)],
-        depth: None,
-        stencil: None,
-    }
+    Rendering { area: EVERYTHING, layer_count: 1, view_mask: 0, color: vec![Some(color)], depth: None, stencil: None }
 }
 
 /// The packets of one draw of `count` random Gaussians, in memory that the host may map.
@@ -96,11 +73,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats = Vec::new();
     for _ in 0..count {
-        floats.extend([
-            rng.random_range(-2.0..2.0),
-            rng.random_range(-1.2..1.2f32),
-            rng.random_range(2.0..6.0),
-        ]);
+        floats.extend([rng.random_range(-2.0..2.0), rng.random_range(-1.2..1.2f32), rng.random_range(2.0..6.0)]);
         floats.extend([0; 3].map(|_| rng.random_range(-4.0..-1.0f32).exp()));
         floats.extend([0; 4].map(|_| rng.random_range(-1.0..1.0f32)));
         floats.push(rng.random_range(0.05..1.0));
@@ -110,11 +83,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
     let memory = Allocation::new(size.max(4), host_visible).unwrap();
     memory.write(0, &floats).unwrap();
     let stream = |offset: u32, format| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size },
         stride: 4 * FLOATS as u32,
         offset: 4 * offset,
         format,
@@ -136,11 +105,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
         first_instance: 0,
         instance_count: 1,
     };
-    vec![
-        Packet::GaussianBegin(Box::new(begin(blend))),
-        Packet::GaussianAppend(Box::new(append)),
-        Packet::GaussianEnd,
-    ]
+    vec![Packet::GaussianBegin(Box::new(begin(blend))), Packet::GaussianAppend(Box::new(append)), Packet::GaussianEnd]
 }
 
 /// The state of the tests' Gaussian draws.
@@ -176,16 +141,10 @@ pub fn begin(blend: BlendState) -> GaussianBegin {
 
 /// A packet that clears rectangles of layer 0.
 pub fn clear(clears: Vec<AttachmentClear>, rects: &[Rect]) -> Packet {
-    Packet::ClearAttachments(ClearAttachments {
-        clears,
-        rects: rects.iter().map(|&rect| (rect, 0, 1)).collect(),
-    })
+    Packet::ClearAttachments(ClearAttachments { clears, rects: rects.iter().map(|&rect| (rect, 0, 1)).collect() })
 }
 
 /// A configuration with one worker and defaults otherwise.
 pub fn single() -> Config {
-    Config {
-        threads: 1,
-        ..Config::default()
-    }
+    Config { threads: 1, ..Config::default() }
 }

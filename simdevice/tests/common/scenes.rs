@@ -13,8 +13,8 @@ use simdevice::program::bindings::Bindings;
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::{
-    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
-    VertexInput, VertexOutput, gaussian, resolve,
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,
+    gaussian, resolve,
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::gaussian::GaussianState;
@@ -51,10 +51,7 @@ pub const KINDS: [(Kind, &str); 6] = [
 /// The configuration of a recording device, and its recorder.
 pub fn recording() -> (Config, Arc<Recorder>) {
     let recorder = Arc::new(Recorder::default());
-    let config = Config {
-        recorder: Some(Arc::clone(&recorder)),
-        ..Config::default()
-    };
+    let config = Config { recorder: Some(Arc::clone(&recorder)), ..Config::default() };
     (config, recorder)
 }
 
@@ -79,13 +76,7 @@ pub fn draw_on(device: &Arc<Device>, kind: Kind, around: [&[Packet]; 2]) -> Vec<
         }
         let clear = |value| LoadOp::Clear(value);
         packets.push(Packet::BeginRendering(Box::new(Rendering {
-            depth: Some(attachment(
-                &depth,
-                clear(ClearValue::DepthStencil {
-                    depth: 1.0,
-                    stencil: 0,
-                }),
-            )),
+            depth: Some(attachment(&depth, clear(ClearValue::DepthStencil { depth: 1.0, stencil: 0 }))),
             ..rendering(attachment(&color, clear(ClearValue::Float([0.0; 4]))))
         })));
         if !matches!(kind, Kind::Gaussians | Kind::Shaded) {
@@ -114,10 +105,7 @@ fn tested(mut packets: Vec<Packet>) -> Vec<Packet> {
     for packet in &mut packets {
         if let Packet::GaussianBegin(begin) = packet {
             let mut state = GaussianState::clone(&begin.state);
-            state.depth_stencil.depth = Some(DepthTest {
-                compare: CompareOp::Less,
-                write: false,
-            });
+            state.depth_stencil.depth = Some(DepthTest { compare: CompareOp::Less, write: false });
             begin.state = Arc::new(state);
             // Beyond the near plane at 1, depths are those of a perspective projection.
             begin.camera.depth_coefficients = [1.2, -1.2];
@@ -132,15 +120,9 @@ const FLOATS: usize = 8;
 /// A program that copies its inputs to its outputs, the colours after some arithmetic.
 fn program(squared: std::ops::Range<usize>, count: usize) -> Program {
     let mut b = Builder::new();
-    let inputs: Vec<_> = (0..count)
-        .map(|slot| b.input(slot as u32, Type::B32, Rate::Varying))
-        .collect();
+    let inputs: Vec<_> = (0..count).map(|slot| b.input(slot as u32, Type::B32, Rate::Varying)).collect();
     for (slot, &input) in inputs.iter().enumerate() {
-        let value = if squared.contains(&slot) {
-            b.compute(Op::FMul, &[input, input])
-        } else {
-            input
-        };
+        let value = if squared.contains(&slot) { b.compute(Op::FMul, &[input, input]) } else { input };
         let output = b.output(slot as u32, Type::B32);
         b.assign(output, value);
     }
@@ -158,9 +140,7 @@ fn dispatch(device: &Device) -> Packet {
     b.assign(output, value);
     let program = b.finish().unwrap();
     Packet::Dispatch(Box::new(Dispatch {
-        program: Arc::new(
-            ComputeProgram::new(device.level(), program, 64, 32, Vec::new()).unwrap(),
-        ),
+        program: Arc::new(ComputeProgram::new(device.level(), program, 64, 32, Vec::new()).unwrap()),
         base: [0; 3],
         count: [40, 2, 1],
         bindings: Bindings::default(),
@@ -184,22 +164,13 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
     let memory = Allocation::new_zeroed(size).unwrap();
     memory.write(0, &floats).unwrap();
     let stream = |offset| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size },
         stride: 48,
         offset,
         format: Format::R32G32B32A32Sfloat,
         instance_divisor: None,
     };
-    let inputs = (0..12).map(|slot| {
-        Some(VertexInput::Attribute {
-            stream: slot / 4,
-            component: slot % 4,
-        })
-    });
+    let inputs = (0..12).map(|slot| Some(VertexInput::Attribute { stream: slot / 4, component: slot % 4 }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
     let others = (0..gaussian::VARYINGS).map(|number| Some(VertexOutput::Varying(number)));
     let programs = DrawPrograms {
@@ -223,15 +194,7 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
                 })
             })
             .collect(),
-        outputs: (0..4)
-            .map(|component| {
-                Some(FragmentOutput::Color {
-                    attachment: 0,
-                    component,
-                    index: 0,
-                })
-            })
-            .collect(),
+        outputs: (0..4).map(|component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 })).collect(),
         early_tests: false,
         discards: false,
         per_sample: false,
@@ -283,35 +246,21 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
     let memory = Allocation::new_zeroed(size).unwrap();
     memory.write(0, &floats).unwrap();
     let stream = |offset| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size },
         stride: 4 * FLOATS as u32,
         offset,
         format: Format::R32G32B32A32Sfloat,
         instance_divisor: None,
     };
-    let attribute =
-        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let attribute = |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
-    let color = (0..4).map(|component| FragmentOutput::Color {
-        attachment: 0,
-        component,
-        index: 0,
-    });
-    let varying = |index| FragmentInput::Varying {
-        index,
-        interpolation: Interpolation::Perspective,
-        sampling: Sampling::Center,
-    };
+    let color = (0..4).map(|component| FragmentOutput::Color { attachment: 0, component, index: 0 });
+    let varying =
+        |index| FragmentInput::Varying { index, interpolation: Interpolation::Perspective, sampling: Sampling::Center };
     let programs = DrawPrograms {
         vertex: program(4..8, FLOATS),
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
-        vertex_outputs: position
-            .chain((0..4).map(|number| Some(VertexOutput::Varying(number))))
-            .collect(),
+        vertex_outputs: position.chain((0..4).map(|number| Some(VertexOutput::Varying(number)))).collect(),
         varyings: 4,
         captured: None,
         tessellation: None,
@@ -328,10 +277,7 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
     };
     let state = DrawState {
         depth_stencil: DepthStencil {
-            depth: Some(DepthTest {
-                compare: CompareOp::Less,
-                write: true,
-            }),
+            depth: Some(DepthTest { compare: CompareOp::Less, write: true }),
             bounds: None,
             stencil: None,
         },

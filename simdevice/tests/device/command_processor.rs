@@ -19,14 +19,7 @@ fn pass() -> Packet {
 fn fill() -> Packet {
     let view = image(Format::R8Unorm, 1, 0);
     let memory = view.image.memory.clone();
-    Packet::FillBuffer {
-        target: BufferRange {
-            memory,
-            offset: 0,
-            size: 16,
-        },
-        word: 1,
-    }
+    Packet::FillBuffer { target: BufferRange { memory, offset: 0, size: 16 }, word: 1 }
 }
 
 #[gaurast_runner::test]
@@ -73,20 +66,14 @@ fn sets_of_gaussians_do_not_nest_or_outlive_the_pass() {
     processor.execute(append).unwrap();
     processor.execute(append).unwrap();
     processor.execute(resolve).unwrap();
-    assert_eq!(
-        processor.execute(resolve),
-        Err(ExecutionError::NoGaussianSet)
-    );
+    assert_eq!(processor.execute(resolve), Err(ExecutionError::NoGaussianSet));
     processor.execute(begin).unwrap();
     assert_eq!(processor.execute(&Packet::EndRendering), open);
     assert!(!processor.in_pass());
     processor.execute(&pass()).unwrap();
     processor.execute(begin).unwrap();
     processor.reset();
-    assert_eq!(
-        processor.execute(&Packet::GaussianEnd),
-        Err(ExecutionError::NoGaussianSet)
-    );
+    assert_eq!(processor.execute(&Packet::GaussianEnd), Err(ExecutionError::NoGaussianSet));
     processor.execute(&pass()).unwrap();
 }
 
@@ -96,10 +83,7 @@ fn attachments_that_cannot_be_rendered_to_begin_no_pass() {
     let mut view = image(Format::R8Unorm, 1, 0);
     view.base_layer = 5;
     let packet = Packet::BeginRendering(Box::new(rendering(attachment(&view, LoadOp::Load))));
-    assert!(matches!(
-        processor.execute(&packet),
-        Err(ExecutionError::Attachment(_))
-    ));
+    assert!(matches!(processor.execute(&packet), Err(ExecutionError::Attachment(_))));
     assert!(!processor.in_pass());
 }
 
@@ -110,9 +94,7 @@ fn timestamps_ascend() {
     let before = host_time();
     for index in 0..2 {
         let pool = pool.clone();
-        processor
-            .execute(&Packet::WriteTimestamp { pool, index })
-            .unwrap();
+        processor.execute(&Packet::WriteTimestamp { pool, index }).unwrap();
     }
     let stamp = |index| match pool.result(index) {
         Some(QueryResult::Timestamp(nanoseconds)) => nanoseconds,
@@ -120,13 +102,7 @@ fn timestamps_ascend() {
     };
     assert!(before <= stamp(0) && stamp(0) <= stamp(1) && stamp(1) <= host_time());
     let (first, count) = (0, 1);
-    processor
-        .execute(&Packet::ResetQueries {
-            pool: pool.clone(),
-            first,
-            count,
-        })
-        .unwrap();
+    processor.execute(&Packet::ResetQueries { pool: pool.clone(), first, count }).unwrap();
     assert_eq!(pool.result(0), None);
     assert!(pool.result(1).is_some());
 }
@@ -135,14 +111,8 @@ fn timestamps_ascend() {
 fn updates_arrive() {
     let mut processor = processor();
     let view = image(Format::R8Unorm, 1, 0);
-    let target = BufferRange {
-        memory: view.image.memory.clone(),
-        offset: 8,
-        size: 4,
-    };
+    let target = BufferRange { memory: view.image.memory.clone(), offset: 8, size: 4 };
     let data = Arc::from([1u8, 2, 3, 4]);
-    processor
-        .execute(&Packet::UpdateBuffer { target, data })
-        .unwrap();
+    processor.execute(&Packet::UpdateBuffer { target, data }).unwrap();
     assert_eq!(bytes(&view)[6..14], [0, 0, 1, 2, 3, 4, 0, 0]);
 }

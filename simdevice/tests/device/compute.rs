@@ -15,11 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 fn device() -> Arc<Device> {
-    let config = Config {
-        threads: 2,
-        shader_timeout: Duration::from_millis(50),
-        ..Config::default()
-    };
+    let config = Config { threads: 2, shader_timeout: Duration::from_millis(50), ..Config::default() };
     Arc::new(Device::new(&config).unwrap())
 }
 
@@ -34,30 +30,18 @@ fn numbering() -> Program {
     let first = b.compute(Op::IMul, &[group, twenty]);
     let index = b.compute(Op::IAdd, &[first, lane]);
     let base = b.compute(Op::IMul, &[index, four]);
-    let address = Address {
-        space: Space::Buffer(Binding::new(0)),
-        base: Some(base),
-        offset: 0,
-    };
+    let address = Address { space: Space::Buffer(Binding::new(0)), base: Some(base), offset: 0 };
     b.store(address, Format::B32, &[value]);
     b.finish().unwrap()
 }
 
 fn dispatch(program: &Arc<ComputeProgram>, memory: &Arc<Allocation>, count: [u32; 3]) -> Packet {
-    let range = BufferRange {
-        memory: Arc::clone(memory),
-        offset: 0,
-        size: memory.len(),
-    };
+    let range = BufferRange { memory: Arc::clone(memory), offset: 0, size: memory.len() };
     Packet::Dispatch(Box::new(Dispatch {
         program: Arc::clone(program),
         base: [1, 0, 0],
         count,
-        bindings: Bindings {
-            buffers: vec![Some(range)],
-            written: vec![Arc::clone(memory)],
-            ..Bindings::default()
-        },
+        bindings: Bindings { buffers: vec![Some(range)], written: vec![Arc::clone(memory)], ..Bindings::default() },
     }))
 }
 
@@ -68,9 +52,7 @@ fn every_workgroup_runs_and_its_work_is_counted() {
     let program = ComputeProgram::new(device.level(), numbering(), 20, 32, inputs).unwrap();
     let (program, memory) = (Arc::new(program), Allocation::new_zeroed(80 * 400).unwrap());
     let mut processor = CommandProcessor::new(device);
-    processor
-        .execute(&dispatch(&program, &memory, [300, 1, 1]))
-        .unwrap();
+    processor.execute(&dispatch(&program, &memory, [300, 1, 1])).unwrap();
     let mut words = vec![0u32; 20 * 302];
     memory.read(0, &mut words).unwrap();
     for (index, word) in (0u32..).zip(words) {
@@ -83,45 +65,27 @@ fn every_workgroup_runs_and_its_work_is_counted() {
     assert_eq!(counters.get(Counter::ShaderBatches), 300);
     assert_eq!(counters.get(Counter::ShaderMemory), 300);
     // 20 of 32 lanes are active.
-    let (active, lanes) = (
-        counters.get(Counter::ShaderActiveLanes),
-        counters.get(Counter::ShaderLanes),
-    );
+    let (active, lanes) = (counters.get(Counter::ShaderActiveLanes), counters.get(Counter::ShaderLanes));
     assert!(active > 0);
     assert_eq!(active * 32, lanes * 20);
 
-    processor
-        .execute(&dispatch(&program, &memory, [300, 0, 1]))
-        .unwrap();
-    assert_eq!(
-        processor.counters().get(Counter::ShaderBatches),
-        300,
-        "nothing to do"
-    );
+    processor.execute(&dispatch(&program, &memory, [300, 0, 1])).unwrap();
+    assert_eq!(processor.counters().get(Counter::ShaderBatches), 300, "nothing to do");
 }
 
 #[gaurast_runner::test]
 fn a_program_without_end_is_stopped() {
     let device = device();
     let mut endless = Program::default();
-    endless.body.push(Statement::Loop {
-        label: Label(0),
-        body: Vec::new(),
-        continuing: Vec::new(),
-    });
-    let endless =
-        Arc::new(ComputeProgram::new(device.level(), endless, 16, 32, Vec::new()).unwrap());
+    endless.body.push(Statement::Loop { label: Label(0), body: Vec::new(), continuing: Vec::new() });
+    let endless = Arc::new(ComputeProgram::new(device.level(), endless, 16, 32, Vec::new()).unwrap());
     let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
     let honest = ComputeProgram::new(device.level(), numbering(), 20, 32, inputs).unwrap();
     let memory = Allocation::new_zeroed(80 * 8).unwrap();
     let mut processor = CommandProcessor::new(device);
-    let error = processor
-        .execute(&dispatch(&endless, &memory, [7, 5, 3]))
-        .unwrap_err();
+    let error = processor.execute(&dispatch(&endless, &memory, [7, 5, 3])).unwrap_err();
     let limit = Duration::from_millis(50);
     assert_eq!(error, ExecutionError::Stopped(Stopped::TimedOut { limit }));
-    processor
-        .execute(&dispatch(&Arc::new(honest), &memory, [2, 1, 1]))
-        .unwrap();
+    processor.execute(&dispatch(&Arc::new(honest), &memory, [2, 1, 1])).unwrap();
     assert_eq!(memory.load_u32(80 + 4), Some(101));
 }

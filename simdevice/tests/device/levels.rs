@@ -12,10 +12,7 @@ fn every_level_draws_what_the_simplest_draws(case: &Case) {
     assert!(SimdLevel::supported().contains(&(case.variant(), level)));
     for (kind, name) in KINDS {
         let [simplest, drawn] = [SimdLevel::Baseline, level].map(|simd| {
-            let config = Config {
-                simd,
-                ..Config::default()
-            };
+            let config = Config { simd, ..Config::default() };
             draw(kind, &config, [&[], &[]])
         });
         // Levels with fused multiply-add round once: a value may be rounded to the other neighbour.

@@ -26,14 +26,8 @@ fn trace(kind: Kind) -> Trace {
 /// The counters of a query around a scene.
 fn counted(kind: Kind, query: QueryKind, config: &Config) -> Counters {
     let pool = Arc::new(QueryPool::new(query, 1));
-    let begin = Packet::BeginQuery {
-        pool: pool.clone(),
-        index: 0,
-    };
-    let end = Packet::EndQuery {
-        pool: pool.clone(),
-        index: 0,
-    };
+    let begin = Packet::BeginQuery { pool: pool.clone(), index: 0 };
+    let end = Packet::EndQuery { pool: pool.clone(), index: 0 };
     draw(kind, config, [&[begin], &[end]]);
     match pool.result(0) {
         Some(QueryResult::Performance(counters)) => *counters,
@@ -56,10 +50,7 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
         let (config, recorder) = recording();
         assert!(draw(kind, &config, NOTHING) == plain, "{name}, recorded");
         assert!(!recorder.trace().frames.is_empty(), "{name}");
-        let simulated = Config {
-            simulated_timestamps: true,
-            ..Config::default()
-        };
+        let simulated = Config { simulated_timestamps: true, ..Config::default() };
         assert!(draw(kind, &simulated, NOTHING) == plain, "{name}, timed");
         for threads in [1, 3] {
             let (config, again) = recording();
@@ -72,30 +63,20 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
 #[gaurast_runner::test]
 fn the_trace_of_triangles_agrees_with_the_counters() {
     // The trace describes hardware that also shades fragments that are overwritten later.
-    let config = Config {
-        optimizations: Optimizations::ALL.without(Optimization::OverwrittenQuads),
-        ..Config::default()
-    };
+    let config =
+        Config { optimizations: Optimizations::ALL.without(Optimization::OverwrittenQuads), ..Config::default() };
     let counters = counted(Kind::Triangles, QueryKind::Performance, &config);
     let trace = trace(Kind::Triangles);
     let of = |of: fn(&TileWork) -> u64| sum(&trace, Mode::Triangle, of);
     let hidden = of(|tile| tile.hidden().into());
     assert_eq!(hidden, counters.get(Counter::TilesHidden));
     assert!(hidden > 0 && of(|tile| tile.killed.into()) > 0);
-    assert_eq!(
-        of(|tile| tile.contributions),
-        counters.get(Counter::SamplesPassed)
-    );
-    assert_eq!(
-        of(|tile| tile.contributions),
-        counters.get(Counter::FragmentInvocations)
-    );
+    assert_eq!(of(|tile| tile.contributions), counters.get(Counter::SamplesPassed));
+    assert_eq!(of(|tile| tile.contributions), counters.get(Counter::FragmentInvocations));
     let quads = of(|tile| tile.quads.into());
     assert!(4 * quads >= of(|tile| tile.contributions));
     for tile in trace.frames.iter().flat_map(|frame| &frame.draws[0].tiles) {
-        let [run] = tile.runs.as_slice() else {
-            panic!("one run: {tile:?}")
-        };
+        let [run] = tile.runs.as_slice() else { panic!("one run: {tile:?}") };
         assert_eq!(run.primitives, tile.listed);
         assert!(run.reached + tile.hidden_blocks() <= 16 * tile.listed);
         assert!(tile.quads + tile.killed <= 4 * run.reached);
@@ -104,15 +85,9 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     let primitives: u64 = draws.iter().map(|draw| draw.primitives).sum();
     assert_eq!(primitives, counters.get(Counter::InputPrimitives));
     // All work of the shader cores is before or after that of tiles.
-    let operations: f64 = draws
-        .iter()
-        .map(|draw| draw.preprocess.operations() + draw.shade.operations())
-        .sum();
+    let operations: f64 = draws.iter().map(|draw| draw.preprocess.operations() + draw.shade.operations()).sum();
     let lanes = counters.get(Counter::ShaderActiveLanes) + counters.get(Counter::ShaderUniform);
-    assert!(
-        (operations - lanes as f64).abs() < 0.5,
-        "{operations} {lanes}"
-    );
+    assert!((operations - lanes as f64).abs() < 0.5, "{operations} {lanes}");
     for draw in draws {
         assert!(draw.preprocess.float > 0.0 && draw.shade.float > 0.0);
         // At least 32 bytes of attributes and 32 of outputs for each vertex, and 36 for each triangle.
@@ -121,11 +96,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
         assert!(draw.sized_pairs.is_sorted_by(|a, b| a > b), "{draw:?}");
         let listed: u64 = draw.pairs();
         // Bounding boxes are those of drawn primitives, so that lists have no more pairs.
-        assert!(
-            listed <= draw.sized_pairs[1],
-            "{listed} {:?}",
-            draw.sized_pairs
-        );
+        assert!(listed <= draw.sized_pairs[1], "{listed} {:?}", draw.sized_pairs);
     }
 }
 
@@ -135,8 +106,7 @@ fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
     let trace = trace(Kind::Shaded);
     let draws: Vec<_> = trace.frames.iter().map(|frame| &frame.draws[0]).collect();
     assert_eq!(draws.len(), 2);
-    let operations =
-        counters.get(Counter::ShaderActiveLanes) + counters.get(Counter::ShaderUniform);
+    let operations = counters.get(Counter::ShaderActiveLanes) + counters.get(Counter::ShaderUniform);
     let mut programs = 0.0;
     for draw in &draws {
         assert_eq!((draw.mode, draw.primitives), (Mode::Gaussian, 1000));
@@ -152,18 +122,11 @@ fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
         assert!(draw.preprocess.float > footprints.float && draw.shade.float > 0.0);
         // 48 bytes of attributes and as many of outputs.
         let bytes = footprints.bytes + 1000.0 * 96.0;
-        assert!(
-            draw.preprocess.bytes >= bytes
-                && draw.preprocess.bytes < bytes + 4.0 * operations as f64
-        );
-        programs +=
-            draw.preprocess.operations() - footprints.operations() + draw.shade.operations();
+        assert!(draw.preprocess.bytes >= bytes && draw.preprocess.bytes < bytes + 4.0 * operations as f64);
+        programs += draw.preprocess.operations() - footprints.operations() + draw.shade.operations();
     }
     // The operations of both programs, counted by lane.
-    assert!(
-        (programs - operations as f64).abs() < 0.5,
-        "{programs} {operations}"
-    );
+    assert!((programs - operations as f64).abs() < 0.5, "{programs} {operations}");
 }
 
 #[gaurast_runner::test]
@@ -194,16 +157,10 @@ fn both_models_agree_on_every_kind_of_scene() {
                     let fast = fast::rasterize(frame, &hardware, 0.0);
                     let slow = stepped::rasterize(frame, &hardware, 0.0);
                     let off = (fast.cycles - slow.cycles).abs();
-                    assert!(
-                        off <= 0.02 * slow.cycles,
-                        "{name}, {preset}, {setting}: {} {}",
-                        fast.cycles,
-                        slow.cycles
-                    );
+                    assert!(off <= 0.02 * slow.cycles, "{name}, {preset}, {setting}: {} {}", fast.cycles, slow.cycles);
                     assert_eq!(fast.switches, slow.switches, "{name}, {preset}");
-                    let evaluations = |report: &RasterReport| {
-                        [report.gaussian_evaluations, report.triangle_evaluations]
-                    };
+                    let evaluations =
+                        |report: &RasterReport| [report.gaussian_evaluations, report.triangle_evaluations];
                     assert_eq!(evaluations(&fast), evaluations(&slow));
                 }
             }
@@ -226,11 +183,8 @@ fn mode_switches_cost_what_the_configuration_says() {
     let more = dear.modules.mode_switch - cheap.modules.mode_switch;
     assert!((more - 100.0 * cheap.switches).abs() < 1e-6);
     assert!(dear.cycles > cheap.cycles + 50.0 * cheap.switches);
-    let triangles = fast::rasterize(
-        &frame.of_mode(Mode::Triangle),
-        &Hardware::preset("single-module", &[]).unwrap(),
-        0.0,
-    );
+    let triangles =
+        fast::rasterize(&frame.of_mode(Mode::Triangle), &Hardware::preset("single-module", &[]).unwrap(), 0.0);
     assert_eq!(triangles.switches, 0.0);
 }
 
@@ -240,13 +194,8 @@ fn timelines_are_well_formed_and_engines_do_one_thing_at_a_time() {
         let trace = trace(kind);
         for preset in ["paper-15x16", "orin-nx-10w"] {
             let hardware = Hardware::preset(preset, &[]).unwrap();
-            let frames: Vec<_> = trace
-                .frames
-                .iter()
-                .map(|frame| simulate::simulate(frame, &hardware))
-                .cycle()
-                .take(5)
-                .collect();
+            let frames: Vec<_> =
+                trace.frames.iter().map(|frame| simulate::simulate(frame, &hardware)).cycle().take(5).collect();
             let spans = simulate::timeline(&frames, &hardware);
             let text = serde_json::to_string(&schedule::chrome_trace(&spans, &hardware)).unwrap();
             let json: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -289,58 +238,32 @@ fn a_query_counts_what_the_model_says_of_the_trace() {
         let counters = counted(kind, QueryKind::Simulated, &Config::default());
         let (config, _) = recording();
         let recorded = counted(kind, QueryKind::Simulated, &config);
-        let results: Vec<_> = trace(kind)
-            .frames
-            .iter()
-            .map(|frame| simulate::simulate(frame, &hardware))
-            .collect();
+        let results: Vec<_> = trace(kind).frames.iter().map(|frame| simulate::simulate(frame, &hardware)).collect();
         let total = |of: fn(&simulate::Simulation) -> f64| results.iter().map(of).sum::<f64>();
         let expected = [
             (Counter::SimulatedTime, total(|r| r.stages.total() * 1e6)),
             (Counter::SimulatedShade, total(|r| r.stages.shade * 1e6)),
             (Counter::SimulatedRasterCycles, total(|r| r.raster.cycles)),
             (Counter::SimulatedBusy, total(|r| r.raster.modules.busy)),
-            (
-                Counter::SimulatedDependency,
-                total(|r| r.raster.modules.dependency),
-            ),
-            (
-                Counter::SimulatedMemoryStall,
-                total(|r| r.raster.modules.memory),
-            ),
-            (
-                Counter::SimulatedController,
-                total(|r| r.raster.modules.controller),
-            ),
-            (
-                Counter::SimulatedModeSwitch,
-                total(|r| r.raster.modules.mode_switch),
-            ),
+            (Counter::SimulatedDependency, total(|r| r.raster.modules.dependency)),
+            (Counter::SimulatedMemoryStall, total(|r| r.raster.modules.memory)),
+            (Counter::SimulatedController, total(|r| r.raster.modules.controller)),
+            (Counter::SimulatedModeSwitch, total(|r| r.raster.modules.mode_switch)),
             (Counter::SimulatedIdle, total(|r| r.raster.modules.idle)),
             (Counter::SimulatedBytesIn, total(|r| r.raster.bytes_in)),
             (Counter::SimulatedBytesOut, total(|r| r.raster.bytes_out)),
             (Counter::SimulatedSwitches, total(|r| r.raster.switches)),
-            (
-                Counter::SimulatedArithmeticEnergy,
-                total(|r| r.energy.arithmetic * 1e6),
-            ),
+            (Counter::SimulatedArithmeticEnergy, total(|r| r.energy.arithmetic * 1e6)),
         ];
         for (counter, expected) in expected {
             for counters in [&counters, &recorded] {
                 let value = counters.get(counter) as f64;
-                assert!(
-                    (value - expected).abs() <= 2.0,
-                    "{name}, {counter:?}: {value} {expected}"
-                );
+                assert!((value - expected).abs() <= 2.0, "{name}, {counter:?}: {value} {expected}");
             }
         }
         assert!(counters.get(Counter::SimulatedTime) > 0, "{name}");
         let occupancy = counters.get(Counter::SimulatedOccupancy);
-        assert_eq!(
-            occupancy > 0,
-            kind != Kind::Dispatches,
-            "{name}: {occupancy}"
-        );
+        assert_eq!(occupancy > 0, kind != Kind::Dispatches, "{name}: {occupancy}");
         assert!(occupancy <= 100);
         // Without a request for the model, no time is simulated.
         let plain = counted(kind, QueryKind::Performance, &Config::default());
@@ -353,11 +276,7 @@ fn counted_on(device: &Arc<Device>, kind: Kind) -> Counters {
     let pool = Arc::new(QueryPool::new(QueryKind::Simulated, 1));
     let [begin, end] = [true, false].map(|begins| {
         let (pool, index) = (Arc::clone(&pool), 0);
-        if begins {
-            Packet::BeginQuery { pool, index }
-        } else {
-            Packet::EndQuery { pool, index }
-        }
+        if begins { Packet::BeginQuery { pool, index } } else { Packet::EndQuery { pool, index } }
     });
     draw_on(device, kind, [&[begin], &[end]]);
     match pool.result(0) {
@@ -395,15 +314,9 @@ fn queries_of_several_queues_count_what_is_their_own() {
 
 #[gaurast_runner::test]
 fn timestamps_may_count_the_models_nanoseconds() {
-    let config = Config {
-        simulated_timestamps: true,
-        ..Config::default()
-    };
+    let config = Config { simulated_timestamps: true, ..Config::default() };
     let pool = Arc::new(QueryPool::new(QueryKind::Timestamp, 3));
-    let stamp = |index| Packet::WriteTimestamp {
-        pool: pool.clone(),
-        index,
-    };
+    let stamp = |index| Packet::WriteTimestamp { pool: pool.clone(), index };
     draw(Kind::Mixed, &config, [&[stamp(0)], &[stamp(1), stamp(2)]]);
     let times: Vec<_> = (0..3).map(|index| pool.result(index)).collect();
     let counters = counted(Kind::Mixed, QueryKind::Simulated, &Config::default());

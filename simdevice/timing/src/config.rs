@@ -177,10 +177,7 @@ pub struct Memory {
 /// The shader cores. Rates are lanes per SM and cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "named after the fields of ShaderWork that they execute"
-)]
+#[allow(missing_docs, reason = "named after the fields of ShaderWork that they execute")]
 pub struct Shader {
     pub sms: u32,
     pub clock_ghz: f64,
@@ -314,15 +311,9 @@ pub enum ConfigError {
 
 const PRESETS: &[(&str, &str)] = &[
     ("paper-15x16", include_str!("../presets/paper-15x16.toml")),
-    (
-        "paper-pipeline",
-        include_str!("../presets/paper-pipeline.toml"),
-    ),
+    ("paper-pipeline", include_str!("../presets/paper-pipeline.toml")),
     ("paper-300", include_str!("../presets/paper-300.toml")),
-    (
-        "single-module",
-        include_str!("../presets/single-module.toml"),
-    ),
+    ("single-module", include_str!("../presets/single-module.toml")),
     ("fp16", include_str!("../presets/fp16.toml")),
     ("orin-nx-10w", include_str!("../presets/orin-nx-10w.toml")),
     ("orin-nx-maxn", include_str!("../presets/orin-nx-maxn.toml")),
@@ -446,11 +437,7 @@ fn check(table: &Table) -> Result<(), ConfigError> {
             _ => continue,
         };
         if !range.contains(number) {
-            return Err(ConfigError::Range {
-                field: format!("{section}.{field}"),
-                value: number.to_string(),
-                range,
-            });
+            return Err(ConfigError::Range { field: format!("{section}.{field}"), value: number.to_string(), range });
         }
     }
     Ok(())
@@ -460,15 +447,12 @@ fn check(table: &Table) -> Result<(), ConfigError> {
 const MAX_DEPTH: usize = 8;
 
 fn parse(text: &str) -> Result<Table, ConfigError> {
-    text.parse()
-        .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
+    text.parse().map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
 }
 
 fn preset_table(name: &str, depth: usize) -> Result<Table, ConfigError> {
-    let (_, text) = PRESETS
-        .iter()
-        .find(|(known, _)| *known == name)
-        .ok_or_else(|| ConfigError::UnknownPreset(name.to_owned()))?;
+    let (_, text) =
+        PRESETS.iter().find(|(known, _)| *known == name).ok_or_else(|| ConfigError::UnknownPreset(name.to_owned()))?;
     resolve(parse(text)?, depth)
 }
 
@@ -478,9 +462,7 @@ fn resolve(mut table: Table, depth: usize) -> Result<Table, ConfigError> {
         return Ok(table);
     };
     let Value::String(parent) = parent else {
-        return Err(ConfigError::Toml(
-            "inherits is not the name of a preset".to_owned(),
-        ));
+        return Err(ConfigError::Toml("inherits is not the name of a preset".to_owned()));
     };
     if depth >= MAX_DEPTH {
         return Err(ConfigError::Inheritance(parent));
@@ -525,15 +507,11 @@ impl Config {
 
     fn from_table(mut table: Table, settings: &[String]) -> Result<Self, ConfigError> {
         for setting in settings {
-            let (name, value) = setting
-                .split_once('=')
-                .ok_or_else(|| ConfigError::Setting(setting.clone()))?;
+            let (name, value) = setting.split_once('=').ok_or_else(|| ConfigError::Setting(setting.clone()))?;
             set(&mut table, name.trim(), value.trim())?;
         }
         check(&table)?;
-        Value::Table(table)
-            .try_into()
-            .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
+        Value::Table(table).try_into().map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
     }
 }
 
@@ -559,10 +537,7 @@ fn set(table: &mut Table, name: &str, text: &str) -> Result<(), ConfigError> {
         }
     };
     let (section, field) = full.split_once('.').ok_or_else(unknown)?;
-    let value = table
-        .get_mut(section)
-        .and_then(|fields| fields.get_mut(field))
-        .ok_or_else(unknown)?;
+    let value = table.get_mut(section).and_then(|fields| fields.get_mut(field)).ok_or_else(unknown)?;
     let wrong = || ConfigError::Setting(format!("{name}={text}"));
     *value = match value {
         Value::Integer(_) => Value::Integer(text.parse().map_err(|_| wrong())?),
@@ -592,9 +567,7 @@ mod tests {
     #[test]
     fn every_number_of_the_presets_says_where_it_comes_from() {
         for (name, text) in PRESETS {
-            let fields = text
-                .lines()
-                .filter(|line| line.contains(" = ") && !line.starts_with("inherits"));
+            let fields = text.lines().filter(|line| line.contains(" = ") && !line.starts_with("inherits"));
             for line in fields.filter(|line| line.contains(char::is_numeric)) {
                 let explained = line.contains('#') || line.trim() == "modules = 0";
                 assert!(explained, "{name}: {line}");
@@ -610,24 +583,16 @@ mod tests {
         assert!((config.memory.efficiency - 0.5).abs() < 1e-12);
         assert_eq!(config.rasterizer.saturation, Saturation::Block);
         let error = |setting: &str| Config::preset("fp16", &[setting.to_owned()]).unwrap_err();
-        assert!(
-            matches!(error("clock_ghz=1"), ConfigError::Ambiguous { among, .. } if among.len() == 2)
-        );
+        assert!(matches!(error("clock_ghz=1"), ConfigError::Ambiguous { among, .. } if among.len() == 2));
         assert!(matches!(error("moduls=1"), ConfigError::UnknownField(_)));
         assert!(matches!(error("modules"), ConfigError::Setting(_)));
-        assert!(matches!(
-            Config::preset("paper", &[]).unwrap_err(),
-            ConfigError::UnknownPreset(_)
-        ));
+        assert!(matches!(Config::preset("paper", &[]).unwrap_err(), ConfigError::UnknownPreset(_)));
     }
 
     #[test]
     fn a_file_may_inherit_and_unknown_fields_are_refused() {
         let config = Config::parse("inherits = 'fp16'\n[rasterizer]\nmodules = 3", &[]).unwrap();
-        assert_eq!(
-            (config.rasterizer.modules, config.rasterizer.number_bytes),
-            (3, 2)
-        );
+        assert_eq!((config.rasterizer.modules, config.rasterizer.number_bytes), (3, 2));
         let typo = Config::parse("inherits = 'fp16'\n[rasterizer]\nmodulse = 3", &[]);
         assert!(matches!(typo, Err(ConfigError::Toml(_))));
         let again = config.with(&["modules=4".to_owned()]).unwrap();
@@ -641,38 +606,14 @@ mod tests {
             other => panic!("{setting}: {other:?}"),
         };
         for (setting, sentence) in [
-            (
-                "memory.efficiency=100",
-                "memory.efficiency is 100; it must be more than 0 and at most 1",
-            ),
-            (
-                "power_w=-5",
-                "soc.power_w is -5; it must be more than 0 and at most 10000",
-            ),
-            (
-                "bandwidth_gb_s=nan",
-                "memory.bandwidth_gb_s is NaN; it must be from 0.01 to 100000",
-            ),
-            (
-                "numbers_in=4294967295",
-                "rasterizer.numbers_in is 4294967295; it must be from 1 to 256",
-            ),
-            (
-                "modules=-1",
-                "rasterizer.modules is -1; it must be from 0 to 4096",
-            ),
-            (
-                "batch=0",
-                "rasterizer.batch is 0; it must be from 1 to 65536",
-            ),
-            (
-                "tile_side=15",
-                "rasterizer.tile_side is 15; it must be one of 8, 16, 32, 64",
-            ),
-            (
-                "latency_ns=inf",
-                "memory.latency_ns is inf; it must be from 0 to 1000000",
-            ),
+            ("memory.efficiency=100", "memory.efficiency is 100; it must be more than 0 and at most 1"),
+            ("power_w=-5", "soc.power_w is -5; it must be more than 0 and at most 10000"),
+            ("bandwidth_gb_s=nan", "memory.bandwidth_gb_s is NaN; it must be from 0.01 to 100000"),
+            ("numbers_in=4294967295", "rasterizer.numbers_in is 4294967295; it must be from 1 to 256"),
+            ("modules=-1", "rasterizer.modules is -1; it must be from 0 to 4096"),
+            ("batch=0", "rasterizer.batch is 0; it must be from 1 to 65536"),
+            ("tile_side=15", "rasterizer.tile_side is 15; it must be one of 8, 16, 32, 64"),
+            ("latency_ns=inf", "memory.latency_ns is inf; it must be from 0 to 1000000"),
         ] {
             assert_eq!(said(setting), sentence);
         }
@@ -689,9 +630,7 @@ mod tests {
         let mut count = 0;
         for (section, fields) in &table {
             for name in numbers(fields) {
-                let of_it = RANGES
-                    .iter()
-                    .filter(|(s, f, _)| (s, f) == (&section.as_str(), &name.as_str()));
+                let of_it = RANGES.iter().filter(|(s, f, _)| (s, f) == (&section.as_str(), &name.as_str()));
                 assert_eq!(of_it.count(), 1, "{section}.{name}");
                 count += 1;
                 // NaN is in no range.
@@ -704,11 +643,7 @@ mod tests {
 
     /// A number as a field of a table writes it: integers without a point.
     fn written(number: f64, is_integer: bool) -> String {
-        if is_integer {
-            format!("{number:.0}")
-        } else {
-            format!("{number:e}")
-        }
+        if is_integer { format!("{number:.0}") } else { format!("{number:e}") }
     }
 
     #[test]
@@ -749,9 +684,7 @@ mod tests {
                     result.baseline_mj,
                 ];
                 assert!(
-                    numbers
-                        .iter()
-                        .all(|number| number.is_finite() && *number >= 0.0),
+                    numbers.iter().all(|number| number.is_finite() && *number >= 0.0),
                     "{section}.{field}={number}: {numbers:?}"
                 );
             }
@@ -790,10 +723,7 @@ mod tests {
             let config = config.unwrap_or_else(|error| panic!("{error}"));
             let result = crate::simulate::simulate(&frame, &config);
             let numbers = [result.raster.cycles, result.fps, result.energy.total()];
-            assert!(
-                numbers.iter().all(|number| number.is_finite()),
-                "{numbers:?}"
-            );
+            assert!(numbers.iter().all(|number| number.is_finite()), "{numbers:?}");
         }
     }
 
@@ -803,20 +733,10 @@ mod tests {
         let gaussian = |raster: &Rasterizer, groups| raster.busy_cycles(Mode::Gaussian, groups);
         assert_eq!(gaussian(&raster, 16), 16);
         assert_eq!(raster.busy_cycles(Mode::Triangle, 16), 16);
-        let wide = Rasterizer {
-            pes_per_module: 20,
-            ..raster.clone()
-        };
+        let wide = Rasterizer { pes_per_module: 20, ..raster.clone() };
         assert_eq!(gaussian(&wide, 16), 13, "256 pixels on 20 PEs");
-        let unfolded = Rasterizer {
-            opacity_folded: false,
-            ..raster
-        };
-        assert_eq!(
-            gaussian(&unfolded, 16),
-            32,
-            "11 multiplications on 10 units"
-        );
+        let unfolded = Rasterizer { opacity_folded: false, ..raster };
+        assert_eq!(gaussian(&unfolded, 16), 32, "11 multiplications on 10 units");
     }
 
     #[test]
@@ -827,10 +747,7 @@ mod tests {
         assert_eq!(waits(Mode::Gaussian, 2, 2), 5, "both have both blocks");
         assert_eq!(waits(Mode::Gaussian, 2, 3), 5, "two of three are shared");
         assert_eq!(waits(Mode::Gaussian, 2, 4), 3, "half of them are apart");
-        let apart = Rasterizer {
-            neighbour_sharing: 0.0,
-            ..raster.clone()
-        };
+        let apart = Rasterizer { neighbour_sharing: 0.0, ..raster.clone() };
         assert_eq!(apart.waiting_cycles(Mode::Gaussian, 2, 4), 0, "all are");
         assert_eq!(waits(Mode::Gaussian, 0, 16), 0);
         assert_eq!(waits(Mode::Triangle, 2, 2), 0, "no transmittance");

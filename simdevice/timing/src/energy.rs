@@ -65,10 +65,7 @@ pub fn evaluation_pj(mode: Mode, blended: f64, config: &Config) -> [f64; 2] {
             let out = f64::from(raster.numbers_out) * number;
             // Depth is read and compared at each pixel; pixels that pass are written.
             let bytes = number + out * blended;
-            [
-                operations_pj(Operations::TRIANGLE, energy),
-                bytes * energy.buffer_pj_per_byte,
-            ]
+            [operations_pj(Operations::TRIANGLE, energy), bytes * energy.buffer_pj_per_byte]
         }
         Mode::Gaussian => {
             let all = operations_pj(Operations::GAUSSIAN, energy);
@@ -85,10 +82,9 @@ fn busy_cycle_pj(mode: Mode, config: &Config) -> f64 {
     let raster: &Rasterizer = &config.rasterizer;
     let [arithmetic, buffers] = evaluation_pj(mode, config.energy.blended_share, config);
     // A primitive passes through the buffer once for all PEs: it is written, then read.
-    let pixels = f64::from(raster.tile_side).powi(2) * f64::from(raster.interval(mode))
-        / f64::from(raster.pes_per_module);
-    let primitive =
-        2.0 * f64::from(raster.primitive_bytes()) / pixels * config.energy.buffer_pj_per_byte;
+    let pixels =
+        f64::from(raster.tile_side).powi(2) * f64::from(raster.interval(mode)) / f64::from(raster.pes_per_module);
+    let primitive = 2.0 * f64::from(raster.primitive_bytes()) / pixels * config.energy.buffer_pj_per_byte;
     let interval = f64::from(raster.interval(mode));
     f64::from(raster.pes_per_module) * (arithmetic + buffers) / interval + primitive
 }
@@ -128,8 +124,7 @@ pub fn static_w(config: &Config) -> f64 {
     let mut alike = config.clone();
     alike.rasterizer.pes_per_module = MEASURED_PES;
     let of = |config| busy_cycle_pj(Mode::Gaussian, config);
-    let size = of(&alike) / of(&measured) * f64::from(config.rasterizer.pes_per_module)
-        / f64::from(MEASURED_PES);
+    let size = of(&alike) / of(&measured) * f64::from(config.rasterizer.pes_per_module) / f64::from(MEASURED_PES);
     measured.energy.module_power_w * measured.energy.static_share * size
 }
 
@@ -145,10 +140,7 @@ pub struct Changed {
 impl Changed {
     /// The same share for both.
     pub fn both(share: f64) -> Self {
-        Self {
-            blended: share,
-            covered: share,
-        }
+        Self { blended: share, covered: share }
     }
 }
 
@@ -186,22 +178,9 @@ mod tests {
     use crate::work::{DrawWork, FrameWork, TileWork};
 
     fn report(config: &Config) -> RasterReport {
-        let tiles = (0..400)
-            .map(|x| TileWork::open([x % 20, x / 20], 2000))
-            .collect();
-        let draws = vec![DrawWork {
-            tiles,
-            ..DrawWork::default()
-        }];
-        fast::rasterize(
-            &FrameWork {
-                size: [320, 320],
-                draws,
-                ..FrameWork::default()
-            },
-            config,
-            0.0,
-        )
+        let tiles = (0..400).map(|x| TileWork::open([x % 20, x / 20], 2000)).collect();
+        let draws = vec![DrawWork { tiles, ..DrawWork::default() }];
+        fast::rasterize(&FrameWork { size: [320, 320], draws, ..FrameWork::default() }, config, 0.0)
     }
 
     #[test]
@@ -212,11 +191,7 @@ mod tests {
         let watts = energy.modules() / report.milliseconds(config.rasterizer.clock_ghz);
         // This frame keeps the PEs busier than the calibration frames do.
         let dynamic = 1.7 * 0.8 * report.utilization() / CALIBRATION_UTILIZATION;
-        assert!(
-            (watts - (dynamic + 1.7 * 0.2)).abs() < 0.02,
-            "{watts} {}",
-            report.utilization()
-        );
+        assert!((watts - (dynamic + 1.7 * 0.2)).abs() < 0.02, "{watts} {}", report.utilization());
     }
 
     #[test]
@@ -235,8 +210,7 @@ mod tests {
         let full = Config::preset("paper-15x16", &[]).unwrap();
         let half = Config::preset("fp16", &[]).unwrap();
         let (a, b) = (report(&full), report(&half));
-        let spent =
-            |report, blended, config| rasterizer(report, Changed::both(blended), config).modules();
+        let spent = |report, blended, config| rasterizer(report, Changed::both(blended), config).modules();
         assert!(spent(&b, 0.25, &half) < 0.6 * spent(&a, 0.25, &full));
         assert!(spent(&a, 0.1, &full) < spent(&a, 0.9, &full));
     }

@@ -35,29 +35,19 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
 }
 
 /// Rasterizes like [`rasterize`], and returns also the tiles of each module in order, module after module.
-pub fn rasterize_tiles(
-    frame: &FrameWork,
-    config: &Config,
-    others_gb_s: f64,
-) -> (RasterReport, Vec<TileSpan>) {
+pub fn rasterize_tiles(frame: &FrameWork, config: &Config, others_gb_s: f64) -> (RasterReport, Vec<TileSpan>) {
     let tasks = plan::tasks(frame, &Division::of(&config.rasterizer));
     rasterize_tasks(&tasks, config, others_gb_s)
 }
 
 /// Rasterizes the tasks of a frame, as [`rasterize_tiles`] does.
-pub fn rasterize_tasks(
-    tasks: &[Task],
-    config: &Config,
-    others_gb_s: f64,
-) -> (RasterReport, Vec<TileSpan>) {
+pub fn rasterize_tasks(tasks: &[Task], config: &Config, others_gb_s: f64) -> (RasterReport, Vec<TileSpan>) {
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
     let mut queue = tasks.iter();
     let raster = &config.rasterizer;
     let contended = rates.port * f64::from(raster.modules) > rates.memory;
-    let mut modules: Vec<_> = (0..raster.modules)
-        .map(|_| Module::new(rates, contended))
-        .collect();
+    let mut modules: Vec<_> = (0..raster.modules).map(|_| Module::new(rates, contended)).collect();
     let now = run(&mut modules, rates, &mut queue, raster, &mut report);
     report.cycles = now;
     // The part of the steps' time that exceeds evaluation is waiting for memory.
@@ -143,10 +133,7 @@ struct Ends {
 impl Ends {
     fn new(count: usize) -> Self {
         let leaves = count.next_power_of_two();
-        Self {
-            nodes: vec![[f64::INFINITY; 2]; 2 * leaves],
-            leaves,
-        }
+        Self { nodes: vec![[f64::INFINITY; 2]; 2 * leaves], leaves }
     }
 
     /// The first ends of all modules.
@@ -160,13 +147,7 @@ impl Ends {
         while node > 1 {
             node /= 2;
             let [a, b] = [self.nodes[2 * node], self.nodes[2 * node + 1]];
-            let least = [0, 1].map(|clock| {
-                if b[clock] < a[clock] {
-                    b[clock]
-                } else {
-                    a[clock]
-                }
-            });
+            let least = [0, 1].map(|clock| if b[clock] < a[clock] { b[clock] } else { a[clock] });
             if self.nodes[node] == least {
                 return;
             }
@@ -294,8 +275,7 @@ impl Module {
 
     /// True if the step has ended, with all transfers that it waits for.
     fn is_done(&self) -> bool {
-        self.step
-            .is_some_and(|step| step.end <= self.now && self.port.len() == self.writes)
+        self.step.is_some_and(|step| step.end <= self.now && self.port.len() == self.writes)
     }
 
     /// The next end on each clock: of an evaluation, of a latency or of a transfer.
@@ -306,9 +286,7 @@ impl Module {
         };
         match self.transfer {
             Transfer::None => [evaluation, f64::INFINITY],
-            Transfer::Waiting(time) | Transfer::Alone(time) => {
-                [evaluation.min(time), f64::INFINITY]
-            }
+            Transfer::Waiting(time) | Transfer::Alone(time) => [evaluation.min(time), f64::INFINITY],
             Transfer::Moving(bytes) => [evaluation, bytes],
         }
     }
@@ -413,16 +391,8 @@ impl Module {
     /// pixels.
     fn begin_step(&mut self, cycles: f64, first_of_tile: bool) {
         let is_blocked = first_of_tile && cycles > 0.0 && self.writes > 1;
-        let end = if is_blocked {
-            f64::INFINITY
-        } else {
-            self.now + cycles
-        };
-        self.step = Some(Step {
-            begin: self.now,
-            cycles,
-            end,
-        });
+        let end = if is_blocked { f64::INFINITY } else { self.now + cycles };
+        self.step = Some(Step { begin: self.now, cycles, end });
     }
 
     /// Goes on to the next step, or to a run of equal steps, if there is any.
@@ -439,19 +409,10 @@ impl Module {
         if let Some(current) = &mut self.current
             && current.count > 1.0
         {
-            let Batches {
-                count,
-                cycles,
-                bytes,
-                ..
-            } = *current;
+            let Batches { count, cycles, bytes, .. } = *current;
             if self.contended || write.is_some() || !self.port.is_empty() {
                 current.count -= 1.0;
-                self.ask(Some(Request {
-                    latency: 0.0,
-                    bytes,
-                    write: false,
-                }));
+                self.ask(Some(Request { latency: 0.0, bytes, write: false }));
                 self.ask(write);
                 self.begin_step(cycles, false);
                 return;
@@ -471,32 +432,17 @@ impl Module {
         let before = std::mem::replace(&mut self.current, next);
         if let Some(next) = next {
             let cold = before.map_or(!self.started, |batch| batch.wasted);
-            let latency = if cold {
-                f64::from(self.rates.latency)
-            } else {
-                0.0
-            };
-            self.ask(Some(Request {
-                latency,
-                bytes: next.bytes,
-                write: false,
-            }));
+            let latency = if cold { f64::from(self.rates.latency) } else { 0.0 };
+            self.ask(Some(Request { latency, bytes: next.bytes, write: false }));
         }
         self.started = true;
         self.ask(write);
-        self.tile_ended = before
-            .filter(|batch| batch.last_of_tile)
-            .map(|batch| batch.mode);
+        self.tile_ended = before.filter(|batch| batch.last_of_tile).map(|batch| batch.mode);
         if before.is_some_and(|batch| batch.first_of_tile)
             && let Some(at) = self.places.pop_front()
         {
             let (module, begin, end) = (0, self.now, self.now);
-            self.spans.push(TileSpan {
-                module,
-                at,
-                begin,
-                end,
-            });
+            self.spans.push(TileSpan { module, at, begin, end });
         }
         if before.is_some() || next.is_some() {
             let cycles = before.map_or(0.0, |batch| batch.cycles);
@@ -514,11 +460,7 @@ impl Module {
         report.bytes_out += bytes;
         // The last pixels must leave the pipeline before they are written.
         let latency = f64::from(raster.latency(mode));
-        Some(Request {
-            latency,
-            bytes,
-            write: true,
-        })
+        Some(Request { latency, bytes, write: true })
     }
 
     /// Claims a tile: its batches, with equal ones grouped.
@@ -563,13 +505,7 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
 }
 
 /// The batches of one draw in a tile. The first takes `begin` cycles more.
-fn part_batches(
-    part: &Part,
-    raster: &Rasterizer,
-    begin: f64,
-    report: &mut RasterReport,
-    out: &mut VecDeque<Batches>,
-) {
+fn part_batches(part: &Part, raster: &Rasterizer, begin: f64, report: &mut RasterReport, out: &mut VecDeque<Batches>) {
     let size = raster.batch;
     let bytes_each = f64::from(raster.primitive_bytes());
     let mut listed = part.needed + part.left_over;
@@ -659,10 +595,7 @@ mod tests {
         assert_eq!(report, rasterize(&frame, &config, 0.0));
         let places: HashSet<_> = spans.iter().map(|span| span.at).collect();
         assert_eq!((spans.len(), places.len()), (260, 260));
-        for pair in spans
-            .windows(2)
-            .filter(|pair| pair[0].module == pair[1].module)
-        {
+        for pair in spans.windows(2).filter(|pair| pair[0].module == pair[1].module) {
             assert!(pair[0].end <= pair[1].begin);
         }
         let in_tiles: f64 = spans.iter().map(|span| span.end - span.begin).sum();

@@ -18,26 +18,11 @@ pub struct Operations {
 
 impl Operations {
     /// The operations of a PE for one pixel and triangle; GauRast, Table II.
-    pub const TRIANGLE: Self = Self {
-        add: 9,
-        mul: 9,
-        div: 1,
-        exp: 0,
-    };
+    pub const TRIANGLE: Self = Self { add: 9, mul: 9, div: 1, exp: 0 };
     /// The operations of a PE for one pixel and Gaussian; GauRast, Table II: 2 additions, 1 multiplication and the
     /// exponential more than its triangle units have.
-    pub const GAUSSIAN: Self = Self {
-        add: 11,
-        mul: 10,
-        div: 0,
-        exp: 1,
-    };
+    pub const GAUSSIAN: Self = Self { add: 11, mul: 10, div: 0, exp: 1 };
     /// The share of [`Self::GAUSSIAN`] that only a blended Gaussian needs: 3 colours, and the next transmittance with
     /// its test. For other Gaussians the inputs of these units are gated.
-    pub const BLEND: Self = Self {
-        add: 3,
-        mul: 3,
-        div: 0,
-        exp: 0,
-    };
+    pub const BLEND: Self = Self { add: 3, mul: 3, div: 0, exp: 0 };
 }

@@ -2,9 +2,7 @@
 //! device does. Both models of the rasterizer use this order; apart from it they share only the cost of one primitive.
 
 use crate::config::{Config, Rasterizer};
-use crate::work::{
-    DrawWork, FrameWork, Mode, Saturation, Segment, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork,
-};
+use crate::work::{DrawWork, FrameWork, Mode, Saturation, Segment, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
 use std::collections::{BTreeMap, HashMap};
 
 /// The work that one module does without interruption: all draws of a tile.
@@ -67,15 +65,9 @@ pub fn tasks(frame: &FrameWork, division: &Division) -> Vec<Task> {
     let mut places = HashMap::new();
     let mut tasks: Vec<Task> = Vec::new();
     for draw in &frame.draws {
-        let tiles = draw
-            .tiles
-            .iter()
-            .map(|tile| (tile.at, part(draw.mode, tile, division)));
-        let parts: Vec<_> = if division.tile_side == TILE_SIDE {
-            tiles.collect()
-        } else {
-            resized(draw, tiles, division)
-        };
+        let tiles = draw.tiles.iter().map(|tile| (tile.at, part(draw.mode, tile, division)));
+        let parts: Vec<_> =
+            if division.tile_side == TILE_SIDE { tiles.collect() } else { resized(draw, tiles, division) };
         for (at, part) in parts {
             if part.needed == 0 {
                 continue;
@@ -96,16 +88,9 @@ pub fn tasks(frame: &FrameWork, division: &Division) -> Vec<Task> {
 /// One draw in a tile of the trace, with the primitives that the hardware fetches.
 fn part(mode: Mode, tile: &TileWork, division: &Division) -> Part {
     // Hidden primitives are fetched, too, and so are triangles of which only the bounding box reaches the tile.
-    let segments: Vec<_> = tile
-        .segments(division.granularity(mode), division.hierarchical_depth)
-        .collect();
+    let segments: Vec<_> = tile.segments(division.granularity(mode), division.hierarchical_depth).collect();
     let needed: u32 = segments.iter().map(|segment| segment.primitives).sum();
-    Part {
-        mode,
-        segments,
-        needed,
-        left_over: tile.listed.saturating_sub(needed),
-    }
+    Part { mode, segments, needed, left_over: tile.listed.saturating_sub(needed) }
 }
 
 /// The lists of a draw in tiles of another size: an estimate. Lists grow in the ratio of the bounding boxes' pairs; a
@@ -135,9 +120,7 @@ fn resized(
             joined.entry(at).or_default().push(part);
         }
         let groups = u64::from(TILE_GROUPS * factor * factor);
-        let of = |([y, x], parts): ([u32; 2], Vec<Part>)| {
-            ([x, y], join(draw.mode, &parts, ratio, groups, per_pixel))
-        };
+        let of = |([y, x], parts): ([u32; 2], Vec<Part>)| ([x, y], join(draw.mode, &parts, ratio, groups, per_pixel));
         return joined.into_iter().map(of).collect();
     }
     let factor = TILE_SIDE / division.tile_side;
@@ -156,10 +139,7 @@ fn resized(
                     segment.groups = (k + 1) * segment.groups / n - k * segment.groups / n;
                 }
             }
-            out.push((
-                [x * factor + number % factor, y * factor + number / factor],
-                piece,
-            ));
+            out.push(([x * factor + number % factor, y * factor + number / factor], piece));
         }
     }
     out
@@ -172,31 +152,15 @@ fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) ->
     let longest = parts.iter().map(listed).fold(0.0, f64::max) * ratio.min(1.0);
     let all = parts.iter().map(listed).sum::<f64>() * ratio;
     let all = all.max(longest).round().max(1.0) as u32;
-    let finished = parts
-        .iter()
-        .map(|part| f64::from(part.needed) / listed(part).max(1.0))
-        .fold(0.0, f64::max);
+    let finished = parts.iter().map(|part| f64::from(part.needed) / listed(part).max(1.0)).fold(0.0, f64::max);
     let needed = ((f64::from(all) * finished).ceil() as u32).min(all);
-    let reached = parts
-        .iter()
-        .flat_map(|part| &part.segments)
-        .map(|segment| segment.groups)
-        .sum();
+    let reached = parts.iter().flat_map(|part| &part.segments).map(|segment| segment.groups).sum();
     let segment = Segment {
         primitives: needed,
-        groups: if per_pixel {
-            reached
-        } else {
-            u64::from(needed) * groups
-        },
+        groups: if per_pixel { reached } else { u64::from(needed) * groups },
         open: groups,
     };
-    Part {
-        mode,
-        segments: vec![segment; usize::from(needed > 0)],
-        needed,
-        left_over: all - needed,
-    }
+    Part { mode, segments: vec![segment; usize::from(needed > 0)], needed, left_over: all - needed }
 }
 
 /// Rates in cycles of the rasterizer's clock.
@@ -238,18 +202,12 @@ mod tests {
         };
         let frame = FrameWork {
             size: [64, 16],
-            draws: vec![
-                draw(Mode::Triangle, &[[0, 0], [1, 0]]),
-                draw(Mode::Gaussian, &[[2, 0], [1, 0]]),
-            ],
+            draws: vec![draw(Mode::Triangle, &[[0, 0], [1, 0]]), draw(Mode::Gaussian, &[[2, 0], [1, 0]])],
             ..FrameWork::default()
         };
         let config = Config::preset("paper-15x16", &[]).unwrap();
         let tasks = tasks(&frame, &Division::of(&config.rasterizer));
-        let modes: Vec<Vec<_>> = tasks
-            .iter()
-            .map(|task| task.parts.iter().map(|part| part.mode).collect())
-            .collect();
+        let modes: Vec<Vec<_>> = tasks.iter().map(|task| task.parts.iter().map(|part| part.mode).collect()).collect();
         let (t, g) = (Mode::Triangle, Mode::Gaussian);
         assert_eq!(modes, [vec![t], vec![t, g], vec![g]]);
     }
@@ -285,18 +243,11 @@ mod tests {
             ..TileWork::default()
         };
         let frame = FrameWork {
-            draws: vec![DrawWork {
-                mode: Mode::Triangle,
-                tiles: vec![tile],
-                ..DrawWork::default()
-            }],
+            draws: vec![DrawWork { mode: Mode::Triangle, tiles: vec![tile], ..DrawWork::default() }],
             ..FrameWork::default()
         };
         let with = |traversal: &str, hierarchical: bool| {
-            let settings = [
-                format!("triangle_traversal={traversal}"),
-                format!("hierarchical_depth={hierarchical}"),
-            ];
+            let settings = [format!("triangle_traversal={traversal}"), format!("hierarchical_depth={hierarchical}")];
             let config = Config::preset("paper-15x16", &settings).unwrap();
             evaluations(&tasks(&frame, &Division::of(&config.rasterizer))) / 16
         };
@@ -308,15 +259,10 @@ mod tests {
     fn other_tile_sizes_keep_the_pixels_and_change_the_lists() {
         let draw = DrawWork {
             sized_pairs: [3200, 1600, 800, 400],
-            tiles: (0..16)
-                .map(|k| TileWork::open([k % 4, k / 4], 100))
-                .collect(),
+            tiles: (0..16).map(|k| TileWork::open([k % 4, k / 4], 100)).collect(),
             ..DrawWork::default()
         };
-        let frame = FrameWork {
-            draws: vec![draw],
-            ..FrameWork::default()
-        };
+        let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
         for (side, tiles, listed) in [(8u32, 64, 50), (16, 16, 100), (32, 4, 200), (64, 1, 400)] {
             let setting = format!("tile_side={side}");
             let config = Config::preset("paper-15x16", &[setting]).unwrap();

@@ -86,11 +86,7 @@ struct Progress {
 
 /// The timeline of frames. A free engine takes the stage that can begin first, of the oldest frame if several can.
 pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
-    let in_flight = if policy.collaborative {
-        policy.frames_in_flight.max(1)
-    } else {
-        1
-    };
+    let in_flight = if policy.collaborative { policy.frames_in_flight.max(1) } else { 1 };
     let mut free = [0.0f64; 2];
     let mut spans = Vec::new();
     let mut waiting = frames.iter().enumerate();
@@ -105,9 +101,7 @@ pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
             begun.push(Progress::new(frame, stages, policy, before));
         }
         let start = |progress: &Progress| progress.start(&free);
-        let chosen = begun
-            .iter_mut()
-            .min_by(|a, b| start(a).total_cmp(&start(b)).then(a.frame.cmp(&b.frame)));
+        let chosen = begun.iter_mut().min_by(|a, b| start(a).total_cmp(&start(b)).then(a.frame.cmp(&b.frame)));
         let Some(progress) = chosen else {
             return spans;
         };
@@ -123,23 +117,13 @@ pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
         progress.next += 1;
         progress.ready = end_ms;
         free[engine as usize] = end_ms;
-        spans.push(Span {
-            engine,
-            frame: progress.frame,
-            stage,
-            begin_ms,
-            end_ms,
-        });
+        spans.push(Span { engine, frame: progress.frame, stage, begin_ms, end_ms });
     }
 }
 
 impl Progress {
     fn new(frame: usize, stages: &Stages, policy: Policy, ready: f64) -> Self {
-        let raster = if policy.has_rasterizer {
-            Engine::Rasterizer
-        } else {
-            Engine::ShaderCores
-        };
+        let raster = if policy.has_rasterizer { Engine::Rasterizer } else { Engine::ShaderCores };
         let all = [
             (Engine::ShaderCores, "compute", stages.compute),
             (Engine::ShaderCores, "preprocess", stages.preprocess),
@@ -148,15 +132,8 @@ impl Progress {
             (Engine::ShaderCores, "shade", stages.shade),
         ];
         // Only stages that every frame has are shown if they take no time.
-        let shown = |&(_, stage, length): &(Engine, &str, f64)| {
-            length > 0.0 || !matches!(stage, "compute" | "shade")
-        };
-        Self {
-            frame,
-            stages: all.into_iter().filter(shown).collect(),
-            next: 0,
-            ready,
-        }
+        let shown = |&(_, stage, length): &(Engine, &str, f64)| length > 0.0 || !matches!(stage, "compute" | "shade");
+        Self { frame, stages: all.into_iter().filter(shown).collect(), next: 0, ready }
     }
 
     /// The time at which the next stage can begin, in ms; negative infinity after the last stage, so that the frame is
@@ -177,18 +154,11 @@ pub fn fps(stages: Stages, policy: Policy) -> f64 {
     const AFTER: usize = 8;
     let spans = timeline(&[stages; WARM_UP + MEASURED + AFTER], policy);
     let end_of = |frame: usize| {
-        let ends = spans
-            .iter()
-            .filter(|span| span.frame == frame)
-            .map(|span| span.end_ms);
+        let ends = spans.iter().filter(|span| span.frame == frame).map(|span| span.end_ms);
         ends.fold(0.0, f64::max)
     };
     let last = end_of(WARM_UP + MEASURED - 1) - end_of(WARM_UP - 1);
-    if last > 0.0 {
-        MEASURED as f64 / last * 1e3
-    } else {
-        0.0
-    }
+    if last > 0.0 { MEASURED as f64 / last * 1e3 } else { 0.0 }
 }
 
 /// A timeline in Chrome's trace event format, which Perfetto also opens: a row per engine. Serialize it as JSON.
@@ -249,11 +219,7 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<
 }
 
 /// The timeline as a Chrome trace, with another row for each module, on which each tile is a span.
-pub fn chrome_trace_of_modules<T: Serialize>(
-    spans: &[Span],
-    modules: &[ModuleSpan],
-    other_data: T,
-) -> ChromeTrace<T> {
+pub fn chrome_trace_of_modules<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_data: T) -> ChromeTrace<T> {
     let track = |engine: Engine| match engine {
         Engine::ShaderCores => 1,
         Engine::Rasterizer => 2,
@@ -270,11 +236,7 @@ pub fn chrome_trace_of_modules<T: Serialize>(
     };
     let mut trace_events = vec![named("process_name", 0, "GauRast".to_owned())];
     for engine in [Engine::ShaderCores, Engine::Rasterizer] {
-        trace_events.push(named(
-            "thread_name",
-            track(engine),
-            engine.name().to_owned(),
-        ));
+        trace_events.push(named("thread_name", track(engine), engine.name().to_owned()));
     }
     trace_events.extend(spans.iter().map(|span| Event {
         name: format!("{} {}", span.stage, span.frame),
@@ -286,11 +248,7 @@ pub fn chrome_trace_of_modules<T: Serialize>(
         dur: Some((span.end_ms - span.begin_ms) * 1e3),
         args: Arguments::Frame(span.frame),
     }));
-    let count = modules
-        .iter()
-        .map(|span| span.module + 1)
-        .max()
-        .unwrap_or(0);
+    let count = modules.iter().map(|span| span.module + 1).max().unwrap_or(0);
     for module in 0..count {
         let track = FIRST_MODULE + module as u32;
         trace_events.push(named("thread_name", track, format!("module {module}")));
@@ -305,59 +263,30 @@ pub fn chrome_trace_of_modules<T: Serialize>(
         dur: Some((span.end_ms - span.begin_ms) * 1e3),
         args: Arguments::Frame(span.frame),
     }));
-    ChromeTrace {
-        trace_events,
-        display_time_unit: "ms",
-        other_data,
-    }
+    ChromeTrace { trace_events, display_time_unit: "ms", other_data }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const STAGES: Stages = Stages {
-        compute: 0.0,
-        preprocess: 20.0,
-        sort: 10.0,
-        raster: 12.0,
-        shade: 0.0,
-    };
-    const POLICY: Policy = Policy {
-        collaborative: true,
-        frames_in_flight: 2,
-        has_rasterizer: true,
-    };
+    const STAGES: Stages = Stages { compute: 0.0, preprocess: 20.0, sort: 10.0, raster: 12.0, shade: 0.0 };
+    const POLICY: Policy = Policy { collaborative: true, frames_in_flight: 2, has_rasterizer: true };
 
     #[test]
     fn the_slower_engine_sets_the_pace_if_they_collaborate() {
         assert!((fps(STAGES, POLICY) - 1e3 / 30.0).abs() < 1e-9);
-        let raster = Stages {
-            raster: 50.0,
-            ..STAGES
-        };
+        let raster = Stages { raster: 50.0, ..STAGES };
         assert!((fps(raster, POLICY) - 1e3 / 50.0).abs() < 1e-9);
-        let serial = Policy {
-            collaborative: false,
-            ..POLICY
-        };
+        let serial = Policy { collaborative: false, ..POLICY };
         assert!((fps(STAGES, serial) - 1e3 / 42.0).abs() < 1e-9);
-        let one = Policy {
-            frames_in_flight: 1,
-            ..POLICY
-        };
+        let one = Policy { frames_in_flight: 1, ..POLICY };
         assert!((fps(STAGES, one) - 1e3 / 42.0).abs() < 1e-9);
         // Fragments wait for the rasterizer, and the shader cores work on the next frame meanwhile.
-        let shaded = Stages {
-            shade: 5.0,
-            ..STAGES
-        };
+        let shaded = Stages { shade: 5.0, ..STAGES };
         assert!((fps(shaded, POLICY) - 1e3 / 35.0).abs() < 1e-9);
         assert!((fps(shaded, serial) - 1e3 / 47.0).abs() < 1e-9);
-        let none = Policy {
-            has_rasterizer: false,
-            ..POLICY
-        };
+        let none = Policy { has_rasterizer: false, ..POLICY };
         assert!((fps(STAGES, none) - 1e3 / 42.0).abs() < 1e-9);
     }
 
@@ -383,13 +312,7 @@ mod tests {
             }
         }
         // Two frames in flight: a third begins when the first has ended.
-        let end = |frame| {
-            spans
-                .iter()
-                .filter(|s| s.frame == frame)
-                .map(|s| s.end_ms)
-                .fold(0.0, f64::max)
-        };
+        let end = |frame| spans.iter().filter(|s| s.frame == frame).map(|s| s.end_ms).fold(0.0, f64::max);
         for span in &spans {
             assert!(span.frame < 2 || span.begin_ms >= end(span.frame - 2));
         }
@@ -402,10 +325,7 @@ mod tests {
         let events = trace["traceEvents"].as_array().unwrap();
         let complete: Vec<_> = events.iter().filter(|event| event["ph"] == "X").collect();
         assert_eq!(complete.len(), spans.len());
-        let total: f64 = complete
-            .iter()
-            .map(|event| event["dur"].as_f64().unwrap())
-            .sum();
+        let total: f64 = complete.iter().map(|event| event["dur"].as_f64().unwrap()).sum();
         assert!((total - 3.0 * 42.0 * 1e3).abs() < 1e-6);
     }
 }

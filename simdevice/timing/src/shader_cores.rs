@@ -33,10 +33,7 @@ pub fn roofline(work: &ShaderWork, shader: &Shader, memory: &Memory) -> Roofline
     ];
     let cycles = units.into_iter().fold(0.0, f64::max);
     let rate = f64::from(shader.sms) * shader.clock_ghz * shader.efficiency * 1e6;
-    Roofline {
-        compute_ms: cycles / rate,
-        memory_ms: work.bytes / (memory.bandwidth_gb_s * memory.efficiency * 1e6),
-    }
+    Roofline { compute_ms: cycles / rate, memory_ms: work.bytes / (memory.bandwidth_gb_s * memory.efficiency * 1e6) }
 }
 
 /// Milliseconds of stage 3 on the shader cores, for `evaluations` pairs of a pixel and a primitive.
@@ -55,21 +52,11 @@ mod tests {
         let config = Config::preset("paper-15x16", &["shader.efficiency=1".to_owned()]).unwrap();
         let time = |work: ShaderWork| roofline(&work, &config.shader, &config.memory);
         let lanes = 4.0 * 0.612e6;
-        let float = time(ShaderWork {
-            float: 128.0 * lanes,
-            ..ShaderWork::default()
-        });
+        let float = time(ShaderWork { float: 128.0 * lanes, ..ShaderWork::default() });
         assert!((float.milliseconds() - 1.0).abs() < 1e-9);
-        let special = time(ShaderWork {
-            special: 32.0 * lanes,
-            ..ShaderWork::default()
-        });
+        let special = time(ShaderWork { special: 32.0 * lanes, ..ShaderWork::default() });
         assert!((special.milliseconds() - 2.0).abs() < 1e-9);
-        let bytes = time(ShaderWork {
-            bytes: 68.3e6 * 0.9 * 3.0,
-            float: lanes,
-            ..ShaderWork::default()
-        });
+        let bytes = time(ShaderWork { bytes: 68.3e6 * 0.9 * 3.0, float: lanes, ..ShaderWork::default() });
         assert!((bytes.milliseconds() - 3.0).abs() < 1e-9);
     }
 }

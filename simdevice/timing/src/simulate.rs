@@ -73,11 +73,7 @@ pub struct Gains {
 
 impl Gains {
     /// No gain and no speed-up.
-    const NONE: Self = Self {
-        hardware: 1.0,
-        lists: 1.0,
-        stalls: 1.0,
-    };
+    const NONE: Self = Self { hardware: 1.0, lists: 1.0, stalls: 1.0 };
 }
 
 /// A frame with all that simulations on several machines share. Threads may use it at the same time.
@@ -106,11 +102,7 @@ struct Divided {
 
 impl<'a> Listed<'a> {
     fn new(frame: Cow<'a, FrameWork>) -> Self {
-        Self {
-            frame,
-            baseline_evaluations: OnceLock::new(),
-            divided: Mutex::default(),
-        }
+        Self { frame, baseline_evaluations: OnceLock::new(), divided: Mutex::default() }
     }
 
     /// The evaluations of stage 3 on shader cores. The original code ends a tile's list when all its pixels are
@@ -132,10 +124,8 @@ impl<'a> Listed<'a> {
         if let Some((_, divided)) = found {
             return Arc::clone(divided);
         }
-        let divided = Arc::new(Divided {
-            tasks: plan::tasks(&self.frame, &division),
-            changed: changed(&self.frame, &division),
-        });
+        let divided =
+            Arc::new(Divided { tasks: plan::tasks(&self.frame, &division), changed: changed(&self.frame, &division) });
         known.push((division, Arc::clone(&divided)));
         divided
     }
@@ -150,19 +140,13 @@ impl<'a> Listed<'a> {
 impl<'a> Shared<'a> {
     /// A frame of which nothing is known yet.
     pub fn new(frame: &'a FrameWork) -> Self {
-        Self {
-            exact: Listed::new(Cow::Borrowed(frame)),
-            squares: OnceLock::new(),
-            triangles: OnceLock::new(),
-        }
+        Self { exact: Listed::new(Cow::Borrowed(frame)), squares: OnceLock::new(), triangles: OnceLock::new() }
     }
 
     fn listed(&self, lists: Lists) -> &Listed<'a> {
         match lists {
             Lists::Exact => &self.exact,
-            Lists::Squares => self
-                .squares
-                .get_or_init(|| Listed::new(Cow::Owned(self.exact.frame.with_squares()))),
+            Lists::Squares => self.squares.get_or_init(|| Listed::new(Cow::Owned(self.exact.frame.with_squares()))),
         }
     }
 
@@ -241,13 +225,7 @@ struct Both {
 impl Both {
     fn stages(&self) -> Stages {
         let [compute, preprocess, sort, shade] = self.shader.map(|stage| stage.milliseconds());
-        Stages {
-            compute,
-            preprocess,
-            sort,
-            raster: self.raster_ms,
-            shade,
-        }
+        Stages { compute, preprocess, sort, raster: self.raster_ms, shade }
     }
 }
 
@@ -260,12 +238,7 @@ fn serial(listed: &Listed, config: &Config, baseline_raster_ms: f64) -> Both {
         raster = listed.rasterize(config, 0.0);
         raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
     }
-    Both {
-        shader: on_shader_cores(&listed.frame, config, 0.0),
-        raster,
-        raster_ms,
-        contention_gb_s: 0.0,
-    }
+    Both { shader: on_shader_cores(&listed.frame, config, 0.0), raster, raster_ms, contention_gb_s: 0.0 }
 }
 
 /// The times if a frame's work on shader cores overlaps stage 3 of another frame: both move bytes through one memory.
@@ -277,12 +250,7 @@ fn collaborative(listed: &Listed, config: &Config, alone: &Both) -> Both {
     let time = milliseconds(&shader);
     let contention_gb_s = if time > 0.0 { bytes / time * 1e-6 } else { 0.0 };
     let raster = listed.rasterize(config, contention_gb_s);
-    Both {
-        shader,
-        raster_ms: raster.milliseconds(config.rasterizer.clock_ghz),
-        raster,
-        contention_gb_s,
-    }
+    Both { shader, raster_ms: raster.milliseconds(config.rasterizer.clock_ghz), raster, contention_gb_s }
 }
 
 /// Simulates a frame.
@@ -301,37 +269,18 @@ impl Shared<'_> {
 }
 
 /// Simulates a frame with the baseline's lists and with the rasterizer's.
-fn simulate_listed(
-    of_baseline: &Listed,
-    of_rasterizer: &Listed,
-    triangles_ms: f64,
-    config: &Config,
-) -> Simulation {
+fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f64, config: &Config) -> Simulation {
     let policy = policy(config);
     let on_baseline = on_shader_cores(&of_baseline.frame, config, 0.0);
-    let on_cores_ms = |listed: &Listed| {
-        shader_cores::stage_3_ms(listed.baseline_evaluations(), config) + triangles_ms
-    };
+    let on_cores_ms = |listed: &Listed| shader_cores::stage_3_ms(listed.baseline_evaluations(), config) + triangles_ms;
     let baseline_raster_ms = on_cores_ms(of_baseline);
     let same_lists_ms = on_cores_ms(of_rasterizer);
     let baseline_ms = milliseconds(&on_baseline) + baseline_raster_ms;
     let alone = serial(of_rasterizer, config, baseline_raster_ms);
     let (raster_alone, stages_alone) = (alone.raster.clone(), alone.stages());
-    let fps = |stages, collaborative| {
-        schedule::fps(
-            stages,
-            Policy {
-                collaborative,
-                ..policy
-            },
-        )
-    };
+    let fps = |stages, collaborative| schedule::fps(stages, Policy { collaborative, ..policy });
     let fps_serial = fps(alone.stages(), false);
-    let shader_ms = if policy.has_rasterizer {
-        milliseconds(&alone.shader)
-    } else {
-        baseline_ms
-    };
+    let shader_ms = if policy.has_rasterizer { milliseconds(&alone.shader) } else { baseline_ms };
     let mut fps_collaborative = fps_serial;
     let mut chosen = alone;
     if policy.has_rasterizer {
@@ -347,17 +296,11 @@ fn simulate_listed(
         energy = energy::rasterizer(&chosen.raster, changed, config);
     }
     energy.shader_cores = energy::shader_cores_mj(shader_ms, config);
-    let fps = if policy.collaborative {
-        fps_collaborative
-    } else {
-        fps_serial
-    };
+    let fps = if policy.collaborative { fps_collaborative } else { fps_serial };
     let stages = chosen.stages();
     let [compute, preprocess, sort, shade] = chosen.shader;
-    let busy_ms = chosen.raster.modules.busy
-        / f64::from(config.rasterizer.modules.max(1))
-        / config.rasterizer.clock_ghz
-        * 1e-6;
+    let busy_ms =
+        chosen.raster.modules.busy / f64::from(config.rasterizer.modules.max(1)) / config.rasterizer.clock_ghz * 1e-6;
     let gains = if policy.has_rasterizer && busy_ms > 0.0 && same_lists_ms > 0.0 {
         Gains {
             hardware: same_lists_ms / busy_ms,
@@ -383,16 +326,8 @@ fn simulate_listed(
         fps_collaborative,
         fps_serial,
         baseline_raster_ms,
-        baseline_fps: if baseline_ms > 0.0 {
-            1e3 / baseline_ms
-        } else {
-            0.0
-        },
-        raster_speedup: if stages.raster > 0.0 {
-            baseline_raster_ms / stages.raster
-        } else {
-            1.0
-        },
+        baseline_fps: if baseline_ms > 0.0 { 1e3 / baseline_ms } else { 0.0 },
+        raster_speedup: if stages.raster > 0.0 { baseline_raster_ms / stages.raster } else { 1.0 },
         speedup: fps * baseline_ms * 1e-3,
         energy,
         baseline_mj: energy::shader_cores_mj(baseline_ms, config),
@@ -420,11 +355,7 @@ fn changed(frame: &FrameWork, division: &Division) -> Changed {
     let share = |mode| {
         let (mut changed, mut evaluated) = (0, 0);
         for draw in frame.draws.iter().filter(|draw| draw.mode == mode) {
-            changed += draw
-                .tiles
-                .iter()
-                .map(|tile| tile.contributions)
-                .sum::<u64>();
+            changed += draw.tiles.iter().map(|tile| tile.contributions).sum::<u64>();
             evaluated += draw.evaluations(division.granularity(mode), division.hierarchical_depth);
         }
         match evaluated {
@@ -432,10 +363,7 @@ fn changed(frame: &FrameWork, division: &Division) -> Changed {
             _ => (changed as f64 / evaluated as f64).min(1.0),
         }
     };
-    Changed {
-        blended: share(Mode::Gaussian),
-        covered: share(Mode::Triangle),
-    }
+    Changed { blended: share(Mode::Gaussian), covered: share(Mode::Triangle) }
 }
 
 /// A frame of Gaussians that are spread evenly over the tiles of an image, in which no pixel finishes.
@@ -444,23 +372,13 @@ pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
     let tiles = u64::from(columns) * u64::from(rows);
     let tile = |index: u64| {
         let listed = (pairs * (index + 1) / tiles - pairs * index / tiles) as u32;
-        let at = [
-            (index % u64::from(columns)) as u32,
-            (index / u64::from(columns)) as u32,
-        ];
+        let at = [(index % u64::from(columns)) as u32, (index / u64::from(columns)) as u32];
         let mut work = crate::work::TileWork::open(at, listed);
         work.contributions = (work.contributions as f64 * contributions) as u64;
         work
     };
-    let draw = DrawWork {
-        tiles: (0..tiles).map(tile).collect(),
-        ..DrawWork::default()
-    };
-    FrameWork {
-        size,
-        draws: vec![draw],
-        ..FrameWork::default()
-    }
+    let draw = DrawWork { tiles: (0..tiles).map(tile).collect(), ..DrawWork::default() };
+    FrameWork { size, draws: vec![draw], ..FrameWork::default() }
 }
 
 #[cfg(test)]
@@ -471,16 +389,8 @@ mod tests {
     fn frame() -> FrameWork {
         let mut frame = even_frame([640, 480], 1_000_000, 0.25);
         let draw = &mut frame.draws[0];
-        draw.preprocess = ShaderWork {
-            float: 3e9,
-            bytes: 2e8,
-            ..ShaderWork::default()
-        };
-        draw.sort = ShaderWork {
-            integer: 5e8,
-            bytes: 4e8,
-            ..ShaderWork::default()
-        };
+        draw.preprocess = ShaderWork { float: 3e9, bytes: 2e8, ..ShaderWork::default() };
+        draw.sort = ShaderWork { integer: 5e8, bytes: 4e8, ..ShaderWork::default() };
         frame
     }
 
@@ -491,11 +401,7 @@ mod tests {
         let with = |preset: &str| simulate(&frame, &Config::preset(preset, &[]).unwrap());
         let (exact, squares) = (with("paper-15x16"), with("paper-pipeline"));
         for result in [&exact, &squares] {
-            let Gains {
-                hardware,
-                lists,
-                stalls,
-            } = result.gains;
+            let Gains { hardware, lists, stalls } = result.gains;
             let product = hardware * lists * stalls;
             assert!((product / result.raster_speedup - 1.0).abs() < 1e-9);
             // 26.9 operations an evaluation on 282 G lanes/s, against 240 G evaluations/s.
@@ -516,13 +422,8 @@ mod tests {
     #[test]
     fn one_frame_at_a_time_is_the_same_whether_others_may_overlap_or_not() {
         let overlapping = Config::preset("paper-15x16", &[]).unwrap();
-        let serial = overlapping
-            .with(&["collaborative=false".to_owned()])
-            .unwrap();
-        let (a, b) = (
-            simulate(&frame(), &overlapping),
-            simulate(&frame(), &serial),
-        );
+        let serial = overlapping.with(&["collaborative=false".to_owned()]).unwrap();
+        let (a, b) = (simulate(&frame(), &overlapping), simulate(&frame(), &serial));
         assert_eq!(a.raster_alone, b.raster);
         assert_eq!(a.raster_alone, b.raster_alone);
         assert_eq!(a.stages_alone, b.stages);
@@ -542,10 +443,7 @@ mod tests {
             result.speedup,
             result.energy.total(),
         ];
-        assert!(
-            numbers.iter().all(|number| number.is_finite()),
-            "{numbers:?}"
-        );
+        assert!(numbers.iter().all(|number| number.is_finite()), "{numbers:?}");
     }
 
     #[test]
@@ -566,10 +464,7 @@ mod tests {
     fn the_baseline_has_no_rasterizer() {
         let config = Config::preset("orin-nx-10w", &[]).unwrap();
         let simulation = simulate(&frame(), &config);
-        assert!(
-            (simulation.speedup - 1.0).abs() < 1e-9
-                && (simulation.raster_speedup - 1.0).abs() < 1e-9
-        );
+        assert!((simulation.speedup - 1.0).abs() < 1e-9 && (simulation.raster_speedup - 1.0).abs() < 1e-9);
         assert!((simulation.energy.total() - simulation.baseline_mj).abs() < 1e-9);
         let paper = simulate(&frame(), &Config::preset("paper-15x16", &[]).unwrap());
         assert!((paper.baseline_fps - simulation.fps).abs() < 1e-9);
@@ -580,26 +475,14 @@ mod tests {
     fn overlapping_frames_share_memory() {
         // Memory alone limits stages 1 and 2: a frame takes as long as all its bytes.
         let mut frame = frame();
-        let [draw] = frame.draws.as_mut_slice() else {
-            panic!("one draw")
-        };
-        draw.preprocess = ShaderWork {
-            bytes: 2e8,
-            ..ShaderWork::default()
-        };
-        draw.sort = ShaderWork {
-            bytes: 4e8,
-            ..ShaderWork::default()
-        };
+        let [draw] = frame.draws.as_mut_slice() else { panic!("one draw") };
+        draw.preprocess = ShaderWork { bytes: 2e8, ..ShaderWork::default() };
+        draw.sort = ShaderWork { bytes: 4e8, ..ShaderWork::default() };
         let config = Config::preset("paper-15x16", &[]).unwrap();
         let simulation = simulate(&frame, &config);
         let bytes = 6e8 + simulation.raster.bytes_in + simulation.raster.bytes_out;
         let least_ms = bytes / (68.3e6 * 0.9);
-        assert!(
-            (1e3 / simulation.fps / least_ms - 1.0).abs() < 0.01,
-            "{} {least_ms}",
-            simulation.fps
-        );
+        assert!((1e3 / simulation.fps / least_ms - 1.0).abs() < 0.01, "{} {least_ms}", simulation.fps);
         assert!(simulation.stages.raster > 0.0 && simulation.contention_gb_s < 68.3 * 0.9);
     }
 
@@ -620,8 +503,7 @@ mod tests {
         }
         let mut last = f64::INFINITY;
         for saturation in ["none", "tile", "row", "block", "reached"] {
-            let config =
-                Config::preset("single-module", &[format!("saturation={saturation}")]).unwrap();
+            let config = Config::preset("single-module", &[format!("saturation={saturation}")]).unwrap();
             let cycles = simulate(&frame, &config).raster.cycles;
             assert!(cycles < last, "{saturation}: {cycles} {last}");
             last = cycles;

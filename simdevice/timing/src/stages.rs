@@ -5,16 +5,8 @@
 use crate::work::ShaderWork;
 
 /// Work for every Gaussian that is read: the transform to camera space and the near plane's test. 12 bytes of position.
-const CULL: ShaderWork = ShaderWork {
-    float: 16.0,
-    integer: 8.0,
-    special: 0.0,
-    wide: 0.0,
-    memory: 3.0,
-    image: 0.0,
-    other: 0.0,
-    bytes: 12.0,
-};
+const CULL: ShaderWork =
+    ShaderWork { float: 16.0, integer: 8.0, special: 0.0, wide: 0.0, memory: 3.0, image: 0.0, other: 0.0, bytes: 12.0 };
 
 /// Work for every Gaussian that passes: normalised quaternion and rotation (34), J W R S (60), its product with its
 /// transpose (18), determinant, conic, radius and rectangle (40); reads 32 bytes of scale, rotation and opacity, writes
@@ -44,52 +36,20 @@ const FOOTPRINT: ShaderWork = ShaderWork {
 };
 
 /// Work for every Gaussian that is drawn: the view direction and the spherical harmonics basis.
-const DIRECTION: ShaderWork = ShaderWork {
-    float: 45.0,
-    integer: 4.0,
-    special: 2.0,
-    wide: 0.0,
-    memory: 3.0,
-    image: 0.0,
-    other: 0.0,
-    bytes: 0.0,
-};
+const DIRECTION: ShaderWork =
+    ShaderWork { float: 45.0, integer: 4.0, special: 2.0, wide: 0.0, memory: 3.0, image: 0.0, other: 0.0, bytes: 0.0 };
 
 /// Work for every spherical harmonics coefficient of three colours.
-const COEFFICIENT: ShaderWork = ShaderWork {
-    float: 3.0,
-    integer: 0.0,
-    special: 0.0,
-    wide: 0.0,
-    memory: 3.0,
-    image: 0.0,
-    other: 0.0,
-    bytes: 12.0,
-};
+const COEFFICIENT: ShaderWork =
+    ShaderWork { float: 3.0, integer: 0.0, special: 0.0, wide: 0.0, memory: 3.0, image: 0.0, other: 0.0, bytes: 12.0 };
 
 /// Work for every pair: its key and value, 12 bytes; finding the tiles' ranges reads the key again.
-const EMIT: ShaderWork = ShaderWork {
-    float: 0.0,
-    integer: 14.0,
-    special: 0.0,
-    wide: 0.0,
-    memory: 4.0,
-    image: 0.0,
-    other: 0.0,
-    bytes: 20.0,
-};
+const EMIT: ShaderWork =
+    ShaderWork { float: 0.0, integer: 14.0, special: 0.0, wide: 0.0, memory: 4.0, image: 0.0, other: 0.0, bytes: 20.0 };
 
 /// Work for every pair and pass of the sort: reads and writes 12 bytes.
-const SORT_PASS: ShaderWork = ShaderWork {
-    float: 0.0,
-    integer: 24.0,
-    special: 0.0,
-    wide: 0.0,
-    memory: 4.0,
-    image: 0.0,
-    other: 0.0,
-    bytes: 24.0,
-};
+const SORT_PASS: ShaderWork =
+    ShaderWork { float: 0.0, integer: 24.0, special: 0.0, wide: 0.0, memory: 4.0, image: 0.0, other: 0.0, bytes: 24.0 };
 
 /// Bits of the key that a pass sorts by.
 const DIGIT_BITS: u32 = 8;
@@ -121,17 +81,11 @@ pub fn gaussian(counts: &GaussianCounts) -> [ShaderWork; 2] {
         .times(counts.read as f64)
         .plus(&PROJECT.times(counts.projected as f64))
         .plus(&FOOTPRINT.times(counts.shaded as f64))
-        .plus(
-            &DIRECTION
-                .plus(&COEFFICIENT.times(coefficients))
-                .times(counts.drawn as f64),
-        );
+        .plus(&DIRECTION.plus(&COEFFICIENT.times(coefficients)).times(counts.drawn as f64));
     // 32 bits of depth in the key below the tile's number.
     let bits = 32 + u64::BITS - counts.tiles.saturating_sub(1).leading_zeros();
     let passes = f64::from(bits.div_ceil(DIGIT_BITS));
-    let sort = EMIT
-        .plus(&SORT_PASS.times(passes))
-        .times(counts.pairs as f64);
+    let sort = EMIT.plus(&SORT_PASS.times(passes)).times(counts.pairs as f64);
     [preprocess, sort]
 }
 
@@ -141,28 +95,14 @@ mod tests {
 
     #[test]
     fn work_grows_with_what_there_is() {
-        let counts = GaussianCounts {
-            read: 10,
-            projected: 8,
-            drawn: 5,
-            shaded: 0,
-            degree: 3,
-            pairs: 20,
-            tiles: 3600,
-        };
+        let counts = GaussianCounts { read: 10, projected: 8, drawn: 5, shaded: 0, degree: 3, pairs: 20, tiles: 3600 };
         let [one, two] = gaussian(&counts);
         assert!((one.bytes - (10.0 * 12.0 + 8.0 * 80.0 + 5.0 * 192.0)).abs() < 1e-9);
         // 12 bits of tile number: 44 bits, 6 passes.
         assert!((two.bytes - 20.0 * (20.0 + 6.0 * 24.0)).abs() < 1e-9);
-        let [flat, _] = gaussian(&GaussianCounts {
-            degree: 0,
-            ..counts
-        });
+        let [flat, _] = gaussian(&GaussianCounts { degree: 0, ..counts });
         assert!(flat.float < one.float);
-        let [more, _] = gaussian(&GaussianCounts {
-            shaded: 7,
-            ..counts
-        });
+        let [more, _] = gaussian(&GaussianCounts { shaded: 7, ..counts });
         assert!((more.bytes - one.bytes - 7.0 * 48.0).abs() < 1e-9);
     }
 }

@@ -39,9 +39,7 @@ pub enum TraceError {
     #[error("a trace of version {0}, not {TRACE_VERSION}")]
     Version(u32),
     /// The frame has more pairs than can be simulated in reasonable time.
-    #[error(
-        "frame {frame} has {pairs} pairs of a tile and a primitive; it must be at most {MAX_PAIRS}"
-    )]
+    #[error("frame {frame} has {pairs} pairs of a tile and a primitive; it must be at most {MAX_PAIRS}")]
     TooLarge {
         /// The frame, from 0.
         frame: usize,
@@ -62,9 +60,7 @@ pub enum TraceError {
     #[error("frame {0}: work of shader cores is negative or no number")]
     ShaderWork(usize),
     /// The frame has a draw whose boxes touch numbers of tiles that no boxes touch.
-    #[error(
-        "frame {0}: sized_pairs must not grow with the side of a tile, nor shrink by more than four"
-    )]
+    #[error("frame {0}: sized_pairs must not grow with the side of a tile, nor shrink by more than four")]
     SizedPairs(usize),
 }
 
@@ -189,16 +185,8 @@ pub struct ShaderWork {
 impl ShaderWork {
     /// Reports whether every count is a number and not negative.
     fn is_valid(&self) -> bool {
-        let counts = [
-            self.float,
-            self.integer,
-            self.special,
-            self.wide,
-            self.memory,
-            self.image,
-            self.other,
-            self.bytes,
-        ];
+        let counts =
+            [self.float, self.integer, self.special, self.wide, self.memory, self.image, self.other, self.bytes];
         counts.iter().all(|count| (0.0..1e18).contains(count))
     }
 
@@ -288,11 +276,7 @@ pub struct Run {
 impl Run {
     /// Groups of 16 pixels that hardware of this saturation, with or without hierarchical depth, evaluates.
     fn groups(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
-        let evaluated = if hierarchical_depth {
-            self.primitives.saturating_sub(self.hidden)
-        } else {
-            self.primitives
-        };
+        let evaluated = if hierarchical_depth { self.primitives.saturating_sub(self.hidden) } else { self.primitives };
         let open = match saturation {
             Saturation::None | Saturation::Tile => TILE_GROUPS,
             Saturation::Row => self.rows.into(),
@@ -316,11 +300,7 @@ impl Run {
 
     /// The run without its last `rest` primitives, which are hidden.
     fn without(&self, rest: u32) -> Self {
-        Self {
-            primitives: self.primitives.saturating_sub(rest),
-            hidden: self.hidden.saturating_sub(rest),
-            ..*self
-        }
+        Self { primitives: self.primitives.saturating_sub(rest), hidden: self.hidden.saturating_sub(rest), ..*self }
     }
 }
 
@@ -343,13 +323,7 @@ pub enum Saturation {
 
 impl Saturation {
     /// Every granularity, the coarsest first.
-    pub const ALL: [Self; 5] = [
-        Self::None,
-        Self::Tile,
-        Self::Row,
-        Self::Block,
-        Self::Reached,
-    ];
+    pub const ALL: [Self; 5] = [Self::None, Self::Tile, Self::Row, Self::Block, Self::Reached];
 }
 
 impl TileWork {
@@ -415,36 +389,21 @@ impl TileWork {
 
     /// The parts of the list that hardware of this saturation, with or without hierarchical depth, fetches, in order.
     /// Each has its primitives and the groups of 16 pixels in which they are evaluated.
-    pub fn segments(
-        &self,
-        saturation: Saturation,
-        hierarchical_depth: bool,
-    ) -> impl Iterator<Item = Segment> {
+    pub fn segments(&self, saturation: Saturation, hierarchical_depth: bool) -> impl Iterator<Item = Segment> {
         let all = matches!(saturation, Saturation::None);
-        let rest = if all {
-            self.listed.saturating_sub(self.needed())
-        } else {
-            0
-        };
+        let rest = if all { self.listed.saturating_sub(self.needed()) } else { 0 };
         let last = self.runs.len().wrapping_sub(1);
         let ends_early = hierarchical_depth && !all;
         let runs = self.runs.iter().enumerate().map(move |(index, run)| {
-            let run = if ends_early && index == last {
-                run.without(self.hidden_rest)
-            } else {
-                *run
-            };
+            let run = if ends_early && index == last { run.without(self.hidden_rest) } else { *run };
             Segment {
                 primitives: run.primitives,
                 groups: run.groups(saturation, hierarchical_depth),
                 open: run.open(saturation),
             }
         });
-        let rest = Segment {
-            primitives: rest,
-            groups: u64::from(rest) * u64::from(TILE_GROUPS),
-            open: TILE_GROUPS.into(),
-        };
+        let rest =
+            Segment { primitives: rest, groups: u64::from(rest) * u64::from(TILE_GROUPS), open: TILE_GROUPS.into() };
         runs.chain([rest]).filter(|segment| segment.primitives > 0)
     }
 
@@ -473,9 +432,7 @@ impl DrawWork {
     fn has_possible_boxes(&self) -> bool {
         let pairs = self.sized_pairs.windows(2);
         let known = pairs.filter(|pair| pair.iter().all(|&count| count > 0));
-        known
-            .into_iter()
-            .all(|pair| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4))
+        known.into_iter().all(|pair| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4))
     }
 
     /// Pairs of a tile and a primitive in the lists.
@@ -490,10 +447,7 @@ impl DrawWork {
 
     /// Pairs of a pixel and a primitive that are evaluated; see [`TileWork::evaluations`].
     pub fn evaluations(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
-        self.tiles
-            .iter()
-            .map(|tile| tile.evaluations(saturation, hierarchical_depth))
-            .sum()
+        self.tiles.iter().map(|tile| tile.evaluations(saturation, hierarchical_depth)).sum()
     }
 }
 
@@ -506,17 +460,9 @@ impl FrameWork {
     /// The work of the shader cores: dispatches, stages 1 and 2 of all draws, and fragment programs.
     pub fn shader(&self) -> [ShaderWork; 4] {
         let zero = ShaderWork::default();
-        self.draws.iter().fold(
-            [self.compute, zero, zero, zero],
-            |[compute, one, two, after], draw| {
-                [
-                    compute,
-                    one.plus(&draw.preprocess),
-                    two.plus(&draw.sort),
-                    after.plus(&draw.shade),
-                ]
-            },
-        )
+        self.draws.iter().fold([self.compute, zero, zero, zero], |[compute, one, two, after], draw| {
+            [compute, one.plus(&draw.preprocess), two.plus(&draw.sort), after.plus(&draw.shade)]
+        })
     }
 
     /// The frame with as many pairs as 3-sigma squares give, and the sorting work for them. The trace does not say in
@@ -547,11 +493,7 @@ impl FrameWork {
     /// The frame with only the draws of one mode, and without dispatches.
     pub fn of_mode(&self, mode: Mode) -> Self {
         let draws = self.draws.iter().filter(|draw| draw.mode == mode);
-        Self {
-            size: self.size,
-            draws: draws.cloned().collect(),
-            ..Self::default()
-        }
+        Self { size: self.size, draws: draws.cloned().collect(), ..Self::default() }
     }
 }
 
@@ -560,13 +502,7 @@ mod tests {
     use super::*;
 
     fn tile() -> TileWork {
-        let run = |primitives, rows, blocks, reached| Run {
-            primitives,
-            rows,
-            blocks,
-            reached,
-            ..Run::default()
-        };
+        let run = |primitives, rows, blocks, reached| Run { primitives, rows, blocks, reached, ..Run::default() };
         TileWork {
             at: [0, 0],
             listed: 10,
@@ -580,24 +516,14 @@ mod tests {
     #[test]
     fn finer_saturation_evaluates_less() {
         let evaluations = Saturation::ALL.map(|saturation| tile().evaluations(saturation, false));
-        assert_eq!(
-            evaluations,
-            [10 * 256, 7 * 256, (48 + 36) * 16, (48 + 28) * 16, 28 * 16]
-        );
+        assert_eq!(evaluations, [10 * 256, 7 * 256, (48 + 36) * 16, (48 + 28) * 16, 28 * 16]);
     }
 
     #[test]
     fn what_was_not_needed_is_a_segment_without_saturation() {
         let segments: Vec<_> = tile().segments(Saturation::None, false).collect();
         assert_eq!(segments.len(), 3);
-        assert_eq!(
-            segments[2],
-            Segment {
-                primitives: 3,
-                groups: 48,
-                open: 16
-            }
-        );
+        assert_eq!(segments[2], Segment { primitives: 3, groups: 48, open: 16 });
         assert_eq!(tile().segments(Saturation::Row, false).count(), 2);
     }
 
@@ -606,16 +532,9 @@ mod tests {
         let mut tile = tile();
         // Of the last run's four primitives, the tile hides one, two more are behind everything, and a block hides the
         // fourth.
-        tile.runs[1] = Run {
-            hidden: 3,
-            hidden_blocks: 6,
-            reached: 2,
-            ..tile.runs[1]
-        };
+        tile.runs[1] = Run { hidden: 3, hidden_blocks: 6, reached: 2, ..tile.runs[1] };
         tile.hidden_rest = 2;
-        let groups = |hierarchical| {
-            Saturation::ALL.map(|saturation| tile.evaluations(saturation, hierarchical) / 16)
-        };
+        let groups = |hierarchical| Saturation::ALL.map(|saturation| tile.evaluations(saturation, hierarchical) / 16);
         assert_eq!(groups(false), [160, 112, 84, 76, 28]);
         // Without saturation the list is fetched to its end, and primitives beyond the runs are evaluated, too.
         assert_eq!(groups(true), [112, 64, 57, 55, 22]);
@@ -633,23 +552,14 @@ mod tests {
         let check = |change: fn(&mut TileWork)| {
             let mut tile = tile();
             change(&mut tile);
-            let draw = DrawWork {
-                tiles: vec![tile],
-                ..DrawWork::default()
-            };
-            let frame = FrameWork {
-                draws: vec![draw],
-                ..FrameWork::default()
-            };
+            let draw = DrawWork { tiles: vec![tile], ..DrawWork::default() };
+            let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
             let (version, frames) = (TRACE_VERSION, vec![frame]);
             Trace { version, frames }.check()
         };
         assert_eq!(check(|_| ()), Ok(()));
         let pairs = 4_000_000_000;
-        assert_eq!(
-            check(|tile| tile.listed = 4_000_000_000),
-            Err(TraceError::TooLarge { frame: 0, pairs })
-        );
+        assert_eq!(check(|tile| tile.listed = 4_000_000_000), Err(TraceError::TooLarge { frame: 0, pairs }));
         for wrong in [
             (|tile| tile.runs[0].primitives = 10) as fn(&mut TileWork),
             |tile| tile.runs[0].rows = 17,
@@ -666,14 +576,8 @@ mod tests {
     #[test]
     fn boxes_that_no_primitives_have_are_refused() {
         let check = |sized_pairs| {
-            let draw = DrawWork {
-                sized_pairs,
-                ..DrawWork::default()
-            };
-            let frame = FrameWork {
-                draws: vec![draw],
-                ..FrameWork::default()
-            };
+            let draw = DrawWork { sized_pairs, ..DrawWork::default() };
+            let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
             let (version, frames) = (TRACE_VERSION, vec![frame]);
             Trace { version, frames }.check()
         };
@@ -688,14 +592,8 @@ mod tests {
     #[test]
     fn shader_work_that_is_no_number_is_refused() {
         for wrong in [f64::NAN, f64::INFINITY, -1.0, 1e18] {
-            let work = ShaderWork {
-                bytes: wrong,
-                ..ShaderWork::default()
-            };
-            let frame = FrameWork {
-                compute: work,
-                ..FrameWork::default()
-            };
+            let work = ShaderWork { bytes: wrong, ..ShaderWork::default() };
+            let frame = FrameWork { compute: work, ..FrameWork::default() };
             let (version, frames) = (TRACE_VERSION, vec![frame]);
             let checked = Trace { version, frames }.check();
             assert_eq!(checked, Err(TraceError::ShaderWork(0)), "{wrong}");
@@ -708,10 +606,7 @@ mod tests {
             version: TRACE_VERSION,
             frames: vec![FrameWork {
                 size: [16, 16],
-                draws: vec![DrawWork {
-                    tiles: vec![tile()],
-                    ..DrawWork::default()
-                }],
+                draws: vec![DrawWork { tiles: vec![tile()], ..DrawWork::default() }],
                 ..FrameWork::default()
             }],
         };

@@ -35,15 +35,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("a folder of cameras.json files")?;
     let views: usize = arguments.next().map_or(Ok(8), |text| text.parse())?;
-    println!(
-        "# Means over {views} views of generated gardens; written by tests/bench/examples/paper_scenes.rs."
-    );
+    println!("# Means over {views} views of generated gardens; written by tests/bench/examples/paper_scenes.rs.");
     for (name, millions, size, path) in SCENES {
         let file = Path::new(&folder).join(format!("{path}.json"));
-        let path_cameras: Vec<_> = gaurast_scene::camera_files::load(&file, size)?
-            .into_iter()
-            .map(|view| view.camera)
-            .collect();
+        let path_cameras: Vec<_> =
+            gaurast_scene::camera_files::load(&file, size)?.into_iter().map(|view| view.camera).collect();
         let cameras = around_the_garden(&path_cameras, size, views)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
         let count = (millions * 1e6) as usize;
@@ -67,11 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// `count` cameras of the path, evenly, as they would look at the garden.
-fn around_the_garden(
-    path: &[Camera],
-    size: [u32; 2],
-    count: usize,
-) -> Result<Vec<Camera>, Box<dyn Error>> {
+fn around_the_garden(path: &[Camera], size: [u32; 2], count: usize) -> Result<Vec<Camera>, Box<dyn Error>> {
     let garden = gaurast_scene::garden::camera(None, size)?;
     let axes = |camera: &Camera| camera.rotation.map(DVec3::from_array);
     let [_, down, forward] = axes(&garden);
@@ -85,22 +77,15 @@ fn around_the_garden(
 
     let center = looked_at(path);
     let mean_down: DVec3 = path.iter().map(|camera| axes(camera)[1]).sum();
-    let mean_distance = path
-        .iter()
-        .map(|camera| DVec3::from_array(camera.eye).distance(center))
-        .sum::<f64>()
-        / path.len() as f64;
+    let mean_distance =
+        path.iter().map(|camera| DVec3::from_array(camera.eye).distance(center)).sum::<f64>() / path.len() as f64;
     let turn = DQuat::from_rotation_arc(mean_down.normalize(), down.normalize());
     let scale = distance / mean_distance;
     let moved = |camera: &Camera| {
         let eye = middle + turn * (DVec3::from_array(camera.eye) - center) * scale;
         let rotation = axes(camera).map(|axis| (turn * axis).to_array());
         let camera = camera.resized(size);
-        Camera {
-            rotation,
-            eye: eye.to_array(),
-            ..camera
-        }
+        Camera { rotation, eye: eye.to_array(), ..camera }
     };
     let step = path.len() / count.clamp(1, path.len());
     Ok(path.iter().step_by(step).take(count).map(moved).collect())
@@ -111,8 +96,7 @@ fn looked_at(path: &[Camera]) -> DVec3 {
     let (mut matrix, mut vector) = (DMat3::ZERO, DVec3::ZERO);
     for camera in path {
         let along = DVec3::from_array(camera.rotation[2]);
-        let across =
-            DMat3::IDENTITY - DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+        let across = DMat3::IDENTITY - DMat3::from_cols(along * along.x, along * along.y, along * along.z);
         matrix += across;
         vector += across * DVec3::from_array(camera.eye);
     }

@@ -6,9 +6,8 @@ use ash::vk;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model,
-    GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
-    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model, GaussianCutOffGAURAST as CutOff,
+    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
     GaussianPrecisionGAURAST as Precision,
 };
 use gaurast_oracle::oracle::Stored;
@@ -36,9 +35,7 @@ impl Device {
     /// # Errors
     /// If there is no such device, or Vulkan fails.
     pub fn open(driver: &str) -> Result<Self, Error> {
-        let is_manifest = Path::new(driver)
-            .extension()
-            .is_some_and(|extension| extension == "json");
+        let is_manifest = Path::new(driver).extension().is_some_and(|extension| extension == "json");
         if is_manifest {
             for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
                 // SAFETY: the program opens its device before it starts a second thread.
@@ -49,10 +46,7 @@ impl Device {
             "embedded" => Opening::of(Driver::Embedded),
             "loader" => Opening::of(Driver::Extended),
             _ if is_manifest => Opening::of(Driver::Extended),
-            name => Opening {
-                device: name,
-                ..Opening::of(Driver::Extended)
-            },
+            name => Opening { device: name, ..Opening::of(Driver::Extended) },
         };
         let refused = |error: OpenError| Error(error.to_string());
         Ok(Self::of(Gpu::open(&opening).map_err(refused)?))
@@ -71,11 +65,7 @@ impl Device {
         }
         features.p_next = std::ptr::null_mut();
         properties.p_next = std::ptr::null_mut();
-        Self {
-            gpu,
-            features,
-            properties,
-        }
+        Self { gpu, features, properties }
     }
 
     /// The first feature, limit or format that a draw needs and the device lacks.
@@ -83,108 +73,35 @@ impl Device {
         let has = &self.features;
         let state = &draw.state;
         let depth = draw.depth.as_ref();
-        let any = draw
-            .approximation
-            .is_some_and(|numbers| numbers != [0.0; 2]);
+        let any = draw.approximation.is_some_and(|numbers| numbers != [0.0; 2]);
         let footprint = draw.footprint.unwrap_or_default();
         let needs = [
-            (
-                state.order == Order::RADIAL_DISTANCE,
-                has.radial_distance_order,
-                "radialDistanceOrder",
-            ),
-            (
-                state.order == Order::PRIMITIVE,
-                has.primitive_order,
-                "primitiveOrder",
-            ),
-            (
-                state.order == Order::PER_PIXEL,
-                has.per_pixel_order,
-                "perPixelOrder",
-            ),
-            (
-                state.precision == Precision::FLOAT16,
-                has.rasterization_float16,
-                "rasterizationFloat16",
-            ),
-            (
-                state.antialiasing == Antialiasing::OPACITY_COMPENSATED,
-                has.opacity_compensation,
-                "opacityCompensation",
-            ),
-            (
-                draw.camera.model == Model::ORTHOGRAPHIC,
-                has.orthographic_camera,
-                "orthographicCamera",
-            ),
-            (
-                draw.camera.model == Model::FISHEYE,
-                has.fisheye_camera,
-                "fisheyeCamera",
-            ),
-            (
-                draw.camera.model == Model::EQUIRECTANGULAR,
-                has.equirectangular_camera,
-                "equirectangularCamera",
-            ),
-            (
-                state.linearization == Linearization::UNSCENTED,
-                has.unscented_projection,
-                "unscentedProjection",
-            ),
-            (
-                state.geometry == Geometry::GAUSSIAN_2D,
-                has.gaussian_2d,
-                "gaussian2D",
-            ),
-            (
-                draw.camera_in_buffer,
-                has.uniform_buffer_camera,
-                "uniformBufferCamera",
-            ),
+            (state.order == Order::RADIAL_DISTANCE, has.radial_distance_order, "radialDistanceOrder"),
+            (state.order == Order::PRIMITIVE, has.primitive_order, "primitiveOrder"),
+            (state.order == Order::PER_PIXEL, has.per_pixel_order, "perPixelOrder"),
+            (state.precision == Precision::FLOAT16, has.rasterization_float16, "rasterizationFloat16"),
+            (state.antialiasing == Antialiasing::OPACITY_COMPENSATED, has.opacity_compensation, "opacityCompensation"),
+            (draw.camera.model == Model::ORTHOGRAPHIC, has.orthographic_camera, "orthographicCamera"),
+            (draw.camera.model == Model::FISHEYE, has.fisheye_camera, "fisheyeCamera"),
+            (draw.camera.model == Model::EQUIRECTANGULAR, has.equirectangular_camera, "equirectangularCamera"),
+            (state.linearization == Linearization::UNSCENTED, has.unscented_projection, "unscentedProjection"),
+            (state.geometry == Geometry::GAUSSIAN_2D, has.gaussian_2d, "gaussian2D"),
+            (draw.camera_in_buffer, has.uniform_buffer_camera, "uniformBufferCamera"),
             (draw.merged, has.merged_draws, "mergedDraws"),
+            (draw.instances.is_some(), has.gaussian_instancing, "gaussianInstancing"),
             (
-                draw.instances.is_some(),
-                has.gaussian_instancing,
-                "gaussianInstancing",
-            ),
-            (
-                depth
-                    .is_some_and(|d| d.test.is_some() || d.bounds.is_some() || d.stencil.is_some()),
+                depth.is_some_and(|d| d.test.is_some() || d.bounds.is_some() || d.stencil.is_some()),
                 has.gaussian_depth_stencil,
                 "gaussianDepthStencil",
             ),
-            (
-                draw.samples > 1,
-                has.gaussian_multisample,
-                "gaussianMultisample",
-            ),
+            (draw.samples > 1, has.gaussian_multisample, "gaussianMultisample"),
             (any, has.gaussian_approximation, "gaussianApproximation"),
-            (
-                footprint.cut_off != CutOff::NONE,
-                has.gaussian_cut_off,
-                "gaussianCutOff",
-            ),
-            (
-                footprint.compensation_floor != 0.0,
-                has.opacity_compensation_floor,
-                "opacityCompensationFloor",
-            ),
-            (
-                draw.shown.is_some(),
-                has.resolve_fragment_shader,
-                "resolveFragmentShader",
-            ),
-            (
-                draw.shown.is_some(),
-                has.resolve_gaussian_indices,
-                "resolveGaussianIndices",
-            ),
+            (footprint.cut_off != CutOff::NONE, has.gaussian_cut_off, "gaussianCutOff"),
+            (footprint.compensation_floor != 0.0, has.opacity_compensation_floor, "opacityCompensationFloor"),
+            (draw.shown.is_some(), has.resolve_fragment_shader, "resolveFragmentShader"),
+            (draw.shown.is_some(), has.resolve_gaussian_indices, "resolveGaussianIndices"),
         ];
-        let lacks = needs
-            .iter()
-            .find(|(needed, offered, _)| *needed && *offered == vk::FALSE);
+        let lacks = needs.iter().find(|(needed, offered, _)| *needed && *offered == vk::FALSE);
         if let Some((_, _, name)) = lacks {
             return Some(name);
         }
@@ -206,9 +123,7 @@ impl Device {
         if depth.is_some_and(|depth| !has(depth.format, tested)) {
             return Some("the depth attachment's format");
         }
-        if depth.is_some_and(|depth| depth.bounds.is_some())
-            && self.gpu.features().depth_bounds == vk::FALSE
-        {
+        if depth.is_some_and(|depth| depth.bounds.is_some()) && self.gpu.features().depth_bounds == vk::FALSE {
             return Some("depthBounds");
         }
         None

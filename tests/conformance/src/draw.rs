@@ -2,8 +2,8 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance};
 use gaurast_oracle::scenes::{self, SceneBuffers};
@@ -201,11 +201,7 @@ impl Depth {
 
     /// The number of bytes of a depth.
     pub(crate) fn texel(&self) -> u64 {
-        if self.format == vk::Format::D16_UNORM {
-            2
-        } else {
-            4
-        }
+        if self.format == vk::Format::D16_UNORM { 2 } else { 4 }
     }
 }
 
@@ -225,10 +221,7 @@ impl Draw {
             camera_in_buffer: false,
             instances: None,
             indices: Vec::new(),
-            calls: vec![Call::Draw {
-                vertices: [0, count],
-                instances: [0, 1],
-            }],
+            calls: vec![Call::Draw { vertices: [0, count], instances: [0, 1] }],
             merged: false,
             size: SIZE,
             viewport: None,
@@ -270,10 +263,7 @@ impl Draw {
     pub(crate) fn viewport(&self) -> vk::Viewport {
         self.viewport.unwrap_or_else(|| {
             let [width, height] = self.size.map(|side| side as f32);
-            vk::Viewport::default()
-                .width(width)
-                .height(height)
-                .max_depth(1.0)
+            vk::Viewport::default().width(width).height(height).max_depth(1.0)
         })
     }
 }

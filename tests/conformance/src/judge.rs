@@ -7,8 +7,8 @@ use gaurast::vk::GaussianPrecisionGAURAST as Precision;
 use gaurast_oracle::compare::{Limits, Verdict, verdict};
 use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::{
-    OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference,
-    Stored, render_binary16, render_bounded, render_tested,
+    OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference, Stored,
+    render_binary16, render_bounded, render_tested,
 };
 use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
@@ -75,16 +75,9 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     let sets = sets(draw);
     for members in &sets {
         let (scene, instances) = gathered(draw, members);
-        let scene = OracleScene {
-            requested_degree: draw.degree,
-            instances: &instances,
-            ..scene.as_oracle()
-        };
-        let colors =
-            (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok());
-        greatest = colors
-            .flat_map(|splat| splat.color)
-            .fold(greatest, f64::max);
+        let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
+        let colors = (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok());
+        greatest = colors.flat_map(|splat| splat.color).fold(greatest, f64::max);
         let drawn = if draw.depth.is_some() {
             let tested = render_tested(&scene, &camera, &state, &tests(draw), before);
             if draw.samples == 1 {
@@ -98,19 +91,10 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
         };
         blend(draw, &mut color, &drawn);
     }
-    if draw
-        .depth
-        .as_ref()
-        .is_some_and(|depth| !depth.has_stencil())
-    {
+    if draw.depth.as_ref().is_some_and(|depth| !depth.has_stencil()) {
         stencil.clear();
     }
-    Expected {
-        color,
-        distance: distance(draw, greatest, sets.len()),
-        depth,
-        stencil,
-    }
+    Expected { color, distance: distance(draw, greatest, sets.len()), depth, stencil }
 }
 
 /// The distance that a colour may have from the envelope, if no drawn colour exceeds `greatest`.
@@ -120,8 +104,7 @@ fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     let approximate = match draw.approximation {
         Some([error, budget]) => {
             let state = &draw.state;
-            let left =
-                f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
+            let left = f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
             let finished = if error > 0.0 { left } else { 0.0 };
             range * (f64::from(error) + f64::from(budget) + finished)
         }
@@ -150,12 +133,11 @@ impl Covered {
     /// The pixels whose centres are within the viewport.
     fn of(viewport: &vk::Viewport) -> Self {
         let top = viewport.y + viewport.height.min(0.0);
-        let [columns, rows] =
-            [[viewport.x, viewport.width], [top, viewport.height.abs()]].map(|[start, side]| {
-                let centre_from = |edge: f32| (edge - 0.5).ceil();
-                let first = centre_from(start);
-                (first, centre_from(start + side) - first, start - first)
-            });
+        let [columns, rows] = [[viewport.x, viewport.width], [top, viewport.height.abs()]].map(|[start, side]| {
+            let centre_from = |edge: f32| (edge - 0.5).ceil();
+            let first = centre_from(start);
+            (first, centre_from(start + side) - first, start - first)
+        });
         Self {
             first: [columns.0 as i64, rows.0 as i64],
             size: [columns.1 as u32, rows.1 as u32],
@@ -202,24 +184,14 @@ pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
     let (mut sets, mut open) = (Vec::<Vec<Member>>::new(), false);
     for call in &draw.calls {
         let members: Vec<Member> = match *call {
-            Call::Draw {
-                vertices: [first, count],
-                instances: [first_instance, instances],
-            } => (first_instance..first_instance + instances)
+            Call::Draw { vertices: [first, count], instances: [first_instance, instances] } => (first_instance
+                ..first_instance + instances)
                 .flat_map(|instance| (first..first + count).map(move |vertex| [vertex, instance]))
                 .collect(),
-            Call::Indirect {
-                vertices: [first, count],
-            } => (first..first + count).map(|vertex| [vertex, 0]).collect(),
-            Call::Indexed {
-                indices: [first, count],
-                offset,
-            } => {
+            Call::Indirect { vertices: [first, count] } => (first..first + count).map(|vertex| [vertex, 0]).collect(),
+            Call::Indexed { indices: [first, count], offset } => {
                 let indices = &draw.indices[first as usize..][..count as usize];
-                indices
-                    .iter()
-                    .map(|index| [index.wrapping_add_signed(offset), 0])
-                    .collect()
+                indices.iter().map(|index| [index.wrapping_add_signed(offset), 0]).collect()
             }
             Call::EndSet => {
                 open = false;
@@ -240,16 +212,9 @@ pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<Or
     let scene = &draw.scene;
     let triples = (scene.degree + 1).pow(2) as usize;
     let stored = |value: f32| {
-        if draw.half {
-            f16::from_f32(value).to_f32()
-        } else {
-            value
-        }
+        if draw.half { f16::from_f32(value).to_f32() } else { value }
     };
-    let mut all = SceneBuffers {
-        degree: scene.degree,
-        ..SceneBuffers::default()
-    };
+    let mut all = SceneBuffers { degree: scene.degree, ..SceneBuffers::default() };
     let mut instances = Vec::new();
     for &[vertex, instance] in members {
         let at = vertex as usize;
@@ -258,8 +223,7 @@ pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<Or
         all.rotations.push(scene.rotations[at].map(stored));
         all.opacities.push(stored(scene.opacities[at]));
         let coefficients = &scene.sh[at * triples..][..triples];
-        all.sh
-            .extend(coefficients.iter().map(|triple| triple.map(stored)));
+        all.sh.extend(coefficients.iter().map(|triple| triple.map(stored)));
         if let Some((rate, placed)) = &draw.instances {
             let which = match *rate {
                 vk::VertexInputRate::INSTANCE => instance,
@@ -284,10 +248,8 @@ fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
     let [left, top] = Covered::of(&draw.viewport()).first;
     let inside = |rectangle: Option<vk::Rect2D>, [x, y]: [i64; 2]| {
         rectangle.is_none_or(|vk::Rect2D { offset, extent }| {
-            let [right, bottom] = [
-                i64::from(offset.x) + i64::from(extent.width),
-                i64::from(offset.y) + i64::from(extent.height),
-            ];
+            let [right, bottom] =
+                [i64::from(offset.x) + i64::from(extent.width), i64::from(offset.y) + i64::from(extent.height)];
             (i64::from(offset.x)..right).contains(&x) && (i64::from(offset.y)..bottom).contains(&y)
         })
     };
@@ -297,8 +259,7 @@ fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
     for at in 0..held.nominal.len() {
         let place = [at as u32 % held.width, at as u32 / held.width].map(i64::from);
         let own = [place[0] - left, place[1] - top];
-        let within = (0..i64::from(drawn.width)).contains(&own[0])
-            && (0..i64::from(drawn.height)).contains(&own[1]);
+        let within = (0..i64::from(drawn.width)).contains(&own[0]) && (0..i64::from(drawn.height)).contains(&own[1]);
         if !within || !inside(draw.scissor, place) || !inside(draw.area, place) {
             continue;
         }
@@ -336,11 +297,7 @@ fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
     };
     let mask = draw.write_mask.as_raw();
     let component = |c: usize| {
-        if mask >> c & 1 == 1 {
-            source * fragment[c] + destination * behind[c]
-        } else {
-            behind[c]
-        }
+        if mask >> c & 1 == 1 { source * fragment[c] + destination * behind[c] } else { behind[c] }
     };
     stored_color(draw, [0, 1, 2, 3].map(component))
 }
@@ -348,10 +305,7 @@ fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
 impl Expected {
     /// The verdict on a picture's colours.
     pub fn verdict(&self, picture: &Picture) -> Verdict {
-        let limits = Limits {
-            distance: self.distance,
-            ..Limits::ENVELOPE_ONLY
-        };
+        let limits = Limits { distance: self.distance, ..Limits::ENVELOPE_ONLY };
         verdict(&picture.color, &self.color, limits)
     }
 
@@ -361,30 +315,17 @@ impl Expected {
         if !verdict.holds() {
             return Some(format!("colours: {verdict}"));
         }
-        let place = |at: usize| {
-            [
-                at % self.color.width as usize,
-                at / self.color.width as usize,
-            ]
-        };
+        let place = |at: usize| [at % self.color.width as usize, at / self.color.width as usize];
         for (at, (allowed, code)) in self.depth.iter().zip(&picture.stored.depth).enumerate() {
-            if allowed
-                .as_ref()
-                .is_some_and(|allowed| !allowed.contains(code))
-            {
+            if allowed.as_ref().is_some_and(|allowed| !allowed.contains(code)) {
                 let place = place(at);
-                return Some(format!(
-                    "depths: {code:#x} at {place:?}, not one of {allowed:x?}"
-                ));
+                return Some(format!("depths: {code:#x} at {place:?}, not one of {allowed:x?}"));
             }
         }
-        for (at, (allowed, stencil)) in self.stencil.iter().zip(&picture.stored.stencil).enumerate()
-        {
+        for (at, (allowed, stencil)) in self.stencil.iter().zip(&picture.stored.stencil).enumerate() {
             if !allowed.contains(stencil) {
                 let place = place(at);
-                return Some(format!(
-                    "stencils: {stencil} at {place:?}, not one of {allowed:?}"
-                ));
+                return Some(format!("stencils: {stencil} at {place:?}, not one of {allowed:?}"));
             }
         }
         None

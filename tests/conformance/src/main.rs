@@ -45,12 +45,7 @@ fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|_| {}));
     let mut cases = all();
     if !arguments.case.is_empty() {
-        cases.retain(|case| {
-            arguments
-                .case
-                .iter()
-                .any(|pattern| cases::fits(&case.path(), pattern))
-        });
+        cases.retain(|case| arguments.case.iter().any(|pattern| cases::fits(&case.path(), pattern)));
     }
     if arguments.list {
         for case in &cases {
@@ -70,15 +65,9 @@ fn main() -> ExitCode {
         return gaurast_conformance::mistakes::prove(&*device, &cases);
     }
     println!("{} cases on {}", cases.len(), device.name());
-    let results: Vec<Result> = cases
-        .iter()
-        .map(|case| tell(&*device, case, &arguments))
-        .collect();
+    let results: Vec<Result> = cases.iter().map(|case| tell(&*device, case, &arguments)).collect();
     for chapter in cases::chapters() {
-        let own: Vec<&Result> = results
-            .iter()
-            .filter(|result| result.chapter == chapter)
-            .collect();
+        let own: Vec<&Result> = results.iter().filter(|result| result.chapter == chapter).collect();
         let counts = Counts::of(own.iter().copied());
         if counts.all() > 0 {
             let seconds: f64 = own.iter().map(|result| result.time.as_secs_f64()).sum();
@@ -93,19 +82,11 @@ fn main() -> ExitCode {
         eprintln!("{}: {error}", path.display());
         return ExitCode::from(2);
     }
-    if counts.failed > 0 {
-        ExitCode::FAILURE
-    } else {
-        ExitCode::SUCCESS
-    }
+    if counts.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }
 
 fn line(counts: Counts) -> String {
-    let Counts {
-        passed,
-        failed,
-        not_supported,
-    } = counts;
+    let Counts { passed, failed, not_supported } = counts;
     format!("{passed:4} Pass {failed:4} Fail {not_supported:4} NotSupported")
 }
 
@@ -116,10 +97,7 @@ fn tell(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Resu
     let time = start.elapsed();
     match &outcome {
         Outcome::Pass(distance) if arguments.verbose => {
-            println!(
-                "Pass          {}  ({distance:.1e} from the envelope)",
-                case.path()
-            );
+            println!("Pass          {}  ({distance:.1e} from the envelope)", case.path());
         }
         Outcome::NotSupported(what) if arguments.verbose => {
             println!("NotSupported  {}  ({what})", case.path());
@@ -133,10 +111,5 @@ fn tell(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Resu
         }
         _ => {}
     }
-    Result {
-        chapter: case.chapter,
-        name: case.name.clone(),
-        outcome,
-        time,
-    }
+    Result { chapter: case.chapter, name: case.name.clone(), outcome, time }
 }

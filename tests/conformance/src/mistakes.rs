@@ -18,11 +18,7 @@ pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
     let failing = failing(device, cases);
     let mut caught: BTreeMap<&str, usize> = BTreeMap::new();
     if !failing.is_empty() {
-        println!(
-            "without a mistake {} cases fail, the first of them {}",
-            failing.len(),
-            failing[0].path()
-        );
+        println!("without a mistake {} cases fail, the first of them {}", failing.len(), failing[0].path());
         return ExitCode::FAILURE;
     }
     for &(mistake, text) in Mistake::ALL {
@@ -34,10 +30,7 @@ pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
             *chapters.entry(case.chapter).or_default() += 1;
             *caught.entry(case.chapter).or_default() += 1;
         }
-        let chapters: Vec<String> = chapters
-            .iter()
-            .map(|(chapter, count)| format!("{chapter} {count}"))
-            .collect();
+        let chapters: Vec<String> = chapters.iter().map(|(chapter, count)| format!("{chapter} {count}")).collect();
         let verdict = match failing.first() {
             Some(first) => format!("{}; first {}", chapters.join(", "), first.path()),
             None => "ESCAPES".to_owned(),
@@ -46,11 +39,7 @@ pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
         escaped += usize::from(failing.is_empty());
     }
     println!("{} mistakes, {escaped} of them escape", Mistake::ALL.len());
-    if escaped == 0 {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    }
+    if escaped == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 fn failing<'a>(device: &dyn Implementation, cases: &'a [Case]) -> Vec<&'a Case> {

@@ -8,8 +8,8 @@ use gaurast::vk::{
 };
 use gaurast_oracle::oracle::Stored;
 use gaurast_testkit::{
-    Attachments, Bindings, Buffer, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu,
-    Image, Instance, Pass, Resource, Shader, Target, TargetOptions, bind_instances, blend, opaque,
+    Attachments, Bindings, Buffer, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Image, Instance,
+    Pass, Resource, Shader, Target, TargetOptions, bind_instances, blend, opaque,
 };
 use half::f16;
 
@@ -38,9 +38,7 @@ pub(crate) fn record(gpu: &Gpu, draw: &Draw, stored: &Stored) -> Picture {
             let [x, y, z] = instance.matrix;
             let numbers = [x, y, z].into_iter().flatten().chain([instance.opacity]);
             let mut row = [0.0; 13];
-            row.iter_mut()
-                .zip(numbers)
-                .for_each(|(to, from)| *to = from);
+            row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
             row
         });
         Buffer::of(gpu, &all.collect::<Vec<_>>())
@@ -48,24 +46,16 @@ pub(crate) fn record(gpu: &Gpu, draw: &Draw, stored: &Stored) -> Picture {
     let indices = Buffer::of(gpu, &draw.indices);
     let parameters: Vec<Buffer> = (draw.calls.iter())
         .map(|call| match *call {
-            Call::Indirect {
-                vertices: [first, count],
-            } => Buffer::of(gpu, &[count, 1, first, 0]),
+            Call::Indirect { vertices: [first, count] } => Buffer::of(gpu, &[count, 1, first, 0]),
             _ => Buffer::new(gpu, 16),
         })
         .collect();
-    let pass = Pass {
-        area: draw.area,
-        ..Pass::load()
-    };
+    let pass = Pass { area: draw.area, ..Pass::load() };
     gpu.run(|commands| {
         commands.pass(&target, &pass, || {
             commands.bind(&pipeline);
             let view = draw.viewport();
-            commands.viewport(
-                [view.x, view.y, view.width, view.height],
-                [view.min_depth, view.max_depth],
-            );
+            commands.viewport([view.x, view.y, view.width, view.height], [view.min_depth, view.max_depth]);
             if let Some(vk::Rect2D { offset, extent }) = draw.scissor {
                 commands.scissor([offset.x, offset.y], [extent.width, extent.height]);
             }
@@ -95,16 +85,10 @@ pub(crate) fn record(gpu: &Gpu, draw: &Draw, stored: &Stored) -> Picture {
 /// Records a draw command. `parameters` is the buffer of an indirect one.
 fn issue(commands: &Commands, call: &Call, parameters: &Buffer) {
     match *call {
-        Call::Draw {
-            vertices: [vertex, vertices],
-            instances: [instance, instances],
-        } => {
+        Call::Draw { vertices: [vertex, vertices], instances: [instance, instances] } => {
             commands.draw_instances(vertex..vertex + vertices, instance..instance + instances);
         }
-        Call::Indexed {
-            indices: [first, count],
-            offset,
-        } => commands.draw_indexed(first..first + count, offset),
+        Call::Indexed { indices: [first, count], offset } => commands.draw_indexed(first..first + count, offset),
         Call::Indirect { .. } => commands.draw_indirect(parameters, 1),
         Call::EndSet => {}
     }
@@ -126,9 +110,7 @@ fn target(gpu: &Gpu, draw: &Draw, stored: &Stored) -> Target {
     gpu.run(|commands| commands.pass(&target, &Pass::clear(draw.behind), || {}));
     if let (Some(depth), Some(image), 1) = (&draw.depth, &target.depth, draw.samples) {
         let depths: Vec<u8> = match depth.texel() {
-            2 => (stored.depth.iter())
-                .flat_map(|&code| (code as u16).to_ne_bytes())
-                .collect(),
+            2 => (stored.depth.iter()).flat_map(|&code| (code as u16).to_ne_bytes()).collect(),
             _ => bytemuck::cast_slice(&stored.depth).to_vec(),
         };
         image.upload(vk::ImageAspectFlags::DEPTH, &depths);
@@ -151,9 +133,7 @@ fn picture(draw: &Draw, target: &Target) -> Picture {
     if let (Some(depth), Some(image), 1) = (&draw.depth, &target.depth, draw.samples) {
         let bytes = image.download(vk::ImageAspectFlags::DEPTH);
         stored.depth = match depth.texel() {
-            2 => (bytes.chunks_exact(2))
-                .map(|code| u16::from_ne_bytes([code[0], code[1]]).into())
-                .collect(),
+            2 => (bytes.chunks_exact(2)).map(|code| u16::from_ne_bytes([code[0], code[1]]).into()).collect(),
             _ => bytemuck::pod_collect_to_vec(&bytes),
         };
         if depth.format == vk::Format::X8_D24_UNORM_PACK32 {
@@ -167,10 +147,7 @@ fn picture(draw: &Draw, target: &Target) -> Picture {
 }
 
 /// The texels of an image, each component converted.
-fn converted<T: bytemuck::AnyBitPattern>(
-    image: &Image,
-    convert: impl Fn(T) -> f32 + Copy,
-) -> Vec<[f32; 4]> {
+fn converted<T: bytemuck::AnyBitPattern>(image: &Image, convert: impl Fn(T) -> f32 + Copy) -> Vec<[f32; 4]> {
     let texels = image.download(vk::ImageAspectFlags::COLOR);
     let components = texels.chunks_exact(size_of::<T>());
     let floats = components.map(|bytes| convert(bytemuck::pod_read_unaligned(bytes)));
@@ -186,10 +163,7 @@ fn pipeline(gpu: &Gpu, target: &Target, draw: &Draw, set: Option<&Bindings>) -> 
     let resolve = draw.shown.map(|shown| {
         let words = include_bytes!("../shaders/shown.frag.spv").chunks_exact(4);
         let words = words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-        Shader {
-            constants: vec![(0, shown.number())],
-            ..Shader::fragment(words.collect())
-        }
+        Shader { constants: vec![(0, shown.number())], ..Shader::fragment(words.collect()) }
     });
     if resolve.is_some() {
         state = state.resolve_input_locations(
@@ -246,16 +220,10 @@ fn depth_stencil(draw: &Draw) -> vk::PipelineDepthStencilStateCreateInfo<'static
         return state;
     };
     if let Some((op, write)) = depth.test {
-        state = state
-            .depth_test_enable(true)
-            .depth_compare_op(op)
-            .depth_write_enable(write);
+        state = state.depth_test_enable(true).depth_compare_op(op).depth_write_enable(write);
     }
     if let Some([least, greatest]) = depth.bounds {
-        state = state
-            .depth_bounds_test_enable(true)
-            .min_depth_bounds(least)
-            .max_depth_bounds(greatest);
+        state = state.depth_bounds_test_enable(true).min_depth_bounds(least).max_depth_bounds(greatest);
     }
     if let Some(front) = depth.stencil {
         // A Gaussian is always front-facing. The back-face state is different, to show that it is not used.

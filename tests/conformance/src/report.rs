@@ -94,10 +94,7 @@ pub fn junit(device: &str, results: &[Result]) -> String {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -112,10 +109,7 @@ mod tests {
             outcome,
             time: Duration::from_millis(1500),
         };
-        let failure = crate::run::Failure {
-            message: "2 < 3 & \"so\"".to_owned(),
-            picture: None,
-        };
+        let failure = crate::run::Failure { message: "2 < 3 & \"so\"".to_owned(), picture: None };
         let results = [
             result("order", "a", Outcome::Pass(1e-7)),
             result("order", "b", Outcome::NotSupported("perPixelOrder")),
@@ -123,9 +117,7 @@ mod tests {
         ];
         let xml = junit("a device", &results);
         assert!(xml.contains("<testsuites name=\"a device\" tests=\"3\" failures=\"1\">"));
-        assert!(
-            xml.contains("<testsuite name=\"order\" tests=\"2\" failures=\"0\" skipped=\"1\">")
-        );
+        assert!(xml.contains("<testsuite name=\"order\" tests=\"2\" failures=\"0\" skipped=\"1\">"));
         assert!(xml.contains("name=\"a\" time=\"1.500\"/>"));
         assert!(xml.contains("<failure message=\"2 &lt; 3 &amp; &quot;so&quot;\"/>"));
     }

@@ -17,11 +17,7 @@ pub(crate) fn distance(draw: &Draw, shown: Shown, picture: &Picture) -> Result<f
         return Err("a case with a resolve shader has one set".to_owned());
     };
     let (scene, instances) = gathered(draw, members);
-    let scene = OracleScene {
-        requested_degree: draw.degree,
-        instances: &instances,
-        ..scene.as_oracle()
-    };
+    let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
     let (camera, viewport) = (oracle_camera(draw), draw.viewport());
     let tests = OracleTests {
         depth_coefficients: draw.camera.depth_coefficients,
@@ -33,11 +29,7 @@ pub(crate) fn distance(draw: &Draw, shown: Shown, picture: &Picture) -> Result<f
         stencil: None,
     };
     let pixels = resolve_scene(&scene, &camera, &oracle_state(draw), &tests);
-    let judge = Judge {
-        draw,
-        shown,
-        members,
-    };
+    let judge = Judge { draw, shown, members };
     let mut farthest = 0.0_f64;
     for (at, (ways, color)) in pixels.iter().zip(&picture.color).enumerate() {
         let far = judge.pixel(ways, *color);
@@ -130,11 +122,7 @@ impl Judge<'_> {
     ) -> Result<(), String> {
         let is_one = medians.any(|median| (median - value).abs() <= room);
         let is_unknown = ways.iter().any(|way| way.medians_exhausted);
-        if is_one || is_unknown {
-            Ok(())
-        } else {
-            Err("the median is another one".to_owned())
-        }
+        if is_one || is_unknown { Ok(()) } else { Err("the median is another one".to_owned()) }
     }
 
     /// The camera's vector at a location.
@@ -162,14 +150,9 @@ impl Judge<'_> {
 
 /// The distance of a number from the least and the greatest of others.
 fn within(values: impl Iterator<Item = f64>, value: f32, room: f64) -> Result<f64, String> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let value = f64::from(value);
     let distance = (low - value).max(value - high).max(0.0);
-    if distance <= room {
-        Ok(distance)
-    } else {
-        Err(format!("{value} is not within {low} to {high}"))
-    }
+    if distance <= room { Ok(distance) } else { Err(format!("{value} is not within {low} to {high}")) }
 }

@@ -34,17 +34,16 @@ impl Failure {
     /// Writes a picture of three panels to `path`: expected, drawn, and the distance from the envelope. Returns true if
     /// there is such a picture.
     pub fn write(&self, path: &Path) -> bool {
-        self.picture.as_ref().is_some_and(|(expected, drawn)| {
-            write_difference(path, drawn, &expected.color, expected.distance).is_ok()
-        })
+        self.picture
+            .as_ref()
+            .is_some_and(|(expected, drawn)| write_difference(path, drawn, &expected.color, expected.distance).is_ok())
     }
 }
 
 /// The message of a panic.
 fn message(panic: &(dyn std::any::Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("it panics")
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it panics")
 }
 
 /// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
@@ -54,12 +53,7 @@ pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
         return Outcome::NotSupported(feature);
     }
     let before = stored_before(&draw);
-    let nothing = |message: String| {
-        Outcome::Fail(Failure {
-            message,
-            picture: None,
-        })
-    };
+    let nothing = |message: String| Outcome::Fail(Failure { message, picture: None });
     let drawn = catch_unwind(AssertUnwindSafe(|| implementation.draw(&draw, &before)));
     let picture = match drawn {
         Ok(Ok(picture)) => picture,
@@ -75,9 +69,6 @@ pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     let expected = expected(&draw, &before);
     match expected.fault(&picture) {
         None => Outcome::Pass(expected.verdict(&picture).max_distance),
-        Some(message) => Outcome::Fail(Failure {
-            message,
-            picture: Some((Box::new(expected), picture.color)),
-        }),
+        Some(message) => Outcome::Fail(Failure { message, picture: Some((Box::new(expected), picture.color)) }),
     }
 }

@@ -3,8 +3,8 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model,
-    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization,
-    GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
+    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision,
 };
 use gaurast_oracle::oracle::Stored;
 use gaurast_second as second;
@@ -26,15 +26,9 @@ impl Implementation for Second {
         let depth = draw.depth.as_ref();
         let lacks = [
             (state.order != Order::VIEW_DEPTH, "other orders"),
-            (
-                state.precision != Precision::FLOAT32,
-                "rasterizationFloat16",
-            ),
+            (state.precision != Precision::FLOAT32, "rasterizationFloat16"),
             (draw.camera.model != Model::PINHOLE, "other cameras"),
-            (
-                state.linearization != Linearization::JACOBIAN,
-                "unscentedProjection",
-            ),
+            (state.linearization != Linearization::JACOBIAN, "unscentedProjection"),
             (state.geometry != Geometry::GAUSSIAN_3D, "gaussian2D"),
             (draw.camera_in_buffer, "uniformBufferCamera"),
             (draw.instances.is_some(), "gaussianInstancing"),
@@ -43,28 +37,13 @@ impl Implementation for Second {
             (draw.shown.is_some(), "resolveFragmentShader"),
             (draw.samples > 1, "gaussianMultisample"),
             (draw.blend != Blend::Over, "other blending"),
-            (
-                draw.write_mask != vk::ColorComponentFlags::RGBA,
-                "write masks",
-            ),
+            (draw.write_mask != vk::ColorComponentFlags::RGBA, "write masks"),
             (draw.format != ColorFormat::Float32, "other formats"),
-            (
-                draw.scissor.is_some() || draw.area.is_some(),
-                "scissor and render area",
-            ),
-            (
-                depth.is_some_and(|depth| depth.bounds.is_some()),
-                "depth bounds",
-            ),
-            (
-                depth.is_some_and(|depth| depth.stencil.is_some()),
-                "stencil",
-            ),
+            (draw.scissor.is_some() || draw.area.is_some(), "scissor and render area"),
+            (depth.is_some_and(|depth| depth.bounds.is_some()), "depth bounds"),
+            (depth.is_some_and(|depth| depth.stencil.is_some()), "stencil"),
         ];
-        lacks
-            .iter()
-            .find(|(lacks, _)| *lacks)
-            .map(|(_, what)| *what)
+        lacks.iter().find(|(lacks, _)| *lacks).map(|(_, what)| *what)
     }
 
     fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
@@ -74,9 +53,7 @@ impl Implementation for Second {
         let mut attachments = second::Attachments {
             width: draw.size[0] as usize,
             color: vec![draw.behind; pixels],
-            depth: depths
-                .map(|&code| format.map_or(0.0, |format| format.depth(code)))
-                .collect(),
+            depth: depths.map(|&code| format.map_or(0.0, |format| format.depth(code))).collect(),
         };
         for members in sets(draw) {
             let (scene, _) = gathered(draw, &members);
@@ -92,28 +69,15 @@ impl Implementation for Second {
                 })
                 .collect();
             let (camera, viewport, state) = (camera(draw), viewport(draw), state(draw));
-            second::draw(
-                &gaussians,
-                &camera,
-                &viewport,
-                &state,
-                test(draw),
-                &mut attachments,
-            );
+            second::draw(&gaussians, &camera, &viewport, &state, test(draw), &mut attachments);
         }
         let codes = attachments.depth.iter();
         let depth = match format {
             Some(format) => codes.map(|&depth| format.code(depth)).collect(),
             None => Vec::new(),
         };
-        let stored = Stored {
-            depth,
-            stencil: stored.stencil.clone(),
-        };
-        Ok(Picture {
-            color: attachments.color,
-            stored,
-        })
+        let stored = Stored { depth, stencil: stored.stencil.clone() };
+        Ok(Picture { color: attachments.color, stored })
     }
 }
 

@@ -9,24 +9,22 @@ use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format as Word, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
 use simdevice::packet::{
-    Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, BufferRange,
-    ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes,
-    GaussianBegin, LoadOp, PrimitiveBindings, Rendering, StoreOp, SubresourceLayers,
-    SubresourceRange,
+    Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments, ClearImage,
+    CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes, GaussianBegin, LoadOp, PrimitiveBindings,
+    Rendering, StoreOp, SubresourceLayers, SubresourceRange,
 };
 use simdevice::packet::{Dispatch, Draw};
 use simdevice::program::bindings::Bindings;
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::{
-    ComputeInput, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation,
-    Sampling, VertexInput, VertexOutput,
+    ComputeInput, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, VertexInput,
+    VertexOutput,
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::runtime::{FlushPolicy, SimdLevel};
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{
-    self, BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState,
-    Rect, Topology, Viewport,
+    self, BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState, Rect, Topology, Viewport,
 };
 use simdevice::stats::recorder::Recorder;
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
@@ -68,24 +66,13 @@ fn programs() -> DrawPrograms {
         let output = fragment.output(slot, Type::B32);
         fragment.assign(output, input);
     }
-    let attribute =
-        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let attribute = |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let positions = (0..4).map(|axis| Some(VertexOutput::Position(axis)));
     let varyings = (0..4).map(|index| Some(VertexOutput::Varying(index)));
     let inputs = (0..4).map(|index| {
-        Some(FragmentInput::Varying {
-            index,
-            interpolation: Interpolation::Flat,
-            sampling: Sampling::Center,
-        })
+        Some(FragmentInput::Varying { index, interpolation: Interpolation::Flat, sampling: Sampling::Center })
     });
-    let outputs = (0..4).map(|component| {
-        Some(FragmentOutput::Color {
-            attachment: 0,
-            component,
-            index: 0,
-        })
-    });
+    let outputs = (0..4).map(|component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 }));
     DrawPrograms {
         vertex: vertex.finish().expect("a program"),
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
@@ -117,11 +104,7 @@ fn recolor() -> Program {
     let vertex = b.compute(Op::IAdd, &[first, lane]);
     let base = b.compute(Op::IMul, &[vertex, bytes]);
     for offset in [16, 20, 24, 28] {
-        let address = Address {
-            space: Space::Buffer(Binding::new(0)),
-            base: Some(base),
-            offset,
-        };
+        let address = Address { space: Space::Buffer(Binding::new(0)), base: Some(base), offset };
         let color = b.load(address, Word::B32, 1);
         let halved = b.compute(Op::FMul, &[color[0], half]);
         let changed = b.compute(Op::FAdd, &[halved, quarter]);
@@ -130,27 +113,13 @@ fn recolor() -> Program {
     b.finish().expect("a program")
 }
 
-const WHOLE: Rect = Rect {
-    x: 0,
-    y: 0,
-    width: SIZE,
-    height: SIZE,
-};
+const WHOLE: Rect = Rect { x: 0, y: 0, width: SIZE, height: SIZE };
 
-const COLOR: SubresourceLayers = SubresourceLayers {
-    aspect: Aspect::Color,
-    mip_level: 0,
-    base_layer: 0,
-    layer_count: 1,
-};
+const COLOR: SubresourceLayers =
+    SubresourceLayers { aspect: Aspect::Color, mip_level: 0, base_layer: 0, layer_count: 1 };
 
 fn rect([x, y, width, height]: Area) -> Rect {
-    Rect {
-        x: x as i32,
-        y: y as i32,
-        width,
-        height,
-    }
+    Rect { x: x as i32, y: y as i32, width, height }
 }
 
 fn depth_clear(depth: f32) -> ClearValue {
@@ -175,15 +144,8 @@ fn depth_stencil(test: DepthTest) -> DepthStencil {
 }
 
 fn blend(blends: bool) -> BlendState {
-    let over = BlendEquation {
-        source: BlendFactor::One,
-        destination: BlendFactor::OneMinusSrcAlpha,
-        op: BlendOp::Add,
-    };
-    BlendState {
-        equations: blends.then_some((over, over)),
-        write_mask: 0xF,
-    }
+    let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
+    BlendState { equations: blends.then_some((over, over)), write_mask: 0xF }
 }
 
 impl Resources {
@@ -206,10 +168,7 @@ impl Resources {
     }
 
     fn picture(&self) -> Picture {
-        Picture {
-            color: texels(&self.color, Aspect::Color),
-            depth: texels(&self.depth, Aspect::Depth),
-        }
+        Picture { color: texels(&self.color, Aspect::Color), depth: texels(&self.depth, Aspect::Depth) }
     }
 }
 
@@ -221,14 +180,8 @@ impl Player {
 
     /// Creates a device as [`Player::new`] does; `recorder`, if given, records its work.
     pub fn recording(flush: FlushPolicy, recorder: Option<Arc<Recorder>>) -> Self {
-        let config = Config {
-            threads: 1,
-            simd: SimdLevel::Best,
-            macro_tile_size: 32,
-            flush,
-            recorder,
-            ..Config::default()
-        };
+        let config =
+            Config { threads: 1, simd: SimdLevel::Best, macro_tile_size: 32, flush, recorder, ..Config::default() };
         let device = Arc::new(Device::new(&config).expect("a device"));
         let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
         let recolor = ComputeProgram::new(device.level(), recolor(), GROUP, 32, inputs);
@@ -256,27 +209,19 @@ impl Player {
 
     fn lower(&self, interleaving: &Interleaving, resources: &Resources) -> Vec<Packet> {
         let steps = interleaving.steps.iter();
-        steps
-            .flat_map(|step| self.step(interleaving, resources, step))
-            .collect()
+        steps.flat_map(|step| self.step(interleaving, resources, step)).collect()
     }
 
     fn step(&self, interleaving: &Interleaving, resources: &Resources, step: &Step) -> Vec<Packet> {
         match *step {
             Step::BeginPass(clear) => vec![begin_pass(resources, clear)],
             Step::EndPass => vec![Packet::EndRendering],
-            Step::Triangles {
-                first,
-                count,
-                blends,
-                test,
-            } => vec![self.triangles(resources, [first, count], blends, test)],
+            Step::Triangles { first, count, blends, test } => {
+                vec![self.triangles(resources, [first, count], blends, test)]
+            }
             Step::Gaussians { scene, test } => gaussians(interleaving, resources, scene, test),
             Step::ClearAttachments { color, depth, area } => {
-                let color = color.map(|color| AttachmentClear::Color {
-                    index: 0,
-                    value: ClearValue::Float(color),
-                });
+                let color = color.map(|color| AttachmentClear::Color { index: 0, value: ClearValue::Float(color) });
                 let depth = depth.map(AttachmentClear::Depth);
                 vec![Packet::ClearAttachments(ClearAttachments {
                     clears: color.into_iter().chain(depth).collect(),
@@ -323,14 +268,10 @@ impl Player {
                         image_extent: [width, height, 1],
                     }],
                 };
-                vec![
-                    Packet::CopyImageToBuffer(copy([x, y])),
-                    Packet::CopyBufferToImage(copy(to)),
-                ]
+                vec![Packet::CopyImageToBuffer(copy([x, y])), Packet::CopyBufferToImage(copy(to))]
             }
             Step::CopyColor { from, to } => {
-                let color =
-                    |triangle: usize, corner: u64| (3 * triangle as u64 + corner) * VERTEX + 16;
+                let color = |triangle: usize, corner: u64| (3 * triangle as u64 + corner) * VERTEX + 16;
                 let region = |corner| BufferCopyRegion {
                     source_offset: color(from, corner),
                     target_offset: color(to, corner),
@@ -345,26 +286,13 @@ impl Player {
         }
     }
 
-    fn triangles(
-        &self,
-        resources: &Resources,
-        [first, count]: [usize; 2],
-        blends: bool,
-        test: DepthTest,
-    ) -> Packet {
+    fn triangles(&self, resources: &Resources, [first, count]: [usize; 2], blends: bool, test: DepthTest) -> Packet {
         let state = DrawState {
             depth_stencil: depth_stencil(test),
             blend: vec![blend(blends)],
             ..DrawState::new(Topology::TriangleList, [SIZE, SIZE])
         };
-        let attribute = |offset| {
-            stream(
-                &resources.vertices,
-                VERTEX as u32,
-                offset,
-                Format::R32G32B32A32Sfloat,
-            )
-        };
+        let attribute = |offset| stream(&resources.vertices, VERTEX as u32, offset, Format::R32G32B32A32Sfloat);
         Packet::Draw(Box::new(Draw {
             pipeline: Arc::clone(&self.pipeline),
             state: Arc::new(state),
@@ -404,12 +332,7 @@ fn begin_pass(resources: &Resources, clear: Option<([f32; 4], f32)>) -> Packet {
     }))
 }
 
-fn gaussians(
-    interleaving: &Interleaving,
-    resources: &Resources,
-    scene: usize,
-    test: DepthTest,
-) -> Vec<Packet> {
+fn gaussians(interleaving: &Interleaving, resources: &Resources, scene: usize, test: DepthTest) -> Vec<Packet> {
     let camera = &interleaving.camera;
     let begin = GaussianBegin {
         state: Arc::new(GaussianState {
@@ -428,14 +351,7 @@ fn gaussians(
             far_plane: camera.far,
             depth_coefficients: interleaving.depth_coefficients,
         },
-        viewport: Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: SIZE as f32,
-            height: SIZE as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        },
+        viewport: Viewport { x: 0.0, y: 0.0, width: SIZE as f32, height: SIZE as f32, min_depth: 0.0, max_depth: 1.0 },
         scissor: WHOLE,
     };
     let append = GaussianAppend {
@@ -446,9 +362,5 @@ fn gaussians(
         first_instance: 0,
         instance_count: 1,
     };
-    vec![
-        Packet::GaussianBegin(Box::new(begin)),
-        Packet::GaussianAppend(Box::new(append)),
-        Packet::GaussianEnd,
-    ]
+    vec![Packet::GaussianBegin(Box::new(begin)), Packet::GaussianAppend(Box::new(append)), Packet::GaussianEnd]
 }

@@ -28,24 +28,15 @@ pub(super) fn work(seed: u64) -> Trace {
 #[gaurast_runner::test]
 fn interleavings_are_the_composite_of_their_parts_whenever_they_are_flushed() {
     let players = |flush| Player::new(flush);
-    let (never, always) = (
-        players(FlushPolicy::WhenFull),
-        players(FlushPolicy::EveryDraw),
-    );
+    let (never, always) = (players(FlushPolicy::WhenFull), players(FlushPolicy::EveryDraw));
     let judged: Vec<(usize, usize)> = (0..200)
         .into_par_iter()
         .map(|seed| {
             let interleaving = Interleaving::random(seed);
             let drawn = never.play(&interleaving);
-            assert!(
-                drawn == always.play(&interleaving),
-                "{seed}: flushing every draw"
-            );
+            assert!(drawn == always.play(&interleaving), "{seed}: flushing every draw");
             let some = players(FlushPolicy::SomeDraws(seed));
-            assert!(
-                drawn == some.play(&interleaving),
-                "{seed}: flushing some draws"
-            );
+            assert!(drawn == some.play(&interleaving), "{seed}: flushing some draws");
             let mut model = Model::new(&interleaving);
             model.play();
             model.judge(seed, &drawn)

@@ -65,13 +65,7 @@ impl Pixel {
 
 impl<'a> Model<'a> {
     pub fn new(interleaving: &'a Interleaving) -> Self {
-        let nothing = Pixel {
-            least: [0.0; 4],
-            greatest: [0.0; 4],
-            slack: 0.0,
-            depths: vec![0],
-            is_unknown: false,
-        };
+        let nothing = Pixel { least: [0.0; 4], greatest: [0.0; 4], slack: 0.0, depths: vec![0], is_unknown: false };
         Self {
             interleaving,
             pixels: vec![nothing; (SIZE * SIZE) as usize],
@@ -91,12 +85,7 @@ impl<'a> Model<'a> {
         match *step {
             Step::BeginPass(Some((color, depth))) => self.clear(Some(color), Some(depth), WHOLE),
             Step::BeginPass(None) | Step::EndPass | Step::Barrier => {}
-            Step::Triangles {
-                first,
-                count,
-                blends,
-                test,
-            } => {
+            Step::Triangles { first, count, blends, test } => {
                 for triangle in first..first + count {
                     self.triangle(triangle, blends, test);
                 }
@@ -117,11 +106,7 @@ impl<'a> Model<'a> {
                     let target = &mut self.pixels[((to[1] + dy) * SIZE + to[0] + dx) as usize];
                     let depths = std::mem::take(&mut target.depths);
                     let is_unknown = target.is_unknown || source.is_unknown;
-                    *target = Pixel {
-                        depths,
-                        is_unknown,
-                        ..source.clone()
-                    };
+                    *target = Pixel { depths, is_unknown, ..source.clone() };
                 }
             }
             Step::CopyColor { from, to } => self.colors[to] = self.colors[from],
@@ -182,10 +167,7 @@ impl<'a> Model<'a> {
         let references: Vec<TestedReference> = (0..rounds.unwrap_or(1))
             .map(|round| {
                 let depth = |pixel: &Pixel| pixel.depths[round % pixel.depths.len()];
-                let stored = Stored {
-                    depth: self.pixels.iter().map(depth).collect(),
-                    stencil: Vec::new(),
-                };
+                let stored = Stored { depth: self.pixels.iter().map(depth).collect(), stencil: Vec::new() };
                 let state = OracleState::default();
                 render_tested(&scene, &interleaving.camera, &state, &tests, &stored)
             })

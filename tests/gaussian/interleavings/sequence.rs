@@ -140,11 +140,7 @@ fn triangle(rng: &mut ChaCha8Rng) -> Flat {
         });
         let [a, b, c] = corners;
         if (b[0] - a[0]) * (c[1] - a[1]) != (b[1] - a[1]) * (c[0] - a[0]) {
-            return Flat {
-                corners,
-                depth: depth(rng),
-                color: color(rng),
-            };
+            return Flat { corners, depth: depth(rng), color: color(rng) };
         }
     }
 }
@@ -173,8 +169,7 @@ fn test(rng: &mut ChaCha8Rng) -> DepthTest {
         CompareOp::NOT_EQUAL,
         CompareOp::ALWAYS,
     ];
-    rng.random_bool(0.8)
-        .then(|| (*ops.choose(rng).unwrap(), rng.random()))
+    rng.random_bool(0.8).then(|| (*ops.choose(rng).unwrap(), rng.random()))
 }
 
 /// A random step within a pass.
@@ -189,10 +184,7 @@ fn inside(rng: &mut ChaCha8Rng) -> Step {
                 test: test(rng),
             }
         }
-        4..8 => Step::Gaussians {
-            scene: rng.random_range(0..SCENES),
-            test: test(rng),
-        },
+        4..8 => Step::Gaussians { scene: rng.random_range(0..SCENES), test: test(rng) },
         8 => {
             let clears_color: bool = rng.random();
             Step::ClearAttachments {
@@ -214,15 +206,9 @@ fn outside(rng: &mut ChaCha8Rng) -> Step {
             let from = area(rng);
             let [_, _, width, height] = from;
             let place = |rng: &mut ChaCha8Rng, size| rng.random_range(0..=SIZE - size);
-            Step::CopyThroughBuffer {
-                from,
-                to: [place(rng, width), place(rng, height)],
-            }
+            Step::CopyThroughBuffer { from, to: [place(rng, width), place(rng, height)] }
         }
-        _ => Step::CopyColor {
-            from: rng.random_range(0..TRIANGLES),
-            to: rng.random_range(0..TRIANGLES),
-        },
+        _ => Step::CopyColor { from: rng.random_range(0..TRIANGLES), to: rng.random_range(0..TRIANGLES) },
     }
 }
 

@@ -9,8 +9,8 @@ use simdevice::format::{Aspect, ClearValue};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
-    Attachment, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage,
-    LoadOp, PrimitiveBindings, Rendering, StoreOp,
+    Attachment, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp, PrimitiveBindings,
+    Rendering, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
@@ -18,8 +18,7 @@ use simdevice::program::vertex::DrawPipeline;
 use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, GaussianOrder, GaussianState};
 use simdevice::state::{
-    BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, ResolveMode, Topology,
-    Viewport,
+    BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, ResolveMode, Topology, Viewport,
 };
 use simdevice::stats::counters::Counters;
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
@@ -31,10 +30,7 @@ pub const SIZE: [u32; 2] = [150, 83];
 /// The number of floats of a vertex: position, covariance, opacity, colour, key.
 const NUMBERS: usize = 12;
 
-pub const UPRIGHT: OracleViewport = OracleViewport {
-    corner: [0.0, 0.0],
-    size: [SIZE[0] as f32, SIZE[1] as f32],
-};
+pub const UPRIGHT: OracleViewport = OracleViewport { corner: [0.0, 0.0], size: [SIZE[0] as f32, SIZE[1] as f32] };
 
 fn numbers(one: &OracleOutputs) -> [f32; NUMBERS] {
     let mut numbers = [0.0; NUMBERS];
@@ -54,36 +50,22 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
         let output = builder.output(slot, Type::B32);
         builder.assign(output, input);
     }
-    let component = |component| {
-        Some(VertexInput::Attribute {
-            stream: 0,
-            component,
-        })
-    };
+    let component = |component| Some(VertexInput::Attribute { stream: 0, component });
     let programs = DrawPrograms {
         vertex: builder.finish().expect("a program"),
         vertex_inputs: (0..4).map(component).collect(),
-        vertex_outputs: (0..4)
-            .map(|axis| Some(VertexOutput::Position(axis)))
-            .collect(),
+        vertex_outputs: (0..4).map(|axis| Some(VertexOutput::Position(axis))).collect(),
         varyings: 0,
         captured: None,
         tessellation: None,
         geometry: None,
         fragment: None,
     };
-    let corners = [
-        [-0.9f32, -0.8, 0.25, 1.0],
-        [0.8, -0.3, 0.25, 1.0],
-        [-0.2, 0.9, 0.25, 1.0],
-    ];
+    let corners = [[-0.9f32, -0.8, 0.25, 1.0], [0.8, -0.3, 0.25, 1.0], [-0.2, 0.9, 0.25, 1.0]];
     let state = DrawState {
         samples,
         depth_stencil: DepthStencil {
-            depth: Some(DepthTest {
-                compare: CompareOp::Always,
-                write: true,
-            }),
+            depth: Some(DepthTest { compare: CompareOp::Always, write: true }),
             ..DepthStencil::default()
         },
         ..DrawState::new(Topology::TriangleList, SIZE)
@@ -131,26 +113,15 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
         let output = builder.output(slot, Type::B32);
         builder.assign(output, input);
     }
-    let varyings = if with_key {
-        gaussian::VARYINGS
-    } else {
-        gaussian::DEPTH_KEY
-    };
+    let varyings = if with_key { gaussian::VARYINGS } else { gaussian::DEPTH_KEY };
     let positions = (0..4).map(|axis| Some(VertexOutput::Position(axis)));
     let varying = |number| (number < varyings).then_some(VertexOutput::Varying(number));
     let programs = DrawPrograms {
         vertex: builder.finish().expect("a program"),
         vertex_inputs: (0..NUMBERS)
-            .map(|number| {
-                Some(VertexInput::Attribute {
-                    stream: number / 4,
-                    component: number % 4,
-                })
-            })
+            .map(|number| Some(VertexInput::Attribute { stream: number / 4, component: number % 4 }))
             .collect(),
-        vertex_outputs: positions
-            .chain((0..gaussian::VARYINGS).map(varying))
-            .collect(),
+        vertex_outputs: positions.chain((0..gaussian::VARYINGS).map(varying)).collect(),
         varyings,
         captured: None,
         tessellation: None,
@@ -161,10 +132,7 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
 }
 
 /// Blending in which a fragment replaces the attachment's contents.
-pub const REPLACE: BlendState = BlendState {
-    equations: None,
-    write_mask: 0xF,
-};
+pub const REPLACE: BlendState = BlendState { equations: None, write_mask: 0xF };
 
 /// A set of Gaussians to draw.
 pub struct Case<'a> {
@@ -263,9 +231,7 @@ impl Case<'_> {
             transmittance_floor: state.transmittance_floor,
             negative_one_to_one: self.negative_one_to_one,
             depth_stencil: DepthStencil {
-                depth: self
-                    .depth
-                    .map(|(compare, write)| DepthTest { compare, write }),
+                depth: self.depth.map(|(compare, write)| DepthTest { compare, write }),
                 ..DepthStencil::default()
             },
             blend: self.blend.clone(),
@@ -277,9 +243,7 @@ impl Case<'_> {
     pub fn run(&self, device: &Arc<Device>) -> Drawn {
         let color = |_: &BlendState| image(Format::R32G32B32A32Sfloat, SIZE, self.samples);
         let colors: Vec<_> = self.blend.iter().map(color).collect();
-        let resolved: Vec<_> = (self.blend.iter())
-            .map(|_| image(Format::R32G32B32A32Sfloat, SIZE, 1))
-            .collect();
+        let resolved: Vec<_> = (self.blend.iter()).map(|_| image(Format::R32G32B32A32Sfloat, SIZE, 1)).collect();
         let depth = image(self.depth_format, SIZE, self.samples);
         let attachment = |view: &ImageView, value| Attachment {
             view: view.clone(),
@@ -287,16 +251,8 @@ impl Case<'_> {
             store: StoreOp::Store,
             resolve: None,
         };
-        let everything = Rect {
-            x: 0,
-            y: 0,
-            width: SIZE[0],
-            height: SIZE[1],
-        };
-        let stored = ClearValue::DepthStencil {
-            depth: 0.5,
-            stencil: 0,
-        };
+        let everything = Rect { x: 0, y: 0, width: SIZE[0], height: SIZE[1] };
+        let stored = ClearValue::DepthStencil { depth: 0.5, stencil: 0 };
         let given = Viewport {
             x: self.viewport.corner[0],
             y: self.viewport.corner[1],
@@ -309,11 +265,7 @@ impl Case<'_> {
             Some((append, camera)) => (vec![append.clone()], *camera),
             None => (Vec::new(), Camera::default()),
         };
-        let draws = if appends.is_empty() {
-            &self.draws[..]
-        } else {
-            &[]
-        };
+        let draws = if appends.is_empty() { &self.draws[..] } else { &[] };
         let mut packets = vec![Packet::BeginRendering(Box::new(Rendering {
             area: everything,
             layer_count: 1,
@@ -322,10 +274,7 @@ impl Case<'_> {
                 .map(|(color, to)| {
                     let attachment = attachment(color, ClearValue::Float(self.clear));
                     let mode = ResolveMode::Average;
-                    Some(Attachment {
-                        resolve: (self.samples > 1).then(|| (to.clone(), mode)),
-                        ..attachment
-                    })
+                    Some(Attachment { resolve: (self.samples > 1).then(|| (to.clone(), mode)), ..attachment })
                 })
                 .collect(),
             depth: Some(attachment(&depth, stored)),
@@ -337,13 +286,7 @@ impl Case<'_> {
             state: Arc::new(self.state()),
             camera,
             further_cameras: Vec::new(),
-            viewport: Viewport {
-                x: 0.0,
-                y: 0.0,
-                width: SIZE[0] as f32,
-                height: SIZE[1] as f32,
-                ..given
-            },
+            viewport: Viewport { x: 0.0, y: 0.0, width: SIZE[0] as f32, height: SIZE[1] as f32, ..given },
             scissor: everything,
         })));
         let shader = self.resolve.iter().cloned();
@@ -351,14 +294,8 @@ impl Case<'_> {
         let append = |append| Packet::GaussianAppend(Box::new(append));
         packets.extend(appends.into_iter().map(append));
         packets.extend(draws.iter().map(|draw| {
-            let state = DrawState {
-                viewports: vec![given],
-                ..DrawState::clone(&draw.state)
-            };
-            Packet::GaussianAppendDraw(Box::new(Draw {
-                state: Arc::new(state),
-                ..draw.clone()
-            }))
+            let state = DrawState { viewports: vec![given], ..DrawState::clone(&draw.state) };
+            Packet::GaussianAppendDraw(Box::new(Draw { state: Arc::new(state), ..draw.clone() }))
         }));
         packets.extend([Packet::GaussianEnd, Packet::EndRendering]);
         let mut processor = CommandProcessor::new(Arc::clone(device));
@@ -371,11 +308,7 @@ impl Case<'_> {
         Drawn {
             color: drawn.next().expect("an attachment"),
             others: drawn.collect(),
-            depth: if has_floats {
-                texels(&depth, Aspect::Depth)
-            } else {
-                Vec::new()
-            },
+            depth: if has_floats { texels(&depth, Aspect::Depth) } else { Vec::new() },
             counters: processor.counters().clone(),
         }
     }
@@ -385,20 +318,13 @@ impl Case<'_> {
     pub fn check(&self, name: &str, device: &Arc<Device>) -> Drawn {
         let drawn = self.run(device);
         let reference = render_shaded(self.outputs, SIZE, &self.viewport, &self.state);
-        assert!(
-            reference.nominal.iter().any(|rgba| rgba[3] > 0.9),
-            "{name}: it is empty"
-        );
+        assert!(reference.nominal.iter().any(|rgba| rgba[3] > 0.9), "{name}: it is empty");
         assert_contract(name, &drawn.color, &reference, Limits::ENVELOPE_ONLY);
         drawn
     }
 }
 
 pub fn device(simd: SimdLevel) -> Arc<Device> {
-    let config = Config {
-        threads: 2,
-        simd,
-        ..Config::default()
-    };
+    let config = Config { threads: 2, simd, ..Config::default() };
     Arc::new(Device::new(&config).expect("a device"))
 }

@@ -29,11 +29,7 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianF
         let output = builder.output(slot, Type::B32);
         builder.assign(output, input);
     }
-    let output = |slot: usize| FragmentOutput::Color {
-        attachment: slot / 4,
-        component: slot % 4,
-        index: 0,
-    };
+    let output = |slot: usize| FragmentOutput::Color { attachment: slot / 4, component: slot % 4, index: 0 };
     let programs = FragmentPrograms {
         program: builder.finish().expect("a program"),
         inputs: inputs.iter().copied().map(Some).collect(),
@@ -44,9 +40,7 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianF
         has_side_effects: false,
     };
     GaussianFragmentStage {
-        program: Arc::new(
-            GaussianFragmentProgram::new(device.level(), &programs).expect("a program"),
-        ),
+        program: Arc::new(GaussianFragmentProgram::new(device.level(), &programs).expect("a program")),
         bindings: Bindings::default(),
         sample_shading: false,
         alpha_to_coverage: false,
@@ -55,11 +49,7 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianF
 }
 
 fn varying(index: u32) -> FragmentInput {
-    FragmentInput::Varying {
-        index,
-        interpolation: Interpolation::Perspective,
-        sampling: Sampling::Center,
-    }
+    FragmentInput::Varying { index, interpolation: Interpolation::Perspective, sampling: Sampling::Center }
 }
 
 /// All inputs: the accumulated colour, then depths and positions.
@@ -81,9 +71,7 @@ const TOLERANCE: f64 = 5e-6;
 /// True if a value is within the envelope of a pixel's outcomes.
 fn within(ways: &[Resolved], value: f32, of: impl Fn(&Resolved) -> Vec<f64>) -> bool {
     let all = ways.iter().flat_map(of);
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
-    });
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     let value = f64::from(value);
     low - TOLERANCE <= value && value <= high + TOLERANCE
 }
@@ -112,10 +100,7 @@ fn check(name: &str, ways: &[Vec<Resolved>], color: &[[f32; 4]], shown: &[[f32; 
         let mut medians = ways.iter().flat_map(|way| &way.median_depths);
         let is_one = medians.any(|depth| (depth - f64::from(median)).abs() <= 1e-7);
         let unknown = ways.iter().any(|way| way.medians_exhausted);
-        assert!(
-            is_one || unknown,
-            "{name}: pixel {index}: {median}, {ways:?}"
-        );
+        assert!(is_one || unknown, "{name}: pixel {index}: {median}, {ways:?}");
         let (column, row) = (index as u32 % SIZE[0], index as u32 / SIZE[0]);
         assert_eq!([x, y], [column as f32 + 0.5, row as f32 + 0.5], "{name}");
     }
@@ -150,11 +135,7 @@ fn depths_are_rounded_to_the_attachment_and_tested() {
         let [_, _, z, w] = one.position.map(f64::from);
         (z / w) as f32
     };
-    let before: Vec<_> = outputs
-        .iter()
-        .filter(|one| depth(one) < 0.5)
-        .copied()
-        .collect();
+    let before: Vec<_> = outputs.iter().filter(|one| depth(one) < 0.5).copied().collect();
     let ways = resolve_shaded(&before, SIZE, &UPRIGHT, &OracleState::default());
     let case = Case {
         resolve: Some(passing_on(&device, &everything())),
@@ -170,11 +151,7 @@ fn depths_are_rounded_to_the_attachment_and_tested() {
         let expected = if *shown == [-1.0; 4] { 0.5 } else { shown[1] };
         assert_eq!(*stored, expected);
     }
-    let coarse = Case {
-        depth_format: Format::D16Unorm,
-        depth: None,
-        ..case
-    };
+    let coarse = Case { depth_format: Format::D16Unorm, depth: None, ..case };
     let coarse = coarse.run(&device);
     let mut fragments = coarse.others[0].iter().filter(|shown| **shown != [-1.0; 4]);
     assert!(fragments.clone().count() > 5000);
@@ -189,15 +166,8 @@ fn depths_are_rounded_to_the_attachment_and_tested() {
 fn what_a_program_writes_is_blended() {
     let outputs = cloud(43, 1000);
     let device = device(SimdLevel::Best);
-    let over = BlendEquation {
-        source: BlendFactor::One,
-        destination: BlendFactor::OneMinusSrcAlpha,
-        op: BlendOp::Add,
-    };
-    let blended = BlendState {
-        equations: Some((over, over)),
-        write_mask: 0b0101,
-    };
+    let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
+    let blended = BlendState { equations: Some((over, over)), write_mask: 0b0101 };
     let inputs = everything();
     let accumulated = [&inputs[..4], &inputs[..4]].concat();
     let case = |resolve| Case {
@@ -210,26 +180,13 @@ fn what_a_program_writes_is_blended() {
     let shaded = case(Some(passing_on(&device, &accumulated))).run(&device);
     assert!(plain.color == shaded.color);
     // Only a program writes the second attachment.
-    assert!(
-        plain.others[0]
-            .iter()
-            .all(|texel| *texel == [0.5, 0.25, 0.125, 1.0])
-    );
-    let unblended = Case {
-        blend: vec![REPLACE; 2],
-        ..case(None)
-    };
+    assert!(plain.others[0].iter().all(|texel| *texel == [0.5, 0.25, 0.125, 1.0]));
+    let unblended = Case { blend: vec![REPLACE; 2], ..case(None) };
     assert!(unblended.run(&device).color == shaded.others[0]);
     // Alpha may become coverage.
-    let by_alpha = GaussianFragmentStage {
-        alpha_to_coverage: true,
-        alpha_to_one: true,
-        ..passing_on(&device, &accumulated)
-    };
-    let by_alpha = Case {
-        depth: Some((CompareOp::Always, true)),
-        ..case(Some(by_alpha))
-    };
+    let by_alpha =
+        GaussianFragmentStage { alpha_to_coverage: true, alpha_to_one: true, ..passing_on(&device, &accumulated) };
+    let by_alpha = Case { depth: Some((CompareOp::Always, true)), ..case(Some(by_alpha)) };
     let by_alpha = by_alpha.run(&device);
     let mut kept = 0;
     for (index, (all, some)) in std::iter::zip(&shaded.others[0], &by_alpha.others[0]).enumerate() {
@@ -257,16 +214,12 @@ fn samples_share_invocations_unless_each_is_shaded() {
         FragmentInput::FragCoord(3),
     ];
     let case = |sample_shading| Case {
-        resolve: Some(GaussianFragmentStage {
-            sample_shading,
-            ..passing_on(&device, &inputs)
-        }),
+        resolve: Some(GaussianFragmentStage { sample_shading, ..passing_on(&device, &inputs) }),
         samples: 4,
         ..whole(&device, &outputs)
     };
     let (shared, each) = (case(false).run(&device), case(true).run(&device));
-    let invocations =
-        [&shared, &each].map(|drawn| drawn.counters.get(Counter::FragmentInvocations));
+    let invocations = [&shared, &each].map(|drawn| drawn.counters.get(Counter::FragmentInvocations));
     assert_eq!(4 * invocations[0], invocations[1]);
     let covered = shared.color.iter().filter(|texel| texel[3] == 1.0).count();
     assert_eq!(covered as u64, invocations[0]);
@@ -286,10 +239,7 @@ fn samples_that_differ_are_shaded_for_themselves() {
     let outputs = cloud(45, 800);
     let device = device(SimdLevel::Best);
     let case = |sample_shading| Case {
-        resolve: Some(GaussianFragmentStage {
-            sample_shading,
-            ..passing_on(&device, &everything()[..6])
-        }),
+        resolve: Some(GaussianFragmentStage { sample_shading, ..passing_on(&device, &everything()[..6]) }),
         blend: vec![REPLACE; 2],
         before: vec![triangle(&device, 4)],
         depth: Some((CompareOp::Less, true)),
@@ -297,15 +247,11 @@ fn samples_that_differ_are_shaded_for_themselves() {
         ..whole(&device, &outputs)
     };
     let (shared, each) = (case(false).run(&device), case(true).run(&device));
-    let invocations =
-        |drawn: &super::device::Drawn| drawn.counters.get(Counter::FragmentInvocations);
+    let invocations = |drawn: &super::device::Drawn| drawn.counters.get(Counter::FragmentInvocations);
     assert!(shared.color == each.color && shared.others == each.others);
     let samples = invocations(&each);
     // In most pixels all samples agree, and in some at the triangle's edges they do not.
-    let flat = Case {
-        before: Vec::new(),
-        ..case(false)
-    };
+    let flat = Case { before: Vec::new(), ..case(false) };
     let flat = flat.run(&device);
     let pixels = invocations(&flat);
     assert_eq!(4 * pixels, flat.counters.get(Counter::SamplesPassed));
@@ -328,11 +274,7 @@ fn fixed_function_projection_is_resolved_in_the_depths_of_its_camera() {
     for (name, format, oracle) in [
         ("float", Format::D32Sfloat, OracleDepthFormat::Float),
         ("16 bits", Format::D16Unorm, OracleDepthFormat::Unorm(16)),
-        (
-            "24 bits",
-            Format::X8D24UnormPack32,
-            OracleDepthFormat::Unorm(24),
-        ),
+        ("24 bits", Format::X8D24UnormPack32, OracleDepthFormat::Unorm(24)),
     ] {
         let tests = OracleTests {
             negative_one_to_one: false,
@@ -384,10 +326,7 @@ fn check_tracked(name: &str, ways: &[Vec<Resolved>], drawn: &super::device::Draw
         let (color, depths) = (drawn.color[index], drawn.others[0][index]);
         let named = drawn.others[1][index].map(f32::to_bits);
         let is_there = depths != [-1.0; 4];
-        let ways: Vec<Resolved> = (ways.iter())
-            .filter(|way| way.covered == is_there)
-            .cloned()
-            .collect();
+        let ways: Vec<Resolved> = (ways.iter()).filter(|way| way.covered == is_there).cloned().collect();
         assert!(!ways.is_empty(), "{name}: pixel {index}");
         if !is_there {
             continue;
@@ -408,15 +347,9 @@ fn check_tracked(name: &str, ways: &[Vec<Resolved>], drawn: &super::device::Draw
         let mut medians = ways.iter().flat_map(|way| &way.median_gaussians);
         let is_median = medians.any(|&(at, z)| of[at] == first && z == median);
         let is_unknown = ways.iter().any(|way| way.medians_exhausted);
-        assert!(
-            is_median || is_unknown,
-            "{name}: pixel {index}: {first} at {median}, {ways:?}"
-        );
+        assert!(is_median || is_unknown, "{name}: pixel {index}: {first} at {median}, {ways:?}");
         let mut firsts = ways.iter().filter_map(|way| way.nearest);
-        assert!(
-            firsts.any(|at| of[at] == nearest),
-            "{name}: pixel {index}: {nearest}, {ways:?}"
-        );
+        assert!(firsts.any(|at| of[at] == nearest), "{name}: pixel {index}: {nearest}, {ways:?}");
     }
     assert!(covered > 4000, "{name}: {covered}");
 }
@@ -432,10 +365,7 @@ fn gaussians_are_named_at_a_level(test: &gaurast_runner::Case) {
         blend: vec![REPLACE; 3],
         clear: [-1.0; 4],
         // Two draws of a set; the second begins in the middle of the buffer.
-        draws: vec![
-            super::draw(&device, &outputs, 0, 700),
-            super::draw(&device, &outputs, 700, 1300),
-        ],
+        draws: vec![super::draw(&device, &outputs, 0, 700), super::draw(&device, &outputs, 700, 1300)],
         ..whole(&device, &outputs)
     };
     let drawn = case.run(&device);
@@ -445,16 +375,10 @@ fn gaussians_are_named_at_a_level(test: &gaurast_runner::Case) {
         let [_, _, z, w] = one.position.map(f64::from);
         ((z / w) as f32) < 0.5
     };
-    let of: Vec<u32> = (0..)
-        .zip(&outputs)
-        .filter_map(|(number, one)| is_before(&one).then_some(number))
-        .collect();
+    let of: Vec<u32> = (0..).zip(&outputs).filter_map(|(number, one)| is_before(&one).then_some(number)).collect();
     let before: Vec<_> = outputs.iter().filter(is_before).copied().collect();
     let ways = resolve_shaded(&before, SIZE, &UPRIGHT, &OracleState::default());
-    let tested = Case {
-        depth: Some((CompareOp::Less, true)),
-        ..case
-    };
+    let tested = Case { depth: Some((CompareOp::Less, true)), ..case };
     let drawn = tested.run(&device);
     check_tracked(test.variant(), &ways, &drawn, &of);
     for (shown, stored) in std::iter::zip(&drawn.others[0], &drawn.depth) {
@@ -468,10 +392,7 @@ fn samples_that_differ_name_their_own_gaussians() {
     let outputs = cloud(48, 800);
     let device = device(SimdLevel::Best);
     let case = |sample_shading| Case {
-        resolve: Some(GaussianFragmentStage {
-            sample_shading,
-            ..passing_on(&device, &tracked()[..8])
-        }),
+        resolve: Some(GaussianFragmentStage { sample_shading, ..passing_on(&device, &tracked()[..8]) }),
         blend: vec![REPLACE; 2],
         before: vec![triangle(&device, 4)],
         depth: Some((CompareOp::Less, true)),
@@ -515,21 +436,13 @@ fn a_camera_is_read_without_gaussians() {
         [0.0, 1.0, 0.0, 0.5],
         [-1.0, 0.0, 0.0, 0.25],
         [0.0, 0.0, 1.0, -1.0e6],
-        [
-            camera.focal[0],
-            camera.focal[1],
-            camera.principal[0],
-            camera.principal[1],
-        ],
+        [camera.focal[0], camera.focal[1], camera.principal[0], camera.principal[1]],
         [1.05, -2.1, 0.25, f32::INFINITY],
         [0.25, -0.5, 1.0e6, 0.0],
     ];
     let pictures = std::iter::once(&drawn.color).chain(&drawn.others);
     for (picture, expected) in pictures.zip(expected) {
-        let shown: Vec<_> = picture
-            .iter()
-            .filter(|texel| **texel != [-1.0; 4])
-            .collect();
+        let shown: Vec<_> = picture.iter().filter(|texel| **texel != [-1.0; 4]).collect();
         assert!(shown.len() > 1000 && shown.iter().all(|texel| **texel == expected));
     }
 }

@@ -99,9 +99,7 @@ impl Options<'_> {
     /// Options for drawing scenes of a degree.
     pub fn new(state: State, degree: u32) -> Self {
         Self {
-            state: state
-                .spherical_harmonics_degree(degree)
-                .attribute_locations(locations()),
+            state: state.spherical_harmonics_degree(degree).attribute_locations(locations()),
             approximation: None,
             view_mask: 0,
             dynamic: Vec::new(),
@@ -124,17 +122,14 @@ impl Pipeline {
         });
         let attributes = numbered().flat_map(|(binding, stream)| {
             let all = stream.attributes.iter();
-            all.map(
-                move |&(location, format, offset)| vk::VertexInputAttributeDescription {
-                    location,
-                    binding,
-                    format,
-                    offset,
-                },
-            )
+            all.map(move |&(location, format, offset)| vk::VertexInputAttributeDescription {
+                location,
+                binding,
+                format,
+                offset,
+            })
         });
-        let shaders = (options.fragment.iter())
-            .map(|source| Shader::fragment(compile(Stage::Fragment, source)));
+        let shaders = (options.fragment.iter()).map(|source| Shader::fragment(compile(Stage::Fragment, source)));
         let mut graphics = Graphics {
             shaders: shaders.collect(),
             set_layouts: options.bindings.iter().map(|all| all.layout).collect(),

@@ -4,13 +4,11 @@ use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use ash::vk;
 use gaurast::vk::{
     DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST, DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
-    DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST, GaussianAntialiasingGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST, DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST,
+    DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST, DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST,
+    DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST, DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
+    DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST, GaussianAntialiasingGAURAST, GaussianOrderGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
 };
 use gaurast_testkit::Commands;
 use gaurast_tests::compare::{Limits, assert_contract};
@@ -51,13 +49,7 @@ fn settings() -> [Values; 6] {
                 .alpha_ceiling(0.999),
             exact,
         ),
-        (
-            of_degree(1)
-                .order(GaussianOrderGAURAST::PRIMITIVE)
-                .low_pass_variance(1.5)
-                .transmittance_floor(0.05),
-            exact,
-        ),
+        (of_degree(1).order(GaussianOrderGAURAST::PRIMITIVE).low_pass_variance(1.5).transmittance_floor(0.05), exact),
         (
             of_degree(0)
                 .order(GaussianOrderGAURAST::PER_PIXEL)
@@ -66,10 +58,7 @@ fn settings() -> [Values; 6] {
                 .transmittance_floor(0.0),
             exact,
         ),
-        (
-            of_degree(3).alpha_ceiling(0.6),
-            exact.exponential_error(0.01).contribution_budget(0.02),
-        ),
+        (of_degree(3).alpha_ceiling(0.6), exact.exponential_error(0.01).contribution_budget(0.02)),
         (of_degree(3), exact),
     ]
 }
@@ -112,39 +101,20 @@ fn every_dynamic_state_in_one_pipeline_is_static_pipelines() {
     };
     // The pipeline's own values of dynamic states are ignored, even if they are invalid.
     let ignored = State::default().alpha_floor(7.0).low_pass_variance(-1.0);
-    let dynamic = Pipeline::new(
-        &streams,
-        &Options {
-            dynamic: ALL.to_vec(),
-            ..Options::new(ignored, DEGREE)
-        },
-    );
+    let dynamic = Pipeline::new(&streams, &Options { dynamic: ALL.to_vec(), ..Options::new(ignored, DEGREE) });
     let mut drawn: Vec<Vec<[f32; 4]>> = Vec::new();
     for (number, values) in settings().iter().enumerate() {
         let (state, approximation) = values;
         let degree = state.spherical_harmonics_degree;
-        let fixed = Pipeline::new(
-            &streams,
-            &Options {
-                approximation: Some(*approximation),
-                ..Options::new(*state, degree)
-            },
-        );
+        let fixed =
+            Pipeline::new(&streams, &Options { approximation: Some(*approximation), ..Options::new(*state, degree) });
         let picture = draw(&dynamic, Some(values));
         assert!(picture == draw(&fixed, None), "{number}");
         if approximation.exponential_error == 0.0 {
             let oracle = OracleCamera::new(&camera, SIZE).expect("a pinhole");
-            let drawn_degree = OracleScene {
-                requested_degree: degree,
-                ..scene.as_oracle()
-            };
+            let drawn_degree = OracleScene { requested_degree: degree, ..scene.as_oracle() };
             let expected = render_bounded(&drawn_degree, &oracle, &OracleState::from(state));
-            assert_contract(
-                &format!("setting {number}"),
-                &picture,
-                &expected,
-                Limits::ENVELOPE_ONLY,
-            );
+            assert_contract(&format!("setting {number}"), &picture, &expected, Limits::ENVELOPE_ONLY);
         }
         drawn.push(picture);
     }

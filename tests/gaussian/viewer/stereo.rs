@@ -4,8 +4,8 @@ use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 use gaurast::vk::{
-    GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST,
 };
 use gaurast_testkit::{Bindings, Buffer, Commands, Resource};
 use gaurast_tests::compare::{Limits, assert_contract};
@@ -20,9 +20,7 @@ fn eyes() -> [Camera; 2] {
     let middle = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
     [-1.0f32, 1.0].map(|side| {
         let [x, y] = middle.principal_point;
-        middle
-            .eye([0.1 * f64::from(side), 0.02, -0.3])
-            .principal_point([x - 6.0 * side, y + side])
+        middle.eye([0.1 * f64::from(side), 0.02, -0.3]).principal_point([x - 6.0 * side, y + side])
     })
 }
 
@@ -33,10 +31,7 @@ fn set(commands: &Commands, cameras: &[Camera]) {
 
 /// The picture of a pass without views.
 fn single(streams: &[Stream], count: u32, options: &Options<'_>, camera: &Camera) -> Picture {
-    let options = Options {
-        view_mask: 0,
-        ..options.clone()
-    };
+    let options = Options { view_mask: 0, ..options.clone() };
     let pipeline = Pipeline::new(streams, &options);
     let mut all = pictures(1, 0, |commands| {
         pipeline.bind(commands, streams, None);
@@ -69,10 +64,7 @@ fn a_stereo_pair_in_one_pass_is_two_single_passes() {
         State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
     ];
     for state in states {
-        let options = Options {
-            view_mask: mask,
-            ..Options::new(state, scene.degree)
-        };
+        let options = Options { view_mask: mask, ..Options::new(state, scene.degree) };
         let pipeline = Pipeline::new(&streams, &options);
         let pair = pictures(3, mask, |commands| {
             pipeline.bind(commands, &streams, None);
@@ -88,10 +80,7 @@ fn a_stereo_pair_in_one_pass_is_two_single_passes() {
             assert_contract(&name, picture, &expected, Limits::ENVELOPE_ONLY);
         }
         assert!(pair[0] != pair[1]);
-        assert!(
-            pair[2].iter().all(|pixel| *pixel == [0.0; 4]),
-            "the third layer is no view"
-        );
+        assert!(pair[2].iter().all(|pixel| *pixel == [0.0; 4]), "the third layer is no view");
     }
 }
 
@@ -101,10 +90,7 @@ fn a_view_sees_through_the_camera_of_its_index() {
     let scene = scene();
     let (streams, count) = (Stream::of(&scene), scene.positions.len() as u32);
     let mask = 0b101;
-    let options = Options {
-        view_mask: mask,
-        ..Options::new(State::default(), scene.degree)
-    };
+    let options = Options { view_mask: mask, ..Options::new(State::default(), scene.degree) };
     let pipeline = Pipeline::new(&streams, &options);
     let [left, right] = eyes();
     let drawn = |cameras: &[Camera]| {
@@ -136,14 +122,8 @@ fn a_uniform_buffer_has_a_camera_for_each_view() {
     let data: Vec<[u8; 128]> = data.collect();
     let buffer = Buffer::of(own(), data.as_flattened());
     let bindings = Bindings::new(own(), &[Resource::Uniform(buffer.raw)]);
-    let state = State::default()
-        .camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)
-        .camera_count(2);
-    let options = Options {
-        view_mask: mask,
-        bindings: Some(&bindings),
-        ..Options::new(state, scene.degree)
-    };
+    let state = State::default().camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER).camera_count(2);
+    let options = Options { view_mask: mask, bindings: Some(&bindings), ..Options::new(state, scene.degree) };
     let pipeline = Pipeline::new(&streams, &options);
     let pair = pictures(2, mask, |commands| {
         pipeline.bind(commands, &streams, Some(&bindings));
@@ -162,10 +142,7 @@ fn a_resolve_shader_runs_for_each_view() {
     let scene = scene();
     let (streams, count) = (Stream::of(&scene), scene.positions.len() as u32);
     let (eyes, mask) = (eyes(), 0b11);
-    let plain = Options {
-        view_mask: mask,
-        ..Options::new(State::default(), scene.degree)
-    };
+    let plain = Options { view_mask: mask, ..Options::new(State::default(), scene.degree) };
     let mut options = plain.clone();
     options.state.resolve_input_locations.accumulated_color = 0;
     options.fragment = Some(

@@ -19,16 +19,11 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let picture = gaurast_picture::read(Path::new(picture))?;
     let size = [picture.width, picture.height];
     let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, size).to_vulkan();
-    let camera =
-        OracleCamera::new(&camera, size).ok_or("a camera that the oracle does not know")?;
+    let camera = OracleCamera::new(&camera, size).ok_or("a camera that the oracle does not know")?;
     let buffers = SceneBuffers::from(&scene);
     // The state of the picture: 3DGS's defaults, in the order of view depth.
     let reference = render_bounded(&buffers.as_oracle(), &camera, &OracleState::default());
     let verdict = verdict(&picture.pixels, &reference, Limits::CONTRACT);
     println!("{verdict}");
-    Ok(if verdict.holds() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(if verdict.holds() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

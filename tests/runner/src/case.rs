@@ -18,29 +18,19 @@ pub struct Variant {
 impl Variant {
     /// A variant that needs nothing.
     pub fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            needs: Vec::new(),
-        }
+        Self { name: name.into(), needs: Vec::new() }
     }
 }
 
 /// A variant for each SIMD level, with the names of `GAURAST_SIMD`. A level that the processor lacks is ignored and
 /// reported.
 pub fn simd_levels() -> Vec<Variant> {
-    crate::SIMD_LEVELS
-        .map(|level| Variant {
-            name: level.to_owned(),
-            needs: vec![Need::SimdLevel(level)],
-        })
-        .into()
+    crate::SIMD_LEVELS.map(|level| Variant { name: level.to_owned(), needs: vec![Need::SimdLevel(level)] }).into()
 }
 
 /// Variants that divide a test's work by [`Case::shard`].
 pub fn shards(count: usize) -> Vec<Variant> {
-    (1..=count)
-        .map(|index| Variant::new(format!("{index} of {count}")))
-        .collect()
+    (1..=count).map(|index| Variant::new(format!("{index} of {count}"))).collect()
 }
 
 /// A part of a test's work.
@@ -104,10 +94,7 @@ impl Case {
     pub fn shard(&self) -> Shard {
         let (index, count) = self.variant().split_once(" of ").expect("a shard");
         let number = |text: &str| text.parse::<usize>().expect("a shard's number");
-        Shard {
-            index: number(index) - 1,
-            count: number(count),
-        }
+        Shard { index: number(index) - 1, count: number(count) }
     }
 
     /// Returns true if this process belongs to the test alone.
@@ -136,13 +123,8 @@ impl Case {
         let mut command = self.command();
         set_up(&mut command);
         let output = command.output().expect("the test starts itself");
-        let text =
-            String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-        assert!(
-            output.status.success(),
-            "in a process of its own ({}):\n{text}",
-            output.status
-        );
+        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "in a process of its own ({}):\n{text}", output.status);
         if let Some(line) = text.lines().find_map(|line| line.strip_prefix(IGNORED)) {
             let (missing, reason) = line.split_once(' ').expect("what is missing, and why");
             ignore(Missing::from_name(missing), reason);

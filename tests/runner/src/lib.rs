@@ -51,8 +51,7 @@ pub use inventory;
 pub use library::{built_example, built_library};
 use need::Ignored;
 pub use need::{
-    Missing, Need, SIMD_LEVELS, data, data_folder, has_simd_level, ignore, is_long,
-    lavapipe_manifest, require,
+    Missing, Need, SIMD_LEVELS, data, data_folder, has_simd_level, ignore, is_long, lavapipe_manifest, require,
 };
 use report::Report;
 
@@ -90,9 +89,7 @@ impl Requirement {
             Err(std::env::VarError::NotPresent) | Ok("") => Ok(Self::None),
             Ok("programs") => Ok(Self::Programs),
             Ok("all") => Ok(Self::All),
-            Ok(other) => Err(format!(
-                "GAURAST_TEST_REQUIRE is `programs` or `all`, not `{other}`"
-            )),
+            Ok(other) => Err(format!("GAURAST_TEST_REQUIRE is `programs` or `all`, not `{other}`")),
             Err(error) => Err(format!("GAURAST_TEST_REQUIRE: {error}")),
         }
     }
@@ -124,11 +121,7 @@ pub fn main() -> ExitCode {
     let mut trials = Vec::new();
     for test in tests {
         let module = test.module.split_once("::").map(|(_, module)| module);
-        let path = module
-            .into_iter()
-            .chain([test.name])
-            .collect::<Vec<_>>()
-            .join("::");
+        let path = module.into_iter().chain([test.name]).collect::<Vec<_>>().join("::");
         let variants = match test.each {
             Some(each) => each().into_iter().map(Some).collect(),
             None => vec![None],
@@ -140,10 +133,7 @@ pub fn main() -> ExitCode {
             };
             let mut needs = (test.needs)();
             needs.extend(variant.iter().flat_map(|variant| &variant.needs));
-            let case = Case {
-                name,
-                variant: variant.map(|variant| variant.name),
-            };
+            let case = Case { name, variant: variant.map(|variant| variant.name) };
             trials.push(trial(test, case, needs, requirement, &arguments, &report));
         }
     }
@@ -165,8 +155,7 @@ fn trial(
 ) -> Trial {
     let missing = move || needs.iter().find_map(|need| need.missing());
     // Programs that list the tests before running them must see which ones will be ignored.
-    let is_ignored =
-        arguments.list && missing().is_some_and(|ignored| !requirement.forbids(ignored.missing));
+    let is_ignored = arguments.list && missing().is_some_and(|ignored| !requirement.forbids(ignored.missing));
     let report = Arc::clone(report);
     Trial::ignorable_test(case.name.clone(), move || {
         let ignored = match missing() {
@@ -182,10 +171,7 @@ fn trial(
             }
         };
         if requirement.forbids(ignored.missing) {
-            return Err(Failed::from(format!(
-                "{}, and GAURAST_TEST_REQUIRE asks for it",
-                ignored.reason
-            )));
+            return Err(Failed::from(format!("{}, and GAURAST_TEST_REQUIRE asks for it", ignored.reason)));
         }
         case.say_ignored(&ignored);
         report.add_ignored(&ignored.reason);

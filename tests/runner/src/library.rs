@@ -32,11 +32,7 @@ fn built(package: &str, targets: &[&str], file: &Path) -> PathBuf {
     static ONE_BUILD: Mutex<()> = Mutex::new(());
     if let Some(built) = std::env::var_os(LIBRARIES) {
         let library = Path::new(&built).join(file);
-        assert!(
-            library.exists(),
-            "{LIBRARIES}: there is no {}",
-            library.display()
-        );
+        assert!(library.exists(), "{LIBRARIES}: there is no {}", library.display());
         return library;
     }
     let test = std::env::current_exe().expect("the test's own path");
@@ -54,14 +50,7 @@ fn built(package: &str, targets: &[&str], file: &Path) -> PathBuf {
     let _one = ONE_BUILD.lock();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
-        .args([
-            "build",
-            "--quiet",
-            "--package",
-            package,
-            "--profile",
-            profile,
-        ])
+        .args(["build", "--quiet", "--package", package, "--profile", profile])
         .args(targets)
         .arg("--target-dir")
         .arg(folder.parent().expect("the target folder"))
@@ -69,10 +58,7 @@ fn built(package: &str, targets: &[&str], file: &Path) -> PathBuf {
         .output()
         .expect("cargo runs");
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success(),
-        "cargo build -p {package}: {message}"
-    );
+    assert!(output.status.success(), "cargo build -p {package}: {message}");
     assert!(library.exists(), "there is no {}", library.display());
     library
 }

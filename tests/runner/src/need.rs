@@ -44,10 +44,7 @@ pub(crate) struct Ignored {
 /// Ends the running test as ignored, or as failed if `GAURAST_TEST_REQUIRE` says so. It must be called in the test's
 /// own thread.
 pub fn ignore(missing: Missing, reason: impl Into<String>) -> ! {
-    resume_unwind(Box::new(Ignored {
-        missing,
-        reason: reason.into(),
-    }))
+    resume_unwind(Box::new(Ignored { missing, reason: reason.into() }))
 }
 
 /// Ends the running test as ignored if `need` is missing.
@@ -67,9 +64,7 @@ pub fn data_folder() -> Option<PathBuf> {
 /// is missing.
 pub fn data(name: &'static str) -> PathBuf {
     require(Need::Data(name));
-    data_folder()
-        .expect("a folder that was just looked into")
-        .join(name)
+    data_folder().expect("a folder that was just looked into").join(name)
 }
 
 /// Returns true if `GAURAST_TEST_LONG` requests complete runs in place of small samples.
@@ -91,18 +86,12 @@ impl Need {
     /// The reason for ignoring the test, if the requirement is missing.
     pub(crate) fn missing(self) -> Option<Ignored> {
         let (missing, reason) = match self {
-            Self::Program(name) if !on_the_path(name) => {
-                (Missing::Program, format!("there is no {name}"))
-            }
-            Self::File(path) if !Path::new(path).exists() => {
-                (Missing::Program, format!("there is no {path}"))
-            }
+            Self::Program(name) if !on_the_path(name) => (Missing::Program, format!("there is no {name}")),
+            Self::File(path) if !Path::new(path).exists() => (Missing::Program, format!("there is no {path}")),
             Self::FileOf(variable) if !std::env::var_os(variable).is_some_and(is_file) => {
                 (Missing::Program, format!("{variable} names no file"))
             }
-            Self::VulkanLoader if !has_vulkan_loader() => {
-                (Missing::Program, "there is no Vulkan loader".to_owned())
-            }
+            Self::VulkanLoader if !has_vulkan_loader() => (Missing::Program, "there is no Vulkan loader".to_owned()),
             Self::Lavapipe if lavapipe_manifest().is_none() || !has_vulkan_loader() => {
                 (Missing::Program, "there is no lavapipe".to_owned())
             }
@@ -116,10 +105,9 @@ impl Need {
                 }
                 Some(_) => return None,
             },
-            Self::SimdLevel(level) if !has_simd_level(level) => (
-                Missing::Capability,
-                format!("this processor has no {level}"),
-            ),
+            Self::SimdLevel(level) if !has_simd_level(level) => {
+                (Missing::Capability, format!("this processor has no {level}"))
+            }
             _ => return None,
         };
         Some(Ignored { missing, reason })
@@ -151,11 +139,7 @@ pub fn has_simd_level(level: &str) -> bool {
 
 /// Lavapipe's manifest in the folders where Linux systems store drivers' manifests.
 pub fn lavapipe_manifest() -> Option<PathBuf> {
-    const FOLDERS: [&str; 3] = [
-        "/usr/share/vulkan/icd.d",
-        "/usr/local/share/vulkan/icd.d",
-        "/etc/vulkan/icd.d",
-    ];
+    const FOLDERS: [&str; 3] = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
     first_file(&FOLDERS, |name| name.starts_with("lvp_icd"))
 }
 
@@ -166,36 +150,21 @@ fn has_validation_layer() -> bool {
         "/etc/vulkan/explicit_layer.d",
         "/usr/share/vulkan/implicit_layer.d",
     ];
-    first_file(&FOLDERS, |name| {
-        name.starts_with("VkLayer_khronos_validation")
-    })
-    .is_some()
+    first_file(&FOLDERS, |name| name.starts_with("VkLayer_khronos_validation")).is_some()
 }
 
 fn has_vulkan_loader() -> bool {
     let architecture = format!("/usr/lib/{}-linux-gnu", std::env::consts::ARCH);
-    let folders = [
-        architecture.as_str(),
-        "/usr/lib64",
-        "/usr/lib",
-        "/usr/local/lib",
-    ];
+    let folders = [architecture.as_str(), "/usr/lib64", "/usr/lib", "/usr/local/lib"];
     first_file(&folders, |name| name.starts_with("libvulkan.so")).is_some()
 }
 
 /// The first file in `folders` whose name matches.
 fn first_file(folders: &[&str], fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
-    let entries = folders
-        .iter()
-        .filter_map(|folder| std::fs::read_dir(folder).ok())
-        .flatten();
+    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
     entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .find(|path| {
-            path.file_name()
-                .and_then(|name| name.to_str())
-                .is_some_and(&fits)
-        })
+        .find(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(&fits))
 }
 
 fn on_the_path(program: &str) -> bool {

@@ -40,14 +40,13 @@ impl Report {
             let rows: String = times
                 .iter()
                 .map(|(time, name)| format!("{:.2}\t{name}\n", time.as_secs_f64()))
-                .chain(ignored.iter().flat_map(|(reason, &count)| {
-                    std::iter::repeat_n(format!("ignored\t{reason}\n"), count)
-                }))
+                .chain(
+                    ignored
+                        .iter()
+                        .flat_map(|(reason, &count)| std::iter::repeat_n(format!("ignored\t{reason}\n"), count)),
+                )
                 .collect();
-            let file = std::fs::OpenOptions::new()
-                .create(true)
-                .append(true)
-                .open(&path);
+            let file = std::fs::OpenOptions::new().create(true).append(true).open(&path);
             if let Err(error) = file.and_then(|mut file| file.write_all(rows.as_bytes())) {
                 eprintln!("{}: {error}", path.display());
             }

@@ -104,10 +104,8 @@ pub fn draw(
     depth_test: Option<DepthTest>,
     attachments: &mut Attachments,
 ) {
-    let mut set: Vec<Projected> = gaussians
-        .iter()
-        .filter_map(|gaussian| project(gaussian, camera, viewport, state))
-        .collect();
+    let mut set: Vec<Projected> =
+        gaussians.iter().filter_map(|gaussian| project(gaussian, camera, viewport, state)).collect();
     // Stable, so that ties are in the order of the draw.
     set.sort_by(|a, b| a.z.total_cmp(&b.z));
 
@@ -115,55 +113,31 @@ pub fn draw(
     let height = attachments.color.len() / width;
     let origin = viewport.origin();
     let covered = [width, height].map(|pixels| 0..pixels);
-    let covered = [0, 1].map(|axis| {
-        centres(
-            origin[axis],
-            origin[axis] + viewport.size()[axis],
-            &covered[axis],
-        )
-    });
-    let empty = Pixel {
-        color: [0.0; 3],
-        transmittance: 1.0,
-        finished: false,
-        median: None,
-    };
+    let covered = [0, 1].map(|axis| centres(origin[axis], origin[axis] + viewport.size()[axis], &covered[axis]));
+    let empty = Pixel { color: [0.0; 3], transmittance: 1.0, finished: false, median: None };
     let mut pixels = vec![empty; attachments.color.len()];
-    let [ceiling, floor, end] = widened([
-        state.alpha_ceiling,
-        state.alpha_floor,
-        state.transmittance_floor,
-    ]);
+    let [ceiling, floor, end] = widened([state.alpha_ceiling, state.alpha_floor, state.transmittance_floor]);
     let [c0, c1] = widened(camera.depth_coefficients);
 
     for gaussian in &set {
         let mean = [0, 1].map(|axis| origin[axis] + gaussian.mean[axis]);
         let depth = viewport.mapped(c0 + c1 / f64::from(gaussian.z));
-        let depth = depth_test
-            .map_or(DepthFormat::Float32, |test| test.format)
-            .rounded(depth);
+        let depth = depth_test.map_or(DepthFormat::Float32, |test| test.format).rounded(depth);
         let [columns, rows] = [0, 1].map(|axis| {
             let reach = reach(gaussian.opacity, floor) * gaussian.variances()[axis].sqrt();
-            centres(
-                mean[axis] - reach - 1.0,
-                mean[axis] + reach + 1.0,
-                &covered[axis],
-            )
+            centres(mean[axis] - reach - 1.0, mean[axis] + reach + 1.0, &covered[axis])
         });
         for y in rows {
             for x in columns.clone() {
                 let index = y * width + x;
                 let pixel = &mut pixels[index];
-                if pixel.finished
-                    || depth_test
-                        .is_some_and(|test| !test.compare.holds(depth, attachments.depth[index]))
+                if pixel.finished || depth_test.is_some_and(|test| !test.compare.holds(depth, attachments.depth[index]))
                 {
                     continue;
                 }
                 // Step 6.
                 let d = [x as f64 + 0.5 - mean[0], y as f64 + 0.5 - mean[1]];
-                let alpha =
-                    ceiling.min(gaussian.opacity * (-0.5 * gaussian.squared_distance(d)).exp());
+                let alpha = ceiling.min(gaussian.opacity * (-0.5 * gaussian.squared_distance(d)).exp());
                 if alpha < floor {
                     continue;
                 }
@@ -188,8 +162,8 @@ pub fn draw(
         let [red, green, blue] = pixel.color;
         let fragment = [red, green, blue, 1.0 - pixel.transmittance];
         let stored = attachments.color[index];
-        attachments.color[index] = [0, 1, 2, 3]
-            .map(|at| (fragment[at] + (1.0 - fragment[3]) * f64::from(stored[at])) as f32);
+        attachments.color[index] =
+            [0, 1, 2, 3].map(|at| (fragment[at] + (1.0 - fragment[3]) * f64::from(stored[at])) as f32);
         if depth_test.is_some_and(|test| test.write) {
             attachments.depth[index] = median;
         }
@@ -198,18 +172,12 @@ pub fn draw(
 
 /// The pixels of a range whose centres lie between two coordinates.
 fn centres(least: f64, greatest: f64, range: &Range<usize>) -> Range<usize> {
-    let first = (least - 0.5)
-        .ceil()
-        .clamp(range.start as f64, range.end as f64) as usize;
+    let first = (least - 0.5).ceil().clamp(range.start as f64, range.end as f64) as usize;
     let end = ((greatest - 0.5).ceil()).clamp(range.start as f64, range.end as f64) as usize;
     first..end.max(first)
 }
 
 /// The number of standard deviations at which alpha falls below the floor; infinity if the floor is 0.
 fn reach(opacity: f64, floor: f64) -> f64 {
-    if floor == 0.0 {
-        f64::INFINITY
-    } else {
-        (2.0 * (opacity / floor).ln()).max(0.0).sqrt()
-    }
+    if floor == 0.0 { f64::INFINITY } else { (2.0 * (opacity / floor).ln()).max(0.0).sqrt() }
 }

@@ -1,9 +1,7 @@
 //! Steps 1 to 5: the projection of one Gaussian to the picture.
 
 use crate::harmonics;
-use crate::linear::{
-    Matrix, Vector, apply, cross, dot, length, row_times, scaled, subtract, widened,
-};
+use crate::linear::{Matrix, Vector, apply, cross, dot, length, row_times, scaled, subtract, widened};
 use crate::viewport::Viewport;
 
 /// The attributes of one Gaussian, as binary32.
@@ -105,15 +103,8 @@ pub(crate) fn project(
 ) -> Option<Projected> {
     let coefficients = &gaussian.harmonics[..(state.spherical_harmonics_degree + 1).pow(2)];
     // Step 1.
-    let finite = gaussian
-        .position
-        .iter()
-        .chain(&gaussian.scale)
-        .chain(&gaussian.rotation)
-        .chain([&gaussian.opacity]);
-    if !finite
-        .chain(coefficients.iter().flatten())
-        .all(|value| value.is_finite())
+    let finite = gaussian.position.iter().chain(&gaussian.scale).chain(&gaussian.rotation).chain([&gaussian.opacity]);
+    if !finite.chain(coefficients.iter().flatten()).all(|value| value.is_finite())
         || gaussian.rotation.iter().all(|&component| component == 0.0)
         || gaussian.scale.iter().any(|&scale| scale < 0.0)
         || gaussian.opacity < state.alpha_floor
@@ -139,11 +130,7 @@ pub(crate) fn project(
         let margin = 0.15 * size / focal[axis];
         let least = -(principal[axis] / focal[axis] + margin);
         let greatest = (size - principal[axis]) / focal[axis] + margin;
-        let mut jacobian = [
-            0.0,
-            0.0,
-            -focal[axis] * slopes[axis].clamp(least, greatest) / t[2],
-        ];
+        let mut jacobian = [0.0, 0.0, -focal[axis] * slopes[axis].clamp(least, greatest) / t[2]];
         jacobian[axis] = focal[axis] / t[2];
         let row = row_times(row_times(jacobian, &to_camera), &to_world);
         [0, 1, 2].map(|own| row[own] * f64::from(gaussian.scale[own]))
@@ -161,45 +148,19 @@ pub(crate) fn project(
             Antialiasing::Dilate => 1.0,
             Antialiasing::OpacityCompensated => area / determinant.sqrt(),
         };
-    Some(Projected {
-        mean,
-        rows,
-        low_pass,
-        determinant,
-        opacity,
-        color: color(direction, coefficients),
-        z,
-    })
+    Some(Projected { mean, rows, low_pass, determinant, opacity, color: color(direction, coefficients), z })
 }
 
 /// R(q), of a quaternion that need not be normalized.
 fn turn(quaternion: [f32; 4]) -> Matrix {
-    let largest = quaternion
-        .iter()
-        .fold(0.0f32, |largest, component| largest.max(component.abs()));
+    let largest = quaternion.iter().fold(0.0f32, |largest, component| largest.max(component.abs()));
     let divided = widened(quaternion).map(|component| component / f64::from(largest));
-    let norm = divided
-        .iter()
-        .map(|component| component * component)
-        .sum::<f64>()
-        .sqrt();
+    let norm = divided.iter().map(|component| component * component).sum::<f64>().sqrt();
     let [w, x, y, z] = divided.map(|component| component / norm);
     [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
 }
 
@@ -207,11 +168,7 @@ fn turn(quaternion: [f32; 4]) -> Matrix {
 fn color(direction: Vector, coefficients: &[[f32; 3]]) -> Vector {
     let functions = harmonics::functions(scaled(direction, 1.0 / length(direction)));
     [0, 1, 2].map(|component| {
-        let sum: f64 = coefficients
-            .iter()
-            .zip(functions)
-            .map(|(k, y)| y * f64::from(k[component]))
-            .sum();
+        let sum: f64 = coefficients.iter().zip(functions).map(|(k, y)| y * f64::from(k[component])).sum();
         (0.5 + sum).clamp(0.0, f64::from(f32::MAX))
     })
 }

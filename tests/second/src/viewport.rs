@@ -22,14 +22,7 @@ pub struct Viewport {
 impl Viewport {
     /// A viewport over a whole attachment of width x height pixels.
     pub fn whole(width: usize, height: usize) -> Self {
-        Self {
-            x: 0.0,
-            y: 0.0,
-            width: width as f32,
-            height: height as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }
+        Self { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 }
     }
 
     /// Width and height, without signs.
@@ -39,10 +32,7 @@ impl Viewport {
 
     /// The upper left corner of the area.
     pub(crate) fn origin(&self) -> [f64; 2] {
-        [
-            f64::from(self.x),
-            f64::from(self.y) + f64::from(self.height).min(0.0),
-        ]
+        [f64::from(self.x), f64::from(self.y) + f64::from(self.height).min(0.0)]
     }
 
     /// A camera's depth as the viewport maps it.

@@ -19,18 +19,10 @@ const UPDATES: &[(Op, Update)] = &[
     (Op::AtomicExchange, |_, _, value| value),
     (Op::AtomicIAdd, |_, old, value| old.wrapping_add(value)),
     (Op::AtomicISub, |_, old, value| old.wrapping_sub(value)),
-    (Op::AtomicSMin, |kind, old, value| {
-        pick(kind, true, true, [old, value])
-    }),
-    (Op::AtomicUMin, |kind, old, value| {
-        pick(kind, false, true, [old, value])
-    }),
-    (Op::AtomicSMax, |kind, old, value| {
-        pick(kind, true, false, [old, value])
-    }),
-    (Op::AtomicUMax, |kind, old, value| {
-        pick(kind, false, false, [old, value])
-    }),
+    (Op::AtomicSMin, |kind, old, value| pick(kind, true, true, [old, value])),
+    (Op::AtomicUMin, |kind, old, value| pick(kind, false, true, [old, value])),
+    (Op::AtomicSMax, |kind, old, value| pick(kind, true, false, [old, value])),
+    (Op::AtomicUMax, |kind, old, value| pick(kind, false, false, [old, value])),
     (Op::AtomicAnd, |_, old, value| old & value),
     (Op::AtomicOr, |_, old, value| old | value),
     (Op::AtomicXor, |_, old, value| old ^ value),
@@ -104,8 +96,7 @@ pub fn rows() -> Vec<Row> {
                 let cell = cell_with(body, kind, v[0]);
                 let [scope, semantics] = scope(body);
                 let flipped = body.asm.emit(Op::Not, id, &[v[0]]);
-                body.asm
-                    .act(Op::AtomicStore, &[cell, scope, semantics, flipped]);
+                body.asm.act(Op::AtomicStore, &[cell, scope, semantics, flipped]);
                 let operands = [cell, scope, semantics];
                 vec![body.asm.emit(Op::AtomicLoad, id, &operands)]
             },

@@ -23,15 +23,7 @@ fn moves(
 
 pub fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
-    for kind in [
-        Kind::Bool,
-        Kind::U8,
-        Kind::I16,
-        Kind::F16,
-        Kind::F32,
-        Kind::U64,
-        Kind::F64,
-    ] {
+    for kind in [Kind::Bool, Kind::U8, Kind::I16, Kind::F16, Kind::F32, Kind::U64, Kind::F64] {
         rows.extend(vectors(kind));
     }
     for kind in Kind::FLOATS {
@@ -174,23 +166,16 @@ fn array(kind: Kind, class: StorageClass) -> Row {
             let pointer = body.asm.pointer(class, ty);
             for element in 0..5 {
                 let element = body.asm.u32(element);
-                let place = body
-                    .asm
-                    .emit(Op::AccessChain, pointer, &[variable, element]);
+                let place = body.asm.emit(Op::AccessChain, pointer, &[variable, element]);
                 body.asm.act(Op::Store, &[place, v[0]]);
             }
-            let written = body
-                .asm
-                .emit(Op::InBoundsAccessChain, pointer, &[variable, v[2]]);
+            let written = body.asm.emit(Op::InBoundsAccessChain, pointer, &[variable, v[2]]);
             body.asm.act(Op::Store, &[written, v[1]]);
             let read = body.asm.emit(Op::AccessChain, pointer, &[variable, v[3]]);
             let pointer = body.asm.pointer(class, part);
             let one = body.asm.u32(1);
             let component = body.asm.emit(Op::AccessChain, pointer, &[written, one]);
-            vec![
-                body.asm.emit(Op::Load, ty, &[read]),
-                body.asm.emit(Op::Load, part, &[component]),
-            ]
+            vec![body.asm.emit(Op::Load, ty, &[read]), body.asm.emit(Op::Load, part, &[component])]
         },
         |v| {
             let found = if v[2] == v[3] { &v[1] } else { &v[0] };
@@ -233,9 +218,7 @@ fn variables(kind: Kind) -> Vec<Row> {
                 let part = body.ty(Ty::scalar(kind));
                 let pointer = body.asm.pointer(StorageClass::Function, part);
                 let (zero, two) = (body.asm.u32(0), body.asm.u32(2));
-                let place = body
-                    .asm
-                    .emit(Op::AccessChain, pointer, &[variable, zero, two]);
+                let place = body.asm.emit(Op::AccessChain, pointer, &[variable, zero, two]);
                 body.asm.act(Op::Store, &[place, v[1]]);
                 let loaded = body.asm.emit(Op::Load, whole, &[variable]);
                 vec![body.asm.emit(Op::CompositeExtract, ty, &[loaded, 0])]

@@ -19,9 +19,7 @@ pub fn rows() -> Vec<Row> {
         }
     }
     for from in Kind::INTEGERS {
-        let wider = Kind::INTEGERS
-            .into_iter()
-            .filter(|to| to.bits() != from.bits());
+        let wider = Kind::INTEGERS.into_iter().filter(|to| to.bits() != from.bits());
         for to in wider {
             rows.extend(between_integers(from, to));
         }
@@ -54,24 +52,15 @@ fn between(float: Kind, integer: Kind) -> Vec<Row> {
             false => (0.0, 2f64.powi(bits)),
         };
         // A value outside the integer's range gives an undefined result.
-        if whole >= low && whole < high {
-            Expect::Is(integer.wrap(whole as i128))
-        } else {
-            Expect::Any
-        }
+        if whole >= low && whole < high { Expect::Is(integer.wrap(whole as i128)) } else { Expect::Any }
     };
-    let most = 2f64
-        .powi(i32::try_from(integer.bits()).expect("few"))
-        .min(65504.0);
-    let mut within =
-        each(Core(to), &[floats], integers, to_integer).of(0, Domain::Floats(-most, most));
+    let most = 2f64.powi(i32::try_from(integer.bits()).expect("few")).min(65504.0);
+    let mut within = each(Core(to), &[floats], integers, to_integer).of(0, Domain::Floats(-most, most));
     within.name += " in range";
     vec![
         each(Core(to), &[floats], integers, to_integer),
         within,
-        each(Core(from), &[integers], floats, move |v| {
-            Expect::Is(float_of(float, integer.integer(v[0])))
-        }),
+        each(Core(from), &[integers], floats, move |v| Expect::Is(float_of(float, integer.integer(v[0])))),
     ]
 }
 
@@ -81,8 +70,7 @@ fn between_floats(from: Kind, to: Kind) -> Vec<Row> {
     let mut rows = vec![each(Core(Op::FConvert), &[source], target, model)];
     if from.bits() > to.bits() {
         // Numbers near the midpoint of two narrower ones, for which rounding twice gives a wrong result.
-        let mut row =
-            each(Core(Op::FConvert), &[source], target, model).of(0, Domain::NearTies(to));
+        let mut row = each(Core(Op::FConvert), &[source], target, model).of(0, Domain::NearTies(to));
         row.name += " near ties";
         rows.push(row);
     }
@@ -94,14 +82,10 @@ fn between_integers(from: Kind, to: Kind) -> Vec<Row> {
     let signed = from.with_sign(true);
     let mut rows = Vec::new();
     if !to.is_signed() && !from.is_signed() {
-        rows.push(each(Core(Op::UConvert), &[source], target, move |v| {
-            Expect::Is(to.wrap(from.integer(v[0])))
-        }));
+        rows.push(each(Core(Op::UConvert), &[source], target, move |v| Expect::Is(to.wrap(from.integer(v[0])))));
     }
     if from.is_signed() || to.is_signed() {
-        rows.push(each(Core(Op::SConvert), &[source], target, move |v| {
-            Expect::Is(to.wrap(signed.integer(v[0])))
-        }));
+        rows.push(each(Core(Op::SConvert), &[source], target, move |v| Expect::Is(to.wrap(signed.integer(v[0])))));
     }
     rows
 }
@@ -116,10 +100,7 @@ fn quantized() -> Row {
             return Expect::Is(v[0]);
         }
         let near = HALF.rounded(exactly(value));
-        let mut all: Vec<u64> = [near.low, near.high]
-            .into_iter()
-            .map(|value| Kind::F32.round(value))
-            .collect();
+        let mut all: Vec<u64> = [near.low, near.high].into_iter().map(|value| Kind::F32.round(value)).collect();
         if value.abs() < Kind::F16.least_normal() {
             all.retain(|bits| Kind::F32.float(*bits).abs() >= Kind::F16.least_normal());
             all.push(zero);
@@ -168,18 +149,13 @@ fn bit_casts() -> Vec<Row> {
             let (source, target) = (Ty::vector(from, count), Ty::vector(to, results));
             let mut row = whole(Core(Op::Bitcast), &[source], target, move |v| {
                 let cast = |components: &[u64]| -> Vec<u64> {
-                    let whole = components.iter().rev().fold(0u128, |whole, part| {
-                        whole << from.bits() | u128::from(*part)
-                    });
-                    (0..results)
-                        .map(|index| (whole >> (index * to.bits())) as u64 & to.mask())
-                        .collect()
+                    let whole =
+                        components.iter().rev().fold(0u128, |whole, part| whole << from.bits() | u128::from(*part));
+                    (0..results).map(|index| (whole >> (index * to.bits())) as u64 & to.mask()).collect()
                 };
                 let quieted: Vec<u64> = v[0].iter().map(|bits| quiet(from, *bits)).collect();
                 let pairs = cast(&v[0]).into_iter().zip(cast(&quieted));
-                pairs
-                    .map(|(same, quieted)| Expect::OneOf(vec![same, quieted]))
-                    .collect()
+                pairs.map(|(same, quieted)| Expect::OneOf(vec![same, quieted])).collect()
             });
             row.flushes = false;
             row

@@ -32,11 +32,7 @@ pub fn correct_but_sign_of_zero(kind: Kind, value: f64) -> Expect {
 
 type Arithmetic = fn(f64, f64) -> f64;
 
-const ARITHMETIC: &[(Op, Arithmetic)] = &[
-    (Op::FAdd, |a, b| a + b),
-    (Op::FSub, |a, b| a - b),
-    (Op::FMul, |a, b| a * b),
-];
+const ARITHMETIC: &[(Op, Arithmetic)] = &[(Op::FAdd, |a, b| a + b), (Op::FSub, |a, b| a - b), (Op::FMul, |a, b| a * b)];
 
 /// A relation of two numbers that are compared; `None` if one of them is NaN.
 type Relation = fn(Option<Ordering>) -> bool;
@@ -44,25 +40,15 @@ type Relation = fn(Option<Ordering>) -> bool;
 const COMPARISONS: &[(Op, Relation)] = &[
     (Op::FOrdEqual, |order| order == Some(Equal)),
     (Op::FUnordEqual, |order| matches!(order, None | Some(Equal))),
-    (Op::FOrdNotEqual, |order| {
-        matches!(order, Some(Less | Greater))
-    }),
+    (Op::FOrdNotEqual, |order| matches!(order, Some(Less | Greater))),
     (Op::FUnordNotEqual, |order| order != Some(Equal)),
     (Op::FOrdLessThan, |order| order == Some(Less)),
-    (Op::FUnordLessThan, |order| {
-        matches!(order, None | Some(Less))
-    }),
+    (Op::FUnordLessThan, |order| matches!(order, None | Some(Less))),
     (Op::FOrdGreaterThan, |order| order == Some(Greater)),
-    (Op::FUnordGreaterThan, |order| {
-        matches!(order, None | Some(Greater))
-    }),
-    (Op::FOrdLessThanEqual, |order| {
-        matches!(order, Some(Less | Equal))
-    }),
+    (Op::FUnordGreaterThan, |order| matches!(order, None | Some(Greater))),
+    (Op::FOrdLessThanEqual, |order| matches!(order, Some(Less | Equal))),
     (Op::FUnordLessThanEqual, |order| order != Some(Greater)),
-    (Op::FOrdGreaterThanEqual, |order| {
-        matches!(order, Some(Greater | Equal))
-    }),
+    (Op::FOrdGreaterThanEqual, |order| matches!(order, Some(Greater | Equal))),
     (Op::FUnordGreaterThanEqual, |order| order != Some(Less)),
 ];
 
@@ -83,18 +69,10 @@ pub fn rows() -> Vec<Row> {
             }));
         }
         rows.extend([
-            each(Core(Op::FNegate), &[ty], ty, move |v| {
-                correct(kind, -kind.float(v[0]))
-            }),
-            each(Core(Op::IsNan), &[ty], truth, move |v| {
-                Expect::Is(u64::from(kind.float(v[0]).is_nan()))
-            }),
-            each(Core(Op::IsInf), &[ty], truth, move |v| {
-                Expect::Is(u64::from(kind.float(v[0]).is_infinite()))
-            }),
-            each(Core(Op::FDiv), &[ty, ty], ty, move |v| {
-                quotient(kind, kind.float(v[0]), kind.float(v[1]))
-            }),
+            each(Core(Op::FNegate), &[ty], ty, move |v| correct(kind, -kind.float(v[0]))),
+            each(Core(Op::IsNan), &[ty], truth, move |v| Expect::Is(u64::from(kind.float(v[0]).is_nan()))),
+            each(Core(Op::IsInf), &[ty], truth, move |v| Expect::Is(u64::from(kind.float(v[0]).is_infinite()))),
+            each(Core(Op::FDiv), &[ty, ty], ty, move |v| quotient(kind, kind.float(v[0]), kind.float(v[1]))),
             each(Core(Op::FRem), &[ty, ty], ty, move |v| {
                 let (x, y) = (kind.float(v[0]), kind.float(v[1]));
                 modulo(kind, [x, y], x % y, f64::trunc)
@@ -102,11 +80,7 @@ pub fn rows() -> Vec<Row> {
             each(Core(Op::FMod), &[ty, ty], ty, move |v| {
                 let (x, y) = (kind.float(v[0]), kind.float(v[1]));
                 let rest = x % y;
-                let truth = if rest != 0.0 && (rest < 0.0) != (y < 0.0) {
-                    rest + y
-                } else {
-                    rest
-                };
+                let truth = if rest != 0.0 && (rest < 0.0) != (y < 0.0) { rest + y } else { rest };
                 modulo(kind, [x, y], truth, f64::floor)
             }),
             fused_by_hand(kind, ty),
@@ -129,10 +103,7 @@ fn modulo(kind: Kind, [x, y]: [f64; 2], truth: f64, round: fn(f64) -> f64) -> Ex
     let p = format(kind);
     let formula = || {
         let quotient = p.rounded(p.div(exactly(x), exactly(y))?);
-        let whole = Interval {
-            low: round(quotient.low),
-            high: round(quotient.high),
-        };
+        let whole = Interval { low: round(quotient.low), high: round(quotient.high) };
         p.sub(exactly(x), p.mul(exactly(y), whole)?)
     };
     p.inherited(truth, formula()).into()

@@ -37,11 +37,7 @@ fn rounding(kind: Kind) -> Vec<Row> {
     ];
     let mut rows: Vec<Row> = exact
         .into_iter()
-        .map(|(op, model)| {
-            each(Glsl(op), &[ty], ty, move |v| {
-                correct(kind, model(kind.float(v[0])))
-            })
-        })
+        .map(|(op, model)| each(Glsl(op), &[ty], ty, move |v| correct(kind, model(kind.float(v[0])))))
         .collect();
     rows.extend([
         // A half may be rounded either way.
@@ -49,11 +45,7 @@ fn rounding(kind: Kind) -> Vec<Row> {
             let x = kind.float(v[0]);
             // A half rounded down: the result for a slightly smaller number.
             let down = x.signum() * (x.abs() - 0.5).ceil();
-            Expect::OneOf(
-                [x.round_ties_even(), x.round(), down]
-                    .map(|x| kind.round(x))
-                    .to_vec(),
-            )
+            Expect::OneOf([x.round_ties_even(), x.round(), down].map(|x| kind.round(x)).to_vec())
         }),
         each(Glsl(G::FSign), &[ty], ty, move |v| match kind.float(v[0]) {
             0.0 => correct_but_sign_of_zero(kind, 0.0),
@@ -95,9 +87,7 @@ fn mixing(kind: Kind) -> Vec<Row> {
     };
     let fma = move |v: &[u64]| {
         let [a, b, c] = three(v);
-        let formula = p
-            .mul(exactly(a), exactly(b))
-            .and_then(|product| p.add(product, exactly(c)));
+        let formula = p.mul(exactly(a), exactly(b)).and_then(|product| p.add(product, exactly(c)));
         p.inherited(a.mul_add(b, c), formula).into()
     };
     let smooth = move |v: &[u64]| {
@@ -108,10 +98,7 @@ fn mixing(kind: Kind) -> Vec<Row> {
         let formula = || {
             let top = p.sub(exactly(x), exactly(low))?;
             let t = p.rounded(p.div(top, p.sub(exactly(high), exactly(low))?)?);
-            let t = Interval {
-                low: t.low.clamp(0.0, 1.0),
-                high: t.high.clamp(0.0, 1.0),
-            };
+            let t = Interval { low: t.low.clamp(0.0, 1.0), high: t.high.clamp(0.0, 1.0) };
             let slope = p.sub(exactly(3.0), p.mul(exactly(2.0), t)?)?;
             p.mul(p.mul(t, t)?, slope)
         };
@@ -149,9 +136,7 @@ fn roots(kind: Kind) -> Vec<Row> {
             let x = kind.float(v[0]);
             p.inherited(x.sqrt(), p.sqrt(exactly(x))).into()
         }),
-        each(Glsl(G::InverseSqrt), &[ty], ty, move |v| {
-            p.inverse_sqrt(exactly(kind.float(v[0]))).into()
-        }),
+        each(Glsl(G::InverseSqrt), &[ty], ty, move |v| p.inverse_sqrt(exactly(kind.float(v[0]))).into()),
         scaled(G::Radians, PI / 180.0),
         scaled(G::Degrees, 180.0 / PI),
     ]
@@ -165,9 +150,7 @@ fn split(kind: Kind) -> Vec<Row> {
         let one = |bits: &u64| frexp(kind, *bits);
         let both: Vec<_> = v[0].iter().map(one).collect();
         let first = both.iter().map(|both| both.0.clone());
-        first
-            .chain(both.iter().map(|both| both.1.clone()))
-            .collect()
+        first.chain(both.iter().map(|both| both.1.clone())).collect()
     };
     let modf = move |v: &[Vec<u64>]| -> Vec<Expect> {
         let part = |model: fn(f64) -> f64| {
@@ -190,9 +173,7 @@ fn split(kind: Kind) -> Vec<Row> {
             let structure = body.asm.declare(Op::TypeStruct, None, &parts);
             let result = body.asm.glsl(op, structure, &[v[0]]);
             let part = |index: u32| (parts[index as usize], [result, index]);
-            [part(0), part(1)]
-                .map(|(ty, operands)| body.asm.emit(Op::CompositeExtract, ty, &operands))
-                .to_vec()
+            [part(0), part(1)].map(|(ty, operands)| body.asm.emit(Op::CompositeExtract, ty, &operands)).to_vec()
         }
     };
     // A variable of the module, and an array element that is indexed at run time.
@@ -214,42 +195,12 @@ fn split(kind: Kind) -> Vec<Row> {
         _ => 1024,
     };
     vec![
-        row(
-            name("FrexpStruct"),
-            &[ty],
-            &[ty, exponents],
-            both(G::FrexpStruct, exponents, false),
-            frexp,
-        ),
-        row(
-            name("Frexp"),
-            &[ty],
-            &[ty, exponents],
-            both(G::Frexp, exponents, true),
-            frexp,
-        ),
-        row(
-            name("ModfStruct"),
-            &[ty],
-            &[ty, ty],
-            both(G::ModfStruct, ty, false),
-            modf,
-        ),
-        row(
-            name("Modf"),
-            &[ty],
-            &[ty, ty],
-            both(G::Modf, ty, true),
-            modf,
-        ),
-        row(
-            name("Modf into an array"),
-            &[ty, Ty::scalar(Kind::U32)],
-            &[ty, ty],
-            through_array,
-            modf,
-        )
-        .of(1, Domain::Integers(0, 3)),
+        row(name("FrexpStruct"), &[ty], &[ty, exponents], both(G::FrexpStruct, exponents, false), frexp),
+        row(name("Frexp"), &[ty], &[ty, exponents], both(G::Frexp, exponents, true), frexp),
+        row(name("ModfStruct"), &[ty], &[ty, ty], both(G::ModfStruct, ty, false), modf),
+        row(name("Modf"), &[ty], &[ty, ty], both(G::Modf, ty, true), modf),
+        row(name("Modf into an array"), &[ty, Ty::scalar(Kind::U32)], &[ty, ty], through_array, modf)
+            .of(1, Domain::Integers(0, 3)),
         each(Glsl(G::Ldexp), &[ty, exponents], ty, move |v| {
             let (x, exponent) = (kind.float(v[0]), Kind::I32.integer(v[1]));
             ldexp(kind, x, exponent, largest)
@@ -263,11 +214,7 @@ fn frexp(kind: Kind, bits: u64) -> (Expect, Expect) {
     if x == 0.0 || !x.is_finite() {
         let zero = x == 0.0;
         let exponent = if zero { Expect::Is(0) } else { Expect::Any };
-        let same = if zero {
-            correct_but_sign_of_zero(kind, 0.0)
-        } else {
-            Expect::Any
-        };
+        let same = if zero { correct_but_sign_of_zero(kind, 0.0) } else { Expect::Any };
         return (same, exponent);
     }
     // Denormal doubles are normalized first.
@@ -276,10 +223,7 @@ fn frexp(kind: Kind, bits: u64) -> (Expect, Expect) {
     let exponent = (normal.to_bits() >> 52 & 0x7ff) as i32 - 1022;
     let significand = normal / 2f64.powi(exponent - 1) / 2.0;
     let exponent = exponent - if tiny { 64 } else { 0 };
-    (
-        correct(kind, significand),
-        Expect::Is(Kind::I32.wrap(i128::from(exponent))),
-    )
+    (correct(kind, significand), Expect::Is(Kind::I32.wrap(i128::from(exponent))))
 }
 
 fn ldexp(kind: Kind, x: f64, exponent: i128, largest: i128) -> Expect {
@@ -307,14 +251,7 @@ fn half_of(p: Format, x: Maybe) -> Maybe {
 
 fn hyperbolic(p: Format, x: f64, sum: bool) -> Maybe {
     let (up, down) = (p.exp(exactly(x))?, p.exp(exactly(-x))?);
-    half_of(
-        p,
-        if sum {
-            p.add(up, down)
-        } else {
-            p.sub(up, down)
-        },
-    )
+    half_of(p, if sum { p.add(up, down) } else { p.sub(up, down) })
 }
 
 fn sine_of_cosine(p: Format, x: f64) -> Maybe {
@@ -333,52 +270,19 @@ const FUNCTIONS: &[(G, Function, Formula, f64)] = &[
     (G::Sin, f64::sin, |p, x| p.sin(x), PI),
     (G::Cos, f64::cos, |p, x| p.cos(x), PI),
     (G::Tan, f64::tan, |p, x| p.div(p.sin(x)?, p.cos(x)?), PI),
-    (
-        G::Asin,
-        f64::asin,
-        |p, x| p.atan2(exactly(x), sine_of_cosine(p, x)?),
-        1.0,
-    ),
-    (
-        G::Acos,
-        f64::acos,
-        |p, x| p.atan2(sine_of_cosine(p, x)?, exactly(x)),
-        1.0,
-    ),
-    (
-        G::Atan,
-        f64::atan,
-        |p, x| p.atan2(exactly(x), exactly(1.0)),
-        1e4,
-    ),
+    (G::Asin, f64::asin, |p, x| p.atan2(exactly(x), sine_of_cosine(p, x)?), 1.0),
+    (G::Acos, f64::acos, |p, x| p.atan2(sine_of_cosine(p, x)?, exactly(x)), 1.0),
+    (G::Atan, f64::atan, |p, x| p.atan2(exactly(x), exactly(1.0)), 1e4),
     (G::Sinh, f64::sinh, |p, x| hyperbolic(p, x, false), 10.0),
     (G::Cosh, f64::cosh, |p, x| hyperbolic(p, x, true), 10.0),
-    (
-        G::Tanh,
-        f64::tanh,
-        |p, x| p.div(hyperbolic(p, x, false)?, hyperbolic(p, x, true)?),
-        10.0,
-    ),
-    (
-        G::Asinh,
-        f64::asinh,
-        |p, x| inverse_hyperbolic(p, x, 1.0),
-        50.0,
-    ),
-    (
-        G::Acosh,
-        f64::acosh,
-        |p, x| inverse_hyperbolic(p, x, -1.0),
-        50.0,
-    ),
+    (G::Tanh, f64::tanh, |p, x| p.div(hyperbolic(p, x, false)?, hyperbolic(p, x, true)?), 10.0),
+    (G::Asinh, f64::asinh, |p, x| inverse_hyperbolic(p, x, 1.0), 50.0),
+    (G::Acosh, f64::acosh, |p, x| inverse_hyperbolic(p, x, -1.0), 50.0),
     (
         G::Atanh,
         f64::atanh,
         |p, x| {
-            let (up, down) = (
-                p.add(exactly(1.0), exactly(x))?,
-                p.sub(exactly(1.0), exactly(x))?,
-            );
+            let (up, down) = (p.add(exactly(1.0), exactly(x))?, p.sub(exactly(1.0), exactly(x))?);
             half_of(p, p.log(p.rounded(p.div(up, down)?)))
         },
         1.0,
@@ -421,25 +325,18 @@ fn transcendental(kind: Kind) -> Vec<Row> {
     };
     let angle = move |v: &[u64]| {
         let (y, x) = (kind.float(v[0]), kind.float(v[1]));
-        p.inherited(y.atan2(x), p.atan2(exactly(y), exactly(x)))
-            .into()
+        p.inherited(y.atan2(x), p.atan2(exactly(y), exactly(x))).into()
     };
     let two = [ty, ty];
     let around = Domain::Floats(-10.0, 10.0);
     for (op, usual, model) in [
-        (
-            G::Pow,
-            Domain::Floats(0.0, 10.0),
-            Box::new(power) as Box<dyn Fn(&[u64]) -> Expect>,
-        ),
+        (G::Pow, Domain::Floats(0.0, 10.0), Box::new(power) as Box<dyn Fn(&[u64]) -> Expect>),
         (G::Atan2, around, Box::new(angle)),
     ] {
         let model = std::rc::Rc::new(model);
         let again = model.clone();
         rows.push(each(Glsl(op), &two, ty, move |v| model(v)));
-        let mut row = each(Glsl(op), &two, ty, move |v| again(v))
-            .of(0, usual)
-            .of(1, around);
+        let mut row = each(Glsl(op), &two, ty, move |v| again(v)).of(0, usual).of(1, around);
         row.name += " in its usual range";
         rows.push(row);
     }
@@ -450,8 +347,7 @@ fn transcendental(kind: Kind) -> Vec<Row> {
 /// either direction at a half.
 fn scaled(value: f64, least: f64, most: f64) -> Option<Vec<i128>> {
     let product = format(Kind::F32).rounded(exactly(value.clamp(least, 1.0) * most));
-    let whole = [product.low, product.high]
-        .map(|value| [value.round_ties_even() as i128, value.round() as i128]);
+    let whole = [product.low, product.high].map(|value| [value.round_ties_even() as i128, value.round() as i128]);
     let mut all = whole.concat();
     all.dedup();
     (!value.is_nan()).then_some(all)
@@ -477,17 +373,13 @@ fn packing() -> Vec<Row> {
                     return vec![Expect::Any];
                 };
                 let place = |value: i128| part.wrap(value) << (bits * index);
-                all = all
-                    .iter()
-                    .flat_map(|word| either.iter().map(move |value| word | place(*value)))
-                    .collect();
+                all = all.iter().flat_map(|word| either.iter().map(move |value| word | place(*value))).collect();
                 all.dedup();
             }
             vec![Expect::OneOf(all)]
         };
         rows.push(whole(Glsl(pack), &[vector], word, model));
-        let mut usual =
-            whole(Glsl(pack), &[vector], word, model).of(0, Domain::Floats(-1.25, 1.25));
+        let mut usual = whole(Glsl(pack), &[vector], word, model).of(0, Domain::Floats(-1.25, 1.25));
         usual.name += " in its usual range";
         rows.push(usual);
         rows.push(whole(Glsl(unpack), &[word], vector, move |v| {
@@ -498,10 +390,7 @@ fn packing() -> Vec<Row> {
                     let p = format(Kind::F32);
                     let value = exactly(value.max(-1.0));
                     let error = 2.5 * p.ulp(value.low);
-                    Expect::Within(Interval {
-                        low: value.low - error,
-                        high: value.high + error,
-                    })
+                    Expect::Within(Interval { low: value.low - error, high: value.high + error })
                 })
                 .collect()
         }));
@@ -518,14 +407,10 @@ fn packing() -> Vec<Row> {
     half.flushes = true;
     rows.push(half);
     rows.push(whole(Glsl(G::UnpackHalf2x16), &[word], halves, |v| {
-        [0, 16]
-            .map(|at| correct(Kind::F32, Kind::F16.float(v[0][0] >> at & 0xffff)))
-            .to_vec()
+        [0, 16].map(|at| correct(Kind::F32, Kind::F16.float(v[0][0] >> at & 0xffff))).to_vec()
     }));
     let (double, pair) = (Ty::scalar(Kind::F64), Ty::vector(Kind::U32, 2));
-    let mut joined = whole(Glsl(G::PackDouble2x32), &[pair], double, |v| {
-        vec![Expect::Is(v[0][0] | v[0][1] << 32)]
-    });
+    let mut joined = whole(Glsl(G::PackDouble2x32), &[pair], double, |v| vec![Expect::Is(v[0][0] | v[0][1] << 32)]);
     joined.flushes = false;
     let mut parted = whole(Glsl(G::UnpackDouble2x32), &[double], pair, |v| {
         vec![Expect::Is(v[0][0] & 0xffff_ffff), Expect::Is(v[0][0] >> 32)]

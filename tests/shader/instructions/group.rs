@@ -35,20 +35,14 @@ pub fn scoped(body: &mut Body, op: Op, needs: Capability, ty: Ty, operands: &[u3
 }
 
 /// The result of `emit` if a condition holds, and zero otherwise.
-pub fn where_true(
-    body: &mut Body,
-    condition: u32,
-    ty: Ty,
-    emit: impl FnOnce(&mut Body) -> u32,
-) -> u32 {
+pub fn where_true(body: &mut Body, condition: u32, ty: Ty, emit: impl FnOnce(&mut Body) -> u32) -> u32 {
     let id = body.ty(ty);
     let null = body.asm.declare(Op::ConstantNull, Some(id), &[]);
     let variable = body.asm.local(id);
     body.asm.act(Op::Store, &[variable, null]);
     let (inside, after) = (body.asm.id(), body.asm.id());
     body.asm.act(Op::SelectionMerge, &[after, 0]);
-    body.asm
-        .act(Op::BranchConditional, &[condition, inside, after]);
+    body.asm.act(Op::BranchConditional, &[condition, inside, after]);
     body.asm.label(inside);
     let value = emit(body);
     body.asm.act(Op::Store, &[variable, value]);

@@ -124,12 +124,7 @@ pub fn rows() -> Vec<Row> {
         rows.extend(one_operand(kind, ty));
         rows.extend(shifts(kind, ty));
     }
-    rows.extend(
-        Kind::INTEGERS
-            .into_iter()
-            .filter(|kind| kind.bits() == 32)
-            .flat_map(bits),
-    );
+    rows.extend(Kind::INTEGERS.into_iter().filter(|kind| kind.bits() == 32).flat_map(bits));
     rows.extend(extended());
     rows.extend(logic());
     rows
@@ -138,28 +133,16 @@ pub fn rows() -> Vec<Row> {
 fn one_operand(kind: Kind, ty: Ty) -> Vec<Row> {
     let signed = kind.with_sign(true);
     let mut rows = vec![
-        each(Core(Op::Not), &[ty], ty, move |v| {
-            Expect::Is(!v[0] & kind.mask())
-        }),
-        each(Core(Op::SNegate), &[ty], ty, move |v| {
-            outcome(kind, Some(-signed.integer(v[0])))
-        }),
+        each(Core(Op::Not), &[ty], ty, move |v| Expect::Is(!v[0] & kind.mask())),
+        each(Core(Op::SNegate), &[ty], ty, move |v| outcome(kind, Some(-signed.integer(v[0])))),
     ];
     if kind.is_signed() {
         rows.extend([
-            each(Glsl(G::SAbs), &[ty], ty, move |v| {
-                outcome(kind, Some(kind.integer(v[0]).abs()))
-            }),
-            each(Glsl(G::SSign), &[ty], ty, move |v| {
-                outcome(kind, Some(kind.integer(v[0]).signum()))
-            }),
+            each(Glsl(G::SAbs), &[ty], ty, move |v| outcome(kind, Some(kind.integer(v[0]).abs()))),
+            each(Glsl(G::SSign), &[ty], ty, move |v| outcome(kind, Some(kind.integer(v[0]).signum()))),
         ]);
     }
-    let clamp = if kind.is_signed() {
-        G::SClamp
-    } else {
-        G::UClamp
-    };
+    let clamp = if kind.is_signed() { G::SClamp } else { G::UClamp };
     rows.push(each(Glsl(clamp), &[ty, ty, ty], ty, move |v| {
         let [x, low, high] = [0, 1, 2].map(|index| kind.integer(v[index]));
         outcome(kind, (low <= high).then(|| x.clamp(low, high)))
@@ -172,20 +155,13 @@ fn shifts(kind: Kind, ty: Ty) -> Vec<Row> {
     type Shift = fn(Kind, u64, u64) -> i128;
     let models: [(Op, Shift); 3] = [
         (Op::ShiftLeftLogical, |kind, a, by| kind.integer(a) << by),
-        (Op::ShiftRightLogical, |kind, a, by| {
-            kind.with_sign(false).integer(a) >> by
-        }),
-        (Op::ShiftRightArithmetic, |kind, a, by| {
-            kind.with_sign(true).integer(a) >> by
-        }),
+        (Op::ShiftRightLogical, |kind, a, by| kind.with_sign(false).integer(a) >> by),
+        (Op::ShiftRightArithmetic, |kind, a, by| kind.with_sign(true).integer(a) >> by),
     ];
     models
         .into_iter()
         .map(|(op, model)| {
-            each(Core(op), &[ty, ty], ty, move |v| {
-                outcome(kind, Some(model(kind, v[0], v[1])))
-            })
-            .of(1, amounts)
+            each(Core(op), &[ty, ty], ty, move |v| outcome(kind, Some(model(kind, v[0], v[1])))).of(1, amounts)
         })
         .collect()
 }
@@ -215,41 +191,21 @@ fn bits(kind: Kind) -> Vec<Row> {
         }
     };
     vec![
-        each(Core(Op::BitReverse), &[ty], ty, |v| {
-            Expect::Is(u64::from((v[0] as u32).reverse_bits()))
-        }),
-        each(Core(Op::BitCount), &[ty], ty, |v| {
-            Expect::Is(u64::from(v[0].count_ones()))
-        }),
+        each(Core(Op::BitReverse), &[ty], ty, |v| Expect::Is(u64::from((v[0] as u32).reverse_bits()))),
+        each(Core(Op::BitCount), &[ty], ty, |v| Expect::Is(u64::from(v[0].count_ones()))),
         each(Glsl(G::FindILsb), &[ty], ty, |v| {
             Expect::Is(match v[0] {
                 0 => u64::from(u32::MAX),
                 value => u64::from(value.trailing_zeros()),
             })
         }),
-        each(Glsl(G::FindUMsb), &[ty], ty, move |v| {
-            Expect::Is(find(v[0]))
-        }),
+        each(Glsl(G::FindUMsb), &[ty], ty, move |v| Expect::Is(find(v[0]))),
         each(Glsl(G::FindSMsb), &[ty], ty, move |v| {
             let negative = v[0] >> 31 == 1;
             Expect::Is(find(if negative { !v[0] } else { v[0] }))
         }),
-        whole(
-            Core(Op::BitFieldSExtract),
-            &[ty, count, count],
-            ty,
-            extract(true),
-        )
-        .of(1, any)
-        .of(2, any),
-        whole(
-            Core(Op::BitFieldUExtract),
-            &[ty, count, count],
-            ty,
-            extract(false),
-        )
-        .of(1, any)
-        .of(2, any),
+        whole(Core(Op::BitFieldSExtract), &[ty, count, count], ty, extract(true)).of(1, any).of(2, any),
+        whole(Core(Op::BitFieldUExtract), &[ty, count, count], ty, extract(false)).of(1, any).of(2, any),
         whole(Core(Op::BitFieldInsert), &[ty, ty, count, count], ty, |v| {
             let (at, width) = (v[2][0], v[3][0]);
             let mask = ((1 << width) - 1) << at;
@@ -284,9 +240,7 @@ fn extended() -> Vec<Row> {
                     let part = body.ty(ty);
                     let both = body.asm.declare(Op::TypeStruct, None, &[part, part]);
                     let result = body.asm.emit(op, both, operands);
-                    [0, 1]
-                        .map(|index| body.asm.emit(Op::CompositeExtract, part, &[result, index]))
-                        .to_vec()
+                    [0, 1].map(|index| body.asm.emit(Op::CompositeExtract, part, &[result, index])).to_vec()
                 },
                 move |v| {
                     let value = |k: usize| model(kind.integer(v[0][k]), kind.integer(v[1][k]));
@@ -310,36 +264,18 @@ fn logic() -> Vec<Row> {
     ];
     let mut rows: Vec<Row> = two
         .into_iter()
-        .map(|(op, model)| {
-            each(Core(op), &[ty, ty], ty, move |v| {
-                Expect::Is(model(v[0], v[1]))
-            })
-        })
+        .map(|(op, model)| each(Core(op), &[ty, ty], ty, move |v| Expect::Is(model(v[0], v[1]))))
         .collect();
     rows.extend([
         each(Core(Op::LogicalNot), &[ty], ty, |v| Expect::Is(1 - v[0])),
-        whole(Core(Op::Any), &[ty], one, |v| {
-            vec![Expect::Is(u64::from(v[0].contains(&1)))]
-        }),
-        whole(Core(Op::All), &[ty], one, |v| {
-            vec![Expect::Is(u64::from(!v[0].contains(&0)))]
-        }),
+        whole(Core(Op::Any), &[ty], one, |v| vec![Expect::Is(u64::from(v[0].contains(&1)))]),
+        whole(Core(Op::All), &[ty], one, |v| vec![Expect::Is(u64::from(!v[0].contains(&0)))]),
     ]);
-    for kind in [
-        Kind::Bool,
-        Kind::I16,
-        Kind::U64,
-        Kind::F16,
-        Kind::F32,
-        Kind::F64,
-    ] {
+    for kind in [Kind::Bool, Kind::I16, Kind::U64, Kind::F16, Kind::F32, Kind::F64] {
         let value = Ty::vector(kind, 3);
-        rows.push(each(
-            Core(Op::Select),
-            &[Ty::vector(Kind::Bool, 3), value, value],
-            value,
-            |v| Expect::Is(if v[0] != 0 { v[1] } else { v[2] }),
-        ));
+        rows.push(each(Core(Op::Select), &[Ty::vector(Kind::Bool, 3), value, value], value, |v| {
+            Expect::Is(if v[0] != 0 { v[1] } else { v[2] })
+        }));
         rows.push(whole(Core(Op::Select), &[one, value, value], value, |v| {
             let picked = if v[0][0] != 0 { &v[1] } else { &v[2] };
             picked.iter().map(|bits| Expect::Is(*bits)).collect()

@@ -50,9 +50,7 @@ fn products(kind: Kind) -> Vec<Row> {
     let (tall, wide) = (Ty::matrix(kind, 2, 3), Ty::matrix(kind, 4, 2));
     // Column c of the product is the first matrix applied to column c of the second.
     let rows_of = |matrix: &[f64], rows: usize| -> Vec<Vec<f64>> {
-        (0..rows)
-            .map(|row| matrix.iter().skip(row).step_by(rows).copied().collect())
-            .collect()
+        (0..rows).map(|row| matrix.iter().skip(row).step_by(rows).copied().collect()).collect()
     };
     let mut all: Vec<Row> = (2..5)
         .map(|size| {
@@ -64,62 +62,28 @@ fn products(kind: Kind) -> Vec<Row> {
         .collect();
     let scaled = move |v: &[Vec<u64>]| {
         let factor = kind.float(v[1][0]);
-        numbers(kind, &v[0])
-            .into_iter()
-            .map(|value| times(kind, value, factor))
-            .collect()
+        numbers(kind, &v[0]).into_iter().map(|value| times(kind, value, factor)).collect()
     };
     all.extend([
         whole(Core(Op::VectorTimesScalar), &[vector, one], vector, scaled),
         whole(Core(Op::MatrixTimesScalar), &[tall, one], tall, scaled),
-        whole(
-            Core(Op::OuterProduct),
-            &[vector, Ty::vector(kind, 2)],
-            tall,
-            move |v| {
-                let (a, b) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
-                b.iter()
-                    .flat_map(|b| a.iter().map(move |a| times(kind, *a, *b)))
-                    .collect()
-            },
-        ),
-        whole(
-            Core(Op::MatrixTimesVector),
-            &[tall, Ty::vector(kind, 2)],
-            vector,
-            move |v| {
-                let (matrix, vector) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
-                rows_of(&matrix, 3)
-                    .iter()
-                    .map(|row| product(p, row, &vector))
-                    .collect()
-            },
-        ),
-        whole(
-            Core(Op::VectorTimesMatrix),
-            &[vector, tall],
-            Ty::vector(kind, 2),
-            move |v| {
-                let (vector, matrix) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
-                matrix
-                    .chunks(3)
-                    .map(|column| product(p, &vector, column))
-                    .collect()
-            },
-        ),
-        whole(
-            Core(Op::MatrixTimesMatrix),
-            &[tall, wide],
-            Ty::matrix(kind, 4, 3),
-            move |v| {
-                let (left, right) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
-                let rows = rows_of(&left, 3);
-                right
-                    .chunks(2)
-                    .flat_map(|column| rows.iter().map(move |row| product(p, row, column)))
-                    .collect()
-            },
-        ),
+        whole(Core(Op::OuterProduct), &[vector, Ty::vector(kind, 2)], tall, move |v| {
+            let (a, b) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
+            b.iter().flat_map(|b| a.iter().map(move |a| times(kind, *a, *b))).collect()
+        }),
+        whole(Core(Op::MatrixTimesVector), &[tall, Ty::vector(kind, 2)], vector, move |v| {
+            let (matrix, vector) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
+            rows_of(&matrix, 3).iter().map(|row| product(p, row, &vector)).collect()
+        }),
+        whole(Core(Op::VectorTimesMatrix), &[vector, tall], Ty::vector(kind, 2), move |v| {
+            let (vector, matrix) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
+            matrix.chunks(3).map(|column| product(p, &vector, column)).collect()
+        }),
+        whole(Core(Op::MatrixTimesMatrix), &[tall, wide], Ty::matrix(kind, 4, 3), move |v| {
+            let (left, right) = (numbers(kind, &v[0]), numbers(kind, &v[1]));
+            let rows = rows_of(&left, 3);
+            right.chunks(2).flat_map(|column| rows.iter().map(move |row| product(p, row, column))).collect()
+        }),
     ]);
     all
 }
@@ -129,10 +93,7 @@ fn length(p: Format, v: &[Interval]) -> Maybe {
 }
 
 fn difference(p: Format, a: &[f64], b: &[f64]) -> Option<Vec<Interval>> {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| p.sub(exactly(*a), exactly(*b)))
-        .collect()
+    a.iter().zip(b).map(|(a, b)| p.sub(exactly(*a), exactly(*b))).collect()
 }
 
 fn geometry(kind: Kind) -> Vec<Row> {
@@ -181,32 +142,27 @@ fn geometry(kind: Kind) -> Vec<Row> {
                 })
                 .collect()
         }),
-        whole(
-            Glsl(G::FaceForward),
-            &[vector, vector, vector],
-            vector,
-            move |v| {
-                let (i, reference) = (numbers(kind, &v[1]), numbers(kind, &v[2]));
-                let along = p.dot(&exact(&reference), &exact(&i));
-                let facing = |along: Interval| match along {
-                    along if along.high < 0.0 => Some(false),
-                    along if along.low >= 0.0 => Some(true),
-                    _ => None,
-                };
-                let turned = along.and_then(facing);
-                v[0].iter()
-                    .map(|bits| {
-                        let away = kind.round(-kind.float(*bits));
-                        match turned {
-                            Some(true) => Expect::Is(away),
-                            Some(false) => Expect::Is(*bits),
-                            None if kind.float(*bits).is_nan() => Expect::Any,
-                            None => Expect::OneOf(vec![*bits, away]),
-                        }
-                    })
-                    .collect()
-            },
-        ),
+        whole(Glsl(G::FaceForward), &[vector, vector, vector], vector, move |v| {
+            let (i, reference) = (numbers(kind, &v[1]), numbers(kind, &v[2]));
+            let along = p.dot(&exact(&reference), &exact(&i));
+            let facing = |along: Interval| match along {
+                along if along.high < 0.0 => Some(false),
+                along if along.low >= 0.0 => Some(true),
+                _ => None,
+            };
+            let turned = along.and_then(facing);
+            v[0].iter()
+                .map(|bits| {
+                    let away = kind.round(-kind.float(*bits));
+                    match turned {
+                        Some(true) => Expect::Is(away),
+                        Some(false) => Expect::Is(*bits),
+                        None if kind.float(*bits).is_nan() => Expect::Any,
+                        None => Expect::OneOf(vec![*bits, away]),
+                    }
+                })
+                .collect()
+        }),
         whole(Glsl(G::Reflect), &pair, vector, move |v| {
             let (i, n) = both(v);
             let along = p.dot(&exact(&n), &exact(&i));
@@ -278,10 +234,7 @@ fn determinant(m: &[f64], size: usize) -> f64 {
 }
 
 fn without(m: &[f64], size: usize, column: usize, row: usize) -> Vec<f64> {
-    (0..size * size)
-        .filter(|at| at / size != column && at % size != row)
-        .map(|at| m[at])
-        .collect()
+    (0..size * size).filter(|at| at / size != column && at % size != row).map(|at| m[at]).collect()
 }
 
 /// Determinants and inverses. The specification requires no precision for them. The tests require 64 units in the last
@@ -292,18 +245,13 @@ fn of_square_matrices(kind: Kind, size: u32) -> Vec<Row> {
     let n = size as usize;
     let near = move |value: f64, largest: f64| {
         let error = 64.0 * p.ulp(largest);
-        Expect::Within(Interval {
-            low: value - error,
-            high: value + error,
-        })
+        Expect::Within(Interval { low: value - error, high: value + error })
     };
     let small = Domain::Floats(-2.0, 2.0);
     let one: What = Glsl(G::Determinant);
     vec![
-        whole(one, &[matrix], Ty::scalar(kind), move |v| {
-            vec![near(determinant(&numbers(kind, &v[0]), n), 32.0)]
-        })
-        .of(0, small),
+        whole(one, &[matrix], Ty::scalar(kind), move |v| vec![near(determinant(&numbers(kind, &v[0]), n), 32.0)])
+            .of(0, small),
         whole(Glsl(G::MatrixInverse), &[matrix], matrix, move |v| {
             let m = numbers(kind, &v[0]);
             let whole = determinant(&m, n);

@@ -43,10 +43,7 @@ fn all() -> Vec<Row> {
 fn check_all(context: &Context, rows: &[Row], list: &str) {
     let is_listed = |name: &str| {
         let mut lines = list.lines().filter(|line| !line.starts_with('#'));
-        lines.any(|line| {
-            line.split_once(": ")
-                .is_some_and(|(listed, _)| listed == name)
-        })
+        lines.any(|line| line.split_once(": ").is_some_and(|(listed, _)| listed == name))
     };
     let failures = check(context, rows).unwrap_or_else(|(error, rows)| {
         panic!("{}: {error}: {}", context.name, rows.join(", "));
@@ -107,21 +104,14 @@ fn every_instruction_has_a_row() {
         .filter(|name| !is_named(name))
         .collect();
     // The first is reserved; the others exist only in fragment shaders.
-    let none = [
-        "GlslIMix",
-        "GlslInterpolateAtCentroid",
-        "GlslInterpolateAtSample",
-        "GlslInterpolateAtOffset",
-    ];
+    let none = ["GlslIMix", "GlslInterpolateAtCentroid", "GlslInterpolateAtSample", "GlslInterpolateAtOffset"];
     assert_eq!(missing, none);
 }
 
 #[gaurast_runner::test]
 fn the_reserved_function_is_refused() {
     let ty = Ty::scalar(gaurast_tests::programs::types::Kind::I32);
-    let row = whole(What::Glsl(G::IMix), &[ty, ty, ty], ty, |_| {
-        vec![Expect::Any]
-    });
+    let row = whole(What::Glsl(G::IMix), &[ty, ty, ty], ty, |_| vec![Expect::Any]);
     let refused = check(&Context::gaurast().unwrap(), &[row]);
     assert!(refused.is_err(), "GLSL.std.450 has no IMix");
 }

@@ -90,42 +90,12 @@ const REDUCTIONS: &[Reduction] = &[
         combine: |k, a, b| numbers(k, a, b, f64::max),
         identity: |k| k.round(f64::NEG_INFINITY),
     },
-    Reduction {
-        op: Op::GroupNonUniformBitwiseAnd,
-        kinds: UNSIGNED,
-        combine: |_, a, b| a & b,
-        identity: Kind::mask,
-    },
-    Reduction {
-        op: Op::GroupNonUniformBitwiseOr,
-        kinds: UNSIGNED,
-        combine: |_, a, b| a | b,
-        identity: |_| 0,
-    },
-    Reduction {
-        op: Op::GroupNonUniformBitwiseXor,
-        kinds: UNSIGNED,
-        combine: |_, a, b| a ^ b,
-        identity: |_| 0,
-    },
-    Reduction {
-        op: Op::GroupNonUniformLogicalAnd,
-        kinds: &[Kind::Bool],
-        combine: |_, a, b| a & b,
-        identity: |_| 1,
-    },
-    Reduction {
-        op: Op::GroupNonUniformLogicalOr,
-        kinds: &[Kind::Bool],
-        combine: |_, a, b| a | b,
-        identity: |_| 0,
-    },
-    Reduction {
-        op: Op::GroupNonUniformLogicalXor,
-        kinds: &[Kind::Bool],
-        combine: |_, a, b| a ^ b,
-        identity: |_| 0,
-    },
+    Reduction { op: Op::GroupNonUniformBitwiseAnd, kinds: UNSIGNED, combine: |_, a, b| a & b, identity: Kind::mask },
+    Reduction { op: Op::GroupNonUniformBitwiseOr, kinds: UNSIGNED, combine: |_, a, b| a | b, identity: |_| 0 },
+    Reduction { op: Op::GroupNonUniformBitwiseXor, kinds: UNSIGNED, combine: |_, a, b| a ^ b, identity: |_| 0 },
+    Reduction { op: Op::GroupNonUniformLogicalAnd, kinds: &[Kind::Bool], combine: |_, a, b| a & b, identity: |_| 1 },
+    Reduction { op: Op::GroupNonUniformLogicalOr, kinds: &[Kind::Bool], combine: |_, a, b| a | b, identity: |_| 0 },
+    Reduction { op: Op::GroupNonUniformLogicalXor, kinds: &[Kind::Bool], combine: |_, a, b| a ^ b, identity: |_| 0 },
 ];
 
 /// The domain of operands. Sums and products of floats use numbers for which they are exact in any order.
@@ -150,12 +120,7 @@ fn combined(reduction: &Reduction, kind: Kind, values: impl Iterator<Item = u64>
     }
 }
 
-fn reductions(
-    needs: Capability,
-    operation: GroupOperation,
-    cluster: Option<u32>,
-    guarded: bool,
-) -> Vec<Row> {
+fn reductions(needs: Capability, operation: GroupOperation, cluster: Option<u32>, guarded: bool) -> Vec<Row> {
     let mut rows = Vec::new();
     for reduction in REDUCTIONS {
         for kind in reduction.kinds.iter().copied() {
@@ -164,20 +129,11 @@ fn reductions(
             // Floats are converted from integers, so that they are integers.
             let whole = kind.is_float() && matches!(domain, Domain::Integers(..));
             let source = if whole { Ty::scalar(Kind::I32) } else { ty };
-            let suffix = if guarded {
-                " where a condition holds"
-            } else {
-                ""
-            };
-            let cluster_text = cluster
-                .map(|size| format!(" of {size}"))
-                .unwrap_or_default();
+            let suffix = if guarded { " where a condition holds" } else { "" };
+            let cluster_text = cluster.map(|size| format!(" of {size}")).unwrap_or_default();
             rows.push(
                 group(
-                    format!(
-                        "{:?} {kind:?} {operation:?}{cluster_text}{suffix}",
-                        reduction.op
-                    ),
+                    format!("{:?} {kind:?} {operation:?}{cluster_text}{suffix}", reduction.op),
                     &[source, BOOL],
                     ty,
                     move |body, v| {
@@ -190,8 +146,7 @@ fn reductions(
                         if let Some(size) = cluster {
                             operands.push(body.asm.u32(size));
                         }
-                        let combine =
-                            |body: &mut Body| scoped(body, reduction.op, needs, ty, &operands);
+                        let combine = |body: &mut Body| scoped(body, reduction.op, needs, ty, &operands);
                         match guarded {
                             true => where_true(body, v[1], ty, combine),
                             false => combine(body),
@@ -227,12 +182,7 @@ fn reductions(
 pub fn arithmetic() -> Vec<Row> {
     let needs = Capability::GroupNonUniformArithmetic;
     let mut rows = reductions(needs, GroupOperation::Reduce, None, false);
-    rows.extend(reductions(
-        needs,
-        GroupOperation::InclusiveScan,
-        None,
-        false,
-    ));
+    rows.extend(reductions(needs, GroupOperation::InclusiveScan, None, false));
     rows.extend(reductions(needs, GroupOperation::ExclusiveScan, None, true));
     rows.extend(reductions(needs, GroupOperation::Reduce, None, true));
     rows

@@ -61,12 +61,7 @@ pub fn row(
 }
 
 /// A row of one instruction with one result.
-pub fn whole(
-    what: What,
-    operands: &[Ty],
-    result: Ty,
-    model: impl Fn(&[Vec<u64>]) -> Vec<Expect> + 'static,
-) -> Row {
+pub fn whole(what: What, operands: &[Ty], result: Ty, model: impl Fn(&[Vec<u64>]) -> Vec<Expect> + 'static) -> Row {
     row(
         name_of(what, operands, &[result]),
         operands,
@@ -77,12 +72,7 @@ pub fn whole(
 }
 
 /// A row of one instruction that works component by component.
-pub fn each(
-    what: What,
-    operands: &[Ty],
-    result: Ty,
-    model: impl Fn(&[u64]) -> Expect + 'static,
-) -> Row {
+pub fn each(what: What, operands: &[Ty], result: Ty, model: impl Fn(&[u64]) -> Expect + 'static) -> Row {
     whole(what, operands, result, move |operands| {
         (0..result.count())
             .map(|component| {

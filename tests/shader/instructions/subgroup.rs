@@ -17,11 +17,7 @@ pub const GROUPS: [Group; 8] = [
     ("vote", Flags::VOTE, votes),
     ("ballot", Flags::BALLOT, ballots),
     ("shuffle", Flags::SHUFFLE, shuffles),
-    (
-        "relative shuffle",
-        Flags::SHUFFLE_RELATIVE,
-        relative_shuffles,
-    ),
+    ("relative shuffle", Flags::SHUFFLE_RELATIVE, relative_shuffles),
     ("arithmetic", Flags::ARITHMETIC, reduction::arithmetic),
     ("clustered", Flags::CLUSTERED, reduction::clustered),
     ("quad", Flags::QUAD, quads),
@@ -53,11 +49,7 @@ fn basic() -> Vec<Row> {
             "GroupNonUniformElect where a condition holds",
             &[BOOL],
             BOOL,
-            move |body, v| {
-                where_true(body, v[0], BOOL, |body| {
-                    scoped(body, Op::GroupNonUniformElect, base, BOOL, &[])
-                })
-            },
+            move |body, v| where_true(body, v[0], BOOL, |body| scoped(body, Op::GroupNonUniformElect, base, BOOL, &[])),
             |lanes, me| truth(lanes.iter().position(|lane| lane[0][0] != 0) == Some(me)),
         ),
         group(
@@ -78,10 +70,7 @@ fn basic() -> Vec<Row> {
 fn votes() -> Vec<Row> {
     let needs = Capability::GroupNonUniformVote;
     let mut rows = Vec::new();
-    for (op, all) in [
-        (Op::GroupNonUniformAll, true),
-        (Op::GroupNonUniformAny, false),
-    ] {
+    for (op, all) in [(Op::GroupNonUniformAll, true), (Op::GroupNonUniformAny, false)] {
         let vote = move |lanes: &[Lane], operand: usize| match all {
             true => lanes.iter().all(|lane| lane[operand][0] != 0),
             false => lanes.iter().any(|lane| lane[operand][0] != 0),
@@ -99,10 +88,8 @@ fn votes() -> Vec<Row> {
                         scoped(body, op, needs, BOOL, &[less])
                     },
                     move |lanes, _| {
-                        let less: Vec<Lane> = lanes
-                            .iter()
-                            .map(|lane| vec![vec![u64::from(lane[0][0] < u64::from(bound))]])
-                            .collect();
+                        let less: Vec<Lane> =
+                            lanes.iter().map(|lane| vec![vec![u64::from(lane[0][0] < u64::from(bound))]]).collect();
                         truth(vote(&less, 0))
                     },
                 )
@@ -113,17 +100,9 @@ fn votes() -> Vec<Row> {
             format!("{op:?} where a condition holds"),
             &[BOOL, BOOL],
             BOOL,
-            move |body, v| {
-                where_true(body, v[0], BOOL, |body| {
-                    scoped(body, op, needs, BOOL, &[v[1]])
-                })
-            },
+            move |body, v| where_true(body, v[0], BOOL, |body| scoped(body, op, needs, BOOL, &[v[1]])),
             move |lanes, me| {
-                let active: Vec<Lane> = lanes
-                    .iter()
-                    .filter(|lane| lane[0][0] != 0)
-                    .cloned()
-                    .collect();
+                let active: Vec<Lane> = lanes.iter().filter(|lane| lane[0][0] != 0).cloned().collect();
                 truth(lanes[me][0][0] != 0 && vote(&active, 1))
             },
         ));
@@ -192,15 +171,11 @@ fn ballots() -> Vec<Row> {
             &[BOOL, BOOL],
             BALLOT,
             move |body, v| {
-                where_true(body, v[0], BALLOT, |body| {
-                    scoped(body, Op::GroupNonUniformBallot, needs, BALLOT, &[v[1]])
-                })
+                where_true(body, v[0], BALLOT, |body| scoped(body, Op::GroupNonUniformBallot, needs, BALLOT, &[v[1]]))
             },
             move |lanes, me| match lanes[me][0][0] {
                 0 => all([0; 4]),
-                _ => all(ballot_of(
-                    lanes.iter().map(|lane| lane[0][0] != 0 && lane[1][0] != 0),
-                )),
+                _ => all(ballot_of(lanes.iter().map(|lane| lane[0][0] != 0 && lane[1][0] != 0))),
             },
         ),
         group(
@@ -211,13 +186,7 @@ fn ballots() -> Vec<Row> {
                 // The value must be equal for all, so it is the first invocation's.
                 let op = Op::GroupNonUniformBroadcastFirst;
                 let first = scoped(body, op, needs, BALLOT, v);
-                scoped(
-                    body,
-                    Op::GroupNonUniformInverseBallot,
-                    needs,
-                    BOOL,
-                    &[first],
-                )
+                scoped(body, Op::GroupNonUniformInverseBallot, needs, BOOL, &[first])
             },
             |lanes, me| truth(bit_of(&lanes[0][0], me)),
         ),
@@ -227,32 +196,17 @@ fn ballots() -> Vec<Row> {
             WORD,
             move |body, v| {
                 where_true(body, v[0], WORD, |body| {
-                    scoped(
-                        body,
-                        Op::GroupNonUniformBroadcastFirst,
-                        needs,
-                        WORD,
-                        &[v[1]],
-                    )
+                    scoped(body, Op::GroupNonUniformBroadcastFirst, needs, WORD, &[v[1]])
                 })
             },
             |lanes, me| {
                 let first = lanes.iter().find(|lane| lane[0][0] != 0);
                 let here = lanes[me][0][0] != 0;
-                vec![Expect::Is(
-                    first.filter(|_| here).map_or(0, |lane| lane[1][0]),
-                )]
+                vec![Expect::Is(first.filter(|_| here).map_or(0, |lane| lane[1][0]))]
             },
         ),
     ];
-    for kind in [
-        Kind::U8,
-        Kind::F16,
-        Kind::U32,
-        Kind::F32,
-        Kind::I64,
-        Kind::F64,
-    ] {
+    for kind in [Kind::U8, Kind::F16, Kind::U32, Kind::F32, Kind::I64, Kind::F64] {
         let ty = Ty::vector(kind, 2);
         for from in [0, 5] {
             let mut row = group(
@@ -308,13 +262,7 @@ fn ballot_bits() -> Vec<Row> {
             WORD,
             move |body, v| {
                 let operands = [operation as u32, v[0]];
-                scoped(
-                    body,
-                    Op::GroupNonUniformBallotBitCount,
-                    needs,
-                    WORD,
-                    &operands,
-                )
+                scoped(body, Op::GroupNonUniformBallotBitCount, needs, WORD, &operands)
             },
             move |lanes, me| {
                 let end = match operation {
@@ -327,10 +275,7 @@ fn ballot_bits() -> Vec<Row> {
             },
         ));
     }
-    for (op, lowest) in [
-        (Op::GroupNonUniformBallotFindLSB, true),
-        (Op::GroupNonUniformBallotFindMSB, false),
-    ] {
+    for (op, lowest) in [(Op::GroupNonUniformBallotFindLSB, true), (Op::GroupNonUniformBallotFindMSB, false)] {
         rows.push(group(
             format!("{op:?}"),
             &[BALLOT],
@@ -348,13 +293,7 @@ fn ballot_bits() -> Vec<Row> {
 }
 
 /// A row that reads a value of another invocation, if that exists.
-fn moved(
-    op: Op,
-    needs: Capability,
-    kind: Kind,
-    domain: Domain,
-    from: fn(usize, usize) -> Option<usize>,
-) -> Row {
+fn moved(op: Op, needs: Capability, kind: Kind, domain: Domain, from: fn(usize, usize) -> Option<usize>) -> Row {
     let ty = Ty::scalar(kind);
     let mut row = group(
         format!("{op:?} {kind:?}"),
@@ -380,16 +319,8 @@ fn shuffles() -> Vec<Row> {
         .flat_map(|kind| {
             let index = Domain::Integers(0, 7);
             [
-                moved(Op::GroupNonUniformShuffle, needs, kind, index, |_, id| {
-                    Some(id)
-                }),
-                moved(
-                    Op::GroupNonUniformShuffleXor,
-                    needs,
-                    kind,
-                    index,
-                    |me, mask| Some(me ^ mask),
-                ),
+                moved(Op::GroupNonUniformShuffle, needs, kind, index, |_, id| Some(id)),
+                moved(Op::GroupNonUniformShuffleXor, needs, kind, index, |me, mask| Some(me ^ mask)),
             ]
         })
         .collect()
@@ -402,20 +333,8 @@ fn relative_shuffles() -> Vec<Row> {
         .flat_map(|kind| {
             let delta = Domain::Integers(0, 12);
             [
-                moved(
-                    Op::GroupNonUniformShuffleUp,
-                    needs,
-                    kind,
-                    delta,
-                    |me, delta| me.checked_sub(delta),
-                ),
-                moved(
-                    Op::GroupNonUniformShuffleDown,
-                    needs,
-                    kind,
-                    delta,
-                    |me, delta| Some(me + delta),
-                ),
+                moved(Op::GroupNonUniformShuffleUp, needs, kind, delta, |me, delta| me.checked_sub(delta)),
+                moved(Op::GroupNonUniformShuffleDown, needs, kind, delta, |me, delta| Some(me + delta)),
             ]
         })
         .collect()

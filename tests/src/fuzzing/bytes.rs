@@ -50,14 +50,7 @@ impl<'a> Bytes<'a> {
     pub fn number(&mut self, usual: u32) -> u32 {
         match self.below(16) {
             0 => self.word(),
-            1 => self.one(&[
-                u32::MAX,
-                u32::MAX - 1,
-                1 << 31,
-                i32::MAX.cast_unsigned(),
-                1 << 16,
-                0,
-            ]),
+            1 => self.one(&[u32::MAX, u32::MAX - 1, 1 << 31, i32::MAX.cast_unsigned(), 1 << 16, 0]),
             _ => self.word() % usual.max(1),
         }
     }
@@ -66,13 +59,7 @@ impl<'a> Bytes<'a> {
     pub fn long(&mut self, usual: u32) -> u64 {
         match self.below(32) {
             0 => u64::from(self.word()) << 32 | u64::from(self.word()),
-            1 => self.one(&[
-                u64::MAX,
-                u64::MAX - 3,
-                1 << 63,
-                1 << 40,
-                u64::from(u32::MAX) + 1,
-            ]),
+            1 => self.one(&[u64::MAX, u64::MAX - 3, 1 << 63, 1 << 40, u64::from(u32::MAX) + 1]),
             _ => self.number(usual).into(),
         }
     }

@@ -45,14 +45,8 @@ impl Layout {
         }
         let count: u32 = all.iter().map(|it| it.2).sum();
         // No layout has two types of one binding.
-        let is_single = |at: usize| {
-            all[..at]
-                .iter()
-                .all(|it| (it.0, it.1) != (all[at].0, all[at].1))
-        };
-        let fits = count as usize <= MOST_BINDINGS
-            && all.iter().all(|it| it.0 < 4)
-            && (0..all.len()).all(is_single);
+        let is_single = |at: usize| all[..at].iter().all(|it| (it.0, it.1) != (all[at].0, all[at].1));
+        let fits = count as usize <= MOST_BINDINGS && all.iter().all(|it| it.0 < 4) && (0..all.len()).all(is_single);
         fits.then_some(Self(all))
     }
 }
@@ -94,15 +88,9 @@ struct Open {
 
 impl Open {
     fn new() -> Self {
-        let opening = Opening {
-            robust: true,
-            ..Opening::of(Driver::Embedded)
-        };
+        let opening = Opening { robust: true, ..Opening::of(Driver::Embedded) };
         let gpu = Gpu::open(&opening).expect("a device");
-        Self {
-            buffer: Buffer::new(&gpu, BYTES as u64),
-            gpu,
-        }
+        Self { buffer: Buffer::new(&gpu, BYTES as u64), gpu }
     }
 
     /// Writes the guard pattern everywhere, and small numbers in the ranges.
@@ -129,9 +117,7 @@ impl Open {
         let bindings: Vec<Vec<Binding>> = (0..count)
             .map(|set| {
                 let of_set = layout.0.iter().filter(|it| it.0 == set);
-                of_set
-                    .map(|&(_, binding, count, ty)| (binding, ty, count))
-                    .collect()
+                of_set.map(|&(_, binding, count, ty)| (binding, ty, count)).collect()
             })
             .collect();
         let bindings: Vec<&[Binding]> = bindings.iter().map(Vec::as_slice).collect();
@@ -160,13 +146,7 @@ impl Open {
             for element in 0..count {
                 let range = whole(&self.buffer).offset(offset).range(RANGE);
                 offset += 2 * RANGE;
-                write(
-                    &self.gpu,
-                    bound[set as usize],
-                    (binding, element),
-                    ty,
-                    &[range],
-                );
+                write(&self.gpu, bound[set as usize], (binding, element), ty, &[range]);
             }
         }
         bound

@@ -35,9 +35,7 @@ pub fn load(data: &[u8]) -> Option<usize> {
     if compress {
         let mut compressed = Vec::new();
         let mut encoder = GzEncoder::new(&file[..], Compression::fast());
-        encoder
-            .read_to_end(&mut compressed)
-            .expect("memory does not fail");
+        encoder.read_to_end(&mut compressed).expect("memory does not fail");
         file = compressed;
     }
     let len = file.len() as u64;
@@ -52,10 +50,7 @@ pub fn load(data: &[u8]) -> Option<usize> {
         Err(error) => {
             // The message is a single line.
             let message = error.to_string();
-            assert!(
-                !message.is_empty() && !message.contains('\n'),
-                "{message:?}"
-            );
+            assert!(!message.is_empty() && !message.contains('\n'), "{message:?}");
             None
         }
     }
@@ -64,22 +59,17 @@ pub fn load(data: &[u8]) -> Option<usize> {
 /// Seed files, one of each kind, in the form that [`load`] expects.
 pub fn seeds() -> Vec<Vec<u8>> {
     let header = |format: &str, properties: &[&str]| {
-        let properties: Vec<_> = properties
-            .iter()
-            .map(|name| format!("property float {name}\n"))
-            .collect();
+        let properties: Vec<_> = properties.iter().map(|name| format!("property float {name}\n")).collect();
         format!(
             "ply\nformat {format} 1.0\ncomment made for tests\nelement vertex 3\n{}end_header\n",
             properties.concat()
         )
     };
     let names = [
-        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
-        "opacity", "f_dc_0", "f_dc_1", "f_dc_2",
+        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
+        "f_dc_1", "f_dc_2",
     ];
-    let row = [
-        0.1f32, 0.2, 3.0, -1.0, -2.0, -3.0, 1.0, 0.1, 0.2, 0.3, 2.0, 0.5, -0.5, 1.0,
-    ];
+    let row = [0.1f32, 0.2, 3.0, -1.0, -2.0, -3.0, 1.0, 0.1, 0.2, 0.3, 2.0, 0.5, -0.5, 1.0];
     let kind = |kind: u8, file: Vec<u8>| [vec![kind], file].concat();
     let line = row.map(|value| value.to_string()).join(" ") + "\n";
     let ascii = header("ascii", &names) + &line.repeat(3);
@@ -97,25 +87,15 @@ pub fn seeds() -> Vec<Vec<u8>> {
     // rotations of all Gaussians.
     let spz = |version: u32, rotation: usize| {
         let mut file = Vec::new();
-        file.extend(
-            [0x5053_474eu32, version, 2]
-                .iter()
-                .flat_map(|word| word.to_le_bytes()),
-        );
+        file.extend([0x5053_474eu32, version, 2].iter().flat_map(|word| word.to_le_bytes()));
         file.extend([0, 12, 0, 0]);
         file.extend((0..2 * (9 + 1 + 3 + 3 + rotation)).map(|at| (at * 37) as u8));
         file
     };
     vec![
         kind(0, ascii.into_bytes()),
-        kind(
-            0,
-            [header("binary_little_endian", &names).into_bytes(), little].concat(),
-        ),
-        kind(
-            0,
-            [header("binary_big_endian", &names).into_bytes(), big].concat(),
-        ),
+        kind(0, [header("binary_little_endian", &names).into_bytes(), little].concat()),
+        kind(0, [header("binary_big_endian", &names).into_bytes(), big].concat()),
         kind(0, compressed_ply()),
         kind(1, splat),
         kind(3, spz(2, 3)),
@@ -130,21 +110,13 @@ fn glb() -> Vec<u8> {
     let names = ["ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0"];
     let names = names.map(|name| format!("KHR_gaussian_splatting:{name}"));
     let names = std::iter::once("POSITION").chain(names.iter().map(String::as_str));
-    let attributes: Vec<_> = names
-        .enumerate()
-        .map(|(i, name)| format!("\"{name}\":{i}"))
-        .collect();
+    let attributes: Vec<_> = names.enumerate().map(|(i, name)| format!("\"{name}\":{i}")).collect();
     let mut offset = 0;
     let (mut accessors, mut views) = (Vec::new(), Vec::new());
     for (i, size) in sizes.into_iter().enumerate() {
         let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][size];
-        accessors.push(format!(
-            "{{\"bufferView\":{i},\"componentType\":5126,\"count\":1,\"type\":\"{shape}\"}}"
-        ));
-        views.push(format!(
-            "{{\"buffer\":0,\"byteOffset\":{offset},\"byteLength\":{}}}",
-            4 * size
-        ));
+        accessors.push(format!("{{\"bufferView\":{i},\"componentType\":5126,\"count\":1,\"type\":\"{shape}\"}}"));
+        views.push(format!("{{\"buffer\":0,\"byteOffset\":{offset},\"byteLength\":{}}}", 4 * size));
         offset += 4 * size;
     }
     let mut json = format!(
@@ -187,26 +159,12 @@ fn compressed_ply() -> Vec<u8> {
         "max_scale_y",
         "max_scale_z",
     ];
-    let packed = [
-        "packed_position",
-        "packed_rotation",
-        "packed_scale",
-        "packed_color",
-    ];
-    let floats: String = chunk
-        .iter()
-        .map(|name| format!("property float {name}\n"))
-        .collect();
-    let words: String = packed
-        .iter()
-        .map(|name| format!("property uint {name}\n"))
-        .collect();
-    let header = format!(
-        "ply\nformat binary_little_endian 1.0\nelement chunk 1\n{floats}element vertex 2\n{words}end_header\n"
-    );
-    let bounds = [
-        -1.0f32, -1.0, 2.0, 1.0, 1.0, 4.0, -4.0, -4.0, -4.0, -1.0, -1.0, -1.0,
-    ];
+    let packed = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
+    let floats: String = chunk.iter().map(|name| format!("property float {name}\n")).collect();
+    let words: String = packed.iter().map(|name| format!("property uint {name}\n")).collect();
+    let header =
+        format!("ply\nformat binary_little_endian 1.0\nelement chunk 1\n{floats}element vertex 2\n{words}end_header\n");
+    let bounds = [-1.0f32, -1.0, 2.0, 1.0, 1.0, 4.0, -4.0, -4.0, -4.0, -1.0, -1.0, -1.0];
     let mut file = header.into_bytes();
     file.extend(bounds.iter().flat_map(|value| value.to_le_bytes()));
     file.extend((0..32).map(|at| (at * 53) as u8));

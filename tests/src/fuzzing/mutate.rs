@@ -58,16 +58,7 @@ fn number(random: &mut ChaCha8Rng, bound: u32) -> u32 {
     match random.random_range(0..5) {
         0 => random.random(),
         1 => random.random_range(0..16),
-        2 => *[
-            0,
-            u32::MAX,
-            1 << 31,
-            i32::MAX.cast_unsigned(),
-            0x7f80_0000,
-            0xffff,
-        ]
-        .choose(random)
-        .expect("some"),
+        2 => *[0, u32::MAX, 1 << 31, i32::MAX.cast_unsigned(), 0x7f80_0000, 0xffff].choose(random).expect("some"),
         _ => random.random_range(0..bound.max(1)),
     }
 }
@@ -105,11 +96,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
         // An operand comes from an instruction of the same opcode, so that it usually has the right type.
         15..=18 if count > 1 => {
             let at = random.random_range(1..count);
-            let same: Vec<_> = all
-                .iter()
-                .filter(|it| words[it.0] == words[start] && at < it.1)
-                .copied()
-                .collect();
+            let same: Vec<_> = all.iter().filter(|it| words[it.0] == words[start] && at < it.1).copied().collect();
             if let Some((from, _)) = same.choose(random) {
                 words[start + at] = words[from + at];
             }
@@ -118,9 +105,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
         7 => words[start] = words[start] & 0xffff_0000 | random.random_range(0..460),
         8 | 9 => {
             let opcode = words[start] as u16;
-            let near = opcode
-                .wrapping_add(1)
-                .wrapping_sub(random.random_range(0..3));
+            let near = opcode.wrapping_add(1).wrapping_sub(random.random_range(0..3));
             words[start] = words[start] & 0xffff_0000 | u32::from(near);
         }
         10 | 11 => {

@@ -6,15 +6,13 @@ use std::sync::Arc;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::{
-    Activations, Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion,
-    BufferImageRegion, BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage,
-    CopyImage, GaussianAppend, GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion,
-    IndexStream, LoadOp, ModelAttributes, Rendering, ResolveImage, StoreOp, SubresourceLayers,
-    SubresourceRange,
+    Activations, Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion, BufferImageRegion,
+    BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, GaussianAppend,
+    GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion, IndexStream, LoadOp, ModelAttributes,
+    Rendering, ResolveImage, StoreOp, SubresourceLayers, SubresourceRange,
 };
 use simdevice::state::gaussian::{
-    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
-    GaussianState,
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
 };
 use simdevice::state::{Rect, ResolveMode, Viewport};
 use simdevice::stats::query::{QueryKind, QueryPool};
@@ -79,9 +77,7 @@ impl Player {
             bin_budget_bytes: 1 << 16,
             ..Config::default()
         };
-        Self {
-            device: Arc::new(Device::new(&config).expect("a device")),
-        }
+        Self { device: Arc::new(Device::new(&config).expect("a device")) }
     }
 
     /// Executes the packets that `data` encodes.
@@ -130,17 +126,9 @@ impl Resources {
             memory.write(GUARD, &floats).expect("it has room");
         }
         let images = (0..4).filter_map(|_| image(bytes)).collect();
-        let kind = bytes.one(&[
-            QueryKind::Performance,
-            QueryKind::Fragments,
-            QueryKind::Timestamp,
-            QueryKind::Simulated,
-        ]);
-        Self {
-            buffers,
-            images,
-            queries: Arc::new(QueryPool::new(kind, 3)),
-        }
+        let kind =
+            bytes.one(&[QueryKind::Performance, QueryKind::Fragments, QueryKind::Timestamp, QueryKind::Simulated]);
+        Self { buffers, images, queries: Arc::new(QueryPool::new(kind, 3)) }
     }
 
     fn check_guards(&self) {
@@ -148,10 +136,7 @@ impl Resources {
             for offset in [0, BUFFER - GUARD] {
                 let mut guard = [0u8; GUARD as usize];
                 memory.read(offset, &mut guard).expect("it lies inside");
-                assert!(
-                    guard.iter().all(|&byte| byte == GUARDED),
-                    "a guard was written to"
-                );
+                assert!(guard.iter().all(|&byte| byte == GUARDED), "a guard was written to");
             }
         }
     }
@@ -163,11 +148,7 @@ impl Resources {
         BufferRange {
             memory: bytes.one(&self.buffers),
             offset: GUARD + offset,
-            size: if bytes.rarely(3) {
-                u64::from(bytes.word()) % (inside - offset)
-            } else {
-                inside - offset
-            },
+            size: if bytes.rarely(3) { u64::from(bytes.word()) % (inside - offset) } else { inside - offset },
         }
     }
 
@@ -177,13 +158,7 @@ impl Resources {
 }
 
 fn image(bytes: &mut Bytes<'_>) -> Option<Arc<Image>> {
-    let kind = bytes.one(&[
-        ImageKind::D2,
-        ImageKind::D2,
-        ImageKind::D2,
-        ImageKind::D3,
-        ImageKind::D1,
-    ]);
+    let kind = bytes.one(&[ImageKind::D2, ImageKind::D2, ImageKind::D2, ImageKind::D3, ImageKind::D1]);
     let mut extent = [0; 3].map(|_| 1 + bytes.below(70) as u32);
     match kind {
         ImageKind::D1 => extent = [extent[0], 1, 1],
@@ -217,10 +192,7 @@ fn clear_value(bytes: &mut Bytes<'_>) -> ClearValue {
     match bytes.below(4) {
         0 => ClearValue::Uint([0; 4].map(|_| bytes.word())),
         1 => ClearValue::Int([0; 4].map(|_| bytes.word().cast_signed())),
-        2 => ClearValue::DepthStencil {
-            depth: bytes.float(),
-            stencil: bytes.word(),
-        },
+        2 => ClearValue::DepthStencil { depth: bytes.float(), stencil: bytes.word() },
         _ => ClearValue::Float([0; 4].map(|_| bytes.float())),
     }
 }
@@ -290,61 +262,34 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
                 1 => LoadOp::DontCare,
                 _ => LoadOp::Clear(clear_value(bytes)),
             },
-            store: bytes.one(&[
-                StoreOp::Store,
-                StoreOp::Store,
-                StoreOp::DontCare,
-                StoreOp::None,
-            ]),
+            store: bytes.one(&[StoreOp::Store, StoreOp::Store, StoreOp::DontCare, StoreOp::None]),
             resolve: None,
         };
         let mut attachment = of(image);
         if bytes.rarely(6) {
             let target = resources.image(bytes)?;
-            let mode = bytes.one(&[
-                ResolveMode::Average,
-                ResolveMode::SampleZero,
-                ResolveMode::Max,
-            ]);
+            let mode = bytes.one(&[ResolveMode::Average, ResolveMode::SampleZero, ResolveMode::Max]);
             attachment.resolve = Some((view(bytes, target), mode));
         }
         Some(attachment)
     };
     let color: Vec<_> = (0..bytes.below(3)).map(|_| attachment(bytes)).collect();
-    let depth = if bytes.rarely(2) {
-        attachment(bytes)
-    } else {
-        None
-    };
-    let stencil = if bytes.rarely(4) {
-        attachment(bytes)
-    } else {
-        None
-    };
+    let depth = if bytes.rarely(2) { attachment(bytes) } else { None };
+    let stencil = if bytes.rarely(4) { attachment(bytes) } else { None };
     let (mut area, mut layer_count) = (rect(bytes), bytes.number(3));
     if color.iter().flatten().next().is_none() && depth.is_none() && stencil.is_none() {
         // Nothing else limits the area. A larger one takes long and tests nothing more.
         (area.width, area.height) = (area.width % 3000, area.height % 3000);
         layer_count %= 5;
     }
-    Some(Packet::BeginRendering(Box::new(Rendering {
-        area,
-        layer_count,
-        view_mask: 0,
-        color,
-        depth,
-        stencil,
-    })))
+    Some(Packet::BeginRendering(Box::new(Rendering { area, layer_count, view_mask: 0, color, depth, stencil })))
 }
 
 fn clear_attachments(bytes: &mut Bytes<'_>) -> Packet {
     let clear = match bytes.below(3) {
         0 => AttachmentClear::Depth(bytes.float()),
         1 => AttachmentClear::Stencil(bytes.word()),
-        _ => AttachmentClear::Color {
-            index: bytes.number(3) as usize,
-            value: clear_value(bytes),
-        },
+        _ => AttachmentClear::Color { index: bytes.number(3) as usize, value: clear_value(bytes) },
     };
     Packet::ClearAttachments(ClearAttachments {
         clears: vec![clear],
@@ -358,43 +303,26 @@ fn query(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
         0 => Packet::BeginQuery { pool, index },
         1 => Packet::EndQuery { pool, index },
         2 => Packet::WriteTimestamp { pool, index },
-        _ => Packet::ResetQueries {
-            pool,
-            first: index,
-            count: bytes.number(4),
-        },
+        _ => Packet::ResetQueries { pool, first: index, count: bytes.number(4) },
     }
 }
 
 fn buffer_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
     let target = resources.range(bytes);
     match bytes.below(3) {
-        0 => Packet::FillBuffer {
-            target,
-            word: bytes.word(),
-        },
+        0 => Packet::FillBuffer { target, word: bytes.word() },
         1 => Packet::UpdateBuffer {
             data: (0..target.size.min(64)).map(|_| bytes.byte()).collect(),
-            target: BufferRange {
-                size: target.size.min(64),
-                ..target
-            },
+            target: BufferRange { size: target.size.min(64), ..target },
         },
         _ => {
             let source = resources.range(bytes);
             // Regions are within both images, as the driver guarantees.
             let most = source.size.min(target.size);
             let size = u64::from(bytes.word()) % (most + 1);
-            let region = BufferCopyRegion {
-                source_offset: source.size - size,
-                target_offset: target.size - size,
-                size,
-            };
-            Packet::CopyBuffer(CopyBuffer {
-                source,
-                target,
-                regions: vec![region],
-            })
+            let region =
+                BufferCopyRegion { source_offset: source.size - size, target_offset: target.size - size, size };
+            Packet::CopyBuffer(CopyBuffer { source, target, regions: vec![region] })
         }
     }
 }
@@ -426,17 +354,9 @@ fn image_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> 
                     image_extent: extent(bytes),
                 }],
             };
-            if bytes.rarely(2) {
-                Packet::CopyBufferToImage(copy)
-            } else {
-                Packet::CopyImageToBuffer(copy)
-            }
+            if bytes.rarely(2) { Packet::CopyBufferToImage(copy) } else { Packet::CopyImageToBuffer(copy) }
         }
-        3 => Packet::CopyImage(CopyImage {
-            source,
-            target,
-            regions: vec![copy_region(bytes)],
-        }),
+        3 => Packet::CopyImage(CopyImage { source, target, regions: vec![copy_region(bytes)] }),
         4 => Packet::BlitImage(BlitImage {
             source,
             target,
@@ -451,11 +371,7 @@ fn image_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> 
         _ => Packet::ResolveImage(ResolveImage {
             source,
             target,
-            mode: bytes.one(&[
-                ResolveMode::Average,
-                ResolveMode::Min,
-                ResolveMode::SampleZero,
-            ]),
+            mode: bytes.one(&[ResolveMode::Average, ResolveMode::Min, ResolveMode::SampleZero]),
             regions: vec![copy_region(bytes)],
         }),
     })
@@ -463,11 +379,7 @@ fn image_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> 
 
 fn begin(bytes: &mut Bytes<'_>) -> Packet {
     let or = |bytes: &mut Bytes<'_>, usual: f32| {
-        if bytes.rarely(6) {
-            bytes.float()
-        } else {
-            usual
-        }
+        if bytes.rarely(6) { bytes.float() } else { usual }
     };
     let usual = GaussianState::default();
     let state = GaussianState {
@@ -477,20 +389,9 @@ fn begin(bytes: &mut Bytes<'_>) -> Packet {
             GaussianOrder::Primitive,
             GaussianOrder::PerPixel,
         ]),
-        geometry: bytes.one(&[
-            GaussianGeometry::Volume,
-            GaussianGeometry::Volume,
-            GaussianGeometry::Surfel,
-        ]),
-        precision: bytes.one(&[
-            GaussianPrecision::Float32,
-            GaussianPrecision::Float32,
-            GaussianPrecision::Float16,
-        ]),
-        linearization: bytes.one(&[
-            GaussianLinearization::Jacobian,
-            GaussianLinearization::Unscented,
-        ]),
+        geometry: bytes.one(&[GaussianGeometry::Volume, GaussianGeometry::Volume, GaussianGeometry::Surfel]),
+        precision: bytes.one(&[GaussianPrecision::Float32, GaussianPrecision::Float32, GaussianPrecision::Float16]),
+        linearization: bytes.one(&[GaussianLinearization::Jacobian, GaussianLinearization::Unscented]),
         opacity_compensated: bytes.rarely(3),
         low_pass_variance: or(bytes, 0.3),
         alpha_floor: or(bytes, usual.alpha_floor),
@@ -540,9 +441,7 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
     };
     let triple = Format::R32G32B32Sfloat;
     let model = ModelAttributes {
-        matrix: bytes
-            .rarely(4)
-            .then(|| Box::new([0; 3].map(|_| stream(bytes, Format::R32G32B32A32Sfloat)))),
+        matrix: bytes.rarely(4).then(|| Box::new([0; 3].map(|_| stream(bytes, Format::R32G32B32A32Sfloat)))),
         opacity: bytes.rarely(4).then(|| stream(bytes, Format::R32Sfloat)),
     };
     Packet::GaussianAppend(Box::new(GaussianAppend {
@@ -552,10 +451,7 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
             rotation: stream(bytes, Format::R32G32B32A32Sfloat),
             opacity: stream(bytes, Format::R32Sfloat),
             model,
-            activations: Activations {
-                log_scale: bytes.rarely(8),
-                logit_opacity: bytes.rarely(8),
-            },
+            activations: Activations { log_scale: bytes.rarely(8), logit_opacity: bytes.rarely(8) },
             spherical_harmonics: vec![stream(bytes, triple)],
         },
         indices: bytes.rarely(4).then(|| IndexStream {

@@ -1,9 +1,7 @@
 //! A Vulkan device that runs kernels: this driver's, or lavapipe's through the loader.
 
 use ash::vk;
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Kernel as Pipeline, OpenError, Recorded, Resource, Settings,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Kernel as Pipeline, OpenError, Recorded, Resource, Settings};
 
 use super::kernel::Kernel;
 
@@ -57,13 +55,10 @@ impl Context {
     fn of(gpu: Gpu) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut floats = vk::PhysicalDeviceFloatControlsProperties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default()
-            .push_next(&mut subgroup)
-            .push_next(&mut floats);
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut floats);
         // SAFETY: the physical device is the instance's.
         unsafe {
-            gpu.instance()
-                .get_physical_device_properties2(gpu.physical_device(), &mut properties);
+            gpu.instance().get_physical_device_properties2(gpu.physical_device(), &mut properties);
         }
         Self {
             name: gpu.name().to_owned(),
@@ -93,21 +88,13 @@ impl Context {
             })
             .collect();
         let bindings = Bindings::new(gpu, &resources);
-        let (constants, words) = (
-            &kernel.specialization,
-            bytemuck::pod_collect_to_vec::<u8, u32>(&kernel.spirv),
-        );
+        let (constants, words) = (&kernel.specialization, bytemuck::pod_collect_to_vec::<u8, u32>(&kernel.spirv));
         let pipeline = Pipeline::specialized(gpu, &words, &[bindings.layout], constants)
             .map_err(refused("create a compute pipeline"))?;
         let recorded = gpu.record(|commands| {
             pipeline.dispatch(commands, &[bindings.set], &kernel.push, kernel.groups);
         });
-        Ok(Prepared {
-            recorded,
-            _pipeline: pipeline,
-            _bindings: bindings,
-            buffers,
-        })
+        Ok(Prepared { recorded, _pipeline: pipeline, _bindings: bindings, buffers })
     }
 }
 

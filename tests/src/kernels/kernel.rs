@@ -53,15 +53,11 @@ impl Kernel {
 impl Values {
     /// The first word that differs: its index, and both values as text.
     pub fn difference(&self, found: &[u32]) -> Option<(usize, String)> {
-        let differs = |index: usize, wanted: String, found: String| {
-            Some((index, format!("{found} instead of {wanted}")))
-        };
+        let differs =
+            |index: usize, wanted: String, found: String| Some((index, format!("{found} instead of {wanted}")));
         match self {
             Self::Exact(words) => {
-                let index = words
-                    .iter()
-                    .zip(found)
-                    .position(|(wanted, found)| wanted != found)?;
+                let index = words.iter().zip(found).position(|(wanted, found)| wanted != found)?;
                 differs(index, words[index].to_string(), found[index].to_string())
             }
             Self::Close(floats, tolerance) => {
@@ -71,11 +67,7 @@ impl Values {
                     !matches!(error.partial_cmp(&(tolerance * wanted.abs().max(1.0))), Some(order) if order.is_le())
                 };
                 let index = floats.iter().zip(found).position(far)?;
-                differs(
-                    index,
-                    floats[index].to_string(),
-                    f32::from_bits(found[index]).to_string(),
-                )
+                differs(index, floats[index].to_string(), f32::from_bits(found[index]).to_string())
             }
         }
     }

@@ -42,14 +42,7 @@ macro_rules! spirv {
 
 /// All kernels.
 pub fn all(size: Size) -> Vec<Kernel> {
-    vec![
-        mandelbrot(size),
-        matrix_product(size),
-        prefix_sum(size),
-        n_body(size),
-        blur(size),
-        radix_sort(size),
-    ]
+    vec![mandelbrot(size), matrix_product(size), prefix_sum(size), n_body(size), blur(size), radix_sort(size)]
 }
 
 fn bits(floats: &[f32]) -> Vec<u32> {
@@ -108,19 +101,14 @@ fn matrix_product(size: Size) -> Kernel {
         uniform: None,
         push: vec![n as u32],
         groups: [n as u32 / 16, n as u32 / 16, 1],
-        expected: vec![Expected {
-            binding: 2,
-            values: Values::Close(expected, 1e-5),
-        }],
+        expected: vec![Expected { binding: 2, values: Values::Close(expected, 1e-5) }],
     }
 }
 
 fn prefix_sum(size: Size) -> Kernel {
     let groups = size.pick(9, 8192) as usize;
     let mut random = ChaCha8Rng::seed_from_u64(3);
-    let values: Vec<u32> = (0..256 * groups)
-        .map(|_| random.random_range(0..1000))
-        .collect();
+    let values: Vec<u32> = (0..256 * groups).map(|_| random.random_range(0..1000)).collect();
     let (mut sums, mut totals) = (Vec::with_capacity(values.len()), Vec::with_capacity(groups));
     for group in values.chunks_exact(256) {
         let mut sum = 0;
@@ -139,14 +127,8 @@ fn prefix_sum(size: Size) -> Kernel {
         push: Vec::new(),
         groups: [groups as u32, 1, 1],
         expected: vec![
-            Expected {
-                binding: 0,
-                values: Values::Exact(sums),
-            },
-            Expected {
-                binding: 1,
-                values: Values::Exact(totals),
-            },
+            Expected { binding: 0, values: Values::Exact(sums) },
+            Expected { binding: 1, values: Values::Exact(totals) },
         ],
     }
 }
@@ -161,9 +143,7 @@ fn n_body(size: Size) -> Kernel {
             let apart = [0, 1, 2].map(|k| f64::from(other[k]) - f64::from(own[k]));
             let square = apart.iter().map(|a| a * a).sum::<f64>() + f64::from(softening).powi(2);
             let factor = f64::from(other[3]) / square.powi(3).sqrt();
-            pull.iter_mut()
-                .zip(apart)
-                .for_each(|(pull, apart)| *pull += apart * factor);
+            pull.iter_mut().zip(apart).for_each(|(pull, apart)| *pull += apart * factor);
         }
         let mut after: [f32; 8] = std::array::from_fn(|k| own[k]);
         for k in 0..3 {
@@ -177,18 +157,11 @@ fn n_body(size: Size) -> Kernel {
         name: "n-body",
         spirv: spirv!("n_body"),
         specialization: Vec::new(),
-        buffers: vec![
-            bits(&bodies),
-            vec![0; 8 * count],
-            bits(&[step, softening, 0.0, 0.0]),
-        ],
+        buffers: vec![bits(&bodies), vec![0; 8 * count], bits(&[step, softening, 0.0, 0.0])],
         uniform: Some(2),
         push: Vec::new(),
         groups: [(count as u32).div_ceil(64), 1, 1],
-        expected: vec![Expected {
-            binding: 1,
-            values: Values::Close(after.into_flattened(), 1e-3),
-        }],
+        expected: vec![Expected { binding: 1, values: Values::Close(after.into_flattened(), 1e-3) }],
     }
 }
 
@@ -203,8 +176,7 @@ fn blur(size: Size) -> Kernel {
             for dx in -radius..=radius {
                 let x = (at % width + dx).clamp(0, width - 1);
                 let y = (at / width + dy).clamp(0, height - 1);
-                let weight =
-                    weights[dx.unsigned_abs() as usize] * weights[dy.unsigned_abs() as usize];
+                let weight = weights[dx.unsigned_abs() as usize] * weights[dy.unsigned_abs() as usize];
                 for (c, sum) in sum.iter_mut().enumerate() {
                     *sum += weight * image[4 * (y * width + x) as usize + c];
                 }
@@ -222,10 +194,7 @@ fn blur(size: Size) -> Kernel {
         uniform: None,
         push: vec![width.cast_unsigned(), height.cast_unsigned()],
         groups: [(width as u32).div_ceil(8), (height as u32).div_ceil(8), 1],
-        expected: vec![Expected {
-            binding: 1,
-            values: Values::Close(blurred.into_flattened(), 1e-5),
-        }],
+        expected: vec![Expected { binding: 1, values: Values::Close(blurred.into_flattened(), 1e-5) }],
     }
 }
 
@@ -234,9 +203,7 @@ fn radix_sort(size: Size) -> Kernel {
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let keys: Vec<u32> = (0..256 * groups).map(|_| random.random()).collect();
     let mut sorted = keys.clone();
-    sorted
-        .par_chunks_exact_mut(256)
-        .for_each(<[u32]>::sort_unstable);
+    sorted.par_chunks_exact_mut(256).for_each(<[u32]>::sort_unstable);
     Kernel {
         name: "radix sort",
         spirv: spirv!("radix_sort"),
@@ -245,9 +212,6 @@ fn radix_sort(size: Size) -> Kernel {
         uniform: None,
         push: Vec::new(),
         groups: [groups as u32, 1, 1],
-        expected: vec![Expected {
-            binding: 0,
-            values: Values::Exact(sorted),
-        }],
+        expected: vec![Expected { binding: 0, values: Values::Exact(sorted) }],
     }
 }

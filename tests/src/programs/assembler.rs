@@ -1,8 +1,8 @@
 //! A minimal SPIR-V assembler for tests, which writes modules word by word.
 
 use spirv::{
-    AddressingModel, BuiltIn, Capability, Decoration, ExecutionMode, ExecutionModel,
-    FunctionControl, GlslStd450Op, MemoryModel, Op, StorageClass,
+    AddressingModel, BuiltIn, Capability, Decoration, ExecutionMode, ExecutionModel, FunctionControl, GlslStd450Op,
+    MemoryModel, Op, StorageClass,
 };
 use std::collections::{BTreeSet, HashMap};
 
@@ -197,10 +197,7 @@ impl Assembler {
     /// Ends a function whose blocks have been emitted, the first one without its label. The function returns nothing,
     /// or the value that its last block returns. Its parameters have these ids and types.
     pub fn function(&mut self, id: Id, returns: Id, parameters: &[(Id, Id)]) {
-        let types: Vec<Id> = [returns]
-            .into_iter()
-            .chain(parameters.iter().map(|(_, ty)| *ty))
-            .collect();
+        let types: Vec<Id> = [returns].into_iter().chain(parameters.iter().map(|(_, ty)| *ty)).collect();
         let ty = self.declare(Op::TypeFunction, None, &types);
         let control = FunctionControl::NONE.bits();
         let first = self.id();

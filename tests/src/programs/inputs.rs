@@ -45,10 +45,7 @@ pub fn special(kind: Kind) -> Vec<u64> {
             let top = 1u64 << (kind.bits() - 1);
             let all = [0, 1, 2, 3, 7, 10, 31, 32, top, top + 1, top - 1, top - 2];
             let patterns = [0x5555_5555_5555_5555, u64::MAX, u64::MAX - 1, 0xff00_ff00];
-            all.into_iter()
-                .chain(patterns)
-                .map(|bits| bits & kind.mask())
-                .collect()
+            all.into_iter().chain(patterns).map(|bits| bits & kind.mask()).collect()
         }
     }
 }
@@ -70,12 +67,7 @@ fn anything(kind: Kind, random: &mut ChaCha8Rng) -> u64 {
 
 /// A value of a domain for component `component` of operand `operand`. The first lanes take all combinations of the
 /// special values of the first two operands.
-pub fn value(
-    kind: Kind,
-    domain: Domain,
-    [lane, operand, component]: [usize; 3],
-    random: &mut ChaCha8Rng,
-) -> u64 {
+pub fn value(kind: Kind, domain: Domain, [lane, operand, component]: [usize; 3], random: &mut ChaCha8Rng) -> u64 {
     match domain {
         Domain::Any => {
             let special = special(kind);

@@ -83,10 +83,7 @@ pub type Maybe = Option<Interval>;
 
 /// The interval of one number.
 pub fn exactly(value: f64) -> Interval {
-    Interval {
-        low: value,
-        high: value,
-    }
+    Interval { low: value, high: value }
 }
 
 /// A power of two, at least the least positive double.
@@ -102,22 +99,14 @@ fn hull(values: &[f64]) -> Maybe {
         if value.is_nan() {
             return None;
         }
-        all = Interval {
-            low: all.low.min(*value),
-            high: all.high.max(*value),
-        };
+        all = Interval { low: all.low.min(*value), high: all.high.max(*value) };
     }
     Some(all)
 }
 
 /// The range of a function that is monotone in each operand, from its values at the corners.
 fn corners(a: Interval, b: Interval, function: impl Fn(f64, f64) -> f64) -> Maybe {
-    hull(&[
-        function(a.low, b.low),
-        function(a.low, b.high),
-        function(a.high, b.low),
-        function(a.high, b.high),
-    ])
+    hull(&[function(a.low, b.low), function(a.low, b.high), function(a.high, b.low), function(a.high, b.high)])
 }
 
 impl Interval {
@@ -127,17 +116,11 @@ impl Interval {
 
     /// The negated numbers.
     pub fn negated(self) -> Self {
-        Self {
-            low: -self.high,
-            high: -self.low,
-        }
+        Self { low: -self.high, high: -self.low }
     }
 
     fn widened(self, low: f64, high: f64) -> Self {
-        Self {
-            low: self.low - low,
-            high: self.high + high,
-        }
+        Self { low: self.low - low, high: self.high + high }
     }
 }
 
@@ -163,10 +146,7 @@ impl Format {
     }
 
     fn ulps(self, exact: Interval, count: impl Fn(f64) -> f64) -> Interval {
-        exact.widened(
-            count(exact.low) * self.ulp(exact.low),
-            count(exact.high) * self.ulp(exact.high),
-        )
+        exact.widened(count(exact.low) * self.ulp(exact.low), count(exact.high) * self.ulp(exact.high))
     }
 
     /// The possible results of a correctly rounded operation: the neighbouring numbers of the format on either side.
@@ -183,10 +163,7 @@ impl Format {
             (steps, ulp) if steps.is_finite() => steps.ceil() * ulp,
             _ => value,
         };
-        let mut all = Interval {
-            low: down(exact.low),
-            high: up(exact.high),
-        };
+        let mut all = Interval { low: down(exact.low), high: up(exact.high) };
         if all.high > self.largest() {
             all.high = f64::INFINITY;
         }
@@ -309,17 +286,12 @@ impl Format {
     /// The angle of (x, y), for intervals within a quadrant.
     pub fn atan2(self, y: Interval, x: Interval) -> Maybe {
         // GLSL leaves the result undefined if both are zero or either is infinite.
-        let finite = [y.low, y.high, x.low, x.high]
-            .iter()
-            .all(|it| it.is_finite());
+        let finite = [y.low, y.high, x.low, x.high].iter().all(|it| it.is_finite());
         (finite && !(y.has(0.0) && x.has(0.0))).then_some(())?;
         // The branch cut: on the negative x axis both signs of pi are possible.
         if y.has(0.0) && x.low < 0.0 {
             let far = std::f64::consts::PI + self.atan_ulps * self.ulp(std::f64::consts::PI);
-            return Some(Interval {
-                low: -far,
-                high: far,
-            });
+            return Some(Interval { low: -far, high: far });
         }
         let exact = corners(y, x, f64::atan2)?;
         Some(self.ulps(exact, |_| self.atan_ulps))
@@ -328,15 +300,10 @@ impl Format {
     /// The interval around the true result that a formula's interval permits.
     pub fn inherited(self, truth: f64, formula: Maybe) -> Maybe {
         let formula = formula?;
-        let error = (truth - formula.low)
-            .abs()
-            .max((truth - formula.high).abs());
+        let error = (truth - formula.low).abs().max((truth - formula.high).abs());
         (truth.is_finite() && !error.is_nan()).then_some(())?;
         // The formula's own ends are included again, because the widened ends are rounded here.
-        Some(Interval {
-            low: formula.low.min(truth - error),
-            high: formula.high.max(truth + error),
-        })
+        Some(Interval { low: formula.low.min(truth - error), high: formula.high.max(truth + error) })
     }
 
     /// True if a result is within an interval. In place of a value above the largest number, infinity or the largest
@@ -374,10 +341,7 @@ mod tests {
 
     #[test]
     fn inherited_intervals_reach_as_far_on_both_sides() {
-        let formula = Some(Interval {
-            low: 0.5,
-            high: 1.25,
-        });
+        let formula = Some(Interval { low: 0.5, high: 1.25 });
         let found = SINGLE.inherited(1.0, formula).unwrap();
         assert_eq!((found.low, found.high), (0.5, 1.5));
         assert_eq!(SINGLE.inherited(1.0, None), None);

@@ -53,8 +53,7 @@ impl Expect {
             Self::Within(interval) => {
                 let number = kind.float(found);
                 let least = kind.least_normal();
-                let flushed =
-                    flush && number == 0.0 && interval.low < least && interval.high > -least;
+                let flushed = flush && number == 0.0 && interval.low < least && interval.high > -least;
                 flushed || format(kind).permits(*interval, number)
             }
         }
@@ -107,8 +106,7 @@ impl Body {
         let scratch = self.scratch(wide);
         let pointer = self.asm.pointer(StorageClass::StorageBuffer, element);
         let zero = self.asm.u32(0);
-        self.asm
-            .emit(Op::AccessChain, pointer, &[scratch, zero, index])
+        self.asm.emit(Op::AccessChain, pointer, &[scratch, zero, index])
     }
 
     fn scratch(&mut self, wide: bool) -> Id {
@@ -116,9 +114,7 @@ impl Body {
         if self.scratch[at] == 0 {
             let kind = if wide { Kind::U64 } else { Kind::U32 };
             let element = self.ty(Ty::scalar(kind));
-            self.scratch[at] = self
-                .asm
-                .storage_buffer(2 + at as u32, element, kind.bits() / 8);
+            self.scratch[at] = self.asm.storage_buffer(2 + at as u32, element, kind.bits() / 8);
         }
         self.scratch[at]
     }
@@ -161,31 +157,22 @@ impl Row {
 
     /// The operands of the lanes, the same ones each time.
     fn inputs(&self) -> Vec<Lane> {
-        let seed = self
-            .name
-            .bytes()
-            .fold(7, |seed: u64, byte| seed.wrapping_mul(31) + u64::from(byte));
+        let seed = self.name.bytes().fold(7, |seed: u64, byte| seed.wrapping_mul(31) + u64::from(byte));
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let operand = |lane, index, (ty, domain): (Ty, Domain), random: &mut _| -> Vec<u64> {
-            (0..ty.count())
-                .map(|component| inputs::value(ty.kind, domain, [lane, index, component], random))
-                .collect()
+            (0..ty.count()).map(|component| inputs::value(ty.kind, domain, [lane, index, component], random)).collect()
         };
         (0..LANES)
             .map(|lane| {
                 let operands = self.operands.iter().enumerate();
-                operands
-                    .map(|(index, it)| operand(lane, index, *it, &mut random))
-                    .collect()
+                operands.map(|(index, it)| operand(lane, index, *it, &mut random)).collect()
             })
             .collect()
     }
 }
 
 fn words_of(types: impl Iterator<Item = Ty>) -> usize {
-    types
-        .map(|ty| ty.count() * ty.kind.words() as usize)
-        .sum::<usize>()
+    types.map(|ty| ty.count() * ty.kind.words() as usize).sum::<usize>()
 }
 
 /// A row with wrong results.
@@ -290,12 +277,7 @@ fn compare(context: &Context, row: &Row, lanes: &[Lane], found: &[u32]) -> Optio
         let failure = failure.get_or_insert_with(|| Failure {
             row: row.name.clone(),
             lanes: 0,
-            example: describe(
-                row,
-                &lanes[lane],
-                &found,
-                &row.expected(lanes, lane, subgroup),
-            ),
+            example: describe(row, &lanes[lane], &found, &row.expected(lanes, lane, subgroup)),
         });
         failure.lanes += 1;
     }
@@ -332,10 +314,7 @@ fn describe(row: &Row, lane: &Lane, found: &[(Kind, u64)], expected: &[Expect]) 
             all.join(" ")
         })
         .collect();
-    let found: Vec<String> = found
-        .iter()
-        .map(|(kind, bits)| text(*kind, *bits))
-        .collect();
+    let found: Vec<String> = found.iter().map(|(kind, bits)| text(*kind, *bits)).collect();
     let one = |(expected, ty): (&Expect, Kind)| match expected {
         Expect::Is(bits) => text(ty, *bits),
         Expect::OneOf(all) => {
@@ -346,12 +325,7 @@ fn describe(row: &Row, lane: &Lane, found: &[(Kind, u64)], expected: &[Expect]) 
     };
     let kinds = row.results.iter().flat_map(|ty| vec![ty.kind; ty.count()]);
     let expected: Vec<String> = expected.iter().zip(kinds).map(one).collect();
-    format!(
-        "of ({}) came [{}] instead of [{}]",
-        operands.join("; "),
-        found.join(", "),
-        expected.join(", ")
-    )
+    format!("of ({}) came [{}] instead of [{}]", operands.join("; "), found.join(", "), expected.join(", "))
 }
 
 /// The shader of some rows, and the number of scratch cells of an invocation.
@@ -361,49 +335,23 @@ fn assemble(rows: &[Row], preserve_denormals: bool) -> (Vec<u32>, u32) {
     asm.capability(Capability::SignedZeroInfNanPreserve);
     asm.capability(Capability::RoundingModeRTE);
     let word = Ty::scalar(Kind::U32).declare(&mut asm);
-    let (input, output) = (
-        asm.storage_buffer(0, word, 4),
-        asm.storage_buffer(1, word, 4),
-    );
+    let (input, output) = (asm.storage_buffer(0, word, 4), asm.storage_buffer(1, word, 4));
     let triple = Ty::vector(Kind::U32, 3).declare(&mut asm);
     let id = asm.built_in(BuiltIn::GlobalInvocationId, triple);
     let id = asm.emit(Op::Load, triple, &[id]);
     let lane = asm.emit(Op::CompositeExtract, word, &[id, 0]);
-    let mut body = Body {
-        asm,
-        lane,
-        scratch: [0; 2],
-        cells: 0,
-    };
-    let mut memory = Memory {
-        input,
-        output,
-        read: 0,
-        written: 0,
-    };
+    let mut body = Body { asm, lane, scratch: [0; 2], cells: 0 };
+    let mut memory = Memory { input, output, read: 0, written: 0 };
     for row in rows {
-        let operands: Vec<Id> = row
-            .operands
-            .iter()
-            .map(|(ty, _)| memory.load(&mut body, *ty))
-            .collect();
+        let operands: Vec<Id> = row.operands.iter().map(|(ty, _)| memory.load(&mut body, *ty)).collect();
         let results = (row.emit)(&mut body, &operands);
         assert_eq!(results.len(), row.results.len(), "{}", row.name);
         for (ty, value) in row.results.iter().zip(results) {
             memory.store(&mut body, *ty, value);
         }
     }
-    let types = rows.iter().flat_map(|row| {
-        row.operands
-            .iter()
-            .map(|it| it.0)
-            .chain(row.results.clone())
-    });
-    let mut widths: Vec<u32> = types
-        .filter(|ty| ty.kind.is_float())
-        .map(|ty| ty.kind.bits())
-        .chain([32])
-        .collect();
+    let types = rows.iter().flat_map(|row| row.operands.iter().map(|it| it.0).chain(row.results.clone()));
+    let mut widths: Vec<u32> = types.filter(|ty| ty.kind.is_float()).map(|ty| ty.kind.bits()).chain([32]).collect();
     widths.sort_unstable();
     widths.dedup();
     for width in widths {
@@ -436,8 +384,7 @@ impl Memory {
         let pointer = body.asm.pointer(StorageClass::StorageBuffer, ty);
         let (zero, first) = (body.asm.u32(0), body.asm.u32(number * LANES as u32));
         let index = body.asm.emit(Op::IAdd, ty, &[first, body.lane]);
-        body.asm
-            .emit(Op::AccessChain, pointer, &[buffer, zero, index])
+        body.asm.emit(Op::AccessChain, pointer, &[buffer, zero, index])
     }
 
     fn load_word(&mut self, body: &mut Body) -> Id {
@@ -448,9 +395,7 @@ impl Memory {
     }
 
     fn load(&mut self, body: &mut Body, ty: Ty) -> Id {
-        let components: Vec<Id> = (0..ty.count())
-            .map(|_| self.load_scalar(body, ty.kind))
-            .collect();
+        let components: Vec<Id> = (0..ty.count()).map(|_| self.load_scalar(body, ty.kind)).collect();
         ty.construct(&mut body.asm, &components)
     }
 

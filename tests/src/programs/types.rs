@@ -140,11 +140,7 @@ impl Kind {
         match self {
             Bool => to.declare(Op::TypeBool, None, &[]),
             F16 | F32 | F64 => to.declare(Op::TypeFloat, None, &[self.bits()]),
-            _ => to.declare(
-                Op::TypeInt,
-                None,
-                &[self.bits(), u32::from(self.is_signed())],
-            ),
+            _ => to.declare(Op::TypeInt, None, &[self.bits(), u32::from(self.is_signed())]),
         }
     }
 }
@@ -184,11 +180,7 @@ impl Ty {
 
     /// A matrix of floats.
     pub const fn matrix(kind: Kind, columns: u32, rows: u32) -> Self {
-        Self {
-            kind,
-            rows,
-            columns,
-        }
+        Self { kind, rows, columns }
     }
 
     /// The number of its components.

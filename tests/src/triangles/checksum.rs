@@ -7,8 +7,7 @@
 use ash::vk;
 
 use gaurast_testkit::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding, blend,
-    fetch_sample,
+    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding, blend, fetch_sample,
 };
 
 const VERTEX: &str = "
@@ -54,12 +53,8 @@ pub struct Checksums {
 impl Checksums {
     /// Prepares them for drawing to `size` pixels of `samples` samples.
     pub fn new(gpu: &Gpu, triangles: &[[[f32; 4]; 3]], size: [u32; 2], samples: u32) -> Self {
-        let options = TargetOptions {
-            size,
-            samples,
-            resolve: false,
-            ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT)
-        };
+        let options =
+            TargetOptions { size, samples, resolve: false, ..TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT) };
         let target = Target::new(gpu, &options);
         let add = blend(vk::BlendFactor::ONE, vk::BlendFactor::ONE, vk::BlendOp::ADD);
         let options = PipelineOptions {
@@ -71,12 +66,7 @@ impl Checksums {
             ..PipelineOptions::default()
         };
         let pipeline = Pipeline::new(gpu, &target, &options);
-        Self {
-            target,
-            pipeline,
-            vertices: Buffer::of(gpu, triangles.as_flattened()),
-            gpu: gpu.clone(),
-        }
+        Self { target, pipeline, vertices: Buffer::of(gpu, triangles.as_flattened()), gpu: gpu.clone() }
     }
 
     /// The sums of all pixels, sample by sample, after drawing `triangles`.
@@ -93,19 +83,13 @@ impl Checksums {
             let bytes = image.read(vk::ImageAspectFlags::COLOR, 16);
             return vec![bytemuck::pod_collect_to_vec(&bytes)];
         }
-        (0..self.target.options.samples)
-            .map(|sample| fetch_sample(&self.gpu, image, sample).texels())
-            .collect()
+        (0..self.target.options.samples).map(|sample| fetch_sample(&self.gpu, image, sample).texels()).collect()
     }
 }
 
 /// The first of `count` triangles that covers different samples on two devices, found by bisection, with one such
 /// sample and pixel.
-pub fn first_difference(
-    ours: &Checksums,
-    theirs: &Checksums,
-    count: u32,
-) -> Option<(u32, usize, usize)> {
+pub fn first_difference(ours: &Checksums, theirs: &Checksums, count: u32) -> Option<(u32, usize, usize)> {
     let differs = |range: std::ops::Range<u32>| {
         let (ours, theirs) = (ours.draw(range.clone()), theirs.draw(range));
         let samples = ours.iter().zip(&theirs).enumerate();

@@ -19,11 +19,7 @@ pub fn to_clip(position: Position) -> [f32; 4] {
 type Line = [i128; 3];
 
 fn cross(a: Line, b: Line) -> Line {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn dot(a: Line, b: Line) -> i128 {
@@ -131,9 +127,7 @@ mod tests {
         // Depth goes from -1/2 at the left to 3/2 at the right.
         let at = |x: i64, y: i64, z: i64| [x, y, z, UNITS];
         let cut = [at(-64, -64, -32), at(64, -64, 96), at(-64, 64, -32)];
-        let row: Vec<u32> = (0..64)
-            .filter(|&x| covers(&cut, 64, [16 * x + 8, 8]))
-            .collect();
+        let row: Vec<u32> = (0..64).filter(|&x| covers(&cut, 64, [16 * x + 8, 8])).collect();
         assert_eq!(row, (16..48).collect::<Vec<_>>());
     }
 

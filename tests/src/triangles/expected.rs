@@ -39,10 +39,7 @@ impl Expected {
     pub fn read() -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("expected_failures");
         let read = |name| std::fs::read_to_string(folder.join(name)).expect("a checked-in list");
-        Self::parse(
-            &read("triangles.txt"),
-            &read("triangles_not_supported_yet.txt"),
-        )
+        Self::parse(&read("triangles.txt"), &read("triangles_not_supported_yet.txt"))
     }
 
     fn parse(exceptions: &str, unsupported: &str) -> Self {
@@ -60,10 +57,7 @@ impl Expected {
             [scene, reason] if !reason.is_empty() => (scene.to_owned(), reason.to_owned()),
             _ => panic!("scene | reason, not {fields:?}"),
         });
-        Self {
-            exceptions: exceptions.collect(),
-            unsupported: unsupported.collect(),
-        }
+        Self { exceptions: exceptions.collect(), unsupported: unsupported.collect() }
     }
 
     /// The reason for which a scene cannot be drawn yet, if it is listed.
@@ -93,18 +87,14 @@ impl Exception {
 
     /// True if a difference of its picture is within its limits.
     pub fn excuses(&self, difference: &Difference) -> bool {
-        self.covers(&difference.picture)
-            && difference.texels <= self.texels
-            && difference.worst <= self.limits
+        self.covers(&difference.picture) && difference.texels <= self.texels && difference.worst <= self.limits
     }
 }
 
 /// The lines of a list, split at bars; lines that begin with `#` are comments.
 fn lines(text: &str) -> impl Iterator<Item = Vec<&str>> {
     let lines = text.lines().map(str::trim);
-    lines
-        .filter(|line| !line.is_empty() && !line.starts_with('#'))
-        .map(|line| line.split('|').map(str::trim).collect())
+    lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(|line| line.split('|').map(str::trim).collect())
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use ply_rs_bw::ply::{DefaultElement, Property};
 
 use super::Missing;
 use gaurast_testkit::{
-    Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource,
-    Sampler, Target, attribute, binding, depth_test,
+    Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Sampler, Target,
+    attribute, binding, depth_test,
 };
 
 /// A corner of a model's triangle.
@@ -55,8 +55,7 @@ fn missing(path: &Path) -> impl Fn(String) -> Missing {
 /// The path of a file of the test data.
 fn in_data(name: &str) -> Result<PathBuf, Missing> {
     let folder = gaurast_runner::data_folder();
-    let folder =
-        folder.ok_or_else(|| Missing("GAURAST_TEST_DATA, which names their folder".into()));
+    let folder = folder.ok_or_else(|| Missing("GAURAST_TEST_DATA, which names their folder".into()));
     Ok(folder?.join(name))
 }
 
@@ -129,9 +128,7 @@ impl Model {
                 Some(gltf::image::Source::View { view, .. }) => {
                     let bytes = &blob[view.offset()..view.offset() + view.length()];
                     let image = image::load_from_memory(bytes);
-                    image
-                        .map_err(|error| missing(error.to_string()))?
-                        .into_rgba8()
+                    image.map_err(|error| missing(error.to_string()))?.into_rgba8()
                 }
                 _ => grey(),
             };
@@ -162,10 +159,7 @@ impl Model {
         };
         let mut corners: Vec<Corner> = ply.payload["vertex"]
             .iter()
-            .map(|vertex| Corner {
-                position: ["x", "y", "z"].map(|name| float(vertex, name)),
-                ..Corner::default()
-            })
+            .map(|vertex| Corner { position: ["x", "y", "z"].map(|name| float(vertex, name)), ..Corner::default() })
             .collect();
         let mut indices = Vec::new();
         for face in &ply.payload["face"] {
@@ -174,13 +168,7 @@ impl Model {
             }
         }
         smooth_normals(&mut corners, &indices);
-        let part = Part {
-            corners,
-            indices,
-            diffuse: grey(),
-            normals: None,
-            specular: None,
-        };
+        let part = Part { corners, indices, diffuse: grey(), normals: None, specular: None };
         Ok(Self { parts: vec![part] })
     }
 
@@ -188,20 +176,15 @@ impl Model {
     fn bounds(&self) -> (Vec3, f32) {
         let corners = self.parts.iter().flat_map(|part| &part.corners);
         let positions = corners.map(|corner| Vec3::from(corner.position));
-        let (low, high) = positions.fold(
-            (Vec3::INFINITY, Vec3::NEG_INFINITY),
-            |(low, high), position| (low.min(position), high.max(position)),
-        );
+        let (low, high) = positions.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), position| {
+            (low.min(position), high.max(position))
+        });
         (0.5 * (low + high), 0.5 * (high - low).length())
     }
 }
 
 fn read_obj(path: &Path) -> Result<(Vec<Corner>, Vec<u32>), Missing> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        single_index: true,
-        ..tobj::LoadOptions::default()
-    };
+    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..tobj::LoadOptions::default() };
     let models = tobj::load_obj(path, &options);
     let (models, _) = models.map_err(|error| missing(path)(error.to_string()))?;
     let (mut corners, mut indices) = (Vec::new(), Vec::new());
@@ -212,10 +195,7 @@ fn read_obj(path: &Path) -> Result<(Vec<Corner>, Vec<u32>), Missing> {
             position: triple(&mesh.positions, index),
             normal: triple(&mesh.normals, index),
             // OBJ counts texture coordinates from the bottom.
-            uv: [
-                mesh.texcoords[2 * index],
-                1.0 - mesh.texcoords[2 * index + 1],
-            ],
+            uv: [mesh.texcoords[2 * index], 1.0 - mesh.texcoords[2 * index + 1]],
         }));
         indices.extend(mesh.indices.iter().map(|index| first + index));
     }
@@ -332,9 +312,7 @@ impl Ready {
         let sampler = Sampler::new(gpu, &sampler);
         let parts = model.parts.iter();
         Self {
-            parts: parts
-                .map(|part| ReadyPart::new(gpu, target, part, &uniforms, &sampler))
-                .collect(),
+            parts: parts.map(|part| ReadyPart::new(gpu, target, part, &uniforms, &sampler)).collect(),
             _uniforms: uniforms,
             _sampler: sampler,
         }
@@ -357,11 +335,7 @@ fn uniforms(model: &Model, [width, height]: [u32; 2], direction: Vec3) -> Unifor
     let eye = middle + 2.6 * radius * direction.normalize();
     let aspect = width as f32 / height as f32;
     let to_clip = perspective(aspect, 0.5 * radius, 6.0 * radius) * look_at(eye, middle);
-    Uniforms {
-        to_clip,
-        eye: eye.extend(1.0),
-        light: Vec3::new(0.4, 0.6, 0.7).normalize().extend(0.0),
-    }
+    Uniforms { to_clip, eye: eye.extend(1.0), light: Vec3::new(0.4, 0.6, 0.7).normalize().extend(0.0) }
 }
 
 /// The matrix from world space to a camera at `eye` that looks at `middle`: x to the right, y down, z forward.

@@ -46,12 +46,7 @@ pub fn points(seed: u64, count: usize) -> Vec<Vertex> {
     let mut rng = rng(seed);
     (0..count)
         .map(|_| Vertex {
-            position: [
-                rng.random_range(-0.9..0.9),
-                rng.random_range(-0.9..0.9),
-                rng.random_range(0.0..1.0),
-                1.0,
-            ],
+            position: [rng.random_range(-0.9..0.9), rng.random_range(-0.9..0.9), rng.random_range(0.0..1.0), 1.0],
             color: [0; 4].map(|_| rng.random_range(0.0..1.0f32)),
         })
         .collect()
@@ -60,10 +55,7 @@ pub fn points(seed: u64, count: usize) -> Vec<Vertex> {
 /// A rectangle at one depth in one colour, as a triangle list.
 pub fn rectangle([x0, y0, x1, y1]: [f32; 4], z: f32, color: [f32; 4]) -> Vec<Vertex> {
     [[x0, y0], [x1, y0], [x0, y1], [x0, y1], [x1, y0], [x1, y1]]
-        .map(|[x, y]| Vertex {
-            position: [x, y, z, 1.0],
-            color,
-        })
+        .map(|[x, y]| Vertex { position: [x, y, z, 1.0], color })
         .to_vec()
 }
 

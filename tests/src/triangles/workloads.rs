@@ -8,8 +8,8 @@ use super::models::{Model, Ready};
 use super::{Missing, shapes};
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded,
-    Resource, Sampler, Target, TargetOptions, Vertex, blend, depth_test,
+    Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded, Resource, Sampler, Target,
+    TargetOptions, Vertex, blend, depth_test,
 };
 
 /// The names of all workloads.
@@ -59,26 +59,11 @@ impl Workload {
     pub fn smaller(gpu: &Gpu, name: &str, by: u32) -> Result<Self, Missing> {
         let size = SIZE.map(|side| side / by);
         let count = |triangles: usize| triangles / by as usize;
-        let plain = TargetOptions {
-            size,
-            ..TargetOptions::default()
-        };
-        let deep = TargetOptions {
-            size,
-            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
-        };
-        let tested = PipelineOptions {
-            depth_stencil: depth_test(vk::CompareOp::LESS),
-            ..PipelineOptions::default()
-        };
-        let (from, to) = (
-            vk::BlendFactor::SRC_ALPHA,
-            vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-        );
-        let blended = PipelineOptions {
-            blend: vec![blend(from, to, vk::BlendOp::ADD)],
-            ..PipelineOptions::default()
-        };
+        let plain = TargetOptions { size, ..TargetOptions::default() };
+        let deep = TargetOptions { size, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) };
+        let tested = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
+        let (from, to) = (vk::BlendFactor::SRC_ALPHA, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+        let blended = PipelineOptions { blend: vec![blend(from, to, vk::BlendOp::ADD)], ..PipelineOptions::default() };
         let default = PipelineOptions::default();
         let workload = match name {
             "fill" => Self::of(gpu, &plain, &default, &one_big()),
@@ -125,12 +110,7 @@ impl Workload {
         self.commands.submit();
     }
 
-    fn of(
-        gpu: &Gpu,
-        target: &TargetOptions,
-        options: &PipelineOptions<'_>,
-        vertices: &[Vertex],
-    ) -> Self {
+    fn of(gpu: &Gpu, target: &TargetOptions, options: &PipelineOptions<'_>, vertices: &[Vertex]) -> Self {
         let target = Target::new(gpu, target);
         let pipeline = Pipeline::new(gpu, &target, options);
         let buffer = Buffer::of(gpu, vertices);
@@ -141,11 +121,7 @@ impl Workload {
                 commands.draw(0..vertices.len() as u32);
             });
         });
-        Self {
-            commands,
-            _target: target,
-            _things: Box::new((pipeline, buffer)),
-        }
+        Self { commands, _target: target, _things: Box::new((pipeline, buffer)) }
     }
 
     /// A million vertices, shared by twice as many triangles that are too small to be visible.
@@ -157,10 +133,7 @@ impl Workload {
         for row in 0..side {
             for column in 0..side {
                 let [x, y] = [column, row].map(|i| i as f32 / side as f32 * 0.2 - 0.1);
-                vertices.push(Vertex {
-                    position: [x, y, 0.5, 1.0],
-                    color: [x, y, 1.0, 1.0],
-                });
+                vertices.push(Vertex { position: [x, y, 0.5, 1.0], color: [x, y, 1.0, 1.0] });
             }
         }
         let mut indices = Vec::new();
@@ -180,11 +153,7 @@ impl Workload {
                 commands.draw_indexed(0..indices.len() as u32, 0);
             });
         });
-        Self {
-            commands,
-            _target: target,
-            _things: Box::new((pipeline, buffer, index_buffer)),
-        }
+        Self { commands, _target: target, _things: Box::new((pipeline, buffer, index_buffer)) }
     }
 
     /// Textures the whole target, with all levels of the texture in use.
@@ -192,9 +161,8 @@ impl Workload {
         const SIDE: u32 = 1024;
         let target = Target::new(gpu, target);
         let mut rng = shapes::rng(301);
-        let levels: Vec<Vec<[u8; 4]>> = (0..=SIDE.ilog2())
-            .map(|level| (0..(SIDE >> level).pow(2)).map(|_| rng.random()).collect())
-            .collect();
+        let levels: Vec<Vec<[u8; 4]>> =
+            (0..=SIDE.ilog2()).map(|level| (0..(SIDE >> level).pow(2)).map(|_| rng.random()).collect()).collect();
         let format = vk::Format::R8G8B8A8_UNORM;
         let options = ImageOptions::new(format, [SIDE; 2], vk::ImageUsageFlags::empty());
         let image = Image::textured(gpu, &options, &levels);
@@ -217,16 +185,9 @@ impl Workload {
         };
         let pipeline = Pipeline::new(gpu, &target, &options);
         // Perspective, so that the texture is magnified on one side and minified on the other.
-        let corners = [
-            [-1.0, -1.0, 1.0],
-            [1.0, -1.0, 1.0],
-            [-1.0, 1.0, 8.0],
-            [1.0, 1.0, 8.0],
-        ];
-        let corners = corners.map(|[x, y, w]| Vertex {
-            position: [x * w, y * w, 0.5 * w, w],
-            color: [x * w, w, 0.0, 0.0],
-        });
+        let corners = [[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 8.0], [1.0, 1.0, 8.0]];
+        let corners =
+            corners.map(|[x, y, w]| Vertex { position: [x * w, y * w, 0.5 * w, w], color: [x * w, w, 0.0, 0.0] });
         let buffer = Buffer::of(gpu, &[0, 1, 2, 2, 1, 3].map(|index: usize| corners[index]));
         let commands = gpu.record(|commands| {
             commands.pass(&target, &Pass::default(), || {
@@ -236,11 +197,7 @@ impl Workload {
                 commands.draw(0..6);
             });
         });
-        Self {
-            commands,
-            _target: target,
-            _things: Box::new((pipeline, buffer, bindings, image, sampler)),
-        }
+        Self { commands, _target: target, _things: Box::new((pipeline, buffer, bindings, image, sampler)) }
     }
 
     fn model(gpu: &Gpu, target: &TargetOptions) -> Result<Self, Missing> {
@@ -250,11 +207,7 @@ impl Workload {
         let commands = gpu.record(|commands| {
             commands.pass(&target, &Pass::default(), || ready.draw(commands));
         });
-        Ok(Self {
-            commands,
-            _target: target,
-            _things: Box::new(ready),
-        })
+        Ok(Self { commands, _target: target, _things: Box::new(ready) })
     }
 }
 
@@ -304,10 +257,8 @@ fn patches(count: usize) -> Vec<Vertex> {
     let patch = |_| {
         let [x, y] = [0; 2].map(|_| rng.random_range(-1.0..0.8f32));
         let z = rng.random_range(0.0..1.0);
-        [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2], [0.2, 0.2]].map(|[u, v]: [f32; 2]| Vertex {
-            position: [x + u, y + v, z, 1.0],
-            color: [u, v, z, 1.0],
-        })
+        [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2], [0.2, 0.2]]
+            .map(|[u, v]: [f32; 2]| Vertex { position: [x + u, y + v, z, 1.0], color: [u, v, z, 1.0] })
     };
     (0..count).flat_map(patch).collect()
 }
@@ -315,10 +266,7 @@ fn patches(count: usize) -> Vec<Vertex> {
 /// One triangle that covers half of the target.
 fn one_big() -> Vec<Vertex> {
     [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]]
-        .map(|[x, y]| Vertex {
-            position: [x, y, 0.5, 1.0],
-            color: [x, y, 0.5, 1.0],
-        })
+        .map(|[x, y]| Vertex { position: [x, y, 0.5, 1.0], color: [x, y, 0.5, 1.0] })
         .to_vec()
 }
 
@@ -332,10 +280,7 @@ fn small(count: usize, size: [u32; 2]) -> Vec<Vertex> {
         let z = rng.random_range(0.0..1.0);
         for corner in [[-1.4, -1.4], [1.4, -1.4], [-1.4, 1.4f32]] {
             let [x, y] = [0, 1].map(|axis| center[axis] + corner[axis] * pixel[axis]);
-            vertices.push(Vertex {
-                position: [x, y, z, 1.0],
-                color: [x, y, z, 1.0],
-            });
+            vertices.push(Vertex { position: [x, y, z, 1.0], color: [x, y, z, 1.0] });
         }
     }
     vertices

@@ -72,35 +72,19 @@ impl Bindings {
             .collect();
         let sizes: Vec<_> = resources
             .iter()
-            .map(|resource| vk::DescriptorPoolSize {
-                ty: resource.descriptor_type(),
-                descriptor_count: 1,
-            })
+            .map(|resource| vk::DescriptorPoolSize { ty: resource.descriptor_type(), descriptor_count: 1 })
             .collect();
         let device = gpu.device();
         // SAFETY: see the crate.
         let bindings = unsafe {
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&entries);
-            let layout = device
-                .create_descriptor_set_layout(&info, None)
-                .expect("a descriptor set layout");
-            let info = vk::DescriptorPoolCreateInfo::default()
-                .max_sets(1)
-                .pool_sizes(&sizes);
-            let pool = device
-                .create_descriptor_pool(&info, None)
-                .expect("a descriptor pool");
+            let layout = device.create_descriptor_set_layout(&info, None).expect("a descriptor set layout");
+            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+            let pool = device.create_descriptor_pool(&info, None).expect("a descriptor pool");
             let layouts = [layout];
-            let info = vk::DescriptorSetAllocateInfo::default()
-                .descriptor_pool(pool)
-                .set_layouts(&layouts);
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
             let sets = device.allocate_descriptor_sets(&info);
-            Self {
-                set: sets.expect("a descriptor set")[0],
-                layout,
-                pool,
-                gpu: gpu.clone(),
-            }
+            Self { set: sets.expect("a descriptor set")[0], layout, pool, gpu: gpu.clone() }
         };
         for (index, resource) in (0..).zip(resources) {
             bindings.write(index, resource);
@@ -119,11 +103,7 @@ impl Bindings {
                 .sampler(sampler)
                 .image_layout(vk::ImageLayout::GENERAL)]
         };
-        let buffer = |buffer, range| {
-            [vk::DescriptorBufferInfo::default()
-                .buffer(buffer)
-                .range(range)]
-        };
+        let buffer = |buffer, range| [vk::DescriptorBufferInfo::default().buffer(buffer).range(range)];
         // SAFETY: see the crate.
         let update = |write| unsafe { self.gpu.device().update_descriptor_sets(&[write], &[]) };
         match *resource {
@@ -182,29 +162,17 @@ impl Sets {
     /// Creates the pool for these layouts, whose sets have these bindings.
     pub fn of(gpu: &Gpu, layouts: Vec<vk::DescriptorSetLayout>, sets: &[&[Binding]]) -> Self {
         let sizes: Vec<_> = (sets.iter().copied().flatten())
-            .map(|&(_, ty, count)| {
-                vk::DescriptorPoolSize::default()
-                    .ty(ty)
-                    .descriptor_count(count)
-            })
+            .map(|&(_, ty, count)| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count))
             .collect();
-        let info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(sets.len().max(1) as u32)
-            .pool_sizes(&sizes);
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets.len().max(1) as u32).pool_sizes(&sizes);
         // SAFETY: see the crate.
         let pool = unsafe { gpu.device().create_descriptor_pool(&info, None) };
-        Self {
-            layouts,
-            pool: pool.expect("a descriptor pool"),
-            gpu: gpu.clone(),
-        }
+        Self { layouts, pool: pool.expect("a descriptor pool"), gpu: gpu.clone() }
     }
 
     /// Allocates a set of each layout.
     pub fn allocate(&self) -> Vec<vk::DescriptorSet> {
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(self.pool)
-            .set_layouts(&self.layouts);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&self.layouts);
         // SAFETY: see the crate.
         unsafe { self.gpu.device().allocate_descriptor_sets(&info) }.expect("descriptor sets")
     }
@@ -239,9 +207,7 @@ pub fn set_layout(
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
         })
         .collect();
-    let info = vk::DescriptorSetLayoutCreateInfo::default()
-        .flags(flags)
-        .bindings(&bindings);
+    let info = vk::DescriptorSetLayoutCreateInfo::default().flags(flags).bindings(&bindings);
     // SAFETY: see the crate.
     unsafe { gpu.device().create_descriptor_set_layout(&info, None) }.expect("a set layout")
 }

@@ -56,9 +56,7 @@ impl fmt::Display for Difference {
 pub fn differences(ours: &Output, theirs: &Output) -> Vec<Difference> {
     assert_eq!(ours.pictures.len(), theirs.pictures.len());
     let pairs = ours.pictures.iter().zip(&theirs.pictures);
-    pairs
-        .filter_map(|(ours, theirs)| difference(ours, theirs))
-        .collect()
+    pairs.filter_map(|(ours, theirs)| difference(ours, theirs)).collect()
 }
 
 /// The difference of two pictures, or `None` if every texel is within its limit.
@@ -90,9 +88,7 @@ pub fn difference(ours: &Picture, theirs: &Picture) -> Option<Difference> {
 }
 
 fn texels(picture: &Picture) -> impl Iterator<Item = &[u8]> {
-    picture
-        .bytes
-        .chunks_exact(texel_size(picture.format) as usize)
+    picture.bytes.chunks_exact(texel_size(picture.format) as usize)
 }
 
 /// The greatest difference of a component, in multiples of the limit. NaN equals NaN and is infinitely far from
@@ -111,15 +107,9 @@ fn distance(format: vk::Format, first: &[u8], second: &[u8]) -> f64 {
             }
             let distance = match limit {
                 Limit::Absolute(limit) => (first - second).abs() / limit,
-                Limit::Relative(limit) => {
-                    (first - second).abs() / (limit * first.abs().max(second.abs()).max(1.0))
-                }
+                Limit::Relative(limit) => (first - second).abs() / (limit * first.abs().max(second.abs()).max(1.0)),
             };
-            if distance.is_nan() {
-                f64::INFINITY
-            } else {
-                distance
-            }
+            if distance.is_nan() { f64::INFINITY } else { distance }
         })
         .fold(0.0, f64::max)
 }
@@ -154,21 +144,15 @@ fn components(format: vk::Format, texel: &[u8]) -> (Vec<f64>, Limit) {
         F::R16_UINT => (shorts().map(f64::from).collect(), exact),
         F::R16G16B16A16_UNORM => (shorts().map(f64::from).collect(), Limit::Absolute(8.0)),
         F::D16_UNORM => (shorts().map(f64::from).collect(), Limit::Absolute(2.0)),
-        F::R16_SFLOAT | F::R16G16_SFLOAT | F::R16G16B16A16_SFLOAT => (
-            shorts().map(|bits| f16::from_bits(bits).to_f64()).collect(),
-            Limit::Relative(1e-3),
-        ),
+        F::R16_SFLOAT | F::R16G16_SFLOAT | F::R16G16B16A16_SFLOAT => {
+            (shorts().map(|bits| f16::from_bits(bits).to_f64()).collect(), Limit::Relative(1e-3))
+        }
         F::R5G6B5_UNORM_PACK16 => (fields(shorts().map(u32::from).next(), &[5, 6, 5]), unit),
         F::A2B10G10R10_UNORM_PACK32 => (fields(words().next(), &[10, 10, 10, 2]), unit),
         F::B10G11R11_UFLOAT_PACK32 => (fields(words().next(), &[11, 11, 10]), unit),
         F::X8_D24_UNORM_PACK32 => (fields(words().next(), &[24]), Limit::Absolute(2.0)),
-        F::R32_UINT | F::R32G32_UINT | F::R32G32B32A32_UINT => {
-            (words().map(f64::from).collect(), exact)
-        }
-        F::R32_SINT => (
-            words().map(|word| f64::from(word.cast_signed())).collect(),
-            exact,
-        ),
+        F::R32_UINT | F::R32G32_UINT | F::R32G32B32A32_UINT => (words().map(f64::from).collect(), exact),
+        F::R32_SINT => (words().map(|word| f64::from(word.cast_signed())).collect(), exact),
         F::D32_SFLOAT => (floats(words()), Limit::Absolute(1e-6)),
         _ => (floats(words()), Limit::Relative(1e-4)),
     }
@@ -203,10 +187,7 @@ pub fn write_differences(
     std::fs::create_dir_all(folder)?;
     let mut paths = Vec::new();
     for (ours, theirs) in ours.pictures.iter().zip(&theirs.pictures) {
-        if differences
-            .iter()
-            .any(|difference| difference.picture == ours.name)
-        {
+        if differences.iter().any(|difference| difference.picture == ours.name) {
             let path = folder.join(format!("{}.png", ours.name.replace(' ', "_")));
             panels(ours, theirs).save(&path)?;
             paths.push(path);
@@ -219,9 +200,7 @@ pub fn write_differences(
 pub fn for_people(picture: &Picture) -> RgbImage {
     let all: Vec<_> = texels(picture).collect();
     let width = picture.size[0];
-    RgbImage::from_fn(width, picture.size[1], |x, y| {
-        color(picture.format, all[(y * width + x) as usize])
-    })
+    RgbImage::from_fn(width, picture.size[1], |x, y| color(picture.format, all[(y * width + x) as usize]))
 }
 
 fn panels(ours: &Picture, theirs: &Picture) -> RgbImage {
@@ -234,11 +213,7 @@ fn panels(ours: &Picture, theirs: &Picture) -> RgbImage {
         _ => {
             let (ours_texel, theirs_texel) = all[(y * width + x - 2 * width) as usize];
             let distance = distance(ours.format, ours_texel, theirs_texel);
-            if distance > 1.0 {
-                Rgb([255, 0, 0])
-            } else {
-                Rgb([(100.0 * distance) as u8; 3])
-            }
+            if distance > 1.0 { Rgb([255, 0, 0]) } else { Rgb([(100.0 * distance) as u8; 3]) }
         }
     })
 }
@@ -331,9 +306,7 @@ mod tests {
     #[test]
     fn panels_are_written_for_what_differs() {
         let format = vk::Format::R8G8B8A8_UNORM;
-        let output = |bytes: &[u8]| Output {
-            pictures: vec![picture(format, bytes)],
-        };
+        let output = |bytes: &[u8]| Output { pictures: vec![picture(format, bytes)] };
         let (ours, theirs) = (output(&[9; 8]), output(&[9, 9, 9, 9, 0, 9, 9, 9]));
         let differences = differences(&ours, &theirs);
         let folder = tempfile::tempdir().unwrap();

@@ -29,10 +29,8 @@ impl<T> ForLevels<T> {
     fn ask(&self, name: &str) -> Arc<OnceLock<Arc<T>>> {
         let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let values = values.get_or_insert_default();
-        let shared = values.entry(name.to_owned()).or_insert_with(|| Shared {
-            value: Arc::default(),
-            left: levels().len(),
-        });
+        let shared =
+            values.entry(name.to_owned()).or_insert_with(|| Shared { value: Arc::default(), left: levels().len() });
         shared.left -= 1;
         let value = Arc::clone(&shared.value);
         if shared.left == 0 {
@@ -45,8 +43,7 @@ impl<T> ForLevels<T> {
 /// The SIMD levels that this processor supports, the simplest first.
 pub fn levels() -> Vec<&'static str> {
     let all = gaurast_runner::SIMD_LEVELS.into_iter();
-    all.filter(|level| gaurast_runner::has_simd_level(level))
-        .collect()
+    all.filter(|level| gaurast_runner::has_simd_level(level)).collect()
 }
 
 #[cfg(test)]

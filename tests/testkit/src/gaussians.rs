@@ -2,9 +2,9 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
@@ -47,9 +47,7 @@ impl GaussianScene {
     pub fn half(gpu: &Gpu, scene: &SceneBuffers) -> Self {
         let half = |values: &[f32]| -> Vec<u16> {
             let values = values.iter();
-            values
-                .map(|&value| f16::from_f32(value).to_bits())
-                .collect()
+            values.map(|&value| f16::from_f32(value).to_bits()).collect()
         };
         let triples = |triples: &[[f32; 3]]| {
             let padded: Vec<[f32; 4]> = triples.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
@@ -72,12 +70,7 @@ impl GaussianScene {
     ///
     /// # Panics
     /// If the device doesn't draw Gaussians.
-    pub fn bind(
-        &self,
-        commands: &Commands,
-        pipeline: &GaussianPipeline,
-        camera: &GaussianCameraGAURAST,
-    ) {
+    pub fn bind(&self, commands: &Commands, pipeline: &GaussianPipeline, camera: &GaussianCameraGAURAST) {
         commands.bind(pipeline);
         self.bind_buffers(commands);
         commands.camera(camera);
@@ -94,12 +87,7 @@ impl GaussianScene {
     ///
     /// # Panics
     /// If the device doesn't draw Gaussians.
-    pub fn draw(
-        &self,
-        commands: &Commands,
-        pipeline: &GaussianPipeline,
-        camera: &GaussianCameraGAURAST,
-    ) {
+    pub fn draw(&self, commands: &Commands, pipeline: &GaussianPipeline, camera: &GaussianCameraGAURAST) {
         self.bind(commands, pipeline, camera);
         commands.draw(0..self.count);
     }
@@ -187,25 +175,16 @@ impl GaussianOptions<'_> {
 
     /// Options for scenes of `degree` in the default state, which blend over the contents of a target, without tests.
     pub fn over(degree: u32, target: &impl Attachments) -> Self {
-        Self {
-            formats: target.attachment_formats(),
-            blend: vec![over()],
-            ..Self::new(degree)
-        }
+        Self { formats: target.attachment_formats(), blend: vec![over()], ..Self::new(degree) }
     }
 
     /// All state of the pipeline.
     pub fn graphics(&self) -> Graphics<'_> {
         let mut locations = attribute_locations();
         if self.instances.is_some() {
-            locations = locations
-                .first_model_matrix(MODEL_MATRIX)
-                .model_opacity(MODEL_OPACITY);
+            locations = locations.first_model_matrix(MODEL_MATRIX).model_opacity(MODEL_OPACITY);
         }
-        let state = self
-            .state
-            .spherical_harmonics_degree(self.drawn_degree)
-            .attribute_locations(locations);
+        let state = self.state.spherical_harmonics_degree(self.drawn_degree).attribute_locations(locations);
         let mut blend = self.blend.clone();
         blend.resize(self.formats.colors.len(), self.blend[0]);
         let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -273,15 +252,11 @@ fn bindings(options: &GaussianOptions<'_>) -> Vec<vk::VertexInputBindingDescript
             binding.stride = stride;
         }
     }
-    bindings.extend(
-        options
-            .instances
-            .map(|input_rate| vk::VertexInputBindingDescription {
-                binding: INSTANCES,
-                stride: size_of::<Instance>() as u32,
-                input_rate,
-            }),
-    );
+    bindings.extend(options.instances.map(|input_rate| vk::VertexInputBindingDescription {
+        binding: INSTANCES,
+        stride: size_of::<Instance>() as u32,
+        input_rate,
+    }));
     bindings
 }
 
@@ -320,10 +295,7 @@ pub fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
 }
 
 /// The bindings of a scene: positions, scales, rotations, opacities, coefficients.
-pub fn scene_bindings(
-    degree: u32,
-    looks_by_instance: bool,
-) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
+pub fn scene_bindings(degree: u32, looks_by_instance: bool) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
     let triples = (degree + 1).pow(2);
     let strides = [12, 12, 16, 4, 12 * triples];
     std::array::from_fn(|binding| {
@@ -331,11 +303,7 @@ pub fn scene_bindings(
         vk::VertexInputBindingDescription {
             binding: binding as u32,
             stride: strides[binding],
-            input_rate: if by_instance {
-                vk::VertexInputRate::INSTANCE
-            } else {
-                vk::VertexInputRate::VERTEX
-            },
+            input_rate: if by_instance { vk::VertexInputRate::INSTANCE } else { vk::VertexInputRate::VERTEX },
         }
     })
 }

@@ -45,14 +45,8 @@ impl Gpu {
     ///
     /// # Errors
     /// [`OpenError`] names the step that failed.
-    pub fn extended<T: vk::ExtendsDeviceCreateInfo>(
-        extensions: &[&CStr],
-        features: &mut T,
-    ) -> Result<Self, OpenError> {
-        let opening = Opening {
-            extensions,
-            ..Opening::of(Driver::Embedded)
-        };
+    pub fn extended<T: vk::ExtendsDeviceCreateInfo>(extensions: &[&CStr], features: &mut T) -> Result<Self, OpenError> {
+        let opening = Opening { extensions, ..Opening::of(Driver::Embedded) };
         with_settings(&Settings::default(), || Self::open_with(&opening, features))
     }
 
@@ -73,9 +67,7 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`], for example if there is no loader.
     pub fn loaded() -> Result<Self, OpenError> {
-        with_settings(&Settings::default(), || {
-            Self::open(&Opening::of(Driver::Loaded))
-        })
+        with_settings(&Settings::default(), || Self::open(&Opening::of(Driver::Loaded)))
     }
 
     /// Opens lavapipe through the loader. It samples textures as accurately as it can if the process requests that (see
@@ -84,9 +76,7 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`], for example if there is no loader, or it does not find lavapipe.
     pub fn lavapipe() -> Result<Self, OpenError> {
-        with_settings(&Settings::default(), || {
-            Self::open(&Opening::of(Driver::Lavapipe))
-        })
+        with_settings(&Settings::default(), || Self::open(&Opening::of(Driver::Lavapipe)))
     }
 
     /// Opens a driver's device with the options in `opening`.
@@ -94,19 +84,12 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`] names the step that failed.
     pub fn open(opening: &Opening<'_>) -> Result<Self, OpenError> {
-        Self::of(Opened::new(
-            None,
-            opening,
-            None::<&mut vk::PhysicalDeviceFeatures2<'_>>,
-        ))
+        Self::of(Opened::new(None, opening, None::<&mut vk::PhysicalDeviceFeatures2<'_>>))
     }
 
     fn of(opened: Result<Opened, OpenError>) -> Result<Self, OpenError> {
         let opened = opened?;
-        Ok(Self(Arc::new(Shared {
-            queue: Mutex::new(opened.queue),
-            opened,
-        })))
+        Ok(Self(Arc::new(Shared { queue: Mutex::new(opened.queue), opened })))
     }
 
     /// The driver's name and version.
@@ -163,10 +146,7 @@ impl Gpu {
     /// The properties of a format.
     pub fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
         // SAFETY: the physical device is the instance's.
-        unsafe {
-            self.instance()
-                .get_physical_device_format_properties(self.physical_device(), format)
-        }
+        unsafe { self.instance().get_physical_device_format_properties(self.physical_device(), format) }
     }
 
     /// The features of `format` for images with optimal tiling.
@@ -180,12 +160,8 @@ impl Gpu {
     /// If there is none.
     pub(crate) fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> u32 {
         let types = self.0.opened.memory.memory_types_as_slice();
-        let fits = |index: &u32| {
-            bits & (1 << index) != 0 && types[*index as usize].property_flags.contains(flags)
-        };
-        (0..types.len() as u32)
-            .find(fits)
-            .expect("a memory type that fits")
+        let fits = |index: &u32| bits & (1 << index) != 0 && types[*index as usize].property_flags.contains(flags);
+        (0..types.len() as u32).find(fits).expect("a memory type that fits")
     }
 
     /// Records commands, submits them and waits for their completion.
@@ -216,8 +192,7 @@ impl Gpu {
         let info = vk::CommandBufferBeginInfo::default()
             .flags(vk::CommandBufferUsageFlags::RENDER_PASS_CONTINUE)
             .inheritance_info(inheritance);
-        self.record_as(vk::CommandBufferLevel::SECONDARY, &info, record)
-            .expect("it ends")
+        self.record_as(vk::CommandBufferLevel::SECONDARY, &info, record).expect("it ends")
     }
 
     /// Records a command buffer.
@@ -258,11 +233,7 @@ pub struct Commands {
 
 impl Commands {
     fn new(gpu: &Gpu, raw: vk::CommandBuffer) -> Self {
-        Self {
-            gpu: gpu.clone(),
-            raw,
-            layout: Cell::new(vk::PipelineLayout::null()),
-        }
+        Self { gpu: gpu.clone(), raw, layout: Cell::new(vk::PipelineLayout::null()) }
     }
 
     /// The device that commands are recorded for.
@@ -293,8 +264,7 @@ impl Commands {
         let flags = vk::DependencyFlags::empty();
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_pipeline_barrier(self.raw, all, all, flags, &memory, &[], images);
+            self.device().cmd_pipeline_barrier(self.raw, all, all, flags, &memory, &[], images);
         }
     }
 
@@ -311,34 +281,22 @@ impl Commands {
     }
 
     /// Copies a buffer to an image.
-    pub fn upload(
-        &self,
-        from: impl Into<vk::Buffer>,
-        to: impl Into<vk::Image>,
-        regions: &[vk::BufferImageCopy],
-    ) {
+    pub fn upload(&self, from: impl Into<vk::Buffer>, to: impl Into<vk::Image>, regions: &[vk::BufferImageCopy]) {
         let (from, to, layout) = (from.into(), to.into(), vk::ImageLayout::GENERAL);
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_copy_buffer_to_image(self.raw, from, to, layout, regions);
+            self.device().cmd_copy_buffer_to_image(self.raw, from, to, layout, regions);
         }
         self.barrier();
     }
 
     /// Copies an image to a buffer.
-    pub fn download(
-        &self,
-        from: impl Into<vk::Image>,
-        to: impl Into<vk::Buffer>,
-        regions: &[vk::BufferImageCopy],
-    ) {
+    pub fn download(&self, from: impl Into<vk::Image>, to: impl Into<vk::Buffer>, regions: &[vk::BufferImageCopy]) {
         let (from, to, layout) = (from.into(), to.into(), vk::ImageLayout::GENERAL);
         self.barrier();
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_copy_image_to_buffer(self.raw, from, layout, to, regions);
+            self.device().cmd_copy_image_to_buffer(self.raw, from, layout, to, regions);
         }
         self.barrier();
     }
@@ -364,24 +322,14 @@ impl Commands {
 
     /// Sets the viewport to x, y, width and height, and its depth range.
     pub fn viewport(&self, [x, y, width, height]: [f32; 4], [min_depth, max_depth]: [f32; 2]) {
-        let viewport = vk::Viewport {
-            x,
-            y,
-            width,
-            height,
-            min_depth,
-            max_depth,
-        };
+        let viewport = vk::Viewport { x, y, width, height, min_depth, max_depth };
         // SAFETY: see the crate.
         unsafe { self.device().cmd_set_viewport(self.raw, 0, &[viewport]) };
     }
 
     /// Sets the scissor.
     pub fn scissor(&self, [x, y]: [i32; 2], [width, height]: [u32; 2]) {
-        let scissor = vk::Rect2D {
-            offset: vk::Offset2D { x, y },
-            extent: vk::Extent2D { width, height },
-        };
+        let scissor = vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } };
         // SAFETY: see the crate.
         unsafe { self.device().cmd_set_scissor(self.raw, 0, &[scissor]) };
     }
@@ -391,8 +339,7 @@ impl Commands {
         let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_set_stencil_reference(self.raw, faces, reference);
+            self.device().cmd_set_stencil_reference(self.raw, faces, reference);
         }
     }
 
@@ -412,14 +359,7 @@ impl Commands {
         let (point, sets) = (vk::PipelineBindPoint::GRAPHICS, [set.into()]);
         // SAFETY: see the crate.
         unsafe {
-            self.device().cmd_bind_descriptor_sets(
-                self.raw,
-                point,
-                self.layout.get(),
-                0,
-                &sets,
-                dynamic_offsets,
-            );
+            self.device().cmd_bind_descriptor_sets(self.raw, point, self.layout.get(), 0, &sets, dynamic_offsets);
         }
     }
 
@@ -429,8 +369,7 @@ impl Commands {
         let stages = vk::ShaderStageFlags::ALL_GRAPHICS;
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_push_constants(self.raw, self.layout.get(), stages, offset, bytes);
+            self.device().cmd_push_constants(self.raw, self.layout.get(), stages, offset, bytes);
         }
     }
 
@@ -444,8 +383,7 @@ impl Commands {
         let buffers = [buffer.into()];
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_bind_vertex_buffers(self.raw, binding, &buffers, &[offset]);
+            self.device().cmd_bind_vertex_buffers(self.raw, binding, &buffers, &[offset]);
         }
     }
 
@@ -454,8 +392,7 @@ impl Commands {
         let buffer = buffer.into();
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_bind_index_buffer(self.raw, buffer, offset, index_type);
+            self.device().cmd_bind_index_buffer(self.raw, buffer, offset, index_type);
         }
     }
 
@@ -493,8 +430,7 @@ impl Commands {
         let (many, first_instance) = (instances.end - instances.start, instances.start);
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_draw(self.raw, count, many, first, first_instance);
+            self.device().cmd_draw(self.raw, count, many, first, first_instance);
         }
     }
 
@@ -503,8 +439,7 @@ impl Commands {
         let (count, first) = (indices.end - indices.start, indices.start);
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_draw_indexed(self.raw, count, 1, first, vertex_offset, 0);
+            self.device().cmd_draw_indexed(self.raw, count, 1, first, vertex_offset, 0);
         }
     }
 
@@ -513,8 +448,7 @@ impl Commands {
         let draws = draws.into();
         // SAFETY: see the crate.
         unsafe {
-            self.device()
-                .cmd_draw_indirect(self.raw, draws, 0, count, 16);
+            self.device().cmd_draw_indirect(self.raw, draws, 0, count, 16);
         }
     }
 }
@@ -533,20 +467,10 @@ impl Recorded {
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(0);
         // SAFETY: see the crate.
         unsafe {
-            let pool = gpu
-                .device()
-                .create_command_pool(&info, None)
-                .expect("a command pool");
-            let info = vk::CommandBufferAllocateInfo::default()
-                .command_pool(pool)
-                .level(level)
-                .command_buffer_count(1);
+            let pool = gpu.device().create_command_pool(&info, None).expect("a command pool");
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).level(level).command_buffer_count(1);
             let buffers = gpu.device().allocate_command_buffers(&info);
-            Self {
-                gpu: gpu.clone(),
-                pool,
-                raw: buffers.expect("a command buffer")[0],
-            }
+            Self { gpu: gpu.clone(), pool, raw: buffers.expect("a command buffer")[0] }
         }
     }
 

@@ -35,21 +35,17 @@ pub mod transform_feedback;
 
 pub use descriptors::{Binding, Bindings, Resource, Sets};
 pub use difference::{Difference, difference, differences, for_people, write_differences};
-pub use gaussians::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Instance, bind_instances, over,
-};
+pub use gaussians::{GaussianOptions, GaussianPipeline, GaussianScene, Instance, bind_instances, over};
 pub use gpu::{Commands, Driver, Gpu, OpenError, Opening, Recorded};
 pub use loader::accurate_lavapipe;
 pub use messages::{Message, Messages};
 pub use output::{Output, Picture};
 pub use pass::{Attachments, Bindable, Formats, Pass};
 pub use pipeline::{
-    Compute, FRAGMENT, Graphics, Kernel, Pipeline, PipelineOptions, Shader, VERTEX, Vertex,
-    attribute, binding, blend, depth_test, opaque, whole,
+    Compute, FRAGMENT, Graphics, Kernel, Pipeline, PipelineOptions, Shader, VERTEX, Vertex, attribute, binding, blend,
+    depth_test, opaque, whole,
 };
-pub use resource::{
-    Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size,
-};
+pub use resource::{Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size};
 pub use settings::{Settings, with_settings};
 pub use target::{PassObject, Target, TargetOptions, fetch_sample};
 pub use transform_feedback::TransformFeedback;

@@ -74,9 +74,7 @@ pub fn with_the_layer(case: &Case, settings: Option<&str>, inside: impl FnOnce()
         if let Some(settings) = settings {
             let path = folder.join("vk_layer_settings.txt");
             std::fs::write(&path, settings).expect("the settings are written");
-            command
-                .env("VK_LAYER_SETTINGS_PATH", path)
-                .env_remove("VK_LAYER_CUSTOM_STYPE_LIST");
+            command.env("VK_LAYER_SETTINGS_PATH", path).env_remove("VK_LAYER_CUSTOM_STYPE_LIST");
         }
     };
     loaded(case, add, inside);
@@ -102,22 +100,17 @@ fn loaded(case: &Case, add: impl FnOnce(&mut Command, &Path), inside: impl FnOnc
 /// size, all separated by colons.
 fn unregistered_structures() -> String {
     use gaurast::vk::{
-        GaussianCameraGAURAST as Camera,
-        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
+        GaussianCameraGAURAST as Camera, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
         PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
         PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
-        PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
-        PipelineGaussianStateCreateInfoGAURAST as State,
+        PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
     };
     let separator = if cfg!(windows) { ";" } else { ":" };
     [
         (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
         (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
         (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
-        (
-            Approximation::STRUCTURE_TYPE,
-            size_of::<Approximation<'_>>(),
-        ),
+        (Approximation::STRUCTURE_TYPE, size_of::<Approximation<'_>>()),
         (Footprint::STRUCTURE_TYPE, size_of::<Footprint<'_>>()),
         (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
     ]

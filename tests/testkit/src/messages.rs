@@ -53,10 +53,7 @@ unsafe extern "system" fn hear(
     // SAFETY: the caller passes valid data, and the user data of `Messages::messenger_of`.
     let (message, messages) = unsafe {
         let text = |text: Option<&CStr>| text.unwrap_or_default().to_string_lossy().into_owned();
-        let message = Message {
-            id: text((*data).message_id_name_as_c_str()),
-            text: text((*data).message_as_c_str()),
-        };
+        let message = Message { id: text((*data).message_id_name_as_c_str()), text: text((*data).message_as_c_str()) };
         (message, &*user_data.cast::<Messages>())
     };
     let mut heard = messages.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -43,8 +43,9 @@ impl Driver {
         match self {
             Self::Embedded => Ok(vulkan_gaurast::entry()),
             // SAFETY: the loader is the system's own.
-            Self::Loaded | Self::Lavapipe | Self::Extended => unsafe { ash::Entry::load() }
-                .map_err(|error| OpenError::NoLoader(error.to_string())),
+            Self::Loaded | Self::Lavapipe | Self::Extended => {
+                unsafe { ash::Entry::load() }.map_err(|error| OpenError::NoLoader(error.to_string()))
+            }
         }
     }
 }
@@ -71,15 +72,7 @@ pub struct Opening<'a> {
 impl Opening<'_> {
     /// The default options for a driver: Gaussian draws if it has them, and no robust access.
     pub const fn of(driver: Driver) -> Self {
-        Self {
-            driver,
-            device: "",
-            layers: &[],
-            extensions: &[],
-            all_extensions: false,
-            gaussian: None,
-            robust: false,
-        }
+        Self { driver, device: "", layers: &[], extensions: &[], all_extensions: false, gaussian: None, robust: false }
     }
 }
 
@@ -152,17 +145,14 @@ impl Opened {
         // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive
         // the messenger that writes to them.
         unsafe {
-            let instance = entry
-                .create_instance(&info, None)
-                .map_err(refused("create an instance"))?;
+            let instance = entry.create_instance(&info, None).map_err(refused("create an instance"))?;
             let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
             let messenger = debug_utils.create_debug_utils_messenger(&messages.messenger(), None);
             let found = messenger
                 .map_err(refused("create a messenger"))
                 .and_then(|_| find(&instance, opening))
                 .and_then(|found| {
-                    let (physical_device, name) =
-                        found.ok_or(OpenError::NoDevice(driver.name()))?;
+                    let (physical_device, name) = found.ok_or(OpenError::NoDevice(driver.name()))?;
                     let device = create_device(&instance, physical_device, opening, features)?;
                     Ok((physical_device, name, device))
                 });
@@ -201,18 +191,14 @@ impl Drop for Opened {
         // SAFETY: every resource keeps its device, so that none is left.
         unsafe {
             self.device.destroy_device(None);
-            self.debug_utils
-                .destroy_debug_utils_messenger(self.messenger, None);
+            self.debug_utils.destroy_debug_utils_messenger(self.messenger, None);
             self.instance.destroy_instance(None);
         }
     }
 }
 
 /// The first device of the requested driver and name, with its driver's name and version.
-fn find(
-    instance: &ash::Instance,
-    opening: &Opening<'_>,
-) -> Result<Option<(vk::PhysicalDevice, String)>, OpenError> {
+fn find(instance: &ash::Instance, opening: &Opening<'_>) -> Result<Option<(vk::PhysicalDevice, String)>, OpenError> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() };
     for device in devices.map_err(refused("list devices"))? {
@@ -222,8 +208,7 @@ fn find(
         unsafe { instance.get_physical_device_properties2(device, &mut properties) };
         let text = |text: &CStr| text.to_string_lossy().into_owned();
         let own = properties.properties;
-        let is_named =
-            text(own.device_name_as_c_str().unwrap_or_default()).contains(opening.device);
+        let is_named = text(own.device_name_as_c_str().unwrap_or_default()).contains(opening.device);
         let draws = opening.driver != Driver::Extended || has_gaussians(instance, device);
         if opening.driver.is(driver.driver_id) && is_named && draws {
             let name = text(driver.driver_name_as_c_str().unwrap_or_default());
@@ -262,11 +247,7 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
     let mut provoking = vk::PhysicalDeviceProvokingVertexFeaturesEXT::default();
     let mut divisor = vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::default();
     let has_gaussians = has_gaussians(instance, physical_device);
-    let mut names: Vec<_> = opening
-        .extensions
-        .iter()
-        .map(|name| name.as_ptr())
-        .collect();
+    let mut names: Vec<_> = opening.extensions.iter().map(|name| name.as_ptr()).collect();
     if has_gaussians {
         names.push(gaussian_primitive_topology::NAME.as_ptr());
     }
@@ -323,8 +304,6 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
         if let Some(extended) = extended {
             info = info.push_next(extended);
         }
-        instance
-            .create_device(physical_device, &info, None)
-            .map_err(refused("create a device"))
+        instance.create_device(physical_device, &info, None).map_err(refused("create a device"))
     }
 }

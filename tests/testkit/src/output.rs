@@ -14,11 +14,9 @@ pub struct Output {
 impl Output {
     /// Adds the pictures of another output, whose names get a prefix.
     pub fn add(&mut self, prefix: &str, other: Self) {
-        self.pictures
-            .extend(other.pictures.into_iter().map(|picture| Picture {
-                name: format!("{prefix} {}", picture.name),
-                ..picture
-            }));
+        self.pictures.extend(
+            other.pictures.into_iter().map(|picture| Picture { name: format!("{prefix} {}", picture.name), ..picture }),
+        );
     }
 
     /// True if some picture shows anything: its texels are not all equal.
@@ -26,10 +24,7 @@ impl Output {
         self.pictures.iter().any(|picture| {
             let texel = texel_size(picture.format) as usize;
             let first = &picture.bytes[..texel];
-            picture
-                .bytes
-                .chunks_exact(texel)
-                .any(|other| other != first)
+            picture.bytes.chunks_exact(texel).any(|other| other != first)
         })
     }
 }

@@ -22,13 +22,8 @@ pub struct Pass {
 impl Default for Pass {
     fn default() -> Self {
         Self {
-            color: vk::ClearColorValue {
-                float32: [0.1, 0.2, 0.3, 1.0],
-            },
-            depth: vk::ClearDepthStencilValue {
-                depth: 1.0,
-                stencil: 0,
-            },
+            color: vk::ClearColorValue { float32: [0.1, 0.2, 0.3, 1.0] },
+            depth: vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 },
             load: vk::AttachmentLoadOp::CLEAR,
             store: vk::AttachmentStoreOp::STORE,
             area: None,
@@ -40,26 +35,17 @@ impl Default for Pass {
 impl Pass {
     /// A pass that clears to zeros, whatever the format.
     pub fn zeros() -> Self {
-        Self {
-            color: vk::ClearColorValue { uint32: [0; 4] },
-            ..Self::default()
-        }
+        Self { color: vk::ClearColorValue { uint32: [0; 4] }, ..Self::default() }
     }
 
     /// A pass that clears to a colour.
     pub fn clear(float32: [f32; 4]) -> Self {
-        Self {
-            color: vk::ClearColorValue { float32 },
-            ..Self::default()
-        }
+        Self { color: vk::ClearColorValue { float32 }, ..Self::default() }
     }
 
     /// A pass that loads the attachments' contents.
     pub fn load() -> Self {
-        Self {
-            load: vk::AttachmentLoadOp::LOAD,
-            ..Self::default()
-        }
+        Self { load: vk::AttachmentLoadOp::LOAD, ..Self::default() }
     }
 }
 
@@ -77,11 +63,7 @@ pub struct Formats {
 impl Formats {
     /// The formats of one colour attachment with one sample.
     pub fn of(color: vk::Format) -> Self {
-        Self {
-            colors: vec![color],
-            depth: vk::Format::UNDEFINED,
-            samples: 1,
-        }
+        Self { colors: vec![color], depth: vk::Format::UNDEFINED, samples: 1 }
     }
 }
 

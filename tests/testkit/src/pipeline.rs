@@ -2,8 +2,8 @@
 
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::descriptors::{Binding, Bindings, Sets, write};
@@ -27,11 +27,7 @@ pub struct Shader {
 impl Shader {
     /// A shader without specialization constants.
     pub fn new(stage: vk::ShaderStageFlags, words: Vec<u32>) -> Self {
-        Self {
-            stage,
-            words,
-            constants: Vec::new(),
-        }
+        Self { stage, words, constants: Vec::new() }
     }
 
     /// A vertex shader.
@@ -186,29 +182,19 @@ impl Graphics<'_> {
     /// If a shader module is refused, or the driver gives a pipeline that it refused.
     pub fn create(&self, gpu: &Gpu) -> Result<Pipeline, vk::Result> {
         let layout = create_layout(gpu, &self.set_layouts, &self.push, self.layout_flags);
-        let mut pipeline = Pipeline {
-            raw: vk::Pipeline::null(),
-            layout,
-            gpu: gpu.clone(),
-        };
+        let mut pipeline = Pipeline { raw: vk::Pipeline::null(), layout, gpu: gpu.clone() };
         let modules = self.shaders.iter().map(|shader| match self.inline_modules {
             true => vk::ShaderModule::null(),
             false => module(gpu, &shader.words),
         });
         let modules: Vec<_> = modules.collect();
         let codes = self.shaders.iter();
-        let mut codes: Vec<_> = codes
-            .map(|shader| vk::ShaderModuleCreateInfo::default().code(&shader.words))
-            .collect();
+        let mut codes: Vec<_> = codes.map(|shader| vk::ShaderModuleCreateInfo::default().code(&shader.words)).collect();
         let constants = self.shaders.iter();
-        let constants: Vec<_> = constants
-            .map(|shader| specialization(&shader.constants))
-            .collect();
+        let constants: Vec<_> = constants.map(|shader| specialization(&shader.constants)).collect();
         let specializations: Vec<_> = (constants.iter())
             .map(|(entries, values)| {
-                vk::SpecializationInfo::default()
-                    .map_entries(entries)
-                    .data(bytemuck::cast_slice(values))
+                vk::SpecializationInfo::default().map_entries(entries).data(bytemuck::cast_slice(values))
             })
             .collect();
         let stages: Vec<_> = (codes.iter_mut().enumerate())
@@ -244,8 +230,8 @@ impl Graphics<'_> {
         layout: vk::PipelineLayout,
         stages: &[vk::PipelineShaderStageCreateInfo<'_>],
     ) -> Result<vk::Pipeline, vk::Result> {
-        let mut divisors = vk::PipelineVertexInputDivisorStateCreateInfoKHR::default()
-            .vertex_binding_divisors(&self.divisors);
+        let mut divisors =
+            vk::PipelineVertexInputDivisorStateCreateInfoKHR::default().vertex_binding_divisors(&self.divisors);
         let mut vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&self.bindings)
             .vertex_attribute_descriptions(&self.attributes);
@@ -261,16 +247,15 @@ impl Graphics<'_> {
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(self.topology)
             .primitive_restart_enable(self.restart);
-        let mut origin = vk::PipelineTessellationDomainOriginStateCreateInfo::default()
-            .domain_origin(self.domain_origin);
+        let mut origin =
+            vk::PipelineTessellationDomainOriginStateCreateInfo::default().domain_origin(self.domain_origin);
         let tessellation = vk::PipelineTessellationStateCreateInfo::default()
             .patch_control_points(self.patch_vertices)
             .push_next(&mut origin);
-        let mut control = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
-            .negative_one_to_one(self.negative_one_to_one);
-        let mut viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(self.viewports)
-            .scissor_count(self.viewports);
+        let mut control =
+            vk::PipelineViewportDepthClipControlCreateInfoEXT::default().negative_one_to_one(self.negative_one_to_one);
+        let mut viewport =
+            vk::PipelineViewportStateCreateInfo::default().viewport_count(self.viewports).scissor_count(self.viewports);
         if self.negative_one_to_one {
             viewport = viewport.push_next(&mut control);
         }
@@ -294,16 +279,11 @@ impl Graphics<'_> {
         let mut gaussian = self.gaussian.unwrap_or_default();
         let mut approximation = self.approximation.unwrap_or_default();
         let mut footprint = self.footprint.unwrap_or_default();
-        let mut parts = vk::GraphicsPipelineLibraryCreateInfoEXT::default()
-            .flags(self.parts.unwrap_or_default());
+        let mut parts = vk::GraphicsPipelineLibraryCreateInfoEXT::default().flags(self.parts.unwrap_or_default());
         let mut libraries = vk::PipelineLibraryCreateInfoKHR::default().libraries(&self.libraries);
-        let mut info = vk::GraphicsPipelineCreateInfo::default()
-            .flags(self.flags)
-            .dynamic_state(&dynamic);
+        let mut info = vk::GraphicsPipelineCreateInfo::default().flags(self.flags).dynamic_state(&dynamic);
         if self.has(Parts::VERTEX_INPUT_INTERFACE) {
-            info = info
-                .vertex_input_state(&vertex_input)
-                .input_assembly_state(&assembly);
+            info = info.vertex_input_state(&vertex_input).input_assembly_state(&assembly);
         }
         if self.has(Parts::PRE_RASTERIZATION_SHADERS) {
             info = info.viewport_state(&viewport).rasterization_state(&raster);
@@ -315,9 +295,7 @@ impl Graphics<'_> {
             info = info.depth_stencil_state(&self.depth_stencil);
         }
         if self.has(Parts::FRAGMENT_OUTPUT_INTERFACE) {
-            info = info
-                .multisample_state(&multisample)
-                .color_blend_state(&blend);
+            info = info.multisample_state(&multisample).color_blend_state(&blend);
         }
         if self.has(Parts::PRE_RASTERIZATION_SHADERS) || self.has(Parts::FRAGMENT_SHADER) {
             info = info.stages(stages);
@@ -351,9 +329,7 @@ impl Graphics<'_> {
 }
 
 /// The only pipeline that was created, or the error. A refused pipeline must be null.
-fn one(
-    created: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
-) -> Result<vk::Pipeline, vk::Result> {
+fn one(created: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>) -> Result<vk::Pipeline, vk::Result> {
     match created {
         Ok(pipelines) => Ok(pipelines[0]),
         Err((pipelines, error)) => {
@@ -482,25 +458,12 @@ impl Default for PipelineOptions<'_> {
 
 /// A binding that advances by vertex.
 pub fn binding(binding: u32, stride: u32) -> vk::VertexInputBindingDescription {
-    vk::VertexInputBindingDescription {
-        binding,
-        stride,
-        input_rate: vk::VertexInputRate::VERTEX,
-    }
+    vk::VertexInputBindingDescription { binding, stride, input_rate: vk::VertexInputRate::VERTEX }
 }
 
 /// An attribute from binding 0.
-pub fn attribute(
-    location: u32,
-    format: vk::Format,
-    offset: u32,
-) -> vk::VertexInputAttributeDescription {
-    vk::VertexInputAttributeDescription {
-        location,
-        binding: 0,
-        format,
-        offset,
-    }
+pub fn attribute(location: u32, format: vk::Format, offset: u32) -> vk::VertexInputAttributeDescription {
+    vk::VertexInputAttributeDescription { location, binding: 0, format, offset }
 }
 
 /// The state that tests and writes depth.
@@ -518,11 +481,7 @@ pub fn opaque() -> vk::PipelineColorBlendAttachmentState {
 }
 
 /// The state that blends colour and alpha in the same way.
-pub fn blend(
-    from: vk::BlendFactor,
-    to: vk::BlendFactor,
-    op: vk::BlendOp,
-) -> vk::PipelineColorBlendAttachmentState {
+pub fn blend(from: vk::BlendFactor, to: vk::BlendFactor, op: vk::BlendOp) -> vk::PipelineColorBlendAttachmentState {
     opaque()
         .blend_enable(true)
         .src_color_blend_factor(from)
@@ -556,14 +515,10 @@ impl Pipeline {
         };
         let fragment = options.fragment.map(|source| (Stage::Fragment, source));
         let sources = std::iter::once((Stage::Vertex, options.vertex));
-        let sources = sources
-            .chain(options.between.iter().copied())
-            .chain(fragment);
+        let sources = sources.chain(options.between.iter().copied()).chain(fragment);
         let shaders = sources.map(|(stage, source)| shader(stage, stage.flag(), source));
         let shaders = shaders.collect();
-        let push = vk::PushConstantRange::default()
-            .stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS)
-            .size(128);
+        let push = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS).size(128);
         let mut blend = options.blend.clone();
         blend.resize(formats.colors.len(), opaque());
         let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -656,9 +611,7 @@ impl Kernel {
         constants: &[(u32, u32)],
     ) -> Result<Self, vk::Result> {
         let (entries, values) = specialization(constants);
-        let info = vk::SpecializationInfo::default()
-            .map_entries(&entries)
-            .data(bytemuck::cast_slice(&values));
+        let info = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
         Self::create(gpu, words, sets, &info)
     }
 
@@ -672,9 +625,7 @@ impl Kernel {
         sets: &[vk::DescriptorSetLayout],
         specialization: &vk::SpecializationInfo<'_>,
     ) -> Result<Self, vk::Result> {
-        let ranges = [vk::PushConstantRange::default()
-            .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(128)];
+        let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
         let mut kernel = Self {
             raw: vk::Pipeline::null(),
             layout: create_layout(gpu, sets, &ranges, vk::PipelineLayoutCreateFlags::empty()),
@@ -690,9 +641,7 @@ impl Kernel {
                 .module(module)
                 .name(c"main")
                 .specialization_info(specialization);
-            let info = vk::ComputePipelineCreateInfo::default()
-                .stage(stage)
-                .layout(kernel.layout);
+            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(kernel.layout);
             let created = device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None);
             device.destroy_shader_module(module, None);
             kernel.raw = one(created)?;
@@ -721,13 +670,7 @@ impl Kernel {
     }
 
     /// Records a dispatch of workgroups with sets.
-    pub fn dispatch(
-        &self,
-        commands: &Commands,
-        sets: &[vk::DescriptorSet],
-        push: &[u32],
-        [x, y, z]: [u32; 3],
-    ) {
+    pub fn dispatch(&self, commands: &Commands, sets: &[vk::DescriptorSet], push: &[u32], [x, y, z]: [u32; 3]) {
         self.bind(commands.raw, sets);
         if !push.is_empty() {
             self.push(commands.raw, push);
@@ -786,12 +729,7 @@ impl Compute {
     ///
     /// # Panics
     /// If the driver refuses it.
-    pub fn over(
-        gpu: &Gpu,
-        words: &[u32],
-        sets: Sets,
-        specialization: &vk::SpecializationInfo<'_>,
-    ) -> Self {
+    pub fn over(gpu: &Gpu, words: &[u32], sets: Sets, specialization: &vk::SpecializationInfo<'_>) -> Self {
         let kernel = Kernel::create(gpu, words, &sets.layouts, specialization)
             .unwrap_or_else(|error| panic!("{error:?}: {:?}", gpu.messages()));
         Self { kernel, sets }
@@ -818,17 +756,12 @@ impl std::ops::Deref for Compute {
 
 /// All of a buffer.
 pub fn whole(buffer: &Buffer) -> vk::DescriptorBufferInfo {
-    vk::DescriptorBufferInfo::default()
-        .buffer(buffer.raw)
-        .range(vk::WHOLE_SIZE)
+    vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)
 }
 
 fn specialization(constants: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u32>) {
     let entry = |(index, &(id, _)): (usize, &(u32, u32))| {
-        vk::SpecializationMapEntry::default()
-            .constant_id(id)
-            .offset(4 * index as u32)
-            .size(4)
+        vk::SpecializationMapEntry::default().constant_id(id).offset(4 * index as u32).size(4)
     };
     let entries = constants.iter().enumerate().map(entry).collect();
     (entries, constants.iter().map(|&(_, value)| value).collect())
@@ -840,10 +773,7 @@ fn create_layout(
     ranges: &[vk::PushConstantRange],
     flags: vk::PipelineLayoutCreateFlags,
 ) -> vk::PipelineLayout {
-    let info = vk::PipelineLayoutCreateInfo::default()
-        .flags(flags)
-        .set_layouts(sets)
-        .push_constant_ranges(ranges);
+    let info = vk::PipelineLayoutCreateInfo::default().flags(flags).set_layouts(sets).push_constant_ranges(ranges);
     // SAFETY: see the crate.
     unsafe { gpu.device().create_pipeline_layout(&info, None) }.expect("a pipeline layout")
 }

@@ -47,12 +47,7 @@ impl Buffer {
         Self::create(gpu, size, flags, vk::BufferUsageFlags::empty())
     }
 
-    fn create(
-        gpu: &Gpu,
-        size: u64,
-        flags: vk::MemoryPropertyFlags,
-        further: vk::BufferUsageFlags,
-    ) -> Self {
+    fn create(gpu: &Gpu, size: u64, flags: vk::MemoryPropertyFlags, further: vk::BufferUsageFlags) -> Self {
         use vk::BufferUsageFlags as Usage;
         let size = size.max(4);
         let usage = Usage::VERTEX_BUFFER
@@ -72,15 +67,8 @@ impl Buffer {
             let raw = device.create_buffer(&info, None).expect("a buffer");
             let needed = device.get_buffer_memory_requirements(raw);
             let memory = allocate(gpu, needed, flags);
-            device
-                .bind_buffer_memory(raw, memory, 0)
-                .expect("a buffer is bound");
-            Self {
-                raw,
-                size,
-                memory,
-                gpu: gpu.clone(),
-            }
+            device.bind_buffer_memory(raw, memory, 0).expect("a buffer is bound");
+            Self { raw, size, memory, gpu: gpu.clone() }
         }
     }
 
@@ -138,11 +126,7 @@ impl Drop for Buffer {
     }
 }
 
-fn allocate(
-    gpu: &Gpu,
-    needed: vk::MemoryRequirements,
-    flags: vk::MemoryPropertyFlags,
-) -> vk::DeviceMemory {
+fn allocate(gpu: &Gpu, needed: vk::MemoryRequirements, flags: vk::MemoryPropertyFlags) -> vk::DeviceMemory {
     let info = vk::MemoryAllocateInfo::default()
         .allocation_size(needed.size)
         .memory_type_index(gpu.memory_type(needed.memory_type_bits, flags));
@@ -260,11 +244,7 @@ impl Image {
             .flags(options.all_flags())
             .image_type(options.image_type())
             .format(options.format)
-            .extent(vk::Extent3D {
-                width,
-                height,
-                depth,
-            })
+            .extent(vk::Extent3D { width, height, depth })
             .mip_levels(options.levels)
             .array_layers(options.layers)
             .samples(vk::SampleCountFlags::from_raw(options.samples))
@@ -275,15 +255,9 @@ impl Image {
             let raw = device.create_image(&info, None).expect("an image");
             let needed = device.get_image_memory_requirements(raw);
             let memory = allocate(gpu, needed, vk::MemoryPropertyFlags::empty());
-            device
-                .bind_image_memory(raw, memory, 0)
-                .expect("an image is bound");
+            device.bind_image_memory(raw, memory, 0).expect("an image is bound");
             let aspects = aspects(options.format);
-            let one = if aspects.contains(vk::ImageAspectFlags::DEPTH) {
-                vk::ImageAspectFlags::DEPTH
-            } else {
-                aspects
-            };
+            let one = if aspects.contains(vk::ImageAspectFlags::DEPTH) { vk::ImageAspectFlags::DEPTH } else { aspects };
             let view = |aspects| {
                 if !options.has_views() {
                     return vk::ImageView::null();
@@ -295,14 +269,8 @@ impl Image {
                     .subresource_range(range(aspects));
                 device.create_image_view(&info, None).expect("a view")
             };
-            let image = Self {
-                raw,
-                view: view(one),
-                options: *options,
-                attachment: view(aspects),
-                memory,
-                gpu: gpu.clone(),
-            };
+            let image =
+                Self { raw, view: view(one), options: *options, attachment: view(aspects), memory, gpu: gpu.clone() };
             gpu.run(|commands| commands.become_general(raw, range(aspects)));
             image
         }
@@ -342,13 +310,7 @@ impl Image {
             base_array_layer: 0,
             layer_count: self.options.layers,
         };
-        vk::BufferImageCopy::default()
-            .image_subresource(layers)
-            .image_extent(vk::Extent3D {
-                width,
-                height,
-                depth,
-            })
+        vk::BufferImageCopy::default().image_subresource(layers).image_extent(vk::Extent3D { width, height, depth })
     }
 
     /// The texels of one aspect of level 0, tightly packed, `texel` bytes each.
@@ -356,8 +318,7 @@ impl Image {
         let texels = self.options.size.iter().product::<u32>() * self.options.layers;
         let buffer = Buffer::new(&self.gpu, u64::from(texels * texel));
         let region = self.region(aspect, 0);
-        self.gpu
-            .run(|commands| commands.download(self, &buffer, &[region]));
+        self.gpu.run(|commands| commands.download(self, &buffer, &[region]));
         let mut bytes = buffer.read();
         bytes.truncate((texels * texel) as usize);
         bytes
@@ -399,8 +360,7 @@ impl Image {
         assert!(rest.is_empty());
         let buffer = Buffer::of(&self.gpu, &staged);
         let regions: Vec<_> = levels.iter().map(|(region, _)| *region).collect();
-        self.gpu
-            .run(|commands| commands.upload(&buffer, self, &regions));
+        self.gpu.run(|commands| commands.upload(&buffer, self, &regions));
     }
 
     /// All texels of an aspect, in the order of [`Self::upload`].
@@ -408,12 +368,10 @@ impl Image {
         let (levels, size) = self.staged(aspect);
         let buffer = Buffer::new(&self.gpu, size);
         let regions: Vec<_> = levels.iter().map(|(region, _)| *region).collect();
-        self.gpu
-            .run(|commands| commands.download(self, &buffer, &regions));
+        self.gpu.run(|commands| commands.download(self, &buffer, &regions));
         let staged = buffer.read();
-        let levels = levels
-            .iter()
-            .flat_map(|(region, bytes)| staged[region.buffer_offset as usize..][..*bytes].to_vec());
+        let levels =
+            levels.iter().flat_map(|(region, bytes)| staged[region.buffer_offset as usize..][..*bytes].to_vec());
         levels.collect()
     }
 
@@ -483,9 +441,7 @@ pub fn aspects(format: vk::Format) -> vk::ImageAspectFlags {
     match format {
         F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT => Aspect::DEPTH,
         F::S8_UINT => Aspect::STENCIL,
-        F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT => {
-            Aspect::DEPTH | Aspect::STENCIL
-        }
+        F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT => Aspect::DEPTH | Aspect::STENCIL,
         _ => Aspect::COLOR,
     }
 }
@@ -493,16 +449,9 @@ pub fn aspects(format: vk::Format) -> vk::ImageAspectFlags {
 /// The formats of the depth and the stencil attachment; undefined for an aspect that the format lacks.
 pub fn depth_and_stencil(format: vk::Format) -> (vk::Format, vk::Format) {
     let of = |aspect| {
-        if aspects(format).contains(aspect) {
-            format
-        } else {
-            vk::Format::UNDEFINED
-        }
+        if aspects(format).contains(aspect) { format } else { vk::Format::UNDEFINED }
     };
-    (
-        of(vk::ImageAspectFlags::DEPTH),
-        of(vk::ImageAspectFlags::STENCIL),
-    )
+    (of(vk::ImageAspectFlags::DEPTH), of(vk::ImageAspectFlags::STENCIL))
 }
 
 /// All levels and layers of the aspects.
@@ -528,10 +477,7 @@ impl Sampler {
     pub fn new(gpu: &Gpu, info: &vk::SamplerCreateInfo<'_>) -> Self {
         // SAFETY: see the crate.
         let raw = unsafe { gpu.device().create_sampler(info, None) }.expect("a sampler");
-        Self {
-            raw,
-            gpu: gpu.clone(),
-        }
+        Self { raw, gpu: gpu.clone() }
     }
 }
 

@@ -21,15 +21,9 @@ pub struct Settings<'a> {
 pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
     static LOCK: Mutex<()> = Mutex::new(());
     let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
-    let _simd = settings
-        .simd
-        .map(|simd| Variable::set("GAURAST_SIMD", simd.as_ref()));
-    let _threads = settings
-        .threads
-        .map(|threads| Variable::set("GAURAST_THREADS", threads.to_string().as_ref()));
-    let _trace = settings
-        .trace
-        .map(|trace| Variable::set("GAURAST_TRACE", trace.as_os_str()));
+    let _simd = settings.simd.map(|simd| Variable::set("GAURAST_SIMD", simd.as_ref()));
+    let _threads = settings.threads.map(|threads| Variable::set("GAURAST_THREADS", threads.to_string().as_ref()));
+    let _trace = settings.trace.map(|trace| Variable::set("GAURAST_TRACE", trace.as_os_str()));
     create()
 }
 

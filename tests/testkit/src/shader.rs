@@ -59,10 +59,7 @@ pub fn compile(stage: Stage, source: &str) -> Vec<u32> {
     // The lock is held while compiling, so that nothing is compiled twice.
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     let key = (stage, source.to_owned());
-    compiled
-        .entry(key)
-        .or_insert_with(|| kept_or_compiled(stage, source))
-        .clone()
+    compiled.entry(key).or_insert_with(|| kept_or_compiled(stage, source)).clone()
 }
 
 fn kept_or_compiled(stage: Stage, source: &str) -> Vec<u32> {

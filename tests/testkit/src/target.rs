@@ -27,31 +27,19 @@ pub struct TargetOptions {
 impl Default for TargetOptions {
     /// One attachment of 8-bit colour.
     fn default() -> Self {
-        Self {
-            size: [128, 128],
-            colors: vec![vk::Format::R8G8B8A8_UNORM],
-            depth: None,
-            samples: 1,
-            resolve: true,
-        }
+        Self { size: [128, 128], colors: vec![vk::Format::R8G8B8A8_UNORM], depth: None, samples: 1, resolve: true }
     }
 }
 
 impl TargetOptions {
     /// One attachment of 8-bit colour, and depth.
     pub fn with_depth(format: vk::Format) -> Self {
-        Self {
-            depth: Some(format),
-            ..Self::default()
-        }
+        Self { depth: Some(format), ..Self::default() }
     }
 
     /// One attachment of colour in a format.
     pub fn of(format: vk::Format) -> Self {
-        Self {
-            colors: vec![format],
-            ..Self::default()
-        }
+        Self { colors: vec![format], ..Self::default() }
     }
 
     /// The same with four samples per pixel.
@@ -84,21 +72,13 @@ impl Target {
         };
         let colors = |samples| {
             let formats = options.colors.iter();
-            formats
-                .map(|&format| image(format, samples, Usage::COLOR_ATTACHMENT))
-                .collect()
+            formats.map(|&format| image(format, samples, Usage::COLOR_ATTACHMENT)).collect()
         };
         Self {
             options: options.clone(),
             colors: colors(options.samples),
-            resolved: if options.samples > 1 && options.resolve {
-                colors(1)
-            } else {
-                Vec::new()
-            },
-            depth: options
-                .depth
-                .map(|format| image(format, options.samples, Usage::DEPTH_STENCIL_ATTACHMENT)),
+            resolved: if options.samples > 1 && options.resolve { colors(1) } else { Vec::new() },
+            depth: options.depth.map(|format| image(format, options.samples, Usage::DEPTH_STENCIL_ATTACHMENT)),
         }
     }
 
@@ -205,22 +185,15 @@ impl Attachments for Target {
             } else {
                 vk::ResolveModeFlags::AVERAGE
             };
-            *color = color
-                .resolve_mode(mode)
-                .resolve_image_view(resolved.attachment)
-                .resolve_image_layout(layout);
+            *color = color.resolve_mode(mode).resolve_image_view(resolved.attachment).resolve_image_layout(layout);
         }
         let depth_view = self.depth.as_ref().map(|image| image.attachment);
-        let depth = attachment(depth_view.unwrap_or_default()).clear_value(vk::ClearValue {
-            depth_stencil: pass.depth,
-        });
+        let depth =
+            attachment(depth_view.unwrap_or_default()).clear_value(vk::ClearValue { depth_stencil: pass.depth });
         let (_, depth_format, stencil_format) = self.formats();
         let area = self.area(pass);
-        let mut info = vk::RenderingInfo::default()
-            .flags(pass.flags)
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&colors);
+        let mut info =
+            vk::RenderingInfo::default().flags(pass.flags).render_area(area).layer_count(1).color_attachments(&colors);
         if depth_format != vk::Format::UNDEFINED {
             info = info.depth_attachment(&depth);
         }
@@ -252,17 +225,13 @@ impl<'a> PassObject<'a> {
             .final_layout(vk::ImageLayout::GENERAL)];
         let references = [vk::AttachmentReference::default().layout(vk::ImageLayout::GENERAL)];
         let subpasses = [vk::SubpassDescription::default().color_attachments(&references)];
-        let info = vk::RenderPassCreateInfo::default()
-            .attachments(&attachments)
-            .subpasses(&subpasses);
+        let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
         let device = target.colors[0].gpu().device();
         let [width, height] = target.options.size;
         let views = [target.colors[0].attachment];
         // SAFETY: see the crate.
         unsafe {
-            let render_pass = device
-                .create_render_pass(&info, None)
-                .expect("a render pass");
+            let render_pass = device.create_render_pass(&info, None).expect("a render pass");
             let info = vk::FramebufferCreateInfo::default()
                 .render_pass(render_pass)
                 .attachments(&views)
@@ -270,11 +239,7 @@ impl<'a> PassObject<'a> {
                 .height(height)
                 .layers(1);
             let framebuffer = device.create_framebuffer(&info, None);
-            Self {
-                render_pass,
-                framebuffer: framebuffer.expect("a framebuffer"),
-                target,
-            }
+            Self { render_pass, framebuffer: framebuffer.expect("a framebuffer"), target }
         }
     }
 }
@@ -368,13 +333,7 @@ pub fn fetch_sample(gpu: &Gpu, image: &Image, sample: u32) -> Picture {
          void main() {{ texel = texelFetch(image, ivec2(gl_FragCoord.xy), index); }}"
     );
     let size = [image.options.size[0], image.options.size[1]];
-    let target = Target::new(
-        gpu,
-        &TargetOptions {
-            size,
-            ..TargetOptions::of(format)
-        },
-    );
+    let target = Target::new(gpu, &TargetOptions { size, ..TargetOptions::of(format) });
     let sampler = Sampler::new(gpu, &vk::SamplerCreateInfo::default());
     let bindings = Bindings::new(gpu, &[Resource::Texture(image.view, sampler.raw)]);
     let pipeline = Pipeline::new(
@@ -398,9 +357,5 @@ pub fn fetch_sample(gpu: &Gpu, image: &Image, sample: u32) -> Picture {
             commands.draw(0..4);
         });
     });
-    picture(
-        String::new(),
-        &target.colors[0],
-        vk::ImageAspectFlags::COLOR,
-    )
+    picture(String::new(), &target.colors[0], vk::ImageAspectFlags::COLOR)
 }

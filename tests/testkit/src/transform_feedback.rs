@@ -12,10 +12,7 @@ pub struct TransformFeedback(ash::ext::transform_feedback::Device);
 pub type Place<'a> = (&'a Buffer, vk::DeviceSize);
 
 fn split(places: &[Place<'_>]) -> (Vec<vk::Buffer>, Vec<vk::DeviceSize>) {
-    places
-        .iter()
-        .map(|(buffer, offset)| (buffer.raw, *offset))
-        .unzip()
+    places.iter().map(|(buffer, offset)| (buffer.raw, *offset)).unzip()
 }
 
 impl TransformFeedback {
@@ -78,14 +75,7 @@ impl TransformFeedback {
     }
 
     /// Draws the vertices of `stride` bytes that a counter counts, after the first `skipped` bytes.
-    pub fn draw(
-        &self,
-        commands: &Commands,
-        instances: u32,
-        (counter, offset): Place<'_>,
-        skipped: u32,
-        stride: u32,
-    ) {
+    pub fn draw(&self, commands: &Commands, instances: u32, (counter, offset): Place<'_>, skipped: u32, stride: u32) {
         // SAFETY: see the crate.
         unsafe {
             (self.0.fp().cmd_draw_indirect_byte_count_ext)(

@@ -32,12 +32,7 @@ struct Blit {
 }
 
 fn layers(aspect: Aspect, level: u32, layer_count: u32) -> vk::ImageSubresourceLayers {
-    vk::ImageSubresourceLayers {
-        aspect_mask: aspect_flags(aspect),
-        mip_level: level,
-        base_array_layer: 0,
-        layer_count,
-    }
+    vk::ImageSubresourceLayers { aspect_mask: aspect_flags(aspect), mip_level: level, base_array_layer: 0, layer_count }
 }
 
 fn corners([x0, y0, z0]: [i32; 3], [x1, y1, z1]: [i32; 3]) -> [vk::Offset3D; 2] {
@@ -69,21 +64,11 @@ fn blitted(gpu: &Gpu, blit: &Blit) -> Vec<Vec<u8>> {
         let (device, commands) = recording.raw();
         // SAFETY: see the crate.
         unsafe {
-            device.cmd_blit_image(
-                commands,
-                from.raw,
-                GENERAL,
-                to.raw,
-                GENERAL,
-                &blit.regions,
-                blit.filter,
-            );
+            device.cmd_blit_image(commands, from.raw, GENERAL, to.raw, GENERAL, &blit.regions, blit.filter);
         }
     });
     let contents = blit.aspects.iter();
-    contents
-        .map(|&aspect| to.download(aspect_flags(aspect)))
-        .collect()
+    contents.map(|&aspect| to.download(aspect_flags(aspect))).collect()
 }
 
 /// The largest distance between the two devices' targets, in codes of an aspect's format.
@@ -113,12 +98,7 @@ impl Findings {
         if found > 1.0 {
             self.0.push(format!(
                 "{:?} {:?} to {:?} {:?}, {:?}: {found} apart, {:?}",
-                blit.from.format,
-                blit.from.size,
-                blit.to.format,
-                blit.to.size,
-                blit.filter,
-                blit.regions
+                blit.from.format, blit.from.size, blit.to.format, blit.to.size, blit.filter, blit.regions
             ));
         }
     }
@@ -150,20 +130,16 @@ fn regions_are_scaled_and_mirrored(case: &Case) {
             for (index, (x_from, x_to)) in spans.into_iter().enumerate() {
                 let (y_from, y_to) = spans[(index * 3 + 1) % spans.len()];
                 let (z_from, z_to) = spans[(index * 5 + 2) % spans.len()];
-                let ends =
-                    |x: [i32; 2], y: [i32; 2], z: [i32; 2]| [0, 1].map(|i| [x[i], y[i], z[i]]);
-                for (view, used) in [
-                    (vk::ImageViewType::TYPE_1D, 1),
-                    (vk::ImageViewType::TYPE_2D, 2),
-                    (vk::ImageViewType::TYPE_3D, 3),
-                ] {
+                let ends = |x: [i32; 2], y: [i32; 2], z: [i32; 2]| [0, 1].map(|i| [x[i], y[i], z[i]]);
+                for (view, used) in
+                    [(vk::ImageViewType::TYPE_1D, 1), (vk::ImageViewType::TYPE_2D, 2), (vk::ImageViewType::TYPE_3D, 3)]
+                {
                     let shape = |size: u32| ImageOptions {
                         view,
                         size: [0, 1, 2].map(|axis| if axis < used { size } else { 1 }),
                         ..flat(format, size, size)
                     };
-                    let within =
-                        |axis: usize, span: [i32; 2]| if axis < used { span } else { [0, 1] };
+                    let within = |axis: usize, span: [i32; 2]| if axis < used { span } else { [0, 1] };
                     let blit = Blit {
                         from: shape(13),
                         to: shape(17),
@@ -188,11 +164,7 @@ fn mip_chains_are_made_of_layers(case: &Case) {
     exactly(case, |ours, theirs| {
         let mut findings = Findings::default();
         for format in [vk::Format::R8G8B8A8_SRGB, vk::Format::B8G8R8A8_UNORM] {
-            let shape = ImageOptions {
-                levels: 4,
-                layers: 3,
-                ..flat(format, 24, 20)
-            };
+            let shape = ImageOptions { levels: 4, layers: 3, ..flat(format, 24, 20) };
             // Halving an even number puts the centres on edges, where the nearest texel is not defined.
             let filter = vk::Filter::LINEAR;
             for level in 1..4 {
@@ -261,24 +233,14 @@ const NO_SOURCES: &[vk::Format] = &[
 ];
 
 /// The formats that lavapipe is known to support as sources, but not as targets (Mesa 22.3).
-const SOURCES_ONLY: &[vk::Format] = &[
-    vk::Format::B10G11R11_UFLOAT_PACK32,
-    vk::Format::E5B9G9R9_UFLOAT_PACK32,
-];
+const SOURCES_ONLY: &[vk::Format] = &[vk::Format::B10G11R11_UFLOAT_PACK32, vk::Format::E5B9G9R9_UFLOAT_PACK32];
 
 #[gaurast_runner::test(needs = [Need::Lavapipe], each = shards(4))]
 fn formats_are_converted(case: &Case) {
     exactly(case, |ours, theirs| {
         let last = vk::Format::E5B9G9R9_UFLOAT_PACK32;
-        let [sources, targets] = [
-            vk::FormatFeatureFlags::BLIT_SRC,
-            vk::FormatFeatureFlags::BLIT_DST,
-        ]
-        .map(|feature| {
-            formats(ours, theirs, last, |gpu, format| {
-                gpu.format_features(format).contains(feature)
-            })
-        });
+        let [sources, targets] = [vk::FormatFeatureFlags::BLIT_SRC, vk::FormatFeatureFlags::BLIT_DST]
+            .map(|feature| formats(ours, theirs, last, |gpu, format| gpu.format_features(format).contains(feature)));
         assert!(sources.of_both.len() > 50 && targets.of_both.len() > 30);
         let hubs = [
             vk::Format::R32G32B32A32_UINT,
@@ -289,14 +251,8 @@ fn formats_are_converted(case: &Case) {
             vk::Format::R8G8B8A8_UNORM,
             vk::Format::R8G8B8A8_SRGB,
         ];
-        let from_all = sources
-            .of_both
-            .iter()
-            .flat_map(|&from| hubs.map(|to| (from, to)));
-        let to_all = targets
-            .of_both
-            .iter()
-            .flat_map(|&to| hubs.map(|from| (from, to)));
+        let from_all = sources.of_both.iter().flat_map(|&from| hubs.map(|to| (from, to)));
+        let to_all = targets.of_both.iter().flat_map(|&to| hubs.map(|from| (from, to)));
         let mut findings = Findings::default();
         for (index, (from, to)) in from_all.chain(to_all).enumerate() {
             if !case.shard().has(index) {
@@ -312,11 +268,7 @@ fn formats_are_converted(case: &Case) {
             if is_srgb && device_format(to).components()[0].bits > 8 {
                 continue;
             }
-            let filters: &[_] = if from_class == 2 {
-                &FILTERS
-            } else {
-                &FILTERS[..1]
-            };
+            let filters: &[_] = if from_class == 2 { &FILTERS } else { &FILTERS[..1] };
             // A binary16's step at 2, the step of the shortest mantissa, or the error of weights from binary32
             // coordinates.
             let unit = match device_format(to) {
@@ -330,11 +282,7 @@ fn formats_are_converted(case: &Case) {
                     from: flat(from, 5, 3),
                     to: flat(to, 7, 9),
                     filter,
-                    regions: vec![region(
-                        Aspect::Color,
-                        [[0; 3], [5, 3, 1]],
-                        [[0; 3], [7, 9, 1]],
-                    )],
+                    regions: vec![region(Aspect::Color, [[0; 3], [5, 3, 1]], [[0; 3], [7, 9, 1]])],
                     aspects: vec![Aspect::Color],
                 };
                 findings.check(ours, theirs, &blit, unit);
@@ -358,33 +306,21 @@ const DEPTH_AND_STENCIL: [vk::Format; 6] = [
 
 /// A variant for each format of depth or stencil.
 fn depth_and_stencil() -> Vec<Variant> {
-    DEPTH_AND_STENCIL
-        .map(|format| Variant::new(format!("{format:?}")))
-        .into()
+    DEPTH_AND_STENCIL.map(|format| Variant::new(format!("{format:?}"))).into()
 }
 
 #[gaurast_runner::test(needs = [Need::Lavapipe], each = depth_and_stencil())]
 fn depth_and_stencil_are_scaled(case: &Case) {
-    let format = DEPTH_AND_STENCIL
-        .into_iter()
-        .find(|format| format!("{format:?}") == case.variant())
-        .unwrap();
+    let format = DEPTH_AND_STENCIL.into_iter().find(|format| format!("{format:?}") == case.variant()).unwrap();
     exactly(case, |ours, theirs| {
         let blits = vk::FormatFeatureFlags::BLIT_SRC | vk::FormatFeatureFlags::BLIT_DST;
         assert!(ours.format_features(format).contains(blits));
         if !theirs.format_features(format).contains(blits) {
-            ignore(
-                Missing::Capability,
-                format!("lavapipe does not blit {format:?}"),
-            );
+            ignore(Missing::Capability, format!("lavapipe does not blit {format:?}"));
         }
         let aspects = device_format(format).aspects().to_vec();
         let mut both = region(Aspect::Color, [[0; 3], [9, 7, 1]], [[12, 0, 0], [0, 12, 1]]);
-        let mask = aspects
-            .iter()
-            .fold(vk::ImageAspectFlags::empty(), |all, &aspect| {
-                all | aspect_flags(aspect)
-            });
+        let mask = aspects.iter().fold(vk::ImageAspectFlags::empty(), |all, &aspect| all | aspect_flags(aspect));
         both.src_subresource.aspect_mask = mask;
         both.dst_subresource.aspect_mask = mask;
         let blit = Blit {

@@ -21,29 +21,17 @@ pub struct Formats {
 }
 
 /// Finds the formats up to `last` that devices support for a use; `is_capable` tests one.
-pub fn formats(
-    ours: &Gpu,
-    theirs: &Gpu,
-    last: vk::Format,
-    is_capable: impl Fn(&Gpu, vk::Format) -> bool,
-) -> Formats {
+pub fn formats(ours: &Gpu, theirs: &Gpu, last: vk::Format, is_capable: impl Fn(&Gpu, vk::Format) -> bool) -> Formats {
     let all = (1..=last.as_raw()).map(vk::Format::from_raw);
-    let (of_both, of_ours_alone) = all
-        .filter(|&format| is_capable(ours, format))
-        .partition(|&format| is_capable(theirs, format));
-    Formats {
-        of_both,
-        of_ours_alone,
-    }
+    let (of_both, of_ours_alone) =
+        all.filter(|&format| is_capable(ours, format)).partition(|&format| is_capable(theirs, format));
+    Formats { of_both, of_ours_alone }
 }
 
 /// Ends the test as ignored if lavapipe lacks more formats for `operations` than are known, because fewer formats were
 /// then compared than expected.
 pub fn expect_lacking(operations: &str, lacking: &[vk::Format], known: &[vk::Format]) {
-    let new: Vec<_> = lacking
-        .iter()
-        .filter(|format| !known.contains(format))
-        .collect();
+    let new: Vec<_> = lacking.iter().filter(|format| !known.contains(format)).collect();
     if !new.is_empty() {
         let reason = format!("lavapipe's {operations} lack {new:?}");
         ignore(Missing::Capability, reason);
@@ -61,9 +49,6 @@ pub fn exactly(case: &Case, inside: impl FnOnce(&Gpu, &Gpu)) {
     let exact = "no_aos_sampling,no_quad_lod,no_brilinear,no_rho_approx";
     let manifest = gaurast_runner::lavapipe_manifest().expect("the test needs lavapipe");
     case.run_alone(|command| {
-        command
-            .env("GALLIVM_PERF", exact)
-            .env("VK_DRIVER_FILES", &manifest)
-            .env("VK_ICD_FILENAMES", &manifest);
+        command.env("GALLIVM_PERF", exact).env("VK_DRIVER_FILES", &manifest).env("VK_ICD_FILENAMES", &manifest);
     });
 }

@@ -9,9 +9,7 @@ use crate::devices::words;
 use ash::vk;
 use gaurast_runner::{Case, Need, shards};
 use gaurast_testkit::resource::aspect_format;
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler, device_format,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler, device_format};
 use simdevice::format::Aspect;
 use std::cell::OnceCell;
 
@@ -145,11 +143,7 @@ fn request(kind: Kind, noise: &mut Noise) -> Request {
         // A direction towards a face with the longest axis `major`, of any length.
         let major = (noise.bits() % 3) as usize;
         let scale = 0.5 + noise.unit();
-        let sign = if noise.bits().is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        };
+        let sign = if noise.bits().is_multiple_of(2) { 1.0 } else { -1.0 };
         at[major] = sign * scale;
         for axis in (0..3).filter(|&axis| axis != major) {
             let texel = (noise.bits() % extent[0]) as f32 + 0.1 + 0.8 * noise.unit();
@@ -215,20 +209,14 @@ impl<'a> Bench<'a> {
     }
 
     /// Samples an image of this kind.
-    fn sample(
-        &self,
-        kind: Kind,
-        way: Way,
-        sampler: &vk::SamplerCreateInfo<'_>,
-        requests: &[Request],
-    ) -> Vec<[f32; 4]> {
+    fn sample(&self, kind: Kind, way: Way, sampler: &vk::SamplerCreateInfo<'_>, requests: &[Request]) -> Vec<[f32; 4]> {
         self.requests.write(requests);
         // Only depth images are compared with a reference.
-        let samplers =
-            [false, true].map(|compares| Sampler::new(self.gpu, &sampler.compare_enable(compares)));
-        let images = KINDS.iter().zip(&self.images).map(|(kind, image)| {
-            Resource::Texture(image.view, samplers[usize::from(kind.compares())].raw)
-        });
+        let samplers = [false, true].map(|compares| Sampler::new(self.gpu, &sampler.compare_enable(compares)));
+        let images = KINDS
+            .iter()
+            .zip(&self.images)
+            .map(|(kind, image)| Resource::Texture(image.view, samplers[usize::from(kind.compares())].raw));
         let buffers = [&self.requests, &self.results].map(|buffer| Resource::Storage(buffer.raw));
         let bound: Vec<_> = images.chain(buffers).collect();
         let bindings = Bindings::new(self.gpu, &bound);
@@ -252,11 +240,7 @@ struct Comparison<'a> {
 
 impl<'a> Comparison<'a> {
     fn new(ours: &'a Gpu, theirs: &'a Gpu, color: vk::Format, depth: vk::Format) -> Self {
-        Self {
-            ours: Bench::new(ours, color, depth),
-            theirs: Bench::new(theirs, color, depth),
-            findings: Vec::new(),
-        }
+        Self { ours: Bench::new(ours, color, depth), theirs: Bench::new(theirs, color, depth), findings: Vec::new() }
     }
 
     fn check(&mut self, kind: Kind, way: Way, sampler: &vk::SamplerCreateInfo<'_>) {
@@ -373,11 +357,7 @@ fn comparisons(case: &Case) {
             let mut comparison = Comparison::new(ours, theirs, COLOR, depth);
             for kind in KINDS.into_iter().filter(|kind| kind.compares()) {
                 for (index, op) in (0..8).map(vk::CompareOp::from_raw).enumerate() {
-                    let way = if kind.has_way(WAYS[index % 3]) {
-                        WAYS[index % 3]
-                    } else {
-                        Way::Gradient
-                    };
+                    let way = if kind.has_way(WAYS[index % 3]) { WAYS[index % 3] } else { Way::Gradient };
                     let sampler = sampler(FILTERS[index % FILTERS.len()], index % MODES.len());
                     comparison.check(kind, way, &sampler.compare_op(op));
                 }
@@ -445,11 +425,9 @@ const NOT_FILTERED: &[vk::Format] = &[
 #[gaurast_runner::test(needs = [Need::Lavapipe], each = shards(4))]
 fn every_format_is_filtered(case: &Case) {
     exactly(case, |ours, theirs| {
-        let sampled = vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR
-            | vk::FormatFeatureFlags::TRANSFER_DST;
+        let sampled = vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
         let filtered = formats(ours, theirs, vk::Format::BC7_SRGB_BLOCK, |gpu, format| {
-            gpu.format_features(format).contains(sampled)
-                && device_format(format).aspects() == [Aspect::Color]
+            gpu.format_features(format).contains(sampled) && device_format(format).aspects() == [Aspect::Color]
         });
         let compared = filtered.of_both.iter().filter(|&&format| is_exact(format));
         let compared: Vec<_> = compared.collect();

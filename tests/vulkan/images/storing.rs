@@ -5,9 +5,7 @@ use super::texels::{Noise, distance};
 use crate::devices::words;
 use ash::vk;
 use gaurast_runner::{Case, Need};
-use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, device_format,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, device_format};
 use simdevice::Format;
 use simdevice::format::Numeric;
 use vk::FormatFeatureFlags as Feature;
@@ -57,9 +55,7 @@ fn values(format: Format, noise: &mut Noise) -> Vec<[u32; 4]> {
         Class::Uint => noise.bits() >> (32 - narrowest),
         Class::Sint => (noise.bits().cast_signed() >> (32 - narrowest)).cast_unsigned(),
     };
-    (0..VALUES)
-        .map(|_| [(); 4].map(|()| value(noise)))
-        .collect()
+    (0..VALUES).map(|_| [(); 4].map(|()| value(noise))).collect()
 }
 
 /// The bytes that were stored to the image and the texel buffer, and the values that were fetched.
@@ -80,10 +76,7 @@ fn outcome(gpu: &Gpu, class: Class, formats: Formats, values: &[[u32; 4]]) -> Ou
     let texel_buffer = |format: vk::Format| -> (Buffer, vk::BufferView) {
         let texel_size = device_format(format).texel_size();
         let buffer = Buffer::new(gpu, (VALUES * texel_size) as u64);
-        let info = vk::BufferViewCreateInfo::default()
-            .buffer(buffer.raw)
-            .format(format)
-            .range(vk::WHOLE_SIZE);
+        let info = vk::BufferViewCreateInfo::default().buffer(buffer.raw).format(format).range(vk::WHOLE_SIZE);
         // SAFETY: see the crate.
         let view = unsafe { device.create_buffer_view(&info, None).unwrap() };
         (buffer, view)
@@ -160,15 +153,10 @@ fn every_format_is_stored_and_fetched(case: &Case) {
     exactly(case, |ours, theirs| {
         let mut findings = Vec::new();
         let last = vk::Format::E5B9G9R9_UFLOAT_PACK32;
-        let images = formats(ours, theirs, last, |gpu, format| {
-            gpu.format_features(format).contains(Feature::STORAGE_IMAGE)
-        });
+        let images =
+            formats(ours, theirs, last, |gpu, format| gpu.format_features(format).contains(Feature::STORAGE_IMAGE));
         let buffers = |feature| {
-            formats(ours, theirs, last, |gpu, format| {
-                gpu.format_properties(format)
-                    .buffer_features
-                    .contains(feature)
-            })
+            formats(ours, theirs, last, |gpu, format| gpu.format_properties(format).buffer_features.contains(feature))
         };
         let stored = buffers(Feature::STORAGE_TEXEL_BUFFER);
         let fetched = buffers(Feature::UNIFORM_TEXEL_BUFFER);
@@ -188,10 +176,9 @@ fn every_format_is_stored_and_fetched(case: &Case) {
                 _ => 2.0 / 1024.0,
             };
             let size = plain.texel_size();
-            for (what, can, a, b) in [
-                ("image", can[0], &a.image, &b.image),
-                ("texel buffer", can[1], &a.texels, &b.texels),
-            ] {
+            for (what, can, a, b) in
+                [("image", can[0], &a.image, &b.image), ("texel buffer", can[1], &a.texels, &b.texels)]
+            {
                 let texels = a.chunks_exact(size).zip(b.chunks_exact(size));
                 let apart = texels.map(|(a, b)| distance(plain, a, b, unit));
                 let apart = apart.fold(0.0, f64::max);
@@ -202,11 +189,7 @@ fn every_format_is_stored_and_fetched(case: &Case) {
             let values = a.fetched.iter().zip(&b.fetched);
             let apart = values.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             // lavapipe decodes sRGB by a polynomial with an error of 1e-3.
-            let limit = if plain.numeric() == Numeric::Srgb {
-                1.0 / 255.0
-            } else {
-                1e-6
-            };
+            let limit = if plain.numeric() == Numeric::Srgb { 1.0 / 255.0 } else { 1e-6 };
             if can[2] && apart > limit {
                 findings.push(format!("{format:?} fetched: {apart} apart"));
             }
@@ -214,10 +197,7 @@ fn every_format_is_stored_and_fetched(case: &Case) {
         assert!(findings.is_empty(), "{}", findings.join("\n"));
         // At least as many formats as Vulkan requires.
         let counts = [&images, &stored, &fetched].map(|found| found.of_both.len());
-        assert!(
-            counts[0] >= 16 && counts[1] >= 20 && counts[2] >= 36,
-            "{counts:?}"
-        );
+        assert!(counts[0] >= 16 && counts[1] >= 20 && counts[2] >= 36, "{counts:?}");
         expect_lacking("storage images", &images.of_ours_alone, NOT_STORED);
         expect_lacking("storage texel buffers", &stored.of_ours_alone, NOT_STORED);
         expect_lacking("uniform texel buffers", &fetched.of_ours_alone, NOT_FETCHED);

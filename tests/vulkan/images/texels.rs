@@ -12,10 +12,7 @@ impl Noise {
     }
 
     pub fn bits(&mut self) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 32) as u32
     }
 
@@ -37,9 +34,7 @@ impl Noise {
                 let texel = match format.numeric() {
                     Numeric::Sfloat | Numeric::Ufloat | Numeric::SharedExponent => {
                         let is_depth = format.has(simdevice::format::Channel::D);
-                        format.encode(
-                            [(); 4].map(|()| if is_depth { self.unit() } else { self.float() }),
-                        )
+                        format.encode([(); 4].map(|()| if is_depth { self.unit() } else { self.float() }))
                     }
                     _ => bytemuck::cast([(); 4].map(|()| self.bits())),
                 };
@@ -62,15 +57,13 @@ pub fn distance(format: Format, a: &[u8], b: &[u8], unit: f64) -> f64 {
                 f64::INFINITY
             }
         }
-        Numeric::Sfloat | Numeric::Ufloat | Numeric::SharedExponent => {
-            worst([0, 1, 2, 3].map(|i| {
-                let (x, y) = (f64::from(x[i]), f64::from(y[i]));
-                if x == y || x.is_nan() && y.is_nan() {
-                    return 0.0;
-                }
-                (x - y).abs() / unit
-            }))
-        }
+        Numeric::Sfloat | Numeric::Ufloat | Numeric::SharedExponent => worst([0, 1, 2, 3].map(|i| {
+            let (x, y) = (f64::from(x[i]), f64::from(y[i]));
+            if x == y || x.is_nan() && y.is_nan() {
+                return 0.0;
+            }
+            (x - y).abs() / unit
+        })),
         _ => {
             let mut shift = 0;
             let code = |texel: &[u8], shift: u32, bits: u32| {

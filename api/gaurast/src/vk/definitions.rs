@@ -22,13 +22,13 @@ pub const PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST: vk::PrimitiveTopology =
 
 /// `VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST")]
-pub const STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST:
-    vk::StructureType = vk::StructureType::from_raw(1_000_997_000);
+pub const STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_000);
 
 /// `VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST")]
-pub const STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST:
-    vk::StructureType = vk::StructureType::from_raw(1_000_997_001);
+pub const STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_001);
 
 /// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST")]
@@ -37,13 +37,12 @@ pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST: vk::Struct
 
 /// `VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST")]
-pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST: vk::StructureType =
-    vk::StructureType::from_raw(1_000_997_003);
+pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST: vk::StructureType = vk::StructureType::from_raw(1_000_997_003);
 
 /// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST")]
-pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST:
-    vk::StructureType = vk::StructureType::from_raw(1_000_997_004);
+pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_004);
 
 /// `VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST")]
@@ -57,14 +56,12 @@ pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST: 
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
-pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState =
-    vk::DynamicState::from_raw(1_000_997_000);
+pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_000);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::antialiasing`] is set by
 /// `vkCmdSetGaussianAntialiasingGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST")]
-pub const DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST: vk::DynamicState =
-    vk::DynamicState::from_raw(1_000_997_001);
+pub const DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_001);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::low_pass_variance`] is set by
 /// `vkCmdSetGaussianLowPassVarianceGAURAST`.
@@ -75,14 +72,12 @@ pub const DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST: vk::DynamicState =
 /// [`PipelineGaussianStateCreateInfoGAURAST::alpha_floor`] is set by
 /// `vkCmdSetGaussianAlphaFloorGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST")]
-pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST: vk::DynamicState =
-    vk::DynamicState::from_raw(1_000_997_003);
+pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_003);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::alpha_ceiling`] is set by
 /// `vkCmdSetGaussianAlphaCeilingGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST")]
-pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST: vk::DynamicState =
-    vk::DynamicState::from_raw(1_000_997_004);
+pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_004);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::transmittance_floor`] is set by
 /// `vkCmdSetGaussianTransmittanceFloorGAURAST`.
@@ -689,8 +684,7 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
 }
 
 tagged_structure!(
-    PipelineGaussianStateCreateInfoGAURAST =
-        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
+    PipelineGaussianStateCreateInfoGAURAST = STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
     ExtendsGraphicsPipelineCreateInfo
 );
 
@@ -917,10 +911,7 @@ pub struct GaussianSphericalHarmonicsBufferGAURAST<'a> {
     pub _marker: PhantomData<&'a ()>,
 }
 
-tagged_structure!(
-    GaussianSphericalHarmonicsBufferGAURAST =
-        STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST
-);
+tagged_structure!(GaussianSphericalHarmonicsBufferGAURAST = STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST);
 
 impl Default for GaussianSphericalHarmonicsBufferGAURAST<'_> {
     #[inline]
@@ -1008,13 +999,11 @@ pub type PFN_vkCmdSetGaussianCamerasGAURAST = unsafe extern "system" fn(
 
 /// The type of `vkCmdBeginGaussianSetGAURAST`.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]
-pub type PFN_vkCmdBeginGaussianSetGAURAST =
-    unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
+pub type PFN_vkCmdBeginGaussianSetGAURAST = unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
 
 /// The type of `vkCmdEndGaussianSetGAURAST`.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]
-pub type PFN_vkCmdEndGaussianSetGAURAST =
-    unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
+pub type PFN_vkCmdEndGaussianSetGAURAST = unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
 
 /// The type of `vkCmdSetGaussianOrderGAURAST`.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]
@@ -1023,10 +1012,8 @@ pub type PFN_vkCmdSetGaussianOrderGAURAST =
 
 /// The type of `vkCmdSetGaussianAntialiasingGAURAST`.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]
-pub type PFN_vkCmdSetGaussianAntialiasingGAURAST = unsafe extern "system" fn(
-    command_buffer: vk::CommandBuffer,
-    antialiasing: GaussianAntialiasingGAURAST,
-);
+pub type PFN_vkCmdSetGaussianAntialiasingGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, antialiasing: GaussianAntialiasingGAURAST);
 
 /// The type of `vkCmdSetGaussianLowPassVarianceGAURAST`.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]

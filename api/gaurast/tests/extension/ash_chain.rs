@@ -29,11 +29,8 @@ fn features_chain_to_query_and_device_creation() {
         .gaussian_primitive_topology(true)
         .merged_draws(true);
     let mut core = vk::PhysicalDeviceVulkan12Features::default();
-    let create_info = vk::DeviceCreateInfo::default()
-        .push_next(&mut core)
-        .push_next(&mut enabled);
-    let found: &PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> =
-        next(create_info.p_next);
+    let create_info = vk::DeviceCreateInfo::default().push_next(&mut core).push_next(&mut enabled);
+    let found: &PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> = next(create_info.p_next);
     assert_eq!(found.gaussian_primitive_topology, vk::TRUE);
     assert_eq!(found.merged_draws, vk::TRUE);
     assert_eq!(found.gaussian_2d, vk::FALSE);
@@ -57,14 +54,8 @@ fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     let found: &PipelineGaussianStateCreateInfoGAURAST<'_> = next(create_info.p_next);
     assert_eq!(found.spherical_harmonics_degree, 3);
     assert_eq!(found.attribute_locations.position, 7);
-    assert_eq!(
-        found.attribute_locations.opacity,
-        GAUSSIAN_LOCATION_UNUSED_GAURAST
-    );
-    assert_eq!(
-        found.projection_mode,
-        GaussianProjectionModeGAURAST::FIXED_FUNCTION
-    );
+    assert_eq!(found.attribute_locations.opacity, GAUSSIAN_LOCATION_UNUSED_GAURAST);
+    assert_eq!(found.projection_mode, GaussianProjectionModeGAURAST::FIXED_FUNCTION);
     assert_eq!(found.order, GaussianOrderGAURAST::VIEW_DEPTH);
     assert_eq!(found.low_pass_variance, 0.3);
     assert_eq!(found.alpha_floor, 1.0 / 255.0);
@@ -89,31 +80,20 @@ unsafe extern "system" fn record_cameras(
     }
 }
 
-unsafe extern "system" fn get_device_proc_addr(
-    _device: vk::Device,
-    name: *const c_char,
-) -> vk::PFN_vkVoidFunction {
+unsafe extern "system" fn get_device_proc_addr(_device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: ash passes a terminated string.
     if unsafe { CStr::from_ptr(name) } != c"vkCmdSetGaussianCamerasGAURAST" {
         return None;
     }
     let function: PFN_vkCmdSetGaussianCamerasGAURAST = record_cameras;
     // SAFETY: one function pointer type to another; the caller casts it back.
-    Some(unsafe {
-        std::mem::transmute::<PFN_vkCmdSetGaussianCamerasGAURAST, unsafe extern "system" fn()>(
-            function,
-        )
-    })
+    Some(unsafe { std::mem::transmute::<PFN_vkCmdSetGaussianCamerasGAURAST, unsafe extern "system" fn()>(function) })
 }
 
 #[gaurast_runner::test]
 fn the_command_is_loaded_and_called() {
     let load = |name: &CStr| {
-        if name == c"vkGetDeviceProcAddr" {
-            get_device_proc_addr as *const c_void
-        } else {
-            std::ptr::null()
-        }
+        if name == c"vkGetDeviceProcAddr" { get_device_proc_addr as *const c_void } else { std::ptr::null() }
     };
     // SAFETY: only `vkGetDeviceProcAddr` is called, which is loaded.
     let instance = unsafe { ash::Instance::load_with(load, vk::Instance::from_raw(1)) };

@@ -23,11 +23,7 @@ fn by_camera(camera: &GaussianCameraGAURAST<'_>, p: DVec3) -> ([f64; 2], f64, f6
     if camera.model == GaussianCameraModelGAURAST::ORTHOGRAPHIC {
         ([fx * t.x + cx, fy * t.y + cy], c0 + c1 * t.z, t.z)
     } else {
-        (
-            [fx * t.x / t.z + cx, fy * t.y / t.z + cy],
-            c0 + c1 / t.z,
-            t.z,
-        )
+        ([fx * t.x / t.z + cx, fy * t.y / t.z + cy], c0 + c1 / t.z, t.z)
     }
 }
 
@@ -37,33 +33,15 @@ fn by_matrices(view: DMat4, projection: DMat4, viewport: [f32; 2], p: DVec3) -> 
     let ndc = clip.truncate() / clip.w;
     let [width, height] = viewport.map(f64::from);
     let corner = if height < 0.0 { -height } else { 0.0 };
-    (
-        [
-            (ndc.x + 1.0) * width / 2.0,
-            corner + (ndc.y + 1.0) * height / 2.0,
-        ],
-        ndc.z,
-    )
+    ([(ndc.x + 1.0) * width / 2.0, corner + (ndc.y + 1.0) * height / 2.0], ndc.z)
 }
 
 /// Asserts that camera and matrices agree for points in front of the eye, some off screen.
-fn assert_agrees(
-    camera: &GaussianCameraGAURAST<'_>,
-    view: DMat4,
-    projection: DMat4,
-    viewport: [f32; 2],
-    forward: f64,
-) {
+fn assert_agrees(camera: &GaussianCameraGAURAST<'_>, view: DMat4, projection: DMat4, viewport: [f32; 2], forward: f64) {
     assert!(camera.focal_length.iter().all(|&f| f > 0.0));
     let camera_to_world = view.inverse();
     for distance in [0.5, 1.0, 3.0, 20.0, 90.0] {
-        for (x, y) in [
-            (0.0, 0.0),
-            (0.4, 0.1),
-            (-0.7, 0.3),
-            (0.2, -0.5),
-            (-1.5, -1.2),
-        ] {
+        for (x, y) in [(0.0, 0.0), (0.4, 0.1), (-0.7, 0.3), (0.2, -0.5), (-1.5, -1.2)] {
             let t = DVec3::new(x * distance, y * distance, forward * distance);
             let p = camera_to_world.transform_point3(t);
             let (pixel, depth, z) = by_camera(camera, p);
@@ -74,14 +52,8 @@ fn assert_agrees(
                 let error = (pixel[axis] - expected_pixel[axis]).abs();
                 assert!(error < 1e-6 * scale, "{pixel:?} is not {expected_pixel:?}");
             }
-            assert!(
-                (z - distance).abs() < 1e-5 * distance,
-                "z {z} is not {distance}"
-            );
-            assert!(
-                (depth - expected_depth).abs() < 1e-6,
-                "{depth} is not {expected_depth}"
-            );
+            assert!((z - distance).abs() < 1e-5 * distance, "z {z} is not {distance}");
+            assert!((depth - expected_depth).abs() < 1e-6, "{depth} is not {expected_depth}");
         }
     }
 }
@@ -91,18 +63,11 @@ fn look_at() -> DMat4 {
 }
 
 fn from(view: DMat4, projection: DMat4) -> Result<GaussianCameraGAURAST<'static>, CameraError> {
-    GaussianCameraGAURAST::from_view_projection(
-        &view.to_cols_array_2d(),
-        &projection.to_cols_array_2d(),
-        VIEWPORT,
-    )
+    GaussianCameraGAURAST::from_view_projection(&view.to_cols_array_2d(), &projection.to_cols_array_2d(), VIEWPORT)
 }
 
 fn assert_near(value: f32, expected: f32) {
-    assert!(
-        (value - expected).abs() <= 1e-5 * expected.abs(),
-        "{value} is not {expected}"
-    );
+    assert!((value - expected).abs() <= 1e-5 * expected.abs(), "{value} is not {expected}");
 }
 
 #[gaurast_runner::test]
@@ -139,11 +104,7 @@ fn negative_viewport_height_turns_the_picture_over() {
     )
     .unwrap();
     assert_agrees(&camera, look_at(), projection, viewport, -1.0);
-    let flipped = from(
-        look_at(),
-        vulkan::frustum(-0.05, 0.08, -0.03, 0.06, 0.1, 100.0),
-    )
-    .unwrap();
+    let flipped = from(look_at(), vulkan::frustum(-0.05, 0.08, -0.03, 0.06, 0.1, 100.0)).unwrap();
     assert_eq!(camera.rotation, flipped.rotation);
     assert_eq!(camera.principal_point, flipped.principal_point);
 }
@@ -162,11 +123,7 @@ fn reverse_depth_and_infinite_far_planes() {
     let finite_reverse = directx::perspective(0.9, 16.0 / 9.0, 100.0, 0.1);
     let infinite = directx::perspective_infinite(0.9, 16.0 / 9.0, 0.1);
     let infinite_reverse = directx::perspective_infinite_reverse(0.9, 16.0 / 9.0, 0.1);
-    for (projection, far) in [
-        (finite_reverse, 100.0),
-        (infinite, f32::INFINITY),
-        (infinite_reverse, f32::INFINITY),
-    ] {
+    for (projection, far) in [(finite_reverse, 100.0), (infinite, f32::INFINITY), (infinite_reverse, f32::INFINITY)] {
         let camera = from(look_at(), projection).unwrap();
         assert_near(camera.near_plane, 0.1);
         if far.is_finite() {
@@ -227,13 +184,7 @@ fn single_precision_matrices_are_accepted() {
         VIEWPORT,
     )
     .unwrap();
-    assert_agrees(
-        &camera,
-        view.as_dmat4(),
-        projection.as_dmat4(),
-        VIEWPORT,
-        -1.0,
-    );
+    assert_agrees(&camera, view.as_dmat4(), projection.as_dmat4(), VIEWPORT, -1.0);
 }
 
 #[gaurast_runner::test]
@@ -247,8 +198,7 @@ fn a_panorama_fills_its_viewport() {
     let [x, y] = camera.focal_length.map(f64::from);
     assert!((x * core::f64::consts::TAU - 512.0).abs() < 1e-4);
     assert!((y * core::f64::consts::PI - 256.0).abs() < 1e-4);
-    let error =
-        |axes, viewport| GaussianCameraGAURAST::panorama(axes, [0.0; 3], viewport).unwrap_err();
+    let error = |axes, viewport| GaussianCameraGAURAST::panorama(axes, [0.0; 3], viewport).unwrap_err();
     assert_eq!(error(&axes, [0.0, 8.0]), CameraError::EmptyViewport);
     assert_eq!(error(&axes, [8.0, f32::NAN]), CameraError::NotFinite);
     assert_eq!(error(&[[2.0; 3]; 3], [8.0; 2]), CameraError::NotRigid);
@@ -258,9 +208,7 @@ fn a_panorama_fills_its_viewport() {
 fn a_pose_sees_its_axes() {
     let rotation = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-0.2);
     let rows = rotation.transpose().to_cols_array_2d();
-    let camera =
-        GaussianCameraGAURAST::from_pose(&rows, EYE.to_array(), [500.0, 510.0], [300.0, 190.0])
-            .unwrap();
+    let camera = GaussianCameraGAURAST::from_pose(&rows, EYE.to_array(), [500.0, 510.0], [300.0, 190.0]).unwrap();
     // A point 2 ahead, 0.5 to the right and 0.25 down.
     let p = EYE + rotation * DVec3::new(0.5, 0.25, 2.0);
     let (pixel, _, z) = by_camera(&camera, p);
@@ -280,14 +228,8 @@ fn depth_ranges_agree_with_projections() {
             assert!(error.abs() < 1e-6, "{camera:?} {expected:?}");
         }
     };
-    check(
-        pose.depth_range(0.5, 40.0).unwrap(),
-        perspective(0.5, 40.0).unwrap(),
-    );
-    check(
-        pose.reverse_depth_range(0.5, 40.0).unwrap(),
-        perspective(40.0, 0.5).unwrap(),
-    );
+    check(pose.depth_range(0.5, 40.0).unwrap(), perspective(0.5, 40.0).unwrap());
+    check(pose.reverse_depth_range(0.5, 40.0).unwrap(), perspective(40.0, 0.5).unwrap());
     let infinite = pose.depth_range(0.5, f32::INFINITY).unwrap();
     assert_eq!(infinite.depth_coefficients, [1.0, -0.5]);
     let reverse = pose.reverse_depth_range(0.5, f32::INFINITY).unwrap();
@@ -296,10 +238,7 @@ fn depth_ranges_agree_with_projections() {
     let range = orthographic.depth_range(-1.0, 3.0).unwrap();
     assert_eq!(range.depth_coefficients, [0.25, 0.25]);
     for (near, far) in [(0.0, 1.0), (2.0, 2.0), (1.0, f32::NAN), (-1.0, 1.0)] {
-        assert_eq!(
-            pose.depth_range(near, far).unwrap_err(),
-            CameraError::InvalidDepthRange
-        );
+        assert_eq!(pose.depth_range(near, far).unwrap_err(), CameraError::InvalidDepthRange);
     }
     assert!(orthographic.depth_range(1.0, f32::INFINITY).is_err());
 }
@@ -312,19 +251,13 @@ fn unusable_inputs_are_errors() {
     assert_eq!(error(scaled, projection), CameraError::NotRigid);
     assert_eq!(error(DMat4::ZERO, projection), CameraError::NotRigid);
     assert_eq!(error(DMat4::NAN, projection), CameraError::NotFinite);
-    assert_eq!(
-        error(look_at(), DMat4::ZERO),
-        CameraError::UnsupportedProjection
-    );
+    assert_eq!(error(look_at(), DMat4::ZERO), CameraError::UnsupportedProjection);
     let mut skewed = projection;
     skewed.y_axis.x = 0.5;
     assert_eq!(error(look_at(), skewed), CameraError::UnsupportedProjection);
     let mut oblique = projection;
     oblique.x_axis.z = 0.5;
-    assert_eq!(
-        error(look_at(), oblique),
-        CameraError::UnsupportedProjection
-    );
+    assert_eq!(error(look_at(), oblique), CameraError::UnsupportedProjection);
     let backwards = vulkan_lh::perspective(0.9, 1.0, 0.1, 100.0);
     assert_eq!(error(look_at(), backwards), CameraError::OppositeDirection);
     let narrow = DMat4::from_scale(DVec3::new(1e300, 1.0, 1.0)) * projection;
@@ -345,17 +278,11 @@ fn uniform_data_holds_the_same_camera() {
     let camera = from(look_at(), directx::perspective(0.9, 1.0, 0.1, 100.0)).unwrap();
     let data = GaussianCameraDataGAURAST::from(&camera);
     for row in 0..3 {
-        assert_eq!(
-            data.rotation[row][..3],
-            camera.rotation[3 * row..3 * row + 3]
-        );
+        assert_eq!(data.rotation[row][..3], camera.rotation[3 * row..3 * row + 3]);
     }
     assert_eq!(data.eye, camera.eye);
     assert_eq!(data.focal_length, camera.focal_length);
     assert_eq!(data.principal_point, camera.principal_point);
     assert_eq!(data.depth_coefficients, camera.depth_coefficients);
-    assert_eq!(
-        [data.near_plane, data.far_plane],
-        [camera.near_plane, camera.far_plane]
-    );
+    assert_eq!([data.near_plane, data.far_plane], [camera.near_plane, camera.far_plane]);
 }

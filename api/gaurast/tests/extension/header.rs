@@ -16,32 +16,19 @@ const VULKAN_HEADER: Need = Need::File("/usr/include/vulkan/vulkan.h");
 fn compile(compiler: &str, flags: &[&str], name: &str, assertion: &str) {
     let mut source = String::from("#include <stddef.h>\n#include \"vulkan_gaurast.h\"\n");
     for (expression, value) in expectations() {
-        source +=
-            &format!("{assertion}((long long)({expression}) == {value}LL, \"{expression}\");\n");
+        source += &format!("{assertion}((long long)({expression}) == {value}LL, \"{expression}\");\n");
     }
     let file = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
     std::fs::write(&file, source).expect("written");
     let include = concat!(env!("CARGO_MANIFEST_DIR"), "/../include");
     let output = Command::new(compiler)
         .args(flags)
-        .args([
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Werror",
-            "-fsyntax-only",
-            "-I",
-            include,
-        ])
+        .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only", "-I", include])
         .arg(&file)
         .output();
     std::fs::remove_file(&file).expect("removed");
     let output = output.expect("the compiler runs");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[gaurast_runner::test(needs = [Need::Program("cc"), VULKAN_HEADER])]

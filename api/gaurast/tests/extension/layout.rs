@@ -205,10 +205,7 @@ fn enum_values() {
 
 #[gaurast_runner::test]
 fn debug_prints_names_and_unknown_numbers() {
-    assert_eq!(
-        format!("{:?}", GaussianOrderGAURAST::PER_PIXEL),
-        "PER_PIXEL"
-    );
+    assert_eq!(format!("{:?}", GaussianOrderGAURAST::PER_PIXEL), "PER_PIXEL");
     assert_eq!(format!("{:?}", GaussianOrderGAURAST::from_raw(77)), "77");
     let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b1001);
     assert_eq!(format!("{flags:?}"), "LOG_SCALE | 1000");

@@ -13,199 +13,115 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, sType)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            s_type
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, s_type),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, pNext)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            p_next
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, p_next),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianPrimitiveTopology)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_primitive_topology
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_primitive_topology),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, vertexShaderProjection)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            vertex_shader_projection
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, vertex_shader_projection),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, resolveFragmentShader)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            resolve_fragment_shader
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, resolve_fragment_shader),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, radialDistanceOrder)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            radial_distance_order
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, radial_distance_order),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, primitiveOrder)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            primitive_order
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, primitive_order),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, perPixelOrder)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            per_pixel_order
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, per_pixel_order),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, rasterizationFloat16)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            rasterization_float16
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, rasterization_float16),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, opacityCompensation)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            opacity_compensation
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, opacity_compensation),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, orthographicCamera)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            orthographic_camera
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, orthographic_camera),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, fisheyeCamera)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            fisheye_camera
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, fisheye_camera),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, equirectangularCamera)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            equirectangular_camera
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, equirectangular_camera),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, unscentedProjection)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            unscented_projection
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, unscented_projection),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussian2D)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_2d
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_2d),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, uniformBufferCamera)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            uniform_buffer_camera
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, uniform_buffer_camera),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, mergedDraws)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            merged_draws
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, merged_draws),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianInstancing)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_instancing
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_instancing),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianDepthStencil)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_depth_stencil
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_depth_stencil),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianMultisample)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_multisample
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_multisample),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianApproximation)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_approximation
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_approximation),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianMultiview)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_multiview
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_multiview),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, attributeActivation)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            attribute_activation
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, attribute_activation),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, sphericalHarmonicsBuffer)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            spherical_harmonics_buffer
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, spherical_harmonics_buffer),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianDynamicState)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_dynamic_state
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_dynamic_state),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, resolveGaussianIndices)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            resolve_gaussian_indices
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, resolve_gaussian_indices),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianCutOff)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            gaussian_cut_off
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_cut_off),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, opacityCompensationFloor)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-            opacity_compensation_floor
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, opacity_compensation_floor),
     ),
     (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
@@ -213,73 +129,43 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, sType)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            s_type
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, s_type),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, pNext)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            p_next
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, p_next),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, tileSize)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            tile_size
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, tile_size),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, maxSphericalHarmonicsDegree)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            max_spherical_harmonics_degree
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, max_spherical_harmonics_degree),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, gaussianSampleCounts)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            gaussian_sample_counts
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, gaussian_sample_counts),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, maxGaussiansPerDraw)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            max_gaussians_per_draw
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, max_gaussians_per_draw),
     ),
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, maxGaussiansPerSet)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            max_gaussians_per_set
-        ),
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, max_gaussians_per_set),
     ),
-    (
-        "sizeof(VkGaussianAttributeLocationsGAURAST)",
-        size_of::<GaussianAttributeLocationsGAURAST>(),
-    ),
+    ("sizeof(VkGaussianAttributeLocationsGAURAST)", size_of::<GaussianAttributeLocationsGAURAST>()),
     (
         "offsetof(VkGaussianAttributeLocationsGAURAST, position)",
         offset_of!(GaussianAttributeLocationsGAURAST, position),
     ),
-    (
-        "offsetof(VkGaussianAttributeLocationsGAURAST, scale)",
-        offset_of!(GaussianAttributeLocationsGAURAST, scale),
-    ),
+    ("offsetof(VkGaussianAttributeLocationsGAURAST, scale)", offset_of!(GaussianAttributeLocationsGAURAST, scale)),
     (
         "offsetof(VkGaussianAttributeLocationsGAURAST, rotation)",
         offset_of!(GaussianAttributeLocationsGAURAST, rotation),
     ),
-    (
-        "offsetof(VkGaussianAttributeLocationsGAURAST, opacity)",
-        offset_of!(GaussianAttributeLocationsGAURAST, opacity),
-    ),
+    ("offsetof(VkGaussianAttributeLocationsGAURAST, opacity)", offset_of!(GaussianAttributeLocationsGAURAST, opacity)),
     (
         "offsetof(VkGaussianAttributeLocationsGAURAST, firstSphericalHarmonics)",
         offset_of!(GaussianAttributeLocationsGAURAST, first_spherical_harmonics),
@@ -292,10 +178,7 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkGaussianAttributeLocationsGAURAST, modelOpacity)",
         offset_of!(GaussianAttributeLocationsGAURAST, model_opacity),
     ),
-    (
-        "sizeof(VkGaussianVertexOutputLocationsGAURAST)",
-        size_of::<GaussianVertexOutputLocationsGAURAST>(),
-    ),
+    ("sizeof(VkGaussianVertexOutputLocationsGAURAST)", size_of::<GaussianVertexOutputLocationsGAURAST>()),
     (
         "offsetof(VkGaussianVertexOutputLocationsGAURAST, covariance)",
         offset_of!(GaussianVertexOutputLocationsGAURAST, covariance),
@@ -312,10 +195,7 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkGaussianVertexOutputLocationsGAURAST, depthKey)",
         offset_of!(GaussianVertexOutputLocationsGAURAST, depth_key),
     ),
-    (
-        "sizeof(VkGaussianResolveInputLocationsGAURAST)",
-        size_of::<GaussianResolveInputLocationsGAURAST>(),
-    ),
+    ("sizeof(VkGaussianResolveInputLocationsGAURAST)", size_of::<GaussianResolveInputLocationsGAURAST>()),
     (
         "offsetof(VkGaussianResolveInputLocationsGAURAST, accumulatedColor)",
         offset_of!(GaussianResolveInputLocationsGAURAST, accumulated_color),
@@ -340,10 +220,7 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkGaussianResolveInputLocationsGAURAST, firstCamera)",
         offset_of!(GaussianResolveInputLocationsGAURAST, first_camera),
     ),
-    (
-        "sizeof(VkPipelineGaussianStateCreateInfoGAURAST)",
-        size_of::<PipelineGaussianStateCreateInfoGAURAST<'_>>(),
-    ),
+    ("sizeof(VkPipelineGaussianStateCreateInfoGAURAST)", size_of::<PipelineGaussianStateCreateInfoGAURAST<'_>>()),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, sType)",
         offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, s_type),
@@ -370,31 +247,19 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, sphericalHarmonicsDegree)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            spherical_harmonics_degree
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, spherical_harmonics_degree),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, attributeLocations)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            attribute_locations
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, attribute_locations),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, vertexOutputLocations)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            vertex_output_locations
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, vertex_output_locations),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, resolveInputLocations)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            resolve_input_locations
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, resolve_input_locations),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, order)",
@@ -410,10 +275,7 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, lowPassVariance)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            low_pass_variance
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, low_pass_variance),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, alphaFloor)",
@@ -425,10 +287,7 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, transmittanceFloor)",
-        offset_of!(
-            PipelineGaussianStateCreateInfoGAURAST<'_>,
-            transmittance_floor
-        ),
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, transmittance_floor),
     ),
     (
         "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, cameraSource)",
@@ -452,31 +311,19 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPipelineGaussianApproximationStateCreateInfoGAURAST, sType)",
-        offset_of!(
-            PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
-            s_type
-        ),
+        offset_of!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, s_type),
     ),
     (
         "offsetof(VkPipelineGaussianApproximationStateCreateInfoGAURAST, pNext)",
-        offset_of!(
-            PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
-            p_next
-        ),
+        offset_of!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, p_next),
     ),
     (
         "offsetof(VkPipelineGaussianApproximationStateCreateInfoGAURAST, exponentialError)",
-        offset_of!(
-            PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
-            exponential_error
-        ),
+        offset_of!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, exponential_error),
     ),
     (
         "offsetof(VkPipelineGaussianApproximationStateCreateInfoGAURAST, contributionBudget)",
-        offset_of!(
-            PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
-            contribution_budget
-        ),
+        offset_of!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, contribution_budget),
     ),
     (
         "sizeof(VkPipelineGaussianFootprintStateCreateInfoGAURAST)",
@@ -496,66 +343,24 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, cutOffDeviations)",
-        offset_of!(
-            PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
-            cut_off_deviations
-        ),
+        offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, cut_off_deviations),
     ),
     (
         "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, compensationFloor)",
-        offset_of!(
-            PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
-            compensation_floor
-        ),
+        offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, compensation_floor),
     ),
-    (
-        "sizeof(VkGaussianCameraGAURAST)",
-        size_of::<GaussianCameraGAURAST<'_>>(),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, sType)",
-        offset_of!(GaussianCameraGAURAST<'_>, s_type),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, pNext)",
-        offset_of!(GaussianCameraGAURAST<'_>, p_next),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, eye)",
-        offset_of!(GaussianCameraGAURAST<'_>, eye),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, model)",
-        offset_of!(GaussianCameraGAURAST<'_>, model),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, rotation)",
-        offset_of!(GaussianCameraGAURAST<'_>, rotation),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, focalLength)",
-        offset_of!(GaussianCameraGAURAST<'_>, focal_length),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, principalPoint)",
-        offset_of!(GaussianCameraGAURAST<'_>, principal_point),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, depthCoefficients)",
-        offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, nearPlane)",
-        offset_of!(GaussianCameraGAURAST<'_>, near_plane),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, farPlane)",
-        offset_of!(GaussianCameraGAURAST<'_>, far_plane),
-    ),
-    (
-        "sizeof(VkGaussianSphericalHarmonicsBufferGAURAST)",
-        size_of::<GaussianSphericalHarmonicsBufferGAURAST<'_>>(),
-    ),
+    ("sizeof(VkGaussianCameraGAURAST)", size_of::<GaussianCameraGAURAST<'_>>()),
+    ("offsetof(VkGaussianCameraGAURAST, sType)", offset_of!(GaussianCameraGAURAST<'_>, s_type)),
+    ("offsetof(VkGaussianCameraGAURAST, pNext)", offset_of!(GaussianCameraGAURAST<'_>, p_next)),
+    ("offsetof(VkGaussianCameraGAURAST, eye)", offset_of!(GaussianCameraGAURAST<'_>, eye)),
+    ("offsetof(VkGaussianCameraGAURAST, model)", offset_of!(GaussianCameraGAURAST<'_>, model)),
+    ("offsetof(VkGaussianCameraGAURAST, rotation)", offset_of!(GaussianCameraGAURAST<'_>, rotation)),
+    ("offsetof(VkGaussianCameraGAURAST, focalLength)", offset_of!(GaussianCameraGAURAST<'_>, focal_length)),
+    ("offsetof(VkGaussianCameraGAURAST, principalPoint)", offset_of!(GaussianCameraGAURAST<'_>, principal_point)),
+    ("offsetof(VkGaussianCameraGAURAST, depthCoefficients)", offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients)),
+    ("offsetof(VkGaussianCameraGAURAST, nearPlane)", offset_of!(GaussianCameraGAURAST<'_>, near_plane)),
+    ("offsetof(VkGaussianCameraGAURAST, farPlane)", offset_of!(GaussianCameraGAURAST<'_>, far_plane)),
+    ("sizeof(VkGaussianSphericalHarmonicsBufferGAURAST)", size_of::<GaussianSphericalHarmonicsBufferGAURAST<'_>>()),
     (
         "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, sType)",
         offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, s_type),
@@ -582,84 +387,41 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ),
     (
         "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, coefficientStride)",
-        offset_of!(
-            GaussianSphericalHarmonicsBufferGAURAST<'_>,
-            coefficient_stride
-        ),
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, coefficient_stride),
     ),
-    (
-        "sizeof(VkGaussianCameraDataGAURAST)",
-        size_of::<GaussianCameraDataGAURAST>(),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, eye)",
-        offset_of!(GaussianCameraDataGAURAST, eye),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, model)",
-        offset_of!(GaussianCameraDataGAURAST, model),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, reserved)",
-        offset_of!(GaussianCameraDataGAURAST, reserved),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, rotation)",
-        offset_of!(GaussianCameraDataGAURAST, rotation),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, focalLength)",
-        offset_of!(GaussianCameraDataGAURAST, focal_length),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, principalPoint)",
-        offset_of!(GaussianCameraDataGAURAST, principal_point),
-    ),
+    ("sizeof(VkGaussianCameraDataGAURAST)", size_of::<GaussianCameraDataGAURAST>()),
+    ("offsetof(VkGaussianCameraDataGAURAST, eye)", offset_of!(GaussianCameraDataGAURAST, eye)),
+    ("offsetof(VkGaussianCameraDataGAURAST, model)", offset_of!(GaussianCameraDataGAURAST, model)),
+    ("offsetof(VkGaussianCameraDataGAURAST, reserved)", offset_of!(GaussianCameraDataGAURAST, reserved)),
+    ("offsetof(VkGaussianCameraDataGAURAST, rotation)", offset_of!(GaussianCameraDataGAURAST, rotation)),
+    ("offsetof(VkGaussianCameraDataGAURAST, focalLength)", offset_of!(GaussianCameraDataGAURAST, focal_length)),
+    ("offsetof(VkGaussianCameraDataGAURAST, principalPoint)", offset_of!(GaussianCameraDataGAURAST, principal_point)),
     (
         "offsetof(VkGaussianCameraDataGAURAST, depthCoefficients)",
         offset_of!(GaussianCameraDataGAURAST, depth_coefficients),
     ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, nearPlane)",
-        offset_of!(GaussianCameraDataGAURAST, near_plane),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, farPlane)",
-        offset_of!(GaussianCameraDataGAURAST, far_plane),
-    ),
-    (
-        "offsetof(VkGaussianCameraDataGAURAST, padding)",
-        offset_of!(GaussianCameraDataGAURAST, padding),
-    ),
+    ("offsetof(VkGaussianCameraDataGAURAST, nearPlane)", offset_of!(GaussianCameraDataGAURAST, near_plane)),
+    ("offsetof(VkGaussianCameraDataGAURAST, farPlane)", offset_of!(GaussianCameraDataGAURAST, far_plane)),
+    ("offsetof(VkGaussianCameraDataGAURAST, padding)", offset_of!(GaussianCameraDataGAURAST, padding)),
 ];
 
 /// Values of enums, flags and constants.
 pub const VALUES: &[(&str, i64)] = &[
-    (
-        "VK_GAUSSIAN_LOCATION_UNUSED_GAURAST",
-        GAUSSIAN_LOCATION_UNUSED_GAURAST as i64,
-    ),
-    (
-        "VK_PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST",
-        PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw() as i64,
-    ),
+    ("VK_GAUSSIAN_LOCATION_UNUSED_GAURAST", GAUSSIAN_LOCATION_UNUSED_GAURAST as i64),
+    ("VK_PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST", PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw() as i64),
     (
         "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST",
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST.as_raw() as i64,
     ),
     (
         "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST",
-        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST.as_raw()
-            as i64,
+        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST.as_raw() as i64,
     ),
     (
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
-    (
-        "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST",
-        STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST.as_raw() as i64,
-    ),
+    ("VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST", STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST.as_raw() as i64),
     (
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
@@ -672,26 +434,14 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
-    (
-        "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST",
-        DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64,
-    ),
-    (
-        "VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST",
-        DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64,
-    ),
+    ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
+    ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),
     (
         "VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST",
         DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST.as_raw() as i64,
     ),
-    (
-        "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST",
-        DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST.as_raw() as i64,
-    ),
-    (
-        "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST",
-        DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST.as_raw() as i64,
-    ),
+    ("VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST", DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST.as_raw() as i64),
+    ("VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST.as_raw() as i64),
     (
         "VK_DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST",
         DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST.as_raw() as i64,
@@ -712,98 +462,32 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION_GAURAST",
         GaussianProjectionModeGAURAST::FIXED_FUNCTION.as_raw() as i64,
     ),
-    (
-        "VK_GAUSSIAN_PROJECTION_MODE_VERTEX_SHADER_GAURAST",
-        GaussianProjectionModeGAURAST::VERTEX_SHADER.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_GEOMETRY_GAUSSIAN_3D_GAURAST",
-        GaussianGeometryGAURAST::GAUSSIAN_3D.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_GEOMETRY_GAUSSIAN_2D_GAURAST",
-        GaussianGeometryGAURAST::GAUSSIAN_2D.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_LINEARIZATION_JACOBIAN_GAURAST",
-        GaussianLinearizationGAURAST::JACOBIAN.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_LINEARIZATION_UNSCENTED_GAURAST",
-        GaussianLinearizationGAURAST::UNSCENTED.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_ORDER_VIEW_DEPTH_GAURAST",
-        GaussianOrderGAURAST::VIEW_DEPTH.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_ORDER_RADIAL_DISTANCE_GAURAST",
-        GaussianOrderGAURAST::RADIAL_DISTANCE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_ORDER_PRIMITIVE_GAURAST",
-        GaussianOrderGAURAST::PRIMITIVE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST",
-        GaussianOrderGAURAST::PER_PIXEL.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_PRECISION_FLOAT32_GAURAST",
-        GaussianPrecisionGAURAST::FLOAT32.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_PRECISION_FLOAT16_GAURAST",
-        GaussianPrecisionGAURAST::FLOAT16.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_ANTIALIASING_DILATE_GAURAST",
-        GaussianAntialiasingGAURAST::DILATE.as_raw() as i64,
-    ),
+    ("VK_GAUSSIAN_PROJECTION_MODE_VERTEX_SHADER_GAURAST", GaussianProjectionModeGAURAST::VERTEX_SHADER.as_raw() as i64),
+    ("VK_GAUSSIAN_GEOMETRY_GAUSSIAN_3D_GAURAST", GaussianGeometryGAURAST::GAUSSIAN_3D.as_raw() as i64),
+    ("VK_GAUSSIAN_GEOMETRY_GAUSSIAN_2D_GAURAST", GaussianGeometryGAURAST::GAUSSIAN_2D.as_raw() as i64),
+    ("VK_GAUSSIAN_LINEARIZATION_JACOBIAN_GAURAST", GaussianLinearizationGAURAST::JACOBIAN.as_raw() as i64),
+    ("VK_GAUSSIAN_LINEARIZATION_UNSCENTED_GAURAST", GaussianLinearizationGAURAST::UNSCENTED.as_raw() as i64),
+    ("VK_GAUSSIAN_ORDER_VIEW_DEPTH_GAURAST", GaussianOrderGAURAST::VIEW_DEPTH.as_raw() as i64),
+    ("VK_GAUSSIAN_ORDER_RADIAL_DISTANCE_GAURAST", GaussianOrderGAURAST::RADIAL_DISTANCE.as_raw() as i64),
+    ("VK_GAUSSIAN_ORDER_PRIMITIVE_GAURAST", GaussianOrderGAURAST::PRIMITIVE.as_raw() as i64),
+    ("VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST", GaussianOrderGAURAST::PER_PIXEL.as_raw() as i64),
+    ("VK_GAUSSIAN_PRECISION_FLOAT32_GAURAST", GaussianPrecisionGAURAST::FLOAT32.as_raw() as i64),
+    ("VK_GAUSSIAN_PRECISION_FLOAT16_GAURAST", GaussianPrecisionGAURAST::FLOAT16.as_raw() as i64),
+    ("VK_GAUSSIAN_ANTIALIASING_DILATE_GAURAST", GaussianAntialiasingGAURAST::DILATE.as_raw() as i64),
     (
         "VK_GAUSSIAN_ANTIALIASING_OPACITY_COMPENSATED_GAURAST",
         GaussianAntialiasingGAURAST::OPACITY_COMPENSATED.as_raw() as i64,
     ),
-    (
-        "VK_GAUSSIAN_CAMERA_SOURCE_COMMAND_GAURAST",
-        GaussianCameraSourceGAURAST::COMMAND.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CAMERA_SOURCE_UNIFORM_BUFFER_GAURAST",
-        GaussianCameraSourceGAURAST::UNIFORM_BUFFER.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CAMERA_MODEL_PINHOLE_GAURAST",
-        GaussianCameraModelGAURAST::PINHOLE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CAMERA_MODEL_ORTHOGRAPHIC_GAURAST",
-        GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CAMERA_MODEL_FISHEYE_GAURAST",
-        GaussianCameraModelGAURAST::FISHEYE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST",
-        GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CUT_OFF_NONE_GAURAST",
-        GaussianCutOffGAURAST::NONE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST",
-        GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST",
-        GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64,
-    ),
-    (
-        "VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST",
-        GaussianCutOffGAURAST::TILE_RECTANGLE.as_raw() as i64,
-    ),
+    ("VK_GAUSSIAN_CAMERA_SOURCE_COMMAND_GAURAST", GaussianCameraSourceGAURAST::COMMAND.as_raw() as i64),
+    ("VK_GAUSSIAN_CAMERA_SOURCE_UNIFORM_BUFFER_GAURAST", GaussianCameraSourceGAURAST::UNIFORM_BUFFER.as_raw() as i64),
+    ("VK_GAUSSIAN_CAMERA_MODEL_PINHOLE_GAURAST", GaussianCameraModelGAURAST::PINHOLE.as_raw() as i64),
+    ("VK_GAUSSIAN_CAMERA_MODEL_ORTHOGRAPHIC_GAURAST", GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw() as i64),
+    ("VK_GAUSSIAN_CAMERA_MODEL_FISHEYE_GAURAST", GaussianCameraModelGAURAST::FISHEYE.as_raw() as i64),
+    ("VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST", GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64),
+    ("VK_GAUSSIAN_CUT_OFF_NONE_GAURAST", GaussianCutOffGAURAST::NONE.as_raw() as i64),
+    ("VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST", GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64),
+    ("VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST", GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64),
+    ("VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST", GaussianCutOffGAURAST::TILE_RECTANGLE.as_raw() as i64),
     (
         "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST",
         PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE.as_raw() as i64,

@@ -31,8 +31,7 @@ pub(super) unsafe extern "system" fn create_instance(
         let Some(create) = get(vk::Instance::null(), c"vkCreateInstance".as_ptr()) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        let create =
-            std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
+        let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
             let register = AssertUnwindSafe(|| Instance::register(*instance, &link));
@@ -118,17 +117,14 @@ pub(super) unsafe extern "system" fn create_device(
         let Some(create) = get(instance.handle, c"vkCreateDevice".as_ptr()) else {
             return failed;
         };
-        let create =
-            std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
+        let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
         let result = create(physical_device, info, allocator, device);
         let (info, created) = (&*info, (result == vk::Result::SUCCESS).then(|| *device));
         let looked = catch_unwind(AssertUnwindSafe(|| {
             look(physical_device, info, created, &instance, &link);
         }));
         if looked.is_err() {
-            eprintln!(
-                "VK_LAYER_GAURAST_validation: a defect of the layer; a device goes unchecked"
-            );
+            eprintln!("VK_LAYER_GAURAST_validation: a defect of the layer; a device goes unchecked");
         }
         result
     }
@@ -146,15 +142,11 @@ unsafe fn look(
     let mut faults = Faults::default();
     // SAFETY: the caller's promise.
     let (names, features, can) = unsafe {
-        let names = slice(
-            info.pp_enabled_extension_names,
-            info.enabled_extension_count,
-        );
+        let names = slice(info.pp_enabled_extension_names, info.enabled_extension_count);
         let names: Vec<&CStr> = names.iter().map(|&name| string(name)).collect();
         let mut structures = chain(info.p_next);
         let found = structures.find(|s| s.s_type == FeaturesStructure::STRUCTURE_TYPE);
-        let features = found
-            .map(|found| Features::of(&*std::ptr::from_ref(found).cast::<FeaturesStructure<'_>>()));
+        let features = found.map(|found| Features::of(&*std::ptr::from_ref(found).cast::<FeaturesStructure<'_>>()));
         (names, features, supported(physical_device, instance))
     };
     rules::device::check(&names, features.as_ref(), can.as_ref(), &mut faults);
@@ -210,10 +202,7 @@ unsafe fn facts(
     }
     let types = memory.memory_types_as_slice().iter().enumerate();
     let mappable = types
-        .filter(|(_, ty)| {
-            ty.property_flags
-                .contains(vk::MemoryPropertyFlags::HOST_VISIBLE)
-        })
+        .filter(|(_, ty)| ty.property_flags.contains(vk::MemoryPropertyFlags::HOST_VISIBLE))
         .fold(0, |bits, (index, _)| bits | 1 << index);
     Facts {
         has_extension: is_enabled,

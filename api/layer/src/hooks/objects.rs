@@ -169,17 +169,11 @@ fn subpass_of(
     Subpass {
         view_mask,
         colors: colors.collect(),
-        depth: depth
-            .and_then(at)
-            .map(|(format, _)| format)
-            .unwrap_or_default(),
+        depth: depth.and_then(at).map(|(format, _)| format).unwrap_or_default(),
     }
 }
 
-pub(super) unsafe extern "system" fn destroy_device(
-    device: vk::Device,
-    allocator: *const vk::AllocationCallbacks<'_>,
-) {
+pub(super) unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const vk::AllocationCallbacks<'_>) {
     if device == vk::Device::null() {
         return;
     }
@@ -205,9 +199,7 @@ pub(super) unsafe extern "system" fn map_memory(
     // SAFETY: see the module above.
     unsafe {
         map(device, memory, [offset, size], data, |own| {
-            Some(own.next.map_memory?(
-                device, memory, offset, size, flags, data,
-            ))
+            Some(own.next.map_memory?(device, memory, offset, size, flags, data))
         })
     }
 }
@@ -220,9 +212,7 @@ pub(super) unsafe extern "system" fn map_memory2(
     // SAFETY: see the module above.
     unsafe {
         let range = [(*info).offset, (*info).size];
-        map(device, (*info).memory, range, data, |own| {
-            Some(own.next.map_memory2?(device, info, data))
-        })
+        map(device, (*info).memory, range, data, |own| Some(own.next.map_memory2?(device, info, data)))
     }
 }
 
@@ -268,11 +258,7 @@ pub(super) unsafe extern "system" fn unmap_memory2(
     info: *const vk::MemoryUnmapInfoKHR<'_>,
 ) -> vk::Result {
     // SAFETY: see the module above.
-    unsafe {
-        unmap(device, (*info).memory, |own| {
-            Some(own.next.unmap_memory2?(device, info))
-        })
-    }
+    unsafe { unmap(device, (*info).memory, |own| Some(own.next.unmap_memory2?(device, info))) }
 }
 
 /// Unmaps memory by `next`.
@@ -410,14 +396,8 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
 }
 
 fn pipeline_of(request: Request, serial: u64) -> Pipeline {
-    let is_blended = request
-        .blend
-        .first()
-        .is_some_and(|blend| blend.blend_enable != 0);
-    let writes = request
-        .blend
-        .first()
-        .is_some_and(|blend| !blend.color_write_mask.is_empty());
+    let is_blended = request.blend.first().is_some_and(|blend| blend.blend_enable != 0);
+    let writes = request.blend.first().is_some_and(|blend| !blend.color_write_mask.is_empty());
     let has_fragment = request.has(vk::ShaderStageFlags::FRAGMENT);
     let (bindings, attributes) = request.vertex_input.unwrap_or_default();
     Pipeline {
@@ -510,33 +490,21 @@ pub(super) unsafe extern "system" fn reset_descriptor_pool(
 /// The types of descriptors that are buffers with an offset and a range.
 fn is_buffer(ty: vk::DescriptorType) -> bool {
     use vk::DescriptorType as Type;
-    [
-        Type::UNIFORM_BUFFER,
-        Type::UNIFORM_BUFFER_DYNAMIC,
-        Type::STORAGE_BUFFER,
-        Type::STORAGE_BUFFER_DYNAMIC,
-    ]
-    .contains(&ty)
+    [Type::UNIFORM_BUFFER, Type::UNIFORM_BUFFER_DYNAMIC, Type::STORAGE_BUFFER, Type::STORAGE_BUFFER_DYNAMIC]
+        .contains(&ty)
 }
 
 /// Reports whether shaders may write through a descriptor.
 pub(super) fn is_storage(ty: vk::DescriptorType) -> bool {
     use vk::DescriptorType as Type;
-    [
-        Type::STORAGE_BUFFER,
-        Type::STORAGE_BUFFER_DYNAMIC,
-        Type::STORAGE_TEXEL_BUFFER,
-    ]
-    .contains(&ty)
+    [Type::STORAGE_BUFFER, Type::STORAGE_BUFFER_DYNAMIC, Type::STORAGE_TEXEL_BUFFER].contains(&ty)
 }
 
 /// The buffers that a write of descriptors names, by binding; those of arrays beyond the first are left out.
 ///
 /// # Safety
 /// The write is valid.
-pub(super) unsafe fn written_buffers(
-    write: &vk::WriteDescriptorSet<'_>,
-) -> Vec<(u32, vk::DescriptorBufferInfo)> {
+pub(super) unsafe fn written_buffers(write: &vk::WriteDescriptorSet<'_>) -> Vec<(u32, vk::DescriptorBufferInfo)> {
     if !is_buffer(write.descriptor_type) {
         return Vec::new();
     }
@@ -570,8 +538,7 @@ pub(super) unsafe extern "system" fn update_descriptor_sets(
                 };
                 let first = buffers.first().filter(|_| write.dst_array_element == 0);
                 if let Some(&(binding, info)) = first {
-                    set.buffers
-                        .insert(binding, (info.buffer, info.offset, info.range));
+                    set.buffers.insert(binding, (info.buffer, info.offset, info.range));
                 }
             }
             for copy in slice(copies, copy_count) {

@@ -85,15 +85,10 @@ pub(super) unsafe extern "system" fn begin_command_buffer(
                 return;
             };
             let subpass = match objects.render_passes.get(&inherited.render_pass) {
-                Some(pass) => pass
-                    .get(inherited.subpass as usize)
-                    .cloned()
-                    .unwrap_or_default(),
+                Some(pass) => pass.get(inherited.subpass as usize).cloned().unwrap_or_default(),
                 None => Subpass {
-                    view_mask: find::<vk::CommandBufferInheritanceRenderingInfo<'_>>(
-                        inherited.p_next,
-                    )
-                    .map_or(0, |rendering| rendering.view_mask),
+                    view_mask: find::<vk::CommandBufferInheritanceRenderingInfo<'_>>(inherited.p_next)
+                        .map_or(0, |rendering| rendering.view_mask),
                     ..Subpass::default()
                 },
             };
@@ -449,9 +444,7 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
         own.observe(|state, faults| {
             let executed = slice(buffers, count).iter();
             let executed = executed.filter_map(|commands| state.recordings.get(commands));
-            let operations: Vec<_> = executed
-                .flat_map(|other| other.operations.clone())
-                .collect();
+            let operations: Vec<_> = executed.flat_map(|other| other.operations.clone()).collect();
             let (recording, _) = state.recording(commands);
             rules::set::require_ended(recording, "vkCmdExecuteCommands", faults);
             recording.operations.extend(operations);
@@ -464,27 +457,17 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
 }
 
 fn is_dynamic(ty: vk::DescriptorType) -> bool {
-    ty == vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
-        || ty == vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
+    ty == vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC || ty == vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
 }
 
-fn set_viewport(
-    recording: &mut Recording,
-    viewport: Option<&vk::Viewport>,
-    state: vk::DynamicState,
-) {
+fn set_viewport(recording: &mut Recording, viewport: Option<&vk::Viewport>, state: vk::DynamicState) {
     let Some(v) = viewport else { return };
     recording.viewport = Some([v.x, v.y, v.width, v.height]);
     recording.set_dynamic(state, format!("{v:?}"));
 }
 
 /// A value of the front faces' stencil state, which Gaussians have.
-fn set_front(
-    recording: &mut Recording,
-    faces: vk::StencilFaceFlags,
-    state: vk::DynamicState,
-    value: u32,
-) {
+fn set_front(recording: &mut Recording, faces: vk::StencilFaceFlags, state: vk::DynamicState, value: u32) {
     if faces.contains(vk::StencilFaceFlags::FRONT) {
         recording.set_dynamic(state, value.to_ne_bytes());
     }
@@ -497,10 +480,7 @@ fn set_own(recording: &mut Recording, state: vk::DynamicState, bits: u32, faults
     }
 }
 
-fn begin_render_pass(
-    (recording, objects): (&mut Recording, &mut Objects),
-    begin: &vk::RenderPassBeginInfo<'_>,
-) {
+fn begin_render_pass((recording, objects): (&mut Recording, &mut Objects), begin: &vk::RenderPassBeginInfo<'_>) {
     let pass = objects.render_passes.get(&begin.render_pass).cloned();
     let subpass = pass.as_ref().and_then(|pass| pass.first().cloned());
     recording.begin_pass(subpass.unwrap_or_default(), pass.map(|pass| (pass, 0)));

@@ -35,8 +35,7 @@ pub(super) unsafe extern "system" fn queue_submit(
             return FAILED;
         };
         let submits_ = slice(submits, count).iter();
-        let commands = submits_
-            .flat_map(|submit| slice(submit.p_command_buffers, submit.command_buffer_count));
+        let commands = submits_.flat_map(|submit| slice(submit.p_command_buffers, submit.command_buffer_count));
         let commands: Vec<_> = commands.copied().collect();
         own.observe(|state, faults| execute(&own, state, &commands, faults));
         next(queue, count, submits, fence)
@@ -57,12 +56,9 @@ pub(super) unsafe extern "system" fn queue_submit2(
         let Some(next) = own.next.queue_submit2 else {
             return FAILED;
         };
-        let infos = slice(submits, count).iter().flat_map(|submit| {
-            slice(
-                submit.p_command_buffer_infos,
-                submit.command_buffer_info_count,
-            )
-        });
+        let infos = slice(submits, count)
+            .iter()
+            .flat_map(|submit| slice(submit.p_command_buffer_infos, submit.command_buffer_info_count));
         let commands: Vec<_> = infos.map(|info| info.command_buffer).collect();
         own.observe(|state, faults| execute(&own, state, &commands, faults));
         next(queue, count, submits, fence)
@@ -70,28 +66,16 @@ pub(super) unsafe extern "system" fn queue_submit2(
 }
 
 /// Follows what command buffers do, in order.
-fn execute(
-    device: &Device,
-    state: &mut State,
-    commands: &[vk::CommandBuffer],
-    faults: &mut Faults,
-) {
-    let recordings = commands
-        .iter()
-        .filter_map(|commands| state.recordings.get(commands));
-    let operations: Vec<_> = recordings
-        .flat_map(|recording| recording.operations.clone())
-        .collect();
+fn execute(device: &Device, state: &mut State, commands: &[vk::CommandBuffer], faults: &mut Faults) {
+    let recordings = commands.iter().filter_map(|commands| state.recordings.get(commands));
+    let operations: Vec<_> = recordings.flat_map(|recording| recording.operations.clone()).collect();
     for operation in operations {
         let objects = &mut state.objects;
         match operation {
             Operation::Copy(from, to, regions) => copy(device, objects, from, to, &regions),
             Operation::Update(to, offset, bytes) => write(objects, to, offset, bytes),
             Operation::Fill(to, offset, size, word) => {
-                let rest = objects
-                    .buffers
-                    .get(&to)
-                    .map_or(0, |buffer| buffer.size.saturating_sub(offset));
+                let rest = objects.buffers.get(&to).map_or(0, |buffer| buffer.size.saturating_sub(offset));
                 let size = if size == vk::WHOLE_SIZE { rest } else { size };
                 if size > MOST_BYTES {
                     forget(objects, to, offset, size);
@@ -112,15 +96,10 @@ fn execute(
 
 /// Looks at a draw's contents, once.
 fn look(device: &Device, state: &mut State, draw: &Draw, faults: &mut Faults) {
-    if draw.was_checked.swap(true, Ordering::Relaxed)
-        || !state.checked.insert(key(draw, &state.objects))
-    {
+    if draw.was_checked.swap(true, Ordering::Relaxed) || !state.checked.insert(key(draw, &state.objects)) {
         return;
     }
-    let contents = Contents {
-        device,
-        objects: &state.objects,
-    };
+    let contents = Contents { device, objects: &state.objects };
     contents::check(draw, &contents, &device.facts, faults);
 }
 
@@ -140,19 +119,10 @@ fn key(draw: &Draw, objects: &Objects) -> u64 {
 }
 
 fn serial(objects: &Objects, buffer: vk::Buffer) -> u64 {
-    objects
-        .buffers
-        .get(&buffer)
-        .map_or(0, |buffer| buffer.serial)
+    objects.buffers.get(&buffer).map_or(0, |buffer| buffer.serial)
 }
 
-fn copy(
-    device: &Device,
-    objects: &mut Objects,
-    from: vk::Buffer,
-    to: vk::Buffer,
-    regions: &[vk::BufferCopy],
-) {
+fn copy(device: &Device, objects: &mut Objects, from: vk::Buffer, to: vk::Buffer, regions: &[vk::BufferCopy]) {
     for region in regions {
         let bytes = if region.size > MOST_BYTES {
             None
@@ -169,10 +139,7 @@ fn copy(
 
 /// Reports whether the host may map a buffer's memory.
 fn is_mappable(objects: &Objects, buffer: vk::Buffer) -> bool {
-    let memory = objects
-        .buffers
-        .get(&buffer)
-        .and_then(|buffer| buffer.memory);
+    let memory = objects.buffers.get(&buffer).and_then(|buffer| buffer.memory);
     let memory = memory.and_then(|(memory, _)| objects.memories.get(&memory));
     memory.is_some_and(|memory| memory.is_mappable)
 }
@@ -227,10 +194,7 @@ impl Contents<'_> {
 impl Reader for Contents<'_> {
     fn read(&self, buffer: vk::Buffer, offset: u64, length: u64) -> Option<Vec<u8>> {
         let length = usize::try_from(length).ok()?;
-        self.objects
-            .read(buffer, offset, length, |memory, offset, bytes| {
-                self.read_unmapped(memory, offset, bytes)
-            })
+        self.objects.read(buffer, offset, length, |memory, offset, bytes| self.read_unmapped(memory, offset, bytes))
     }
 
     fn size(&self, buffer: vk::Buffer) -> Option<u64> {
@@ -243,26 +207,20 @@ impl Reader for Contents<'_> {
             return pushed.map(Ok);
         }
         let Some(bound) = &draw.camera_set else {
-            return Some(Err(format!(
-                "no descriptor set is bound at cameraSet ({set})"
-            )));
+            return Some(Err(format!("no descriptor set is bound at cameraSet ({set})")));
         };
         let known = self.objects.sets.get(&bound.set)?;
         if known.is_unknown {
             return None;
         }
         let Some(&(buffer, offset, range)) = known.buffers.get(&binding) else {
-            return Some(Err(format!(
-                "the descriptor at set {set}, binding {binding} was not written"
-            )));
+            return Some(Err(format!("the descriptor at set {set}, binding {binding} was not written")));
         };
         let layout = known.layout.as_ref()?;
         let offsets: HashMap<u32, u32> = (layout.iter())
             .filter(|other| {
-                let (uniform, storage) = (
-                    vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC,
-                    vk::DescriptorType::STORAGE_BUFFER_DYNAMIC,
-                );
+                let (uniform, storage) =
+                    (vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC, vk::DescriptorType::STORAGE_BUFFER_DYNAMIC);
                 other.ty == uniform || other.ty == storage
             })
             .flat_map(|other| (0..other.count).map(|_| other.binding))

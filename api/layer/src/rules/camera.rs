@@ -44,74 +44,38 @@ pub(crate) fn check_command(
 }
 
 /// Checks a camera's values.
-pub(crate) fn check(
-    camera: &GaussianCameraGAURAST<'_>,
-    name: &str,
-    facts: &Facts,
-    faults: &mut Faults,
-) {
+pub(crate) fn check(camera: &GaussianCameraGAURAST<'_>, name: &str, facts: &Facts, faults: &mut Faults) {
     let c = camera;
     check_model(c.model, name, facts, faults);
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
-    faults.require(
-        finite(&c.rotation),
-        "VUID-VkGaussianCameraGAURAST-rotation-90064",
-        || format!("{name}.rotation is {:?}, but must be finite", c.rotation),
-    );
+    faults.require(finite(&c.rotation), "VUID-VkGaussianCameraGAURAST-rotation-90064", || {
+        format!("{name}.rotation is {:?}, but must be finite", c.rotation)
+    });
     let eye_is_finite = c.eye.iter().all(|value| value.is_finite());
-    faults.require(
-        eye_is_finite,
-        "VUID-VkGaussianCameraGAURAST-eye-90065",
-        || format!("{name}.eye is {:?}, but must be finite", c.eye),
-    );
-    faults.require(
-        finite(&c.principal_point),
-        "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
-        || {
-            format!(
-                "{name}.principalPoint is {:?}, but must be finite",
-                c.principal_point
-            )
-        },
-    );
-    faults.require(
-        finite(&c.depth_coefficients),
-        "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
-        || {
-            format!(
-                "{name}.depthCoefficients is {:?}, but must be finite",
-                c.depth_coefficients
-            )
-        },
-    );
+    faults.require(eye_is_finite, "VUID-VkGaussianCameraGAURAST-eye-90065", || {
+        format!("{name}.eye is {:?}, but must be finite", c.eye)
+    });
+    faults.require(finite(&c.principal_point), "VUID-VkGaussianCameraGAURAST-principalPoint-90066", || {
+        format!("{name}.principalPoint is {:?}, but must be finite", c.principal_point)
+    });
+    faults.require(finite(&c.depth_coefficients), "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067", || {
+        format!("{name}.depthCoefficients is {:?}, but must be finite", c.depth_coefficients)
+    });
     faults.require(
         finite(&c.focal_length) && c.focal_length.iter().all(|&f| f > 0.0),
         "VUID-VkGaussianCameraGAURAST-focalLength-90068",
-        || {
-            format!(
-                "{name}.focalLength is {:?}, but must be finite and greater than 0",
-                c.focal_length
-            )
-        },
+        || format!("{name}.focalLength is {:?}, but must be finite and greater than 0", c.focal_length),
     );
-    let near_is_right =
-        c.near_plane.is_finite() && (c.near_plane > 0.0 || c.model == Model::ORTHOGRAPHIC);
+    let near_is_right = c.near_plane.is_finite() && (c.near_plane > 0.0 || c.model == Model::ORTHOGRAPHIC);
     faults.require(near_is_right, "VUID-VkGaussianCameraGAURAST-nearPlane-90069", || {
         format!(
             "{name}.nearPlane is {}, but must be finite, and greater than 0 unless the camera is orthographic",
             c.near_plane
         )
     });
-    faults.require(
-        !near_is_right || c.far_plane > c.near_plane,
-        "VUID-VkGaussianCameraGAURAST-farPlane-90070",
-        || {
-            format!(
-                "{name}.farPlane is {}, but must be greater than nearPlane ({})",
-                c.far_plane, c.near_plane
-            )
-        },
-    );
+    faults.require(!near_is_right || c.far_plane > c.near_plane, "VUID-VkGaussianCameraGAURAST-farPlane-90070", || {
+        format!("{name}.farPlane is {}, but must be greater than nearPlane ({})", c.far_plane, c.near_plane)
+    });
     if finite(&c.rotation) {
         check_rotation(&c.rotation, name, faults);
     }
@@ -127,19 +91,14 @@ fn check_model(model: Model, name: &str, facts: &Facts, faults: &mut Faults) {
         other => {
             return faults.error(
                 "VUID-VkGaussianCameraGAURAST-model-parameter",
-                format!(
-                    "{name}.model is {}, which is no VkGaussianCameraModelGAURAST",
-                    other.as_raw()
-                ),
+                format!("{name}.model is {}, which is no VkGaussianCameraModelGAURAST", other.as_raw()),
             );
         }
     };
     let (feature, is_on) = feature;
-    faults.require(
-        is_on != 0,
-        "VUID-VkGaussianCameraGAURAST-model-90079",
-        || format!("{name}.model is {model:?}, but the feature {feature} is not enabled"),
-    );
+    faults.require(is_on != 0, "VUID-VkGaussianCameraGAURAST-model-90079", || {
+        format!("{name}.model is {model:?}, but the feature {feature} is not enabled")
+    });
 }
 
 /// Warns of a matrix that is no rotation, and no mirrored one.

@@ -55,12 +55,7 @@ pub(crate) fn check(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mu
 
 /// The cameras of a draw, as far as they are known; of those in a uniform buffer, the rules are checked. Without the
 /// buffer there are none.
-fn cameras(
-    draw: &Draw,
-    reader: &dyn Reader,
-    facts: &Facts,
-    faults: &mut Faults,
-) -> Option<Vec<Camera>> {
+fn cameras(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) -> Option<Vec<Camera>> {
     if draw.state.camera_source == CameraSource::COMMAND {
         let cameras = draw.cameras.as_deref();
         return Some(cameras.cloned().unwrap_or_default());
@@ -78,16 +73,15 @@ fn cameras(
     };
     let count = u64::from(draw.state.camera_count);
     let element = size_of::<GaussianCameraDataGAURAST>() as u64;
-    let size = reader
-        .size(buffer)
-        .unwrap_or(u64::MAX)
-        .saturating_sub(offset);
+    let size = reader.size(buffer).unwrap_or(u64::MAX).saturating_sub(offset);
     let range = if range == vk::WHOLE_SIZE { size } else { range };
     if range < count * element {
         faults.error(
             id,
-            format!("the descriptor of the camera has a range of {range} bytes, but must have {element} times \
-                 cameraCount ({count})"),
+            format!(
+                "the descriptor of the camera has a range of {range} bytes, but must have {element} times \
+                 cameraCount ({count})"
+            ),
         );
         return None;
     }
@@ -98,12 +92,7 @@ fn cameras(
     let cameras: Vec<_> = elements
         .map(|(index, bytes)| {
             let camera = camera_of(bytes);
-            camera::check(
-                &camera,
-                &format!("cameras[{index}] of the uniform buffer"),
-                facts,
-                faults,
-            );
+            camera::check(&camera, &format!("cameras[{index}] of the uniform buffer"), facts, faults);
             draw::check_model(&camera, &draw.state, faults);
             camera
         })
@@ -118,14 +107,11 @@ fn camera_of(bytes: &[u8]) -> Camera {
         u32::from_le_bytes(bytes.unwrap_or_default())
     };
     let float = |index: usize| f32::from_bits(word(index));
-    let double =
-        |index: usize| f64::from_bits(u64::from(word(index)) | u64::from(word(index + 1)) << 32);
+    let double = |index: usize| f64::from_bits(u64::from(word(index)) | u64::from(word(index + 1)) << 32);
     let pair = |index: usize| [float(index), float(index + 1)];
     let camera = GaussianCameraGAURAST::default()
         .model(Model::from_raw(word(6).cast_signed()))
-        .rotation(std::array::from_fn(|index| {
-            float(8 + index / 3 * 4 + index % 3)
-        }))
+        .rotation(std::array::from_fn(|index| float(8 + index / 3 * 4 + index % 3)))
         .eye([double(0), double(2), double(4)])
         .focal_length(pair(20))
         .principal_point(pair(22))
@@ -141,11 +127,8 @@ fn direct(call: Call, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) -
         return Some(call);
     };
     let bytes = reader.read(buffer, offset, if is_indexed { 20 } else { 16 })?;
-    let word = |index: usize| -> Option<u32> {
-        Some(u32::from_le_bytes(
-            bytes.get(4 * index..)?.get(..4)?.try_into().ok()?,
-        ))
-    };
+    let word =
+        |index: usize| -> Option<u32> { Some(u32::from_le_bytes(bytes.get(4 * index..)?.get(..4)?.try_into().ok()?)) };
     let (count, instances, first) = (word(0)?, word(1)?, word(2)?);
     let gaussians = u64::from(count) * u64::from(instances);
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
@@ -198,15 +181,9 @@ impl Gaussians {
         let (numbers, vertices) = match call {
             Call::Vertices(numbers) => {
                 let [first, count, ..] = numbers.map(u64::from);
-                (
-                    numbers,
-                    (first..first + count.min(MOST)).collect::<Vec<_>>(),
-                )
+                (numbers, (first..first + count.min(MOST)).collect::<Vec<_>>())
             }
-            Call::Indices(numbers, vertex_offset) => (
-                numbers,
-                indexed(draw, numbers, vertex_offset, reader, faults)?,
-            ),
+            Call::Indices(numbers, vertex_offset) => (numbers, indexed(draw, numbers, vertex_offset, reader, faults)?),
             Call::Indirect(..) => return None,
         };
         let [_, count, first_instance, instances] = numbers.map(u64::from);
@@ -249,12 +226,7 @@ impl Gaussians {
                     place
                 }
             };
-            let source = Source {
-                format,
-                offset: u64::from(attribute.offset),
-                divisor,
-                elements,
-            };
+            let source = Source { format, offset: u64::from(attribute.offset), divisor, elements };
             gaussians.add(location, source)?;
         }
         Some(gaussians)
@@ -262,9 +234,7 @@ impl Gaussians {
 
     /// Adds an attribute; `None` beyond all locations that devices have.
     fn add(&mut self, location: u32, source: Source) -> Option<()> {
-        let location = usize::try_from(location)
-            .ok()
-            .filter(|&location| location < 1024)?;
+        let location = usize::try_from(location).ok().filter(|&location| location < 1024)?;
         if self.sources.len() <= location {
             self.sources.resize_with(location + 1, || None);
         }
@@ -281,39 +251,24 @@ impl Gaussians {
             None => vertex,
         };
         let offset = index.checked_sub(elements.first)? * elements.stride + source.offset;
-        source
-            .format
-            .read(&elements.bytes, usize::try_from(offset).ok()?)
+        source.format.read(&elements.bytes, usize::try_from(offset).ok()?)
     }
 }
 
-fn read_elements(
-    draw: &Draw,
-    number: u32,
-    (first, last): (u64, u64),
-    reader: &dyn Reader,
-) -> Option<Elements> {
+fn read_elements(draw: &Draw, number: u32, (first, last): (u64, u64), reader: &dyn Reader) -> Option<Elements> {
     let bound = draw.vertex_buffers.get(&number)?;
     let binding = draw.pipeline.bindings.get(&number)?;
     let stride = u64::from(bound.stride.unwrap_or(binding.stride));
     let size = reader.size(bound.buffer)?.saturating_sub(bound.offset);
     let size = bound.size.map_or(size, |given| given.min(size));
     let start = (first * stride).min(size);
-    let attributes = draw
-        .pipeline
-        .attributes
-        .values()
-        .filter(|attribute| attribute.binding == number);
+    let attributes = draw.pipeline.attributes.values().filter(|attribute| attribute.binding == number);
     let ends = attributes.map(|a| u64::from(a.offset) + u64::from(Format::of(a.format).bytes));
     let end = (last * stride + ends.max().unwrap_or(stride)).min(size);
     if end - start > MOST_BYTES {
         return None;
     }
-    Some(Elements {
-        bytes: reader.read(bound.buffer, bound.offset + start, end - start)?,
-        first,
-        stride,
-    })
+    Some(Elements { bytes: reader.read(bound.buffer, bound.offset + start, end - start)?, first, stride })
 }
 
 /// The vertices that indices name.
@@ -328,24 +283,15 @@ fn indexed(
     let bytes = draw::index_bytes(index.ty);
     let offset = index.offset + u64::from(first) * bytes;
     let has = reader.size(index.buffer)?.saturating_sub(offset) / bytes;
-    let read = reader.read(
-        index.buffer,
-        offset,
-        bytes * u64::from(count).min(MOST).min(has),
-    )?;
+    let read = reader.read(index.buffer, offset, bytes * u64::from(count).min(MOST).min(has))?;
     let vertices: Vec<i64> = (read.chunks_exact(bytes as usize))
         .map(|chunk| {
-            let value = chunk
-                .iter()
-                .rev()
-                .fold(0, |value, &byte| value << 8 | i64::from(byte));
+            let value = chunk.iter().rev().fold(0, |value, &byte| value << 8 | i64::from(byte));
             value + i64::from(vertex_offset)
         })
         .collect();
     let holds = vertices_of(draw, reader)?;
-    let beyond = vertices
-        .iter()
-        .filter(|&&vertex| vertex < 0 || vertex as u64 >= holds);
+    let beyond = vertices.iter().filter(|&&vertex| vertex < 0 || vertex as u64 >= holds);
     let (beyond, greatest) = (beyond.count(), vertices.iter().max().copied().unwrap_or(0));
     if beyond > 0 {
         faults.warning(
@@ -444,11 +390,7 @@ fn fetch(draw: &Draw, gaussians: &Gaussians, vertex: u64, instance: u64) -> Opti
         let first = locations.first_model_matrix;
         Some([get(first)?, get(first + 1)?, get(first + 2)?])
     };
-    let model_opacity = if locations.model_opacity == UNUSED {
-        None
-    } else {
-        Some(get(locations.model_opacity)?[0])
-    };
+    let model_opacity = if locations.model_opacity == UNUSED { None } else { Some(get(locations.model_opacity)?[0]) };
     let in_buffer = draw.state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
     let coefficients = (draw.state.spherical_harmonics_degree + 1).pow(2);
     let harmonics_are_finite = in_buffer
@@ -490,11 +432,7 @@ impl Counts {
         let (flags, state) = (draw.state.flags, &draw.state);
         let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
         let is_log = flags.contains(Flags::LOG_SCALE);
-        let scale = if is_log {
-            g.scale.map(f32::exp)
-        } else {
-            g.scale
-        };
+        let scale = if is_log { g.scale.map(f32::exp) } else { g.scale };
         let mut opacity = g.opacity;
         if flags.contains(Flags::LOGIT_OPACITY) {
             opacity = 1.0 / (1.0 + (-opacity).exp());
@@ -539,24 +477,14 @@ enum Place {
     Inside,
 }
 
-fn place(
-    camera: &Camera,
-    gaussian: &Gaussian,
-    scale: [f32; 3],
-    low_pass: f32,
-    viewport: Option<[f32; 4]>,
-) -> Place {
+fn place(camera: &Camera, gaussian: &Gaussian, scale: [f32; 3], low_pass: f32, viewport: Option<[f32; 4]>) -> Place {
     let mut position = gaussian.position.map(f64::from);
     let mut size = f64::from(scale.into_iter().fold(0.0, f32::max));
     if let Some(model) = gaussian.model {
         let rows = model.map(|row| row.map(f64::from));
         let [x, y, z] = position;
         position = rows.map(|[a, b, c, d]| a * x + b * y + c * z + d);
-        let norm: f64 = rows
-            .iter()
-            .flat_map(|row| &row[..3])
-            .map(|value| value * value)
-            .sum();
+        let norm: f64 = rows.iter().flat_map(|row| &row[..3]).map(|value| value * value).sum();
         size *= norm.sqrt();
     }
     let [x, y, z] = std::array::from_fn(|axis| position[axis] - camera.eye[axis]);
@@ -566,11 +494,7 @@ fn place(
     };
     let [x, y, z] = [row(0), row(1), row(2)];
     let is_flat = camera.model == Model::PINHOLE || camera.model == Model::ORTHOGRAPHIC;
-    let depth = if is_flat {
-        z
-    } else {
-        (x * x + y * y + z * z).sqrt()
-    };
+    let depth = if is_flat { z } else { (x * x + y * y + z * z).sqrt() };
     if depth <= f64::from(camera.near_plane) {
         return Place::Behind;
     }
@@ -580,46 +504,26 @@ fn place(
     let Some([_, _, width, height]) = viewport.filter(|_| is_flat) else {
         return Place::Inside;
     };
-    let unit = if camera.model == Model::PINHOLE {
-        z
-    } else {
-        1.0
-    };
+    let unit = if camera.model == Model::PINHOLE { z } else { 1.0 };
     // Six standard deviations, as wide as they may become at a grazing angle.
     let blur = 6.0 * f64::from(low_pass).sqrt();
     let is_near = |axis: usize, t: f64, side: f32| {
         let f = f64::from(camera.focal_length[axis]);
         let at = f * t / unit + f64::from(camera.principal_point[axis]);
-        let slant = if camera.model == Model::PINHOLE {
-            1.0 + (t / z).abs()
-        } else {
-            1.0
-        };
+        let slant = if camera.model == Model::PINHOLE { 1.0 + (t / z).abs() } else { 1.0 };
         let radius = 6.0 * f * size / unit * slant + blur;
         at >= -radius && at <= f64::from(side.abs()) + radius
     };
-    if is_near(0, x, width) && is_near(1, y, height) {
-        Place::Inside
-    } else {
-        Place::Outside
-    }
+    if is_near(0, x, width) && is_near(1, y, height) { Place::Inside } else { Place::Outside }
 }
 
 /// Tells what is surely not meant.
 fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     let c = counts;
     let all = c.all;
-    let of = if all == total {
-        format!("{all}")
-    } else {
-        format!("the first {all}")
-    };
+    let of = if all == total { format!("{all}") } else { format!("the first {all}") };
     let is_some_share = |count: u64| count > 0 && count * SHARE >= all;
-    let nothing = if c.drawn == 0 {
-        "; nothing is drawn"
-    } else {
-        ""
-    };
+    let nothing = if c.drawn == 0 { "; nothing is drawn" } else { "" };
     let before = faults.0.len();
     if c.not_finite > 0 {
         faults.warning(
@@ -635,10 +539,7 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     if is_some_share(c.zero_quaternion) {
         faults.warning(
             "GAURAST-Draw-zero-quaternion",
-            format!(
-                "{} of {of} Gaussians have a rotation of zeros, and are skipped{nothing}",
-                c.zero_quaternion
-            ),
+            format!("{} of {of} Gaussians have a rotation of zeros, and are skipped{nothing}", c.zero_quaternion),
         );
     }
     if is_some_share(c.negative_scale) {
@@ -697,8 +598,10 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     if c.no_model_opacity == all {
         faults.warning(
             "GAURAST-Draw-model-opacity",
-            format!("modelOpacity is 0 for all of {of} Gaussians, so that nothing is drawn: without a factor it is \
-                 1, or unused"),
+            format!(
+                "modelOpacity is 0 for all of {of} Gaussians, so that nothing is drawn: without a factor it is \
+                 1, or unused"
+            ),
         );
     }
     if faults.0.len() > before || c.drawn > 0 {
@@ -714,26 +617,11 @@ fn tell_nothing(draw: &Draw, counts: &Counts, of: &str, faults: &mut Faults) {
         (
             c.below_floor,
             "GAURAST-Draw-opacity-floor",
-            format!(
-                "have an opacity below alphaFloor ({})",
-                draw.state.alpha_floor
-            ),
+            format!("have an opacity below alphaFloor ({})", draw.state.alpha_floor),
         ),
-        (
-            c.behind,
-            "GAURAST-Draw-behind-camera",
-            "are behind the camera's near plane".to_owned(),
-        ),
-        (
-            c.beyond,
-            "GAURAST-Draw-beyond-camera",
-            "are beyond the camera's far plane".to_owned(),
-        ),
-        (
-            c.outside,
-            "GAURAST-Draw-outside-picture",
-            "are outside of the picture".to_owned(),
-        ),
+        (c.behind, "GAURAST-Draw-behind-camera", "are behind the camera's near plane".to_owned()),
+        (c.beyond, "GAURAST-Draw-beyond-camera", "are beyond the camera's far plane".to_owned()),
+        (c.outside, "GAURAST-Draw-outside-picture", "are outside of the picture".to_owned()),
     ];
     let text: Vec<String> = (reasons.iter())
         .filter(|(count, ..)| *count > 0)
@@ -749,9 +637,6 @@ fn tell_nothing(draw: &Draw, counts: &Counts, of: &str, faults: &mut Faults) {
                      world"
             }
         };
-        faults.warning(
-            id,
-            format!("none of {of} Gaussians is drawn: {}{hint}", text.join(", ")),
-        );
+        faults.warning(id, format!("none of {of} Gaussians is drawn: {}{hint}", text.join(", ")));
     }
 }

@@ -39,12 +39,7 @@ pub(crate) fn named(features: &Features) -> [(&'static str, bool); 23] {
 }
 
 /// Checks what `vkCreateDevice` asks for.
-pub(crate) fn check(
-    extensions: &[&CStr],
-    features: Option<&Features>,
-    can: Option<&Features>,
-    faults: &mut Faults,
-) {
+pub(crate) fn check(extensions: &[&CStr], features: Option<&Features>, can: Option<&Features>, faults: &mut Faults) {
     let is_enabled = extensions.contains(&NAME);
     let on: Vec<&str> = features
         .map(|features| named(features).into_iter())
@@ -56,10 +51,7 @@ pub(crate) fn check(
         if let Some(first) = on.first() {
             faults.error(
                 "VUID-VkDeviceCreateInfo-pNext-pNext",
-                format!(
-                    "the feature {first} is enabled, but not its extension {}",
-                    NAME.to_string_lossy()
-                ),
+                format!("the feature {first} is enabled, but not its extension {}", NAME.to_string_lossy()),
             );
         }
         return;
@@ -87,9 +79,7 @@ pub(crate) fn check(
         Some(_) => {}
     }
     let Some(can) = can else { return };
-    let absent = named(can)
-        .into_iter()
-        .find(|(name, can)| !can && on.contains(name));
+    let absent = named(can).into_iter().find(|(name, can)| !can && on.contains(name));
     if let Some((name, _)) = absent {
         faults.error(
             "VUID-VkDeviceCreateInfo-pNext-features",

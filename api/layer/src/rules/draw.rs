@@ -7,8 +7,8 @@ use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
     GaussianCameraModelGAURAST as Model, GaussianCameraSourceGAURAST as CameraSource,
-    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST, GaussianPrecisionGAURAST as Precision,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
 use crate::facts::{Camera, Facts, GaussianState};
@@ -19,13 +19,7 @@ use crate::report::Faults;
 use crate::rules::{set, state};
 
 /// Checks a draw command, and notes it for the check of its contents.
-pub(crate) fn check(
-    recording: &mut Recording,
-    call: Call,
-    objects: &Objects,
-    facts: &Facts,
-    faults: &mut Faults,
-) {
+pub(crate) fn check(recording: &mut Recording, call: Call, objects: &Objects, facts: &Facts, faults: &mut Faults) {
     let Some(pipeline) = recording.pipeline.clone() else {
         return;
     };
@@ -36,9 +30,7 @@ pub(crate) fn check(
         let gaussian = with_dynamic(gaussian, &pipeline, recording, facts, faults);
         check_cameras(recording, &gaussian, viewport, faults);
         check_harmonics(recording, &gaussian, faults);
-        check_ranges(
-            recording, &pipeline, &gaussian, call, objects, facts, faults,
-        );
+        check_ranges(recording, &pipeline, &gaussian, call, objects, facts, faults);
         if faults.is_empty() {
             if !continues_set {
                 check_blending(recording, &pipeline, viewport, faults);
@@ -74,10 +66,7 @@ fn with_dynamic(
         let Some(bits) = recording.dynamic_bits(own) else {
             faults.error(
                 "VUID-vkCmdDraw-dynamic-90060",
-                format!(
-                    "the pipeline's {} was not set in the command buffer",
-                    own_name(own)
-                ),
+                format!("the pipeline's {} was not set in the command buffer", own_name(own)),
             );
             return s;
         };
@@ -116,20 +105,11 @@ fn with_dynamic(
         },
     );
     let mut broken = Faults::default();
-    state::check_values(
-        &s,
-        Some(approximation),
-        pipeline.has_fragment,
-        facts,
-        &mut broken,
-    );
+    state::check_values(&s, Some(approximation), pipeline.has_fragment, facts, &mut broken);
     if let Some(fault) = broken.0.first() {
         faults.error(
             "VUID-vkCmdDraw-dynamic-90060",
-            format!(
-                "the values of dynamic states do not go together: {} ({})",
-                fault.text, fault.id
-            ),
+            format!("the values of dynamic states do not go together: {} ({})", fault.text, fault.id),
         );
     }
     s
@@ -149,12 +129,7 @@ fn own_name(own: vk::DynamicState) -> &'static str {
     }
 }
 
-fn check_cameras(
-    recording: &Recording,
-    gaussian: &GaussianState,
-    viewport: Option<[f32; 4]>,
-    faults: &mut Faults,
-) {
+fn check_cameras(recording: &Recording, gaussian: &GaussianState, viewport: Option<[f32; 4]>, faults: &mut Faults) {
     if !state::is_fixed(gaussian) || gaussian.camera_source != CameraSource::COMMAND {
         return;
     }
@@ -164,18 +139,15 @@ fn check_cameras(
             "no camera was set in this command buffer, or vkCmdExecuteCommands came after: the draw draws nothing",
         );
     };
-    let view_mask = recording
-        .pass
-        .as_ref()
-        .map_or(0, |pass| pass.subpass.view_mask);
+    let view_mask = recording.pass.as_ref().map_or(0, |pass| pass.subpass.view_mask);
     let views = u32::BITS - view_mask.leading_zeros();
     let count = cameras.len() as u32;
-    faults.require(
-        view_mask == 0 || count == 1 || count >= views,
-        "VUID-vkCmdDraw-cameraCount-90063",
-        || format!("there are {count} cameras, but the view mask is {view_mask:#b}: there must be 1, or at least \
-             {views}"),
-    );
+    faults.require(view_mask == 0 || count == 1 || count >= views, "VUID-vkCmdDraw-cameraCount-90063", || {
+        format!(
+            "there are {count} cameras, but the view mask is {view_mask:#b}: there must be 1, or at least \
+             {views}"
+        )
+    });
     let seen = if view_mask == 0 { 1 } else { cameras.len() };
     for camera in &cameras[..seen.min(cameras.len())] {
         check_model(camera, gaussian, faults);
@@ -191,17 +163,9 @@ pub(crate) fn check_model(camera: &Camera, gaussian: &GaussianState, faults: &mu
     let model = camera.model;
     let is_flat = gaussian.geometry == Geometry::GAUSSIAN_2D;
     if is_flat && model != Model::PINHOLE && model != Model::ORTHOGRAPHIC {
-        faults.error(
-            id,
-            format!(
-                "geometry is GAUSSIAN_2D, but the camera is {model:?}, not PINHOLE or ORTHOGRAPHIC"
-            ),
-        );
+        faults.error(id, format!("geometry is GAUSSIAN_2D, but the camera is {model:?}, not PINHOLE or ORTHOGRAPHIC"));
     } else if gaussian.precision == Precision::FLOAT16 && model == Model::EQUIRECTANGULAR {
-        faults.error(
-            id,
-            "precision is FLOAT16, but the camera is EQUIRECTANGULAR",
-        );
+        faults.error(id, "precision is FLOAT16, but the camera is EQUIRECTANGULAR");
     }
 }
 
@@ -233,14 +197,12 @@ fn warn_of_units(camera: &Camera, [width, height]: [f32; 2], faults: &mut Faults
 }
 
 fn check_harmonics(recording: &Recording, gaussian: &GaussianState, faults: &mut Faults) {
-    let needs =
-        state::is_fixed(gaussian) && gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
-    faults.require(
-        !needs || recording.harmonics.is_some(),
-        "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018",
-        || "flags has SPHERICAL_HARMONICS_BUFFER, but vkCmdBindGaussianSphericalHarmonicsGAURAST has bound no \
-             buffer".to_owned(),
-    );
+    let needs = state::is_fixed(gaussian) && gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
+    faults.require(!needs || recording.harmonics.is_some(), "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018", || {
+        "flags has SPHERICAL_HARMONICS_BUFFER, but vkCmdBindGaussianSphericalHarmonicsGAURAST has bound no \
+             buffer"
+            .to_owned()
+    });
 }
 
 /// The numbers of vertices, indices and instances.
@@ -261,10 +223,7 @@ fn check_ranges(
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
         return faults.error(
             "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
-            format!(
-                "the draw has {gaussians} Gaussians, but must not have more than {}",
-                facts.max_gaussians_per_draw
-            ),
+            format!("the draw has {gaussians} Gaussians, but must not have more than {}", facts.max_gaussians_per_draw),
         );
     }
     if count == 0 || instances == 0 {
@@ -274,14 +233,7 @@ fn check_ranges(
         check_indices(recording, first, count, objects, faults);
     }
     let by_vertex = matches!(call, Call::Vertices(_)).then_some((first, count));
-    check_vertices(
-        recording,
-        pipeline,
-        by_vertex,
-        (first_instance, instances),
-        objects,
-        faults,
-    );
+    check_vertices(recording, pipeline, by_vertex, (first_instance, instances), objects, faults);
     let locations = &gaussian.attribute_locations;
     let used = [
         locations.position,
@@ -292,14 +244,11 @@ fn check_ranges(
         locations.first_model_matrix,
         locations.model_opacity,
     ];
-    let by_instance = used
-        .into_iter()
-        .filter(|&location| location != UNUSED)
-        .any(|location| {
-            let attribute = pipeline.attributes.get(&location);
-            let binding = attribute.and_then(|attribute| pipeline.bindings.get(&attribute.binding));
-            binding.is_none_or(|binding| binding.by_instance)
-        });
+    let by_instance = used.into_iter().filter(|&location| location != UNUSED).any(|location| {
+        let attribute = pipeline.attributes.get(&location);
+        let binding = attribute.and_then(|attribute| pipeline.bindings.get(&attribute.binding));
+        binding.is_none_or(|binding| binding.by_instance)
+    });
     if state::is_fixed(gaussian) && instances > 1 && !by_instance {
         faults.warning(
             "GAURAST-Draw-instances",
@@ -312,13 +261,7 @@ fn check_ranges(
     }
 }
 
-fn check_indices(
-    recording: &Recording,
-    first: u32,
-    count: u32,
-    objects: &Objects,
-    faults: &mut Faults,
-) {
+fn check_indices(recording: &Recording, first: u32, count: u32, objects: &Objects, faults: &mut Faults) {
     let Some(index) = recording.index_buffer else {
         return;
     };
@@ -352,11 +295,7 @@ pub(crate) fn index_bytes(ty: vk::IndexType) -> u64 {
 /// The end of what is bound, in bytes after the offset.
 fn bound_bytes(recording: &Recording, binding: u32, objects: &Objects) -> Option<u64> {
     let bound = recording.vertex_buffers.get(&binding)?;
-    let size = objects
-        .buffers
-        .get(&bound.buffer)?
-        .size
-        .saturating_sub(bound.offset);
+    let size = objects.buffers.get(&bound.buffer)?.size.saturating_sub(bound.offset);
     Some(bound.size.map_or(size, |given| given.min(size)))
 }
 
@@ -382,16 +321,10 @@ fn check_vertices(
             }
             continue;
         };
-        let stride = recording.vertex_buffers[&number]
-            .stride
-            .unwrap_or(binding.stride);
+        let stride = recording.vertex_buffers[&number].stride.unwrap_or(binding.stride);
         let (what, first, last) = if binding.by_instance {
             let steps = (instances - 1).checked_div(binding.divisor).unwrap_or(0);
-            (
-                "instance",
-                first_instance,
-                u64::from(first_instance) + u64::from(steps),
-            )
+            ("instance", first_instance, u64::from(first_instance) + u64::from(steps))
         } else {
             let Some((first, count)) = by_vertex else {
                 continue;
@@ -401,11 +334,7 @@ fn check_vertices(
         let size = u64::from(attribute.offset) + u64::from(Format::of(attribute.format).bytes);
         let end = last * u64::from(stride) + size;
         if end > bytes {
-            let holds = if stride == 0 || bytes < size {
-                0
-            } else {
-                (bytes - size) / u64::from(stride) + 1
-            };
+            let holds = if stride == 0 || bytes < size { 0 } else { (bytes - size) / u64::from(stride) + 1 };
             return faults.warning(
                 "GAURAST-Draw-vertices-past-buffer",
                 format!(
@@ -418,18 +347,9 @@ fn check_vertices(
 }
 
 /// Warns of a fragment that replaces what is there.
-fn check_blending(
-    recording: &Recording,
-    pipeline: &Pipeline,
-    viewport: Option<[f32; 4]>,
-    faults: &mut Faults,
-) {
+fn check_blending(recording: &Recording, pipeline: &Pipeline, viewport: Option<[f32; 4]>, faults: &mut Faults) {
     let Some(pass) = &recording.pass else { return };
-    let is_loaded = pass
-        .subpass
-        .colors
-        .first()
-        .is_some_and(|&(_, is_loaded)| is_loaded);
+    let is_loaded = pass.subpass.colors.first().is_some_and(|&(_, is_loaded)| is_loaded);
     let is_drawn = pass.drawn.contains(&viewport);
     if pipeline.replaces && !pipeline.has_fragment && (is_loaded || is_drawn) {
         faults.warning(

@@ -31,18 +31,12 @@ pub(crate) fn check(
     if format.is_integer || format.components < 3 {
         faults.error(
             id,
-            format!(
-                "format is {:?}, but must have 3 components or more that are no integers",
-                bound.format
-            ),
+            format!("format is {:?}, but must have 3 components or more that are no integers", bound.format),
         );
     } else if !is_vertex_format(bound.format) {
         faults.error(
             id,
-            format!(
-                "format is {:?}, which does not support VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT",
-                bound.format
-            ),
+            format!("format is {:?}, which does not support VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT", bound.format),
         );
     } else if bound.stride == 0 && bound.coefficient_stride == 0 {
         faults.warning(
@@ -52,18 +46,12 @@ pub(crate) fn check(
     }
 }
 
-fn check_range(
-    bound: &GaussianSphericalHarmonicsBufferGAURAST<'_>,
-    objects: &Objects,
-    faults: &mut Faults,
-) {
+fn check_range(bound: &GaussianSphericalHarmonicsBufferGAURAST<'_>, objects: &Objects, faults: &mut Faults) {
     let id = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016";
     let address = bound.device_address;
     match objects.buffer_at(address) {
-        None => faults.error(
-            id,
-            format!("deviceAddress is {address:#x}, which is within no buffer whose address was asked for"),
-        ),
+        None => faults
+            .error(id, format!("deviceAddress is {address:#x}, which is within no buffer whose address was asked for")),
         Some((_, buffer)) => {
             let start = address - buffer.address.unwrap_or_default();
             faults.require(bound.size <= buffer.size - start, id, || {

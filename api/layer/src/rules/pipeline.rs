@@ -3,9 +3,8 @@
 use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
-    GaussianCameraSourceGAURAST as CameraSource, GaussianCutOffGAURAST as CutOff,
-    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianCameraSourceGAURAST as CameraSource, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
 use crate::facts::{Facts, GaussianState};
@@ -120,15 +119,9 @@ fn check_stages(gaussian: &GaussianState, request: &Request, facts: &Facts, faul
     if request.has(others) {
         faults.error(id, "the pipeline has a tessellation, geometry, task or mesh stage, which Gaussians do not pass");
     } else if fixed && has_vertex {
-        faults.error(
-            id,
-            "projectionMode is FIXED_FUNCTION, but the pipeline has a vertex stage",
-        );
+        faults.error(id, "projectionMode is FIXED_FUNCTION, but the pipeline has a vertex stage");
     } else if !fixed && !has_vertex {
-        faults.error(
-            id,
-            "projectionMode is VERTEX_SHADER, but the pipeline has no vertex stage",
-        );
+        faults.error(id, "projectionMode is VERTEX_SHADER, but the pipeline has no vertex stage");
     }
     let interface = |stage: Stage, class: u32| {
         let found = request.stages.iter().find(|other| other.stage == stage)?;
@@ -166,16 +159,12 @@ fn check_fixed_function(request: &Request, faults: &mut Faults) {
         "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
         || "primitiveRestartEnable is VK_TRUE, but a list of Gaussians has no restart".to_owned(),
     );
-    faults.require(
-        !request.discards,
-        "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
-        || "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE".to_owned(),
-    );
-    faults.require(
-        request.viewport_count == 1,
-        "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
-        || format!("viewportCount is {}, but must be 1", request.viewport_count),
-    );
+    faults.require(!request.discards, "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080", || {
+        "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE".to_owned()
+    });
+    faults.require(request.viewport_count == 1, "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081", || {
+        format!("viewportCount is {}, but must be 1", request.viewport_count)
+    });
     for state in [
         vk::DynamicState::PRIMITIVE_RESTART_ENABLE,
         vk::DynamicState::RASTERIZER_DISCARD_ENABLE,
@@ -183,11 +172,9 @@ fn check_fixed_function(request: &Request, faults: &mut Faults) {
         vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT,
         vk::DynamicState::ALPHA_TO_ONE_ENABLE_EXT,
     ] {
-        faults.require(
-            !request.is_dynamic(state),
-            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
-            || format!("{state:?} must not be dynamic in a Gaussian pipeline"),
-        );
+        faults.require(!request.is_dynamic(state), "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082", || {
+            format!("{state:?} must not be dynamic in a Gaussian pipeline")
+        });
     }
 }
 
@@ -196,11 +183,7 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
     let features = &facts.features;
     let is_tested = request.tests_depth && request.subpass.depth != vk::Format::UNDEFINED;
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044";
-    faults.require(
-        !is_tested || features.gaussian_depth_stencil != 0,
-        id,
-        || state::absent(id),
-    );
+    faults.require(!is_tested || features.gaussian_depth_stencil != 0, id, || state::absent(id));
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-90045";
     let is_one = request.samples == vk::SampleCountFlags::TYPE_1;
     if !is_one && features.gaussian_multisample == 0 {
@@ -216,41 +199,20 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
     }
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048";
     let has_own = request.dynamic.iter().any(|&state| is_own(state));
-    faults.require(!has_own || features.gaussian_dynamic_state != 0, id, || {
-        state::absent(id)
-    });
+    faults.require(!has_own || features.gaussian_dynamic_state != 0, id, || state::absent(id));
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049";
     let has_views = request.subpass.view_mask != 0;
-    faults.require(!has_views || features.gaussian_multiview != 0, id, || {
-        state::absent(id)
-    });
+    faults.require(!has_views || features.gaussian_multiview != 0, id, || state::absent(id));
 }
 
 /// Checks the footprint state.
-fn check_footprint(
-    gaussian: &GaussianState,
-    footprint: &Footprint,
-    facts: &Facts,
-    faults: &mut Faults,
-) {
-    let &Footprint {
-        cut_off,
-        cut_off_deviations: deviations,
-        compensation_floor: floor,
-    } = footprint;
-    let known = [
-        CutOff::NONE,
-        CutOff::ELLIPSE,
-        CutOff::TILE_SQUARE,
-        CutOff::TILE_RECTANGLE,
-    ];
+fn check_footprint(gaussian: &GaussianState, footprint: &Footprint, facts: &Facts, faults: &mut Faults) {
+    let &Footprint { cut_off, cut_off_deviations: deviations, compensation_floor: floor } = footprint;
+    let known = [CutOff::NONE, CutOff::ELLIPSE, CutOff::TILE_SQUARE, CutOff::TILE_RECTANGLE];
     if !known.contains(&cut_off) {
         return faults.error(
             "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
-            format!(
-                "cutOff is {}, which is no value of its type",
-                cut_off.as_raw()
-            ),
+            format!("cutOff is {}, which is no value of its type", cut_off.as_raw()),
         );
     }
     let cuts = cut_off != CutOff::NONE;
@@ -271,9 +233,7 @@ fn check_footprint(
         || format!("cutOff is {cut_off:?}, but that needs FLOAT32 and GAUSSIAN_3D"),
     );
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074";
-    faults.require(!cuts || facts.features.gaussian_cut_off != 0, id, || {
-        state::absent(id)
-    });
+    faults.require(!cuts || facts.features.gaussian_cut_off != 0, id, || state::absent(id));
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075";
     let has_floor = facts.features.opacity_compensation_floor != 0;
     faults.require(floor == 0.0 || has_floor, id, || state::absent(id));
@@ -295,11 +255,7 @@ fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {
 /// The locations of an attribute with their names and the components that each needs.
 pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)> {
     let locations = &gaussian.attribute_locations;
-    let scales = if gaussian.geometry == Geometry::GAUSSIAN_2D {
-        2
-    } else {
-        3
-    };
+    let scales = if gaussian.geometry == Geometry::GAUSSIAN_2D { 2 } else { 3 };
     let mut used = vec![
         ("position".to_owned(), locations.position, 3),
         ("scale".to_owned(), locations.scale, scales),
@@ -308,22 +264,13 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
     ];
     let mut rows = |name: &str, first: u32, count: u32, components: u32| {
         used.extend((0..count).map(|index| {
-            let name = if count > 1 {
-                format!("{name} + {index}")
-            } else {
-                name.to_owned()
-            };
+            let name = if count > 1 { format!("{name} + {index}") } else { name.to_owned() };
             (name, first.saturating_add(index), components)
         }));
     };
     if !gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
         let coefficients = (gaussian.spherical_harmonics_degree.min(16) + 1).pow(2);
-        rows(
-            "firstSphericalHarmonics",
-            locations.first_spherical_harmonics,
-            coefficients,
-            3,
-        );
+        rows("firstSphericalHarmonics", locations.first_spherical_harmonics, coefficients, 3);
     }
     if locations.first_model_matrix != UNUSED {
         rows("firstModelMatrix", locations.first_model_matrix, 3, 4);
@@ -337,14 +284,14 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
 fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     let used = used_locations(gaussian);
     for (index, (name, location, _)) in used.iter().enumerate() {
-        let same = used[..index]
-            .iter()
-            .find(|(_, other, _)| other == location && *other != UNUSED);
+        let same = used[..index].iter().find(|(_, other, _)| other == location && *other != UNUSED);
         if let Some((other, ..)) = same {
             return faults.error(
                 "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
-                format!("{other} and {name} are the same location, {location}; members that are not used are ~0U, \
-                     not 0"),
+                format!(
+                    "{other} and {name} are the same location, {location}; members that are not used are ~0U, \
+                     not 0"
+                ),
             );
         }
     }
@@ -376,10 +323,7 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
         if !bindings.contains_key(&attribute.binding) {
             return faults.error(
                 id,
-                format!(
-                    "{name} is location {location}, whose binding {} does not exist",
-                    attribute.binding
-                ),
+                format!("{name} is location {location}, whose binding {} does not exist", attribute.binding),
             );
         }
     }
@@ -396,14 +340,9 @@ fn check_camera(gaussian: &GaussianState, request: &Request, faults: &mut Faults
             let found = layout.iter().find(|binding| binding.binding == number);
             found.copied()
         });
-        let types = [
-            vk::DescriptorType::UNIFORM_BUFFER,
-            vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC,
-        ];
+        let types = [vk::DescriptorType::UNIFORM_BUFFER, vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC];
         let fits = binding.is_some_and(|binding| {
-            types.contains(&binding.ty)
-                && binding.count > 0
-                && binding.stages.contains(vk::ShaderStageFlags::VERTEX)
+            types.contains(&binding.ty) && binding.count > 0 && binding.stages.contains(vk::ShaderStageFlags::VERTEX)
         });
         faults.require(fits, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025", || {
             format!(
@@ -417,8 +356,10 @@ fn check_camera(gaussian: &GaussianState, request: &Request, faults: &mut Faults
     let count = gaussian.camera_count;
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026";
     faults.require(count == 1 || count >= views.max(1), id, || {
-        format!("cameraCount is {count}, but must be 1, or greater than the greatest view index, and not 0 (there \
-             are {views} views)")
+        format!(
+            "cameraCount is {count}, but must be 1, or greater than the greatest view index, and not 0 (there \
+             are {views} views)"
+        )
     });
 }
 
@@ -428,24 +369,16 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     if !request.cull_mode.is_empty() && !request.is_dynamic(vk::DynamicState::CULL_MODE) {
         faults.warning(
             "GAURAST-Pipeline-cull-mode",
-            format!(
-                "cullMode is {:?}, which has no effect: a Gaussian always faces front",
-                request.cull_mode
-            ),
+            format!("cullMode is {:?}, which has no effect: a Gaussian always faces front", request.cull_mode),
         );
     }
     if request.polygon_mode != vk::PolygonMode::FILL {
         faults.warning(
             "GAURAST-Pipeline-polygon-mode",
-            format!(
-                "polygonMode is {:?}, which has no effect on Gaussians",
-                request.polygon_mode
-            ),
+            format!("polygonMode is {:?}, which has no effect on Gaussians", request.polygon_mode),
         );
     }
-    if gaussian.transmittance_floor > 0.0
-        && gaussian.alpha_ceiling > 1.0 - gaussian.transmittance_floor
-    {
+    if gaussian.transmittance_floor > 0.0 && gaussian.alpha_ceiling > 1.0 - gaussian.transmittance_floor {
         faults.warning(
             "GAURAST-Pipeline-alpha-ceiling",
             format!(
@@ -491,8 +424,10 @@ fn warn_of_output(request: &Request, faults: &mut Faults) {
     if is_integer(format) {
         return faults.warning(
             "GAURAST-Pipeline-integer-attachment",
-            format!("the first colour attachment is {format:?}: without a fragment stage integer attachments are \
-                 left as they are"),
+            format!(
+                "the first colour attachment is {format:?}: without a fragment stage integer attachments are \
+                 left as they are"
+            ),
         );
     }
     let Some(blend) = request.blend.first() else {
@@ -505,14 +440,8 @@ fn warn_of_output(request: &Request, faults: &mut Faults) {
             "colorWriteMask is 0 and no depth is written: the pipeline writes nothing",
         );
     }
-    let by_alpha = [
-        vk::BlendFactor::SRC_ALPHA,
-        vk::BlendFactor::SRC_ALPHA_SATURATE,
-    ];
-    if blend.blend_enable != 0
-        && !request.has_logic_op
-        && by_alpha.contains(&blend.src_color_blend_factor)
-    {
+    let by_alpha = [vk::BlendFactor::SRC_ALPHA, vk::BlendFactor::SRC_ALPHA_SATURATE];
+    if blend.blend_enable != 0 && !request.has_logic_op && by_alpha.contains(&blend.src_color_blend_factor) {
         faults.warning(
             "GAURAST-Pipeline-blending",
             format!(

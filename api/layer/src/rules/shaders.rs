@@ -25,22 +25,15 @@ pub(crate) fn check_vertex(
     for (name, location, components) in named {
         if location == UNUSED {
             if name != "depthKey" {
-                return faults.error(
-                    id,
-                    format!("{name} is unused, but vertex-shader projection needs it"),
-                );
+                return faults.error(id, format!("{name} is unused, but vertex-shader projection needs it"));
             }
             continue;
         }
         if let Some((other, _)) = seen.iter().find(|(_, other)| *other == location) {
-            return faults.error(
-                id,
-                format!("{name} and {other} are the same location, {location}"),
-            );
+            return faults.error(id, format!("{name} and {other} are the same location, {location}"));
         }
         seen.push((name, location));
-        let writes =
-            |slots: &Slots| (0..components).all(|c| slots.get(&(location, c)) == Some(&true));
+        let writes = |slots: &Slots| (0..components).all(|c| slots.get(&(location, c)) == Some(&true));
         if outputs.is_some_and(|outputs| !writes(&outputs.slots)) {
             return faults.error(
                 id,
@@ -63,42 +56,27 @@ pub(crate) fn check_fragment(
     let id = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
     let inputs_of_text = resolve_inputs(locations);
     for (index, one) in inputs_of_text.iter().enumerate() {
-        let overlaps = |other: &&ResolveInput| {
-            one.first < other.first + other.count && other.first < one.first + one.count
-        };
+        let overlaps =
+            |other: &&ResolveInput| one.first < other.first + other.count && other.first < one.first + one.count;
         if let Some(other) = inputs_of_text[..index].iter().find(overlaps) {
             return faults.error(
                 id,
-                format!(
-                    "{} and {} have the same location, {}",
-                    other.name,
-                    one.name,
-                    one.first.max(other.first)
-                ),
+                format!("{} and {} have the same location, {}", other.name, one.name, one.first.max(other.first)),
             );
         }
     }
     let Some(inputs) = inputs else { return };
     for (&(location, component), &is_float) in &inputs.slots {
         let location_of = u64::from(location);
-        let input = inputs_of_text
-            .iter()
-            .find(|input| (input.first..input.first + input.count).contains(&location_of));
+        let input = inputs_of_text.iter().find(|input| (input.first..input.first + input.count).contains(&location_of));
         let text = match input {
             Some(input) if component >= input.components => format!(
                 "the fragment shader reads component {component} of location {location}, but {} has {} components",
                 input.name, input.components
             ),
             Some(input) if is_float != input.is_float => {
-                let kind = if input.is_float {
-                    "32-bit floating point"
-                } else {
-                    "32-bit unsigned integers"
-                };
-                format!(
-                    "the fragment shader reads location {location}, {}, as something other than {kind}",
-                    input.name
-                )
+                let kind = if input.is_float { "32-bit floating point" } else { "32-bit unsigned integers" };
+                format!("the fragment shader reads location {location}, {}, as something other than {kind}", input.name)
             }
             Some(_) => continue,
             None => format!(
@@ -110,11 +88,9 @@ pub(crate) fn check_fragment(
         };
         return faults.error(id, text);
     }
-    faults.require(
-        !inputs.writes_depth,
-        "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
-        || "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned(),
-    );
+    faults.require(!inputs.writes_depth, "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024", || {
+        "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned()
+    });
 }
 
 /// An input that a resolve shader may read.
@@ -150,9 +126,5 @@ fn resolve_inputs(locations: &GaussianResolveInputLocationsGAURAST) -> Vec<Resol
 }
 
 fn place(location: u32) -> String {
-    if location == UNUSED {
-        "unused".to_owned()
-    } else {
-        location.to_string()
-    }
+    if location == UNUSED { "unused".to_owned() } else { location.to_string() }
 }

@@ -38,16 +38,11 @@ pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
             s.geometry.as_raw(),
         ),
         is(
-            s.linearization == Linearization::JACOBIAN
-                || s.linearization == Linearization::UNSCENTED,
+            s.linearization == Linearization::JACOBIAN || s.linearization == Linearization::UNSCENTED,
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-linearization-parameter",
             s.linearization.as_raw(),
         ),
-        is(
-            is_order(s.order),
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
-            s.order.as_raw(),
-        ),
+        is(is_order(s.order), "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter", s.order.as_raw()),
         is(
             s.precision == Precision::FLOAT32 || s.precision == Precision::FLOAT16,
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-parameter",
@@ -59,8 +54,7 @@ pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
             s.antialiasing.as_raw(),
         ),
         is(
-            s.camera_source == CameraSource::COMMAND
-                || s.camera_source == CameraSource::UNIFORM_BUFFER,
+            s.camera_source == CameraSource::COMMAND || s.camera_source == CameraSource::UNIFORM_BUFFER,
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraSource-parameter",
             s.camera_source.as_raw(),
         ),
@@ -74,10 +68,7 @@ pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
         None => true,
         Some((id, raw)) => {
             let name = id.split('-').nth(2).unwrap_or(id);
-            faults.error(
-                id,
-                format!("{name} is {raw}, which is no value of its type"),
-            );
+            faults.error(id, format!("{name} is {raw}, which is no value of its type"));
             false
         }
     }
@@ -101,41 +92,24 @@ fn check_numbers(state: &State, approximation: Option<[f32; 2]>, faults: &mut Fa
     faults.require(
         s.low_pass_variance.is_finite() && s.low_pass_variance >= 0.0,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
-        || {
-            format!(
-                "lowPassVariance is {}, but must be finite and not negative",
-                s.low_pass_variance
-            )
-        },
+        || format!("lowPassVariance is {}, but must be finite and not negative", s.low_pass_variance),
     );
     let floor_is_right = (0.0..=1.0).contains(&s.alpha_floor);
-    faults.require(
-        floor_is_right,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
-        || format!("alphaFloor is {}, but must be in [0, 1]", s.alpha_floor),
-    );
-    let ceiling_is_right = s.alpha_ceiling > 0.0
-        && s.alpha_ceiling <= 1.0
-        && (!floor_is_right || s.alpha_ceiling >= s.alpha_floor);
-    faults.require(
-        ceiling_is_right,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
-        || {
-            format!(
-                "alphaCeiling is {}, but must be in (0, 1] and at least alphaFloor ({})",
-                s.alpha_ceiling, s.alpha_floor
-            )
-        },
-    );
+    faults.require(floor_is_right, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012", || {
+        format!("alphaFloor is {}, but must be in [0, 1]", s.alpha_floor)
+    });
+    let ceiling_is_right =
+        s.alpha_ceiling > 0.0 && s.alpha_ceiling <= 1.0 && (!floor_is_right || s.alpha_ceiling >= s.alpha_floor);
+    faults.require(ceiling_is_right, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013", || {
+        format!(
+            "alphaCeiling is {}, but must be in (0, 1] and at least alphaFloor ({})",
+            s.alpha_ceiling, s.alpha_floor
+        )
+    });
     faults.require(
         (0.0..1.0).contains(&s.transmittance_floor),
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
-        || {
-            format!(
-                "transmittanceFloor is {}, but must be in [0, 1)",
-                s.transmittance_floor
-            )
-        },
+        || format!("transmittanceFloor is {}, but must be in [0, 1)", s.transmittance_floor),
     );
     let Some([error, budget]) = approximation else {
         return;
@@ -161,8 +135,11 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
     faults.require(
         fixed || s.order != Order::RADIAL_DISTANCE || s.vertex_output_locations.depth_key != UNUSED,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
-        || "order is RADIAL_DISTANCE with vertex-shader projection, but depthKey is unused: a shader must write the \
-             distance".to_owned(),
+        || {
+            "order is RADIAL_DISTANCE with vertex-shader projection, but depthKey is unused: a shader must write the \
+             distance"
+                .to_owned()
+        },
     );
     faults.require(
         fixed || !is_per_pixel,
@@ -178,10 +155,7 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
     faults.require(
         !fixed || !has_matrix || !is_per_pixel && !is_flat,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028",
-        || {
-            "firstModelMatrix is used, but order is PER_PIXEL or geometry is not GAUSSIAN_3D"
-                .to_owned()
-        },
+        || "firstModelMatrix is used, but order is PER_PIXEL or geometry is not GAUSSIAN_3D".to_owned(),
     );
     faults.require(
         !fixed || !is_flat || s.linearization == Linearization::JACOBIAN,
@@ -221,8 +195,8 @@ fn check_modes(state: &State, approximation: Option<[f32; 2]>, facts: &Facts, fa
     let (s, f) = (state, &facts.features);
     let fixed = is_fixed(s);
     let activation = Flags::LOG_SCALE | Flags::LOGIT_OPACITY;
-    let uses_instancing = s.attribute_locations.first_model_matrix != UNUSED
-        || s.attribute_locations.model_opacity != UNUSED;
+    let uses_instancing =
+        s.attribute_locations.first_model_matrix != UNUSED || s.attribute_locations.model_opacity != UNUSED;
     let approximates = approximation.is_some_and(|numbers| numbers.iter().any(|&n| n != 0.0));
     let modes = [
         (

@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::view::{
-    CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError,
-};
+use super::view::{CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError};
 use crate::camera::Model;
 
 /// COLMAP's camera models, by number: the name, and the number of parameters.
@@ -32,15 +30,11 @@ const POINT: usize = 24;
 pub(super) fn folder(path: &Path) -> Option<PathBuf> {
     let holds = |folder: &Path| {
         ["bin", "txt"].iter().any(|kind| {
-            folder.join(format!("cameras.{kind}")).is_file()
-                && folder.join(format!("images.{kind}")).is_file()
+            folder.join(format!("cameras.{kind}")).is_file() && folder.join(format!("images.{kind}")).is_file()
         })
     };
     if path.is_dir() {
-        return ["", "sparse/0", "sparse", "0"]
-            .iter()
-            .map(|inner| path.join(inner))
-            .find(|folder| holds(folder));
+        return ["", "sparse/0", "sparse", "0"].iter().map(|inner| path.join(inner)).find(|folder| holds(folder));
     }
     let name = path.file_stem()?.to_str()?;
     let folder = parent(path);
@@ -72,33 +66,17 @@ struct Photograph {
 }
 
 /// Reads the model in `folder`. Views are in the order of their names.
-pub(super) fn read(
-    folder: &Path,
-    options: &CameraFileOptions,
-) -> Result<CameraFile, CameraFileError> {
+pub(super) fn read(folder: &Path, options: &CameraFileOptions) -> Result<CameraFile, CameraFileError> {
     let (cameras_path, images_path) = ["bin", "txt"]
-        .map(|kind| {
-            (
-                folder.join(format!("cameras.{kind}")),
-                folder.join(format!("images.{kind}")),
-            )
-        })
+        .map(|kind| (folder.join(format!("cameras.{kind}")), folder.join(format!("images.{kind}"))))
         .into_iter()
         .find(|(cameras, images)| cameras.is_file() && images.is_file())
-        .ok_or_else(|| CameraFileError::UnknownKind {
-            path: folder.to_owned(),
-        })?;
+        .ok_or_else(|| CameraFileError::UnknownKind { path: folder.to_owned() })?;
     let binary = cameras_path.extension().is_some_and(|e| e == "bin");
-    let bytes = |path: &Path| {
-        std::fs::read(path).map_err(|source| CameraFileError::Io {
-            path: path.to_owned(),
-            source,
-        })
-    };
-    let damaged = |path: &Path, reason: &str| CameraFileError::Colmap {
-        path: path.to_owned(),
-        reason: reason.to_owned(),
-    };
+    let bytes =
+        |path: &Path| std::fs::read(path).map_err(|source| CameraFileError::Io { path: path.to_owned(), source });
+    let damaged =
+        |path: &Path, reason: &str| CameraFileError::Colmap { path: path.to_owned(), reason: reason.to_owned() };
     let (cameras, images) = (bytes(&cameras_path)?, bytes(&images_path)?);
     let (cameras, images) = if binary {
         (binary_cameras(&cameras), binary_images(&images))
@@ -113,13 +91,11 @@ pub(super) fn read(
         let camera = cameras
             .get(&image.camera)
             .ok_or_else(|| damaged(&images_path, "an image is of a camera that is not there"))?;
-        let view = image
-            .view(camera, options, &mut file.ignored)
-            .map_err(|reason| CameraFileError::View {
-                path: images_path.clone(),
-                view,
-                reason,
-            })?;
+        let view = image.view(camera, options, &mut file.ignored).map_err(|reason| CameraFileError::View {
+            path: images_path.clone(),
+            view,
+            reason,
+        })?;
         file.views.push(view);
     }
     Ok(file)
@@ -135,20 +111,14 @@ impl Photograph {
         let p = |index: usize| camera.parameters.get(index).copied().unwrap_or(0.0);
         let simple = ([p(0), p(0)], [p(1), p(2)]);
         let full = ([p(0), p(1)], [p(2), p(3)]);
-        let radial = |radial| Distortion {
-            radial,
-            ..Distortion::default()
-        };
+        let radial = |radial| Distortion { radial, ..Distortion::default() };
         let (model, (focal, principal), distortion) = match camera.model.as_str() {
             "SIMPLE_PINHOLE" => (Model::Pinhole, simple, Distortion::default()),
             "PINHOLE" => (Model::Pinhole, full, Distortion::default()),
             "SIMPLE_RADIAL" => (Model::Pinhole, simple, radial([p(3), 0.0, 0.0, 0.0])),
             "RADIAL" => (Model::Pinhole, simple, radial([p(3), p(4), 0.0, 0.0])),
             "OPENCV" => {
-                let distortion = Distortion {
-                    radial: [p(4), p(5), 0.0, 0.0],
-                    tangential: [p(6), p(7)],
-                };
+                let distortion = Distortion { radial: [p(4), p(5), 0.0, 0.0], tangential: [p(6), p(7)] };
                 (Model::Pinhole, full, distortion)
             }
             "OPENCV_FISHEYE" => (Model::Fisheye, full, radial([p(4), p(5), p(6), p(7)])),
@@ -174,10 +144,7 @@ impl Photograph {
             size: camera.size,
         }
         .camera()?;
-        Ok(View {
-            name: self.name,
-            camera,
-        })
+        Ok(View { name: self.name, camera })
     }
 }
 
@@ -230,17 +197,8 @@ fn binary_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str
         let model = bytes.u32()? as usize;
         let (name, parameters) = MODELS.get(model).ok_or("it has an unknown camera model")?;
         let size = [bytes.u64()? as f64, bytes.u64()? as f64];
-        let parameters = (0..*parameters)
-            .map(|_| bytes.f64())
-            .collect::<Result<_, _>>()?;
-        cameras.insert(
-            id,
-            Intrinsics {
-                model: (*name).to_owned(),
-                size,
-                parameters,
-            },
-        );
+        let parameters = (0..*parameters).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
+        cameras.insert(id, Intrinsics { model: (*name).to_owned(), size, parameters });
     }
     Ok(cameras)
 }
@@ -263,12 +221,7 @@ fn binary_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
         let name = String::from_utf8_lossy(bytes.text()?).into_owned();
         let points = bytes.u64()?;
         bytes.skip(points, POINT)?;
-        images.push(Photograph {
-            name,
-            rotation,
-            translation,
-            camera,
-        });
+        images.push(Photograph { name, rotation, translation, camera });
     }
     Ok(images)
 }
@@ -279,13 +232,11 @@ fn lines(bytes: &[u8]) -> Result<impl Iterator<Item = &str>, &'static str> {
 }
 
 fn number(word: Option<&str>) -> Result<f64, &'static str> {
-    word.and_then(|word| word.parse().ok())
-        .ok_or("a line lacks a number")
+    word.and_then(|word| word.parse().ok()).ok_or("a line lacks a number")
 }
 
 fn whole(word: Option<&str>) -> Result<u64, &'static str> {
-    word.and_then(|word| word.parse().ok())
-        .ok_or("a line lacks a whole number")
+    word.and_then(|word| word.parse().ok()).ok_or("a line lacks a whole number")
 }
 
 fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> {
@@ -295,22 +246,13 @@ fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> 
         let id = whole(words.next())?;
         let model = words.next().ok_or("a line lacks the camera model")?;
         let size = [number(words.next())?, number(words.next())?];
-        let parameters = words
-            .map(|word| number(Some(word)))
-            .collect::<Result<Vec<_>, _>>()?;
+        let parameters = words.map(|word| number(Some(word))).collect::<Result<Vec<_>, _>>()?;
         let known = MODELS.iter().find(|(name, _)| *name == model);
         let (_, expected) = known.ok_or("it has an unknown camera model")?;
         if parameters.len() != *expected {
             return Err("a camera has too many or too few parameters");
         }
-        cameras.insert(
-            id,
-            Intrinsics {
-                model: model.to_owned(),
-                size,
-                parameters,
-            },
-        );
+        cameras.insert(id, Intrinsics { model: model.to_owned(), size, parameters });
     }
     Ok(cameras)
 }
@@ -333,12 +275,7 @@ fn text_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
         let camera = whole(words.next())?;
         let name = words.collect::<Vec<_>>().join(" ");
         lines.next();
-        images.push(Photograph {
-            name,
-            rotation: [w, x, y, z],
-            translation: [tx, ty, tz],
-            camera,
-        });
+        images.push(Photograph { name, rotation: [w, x, y, z], translation: [tx, ty, tz], camera });
     }
     Ok(images)
 }
@@ -347,11 +284,9 @@ fn text_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
 mod tests {
     use super::*;
 
-    const CAMERAS: &str =
-        "# cameras\n1 PINHOLE 200 100 50 80 90 60\n2 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n";
+    const CAMERAS: &str = "# cameras\n1 PINHOLE 200 100 50 80 90 60\n2 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n";
     /// b looks along +z from (1, 2, 3); a is the same, rotated half a turn about y.
-    const IMAGES: &str =
-        "# images\n7 1 0 0 0 -1 -2 -3 1 b.png\n\n9 0 0 1 0 1 -2 3 1 a.png\n1 2 -1\n";
+    const IMAGES: &str = "# images\n7 1 0 0 0 -1 -2 -3 1 b.png\n\n9 0 0 1 0 1 -2 3 1 a.png\n1 2 -1\n";
 
     fn model(cameras: &[u8], images: &[u8], kind: &str) -> Result<CameraFile, CameraFileError> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -359,11 +294,7 @@ mod tests {
         std::fs::create_dir_all(&sparse).expect("folders");
         std::fs::write(sparse.join(format!("cameras.{kind}")), cameras).expect("written");
         std::fs::write(sparse.join(format!("images.{kind}")), images).expect("written");
-        let options = CameraFileOptions {
-            size: [8, 8],
-            dataparser: None,
-            undistorted: false,
-        };
+        let options = CameraFileOptions { size: [8, 8], dataparser: None, undistorted: false };
         super::super::read(folder.path(), &options)
     }
 
@@ -389,11 +320,7 @@ mod tests {
         cameras.extend(1_u32.to_le_bytes());
         cameras.extend(1_u32.to_le_bytes());
         cameras.extend([200_u64, 100].iter().flat_map(|side| side.to_le_bytes()));
-        cameras.extend(
-            [50.0_f64, 80.0, 90.0, 60.0]
-                .iter()
-                .flat_map(|p| p.to_le_bytes()),
-        );
+        cameras.extend([50.0_f64, 80.0, 90.0, 60.0].iter().flat_map(|p| p.to_le_bytes()));
         let mut images = 2_u64.to_le_bytes().to_vec();
         for (name, pose, points) in [
             ("b.png", [1.0_f64, 0.0, 0.0, 0.0, -1.0, -2.0, -3.0], 0_u64),
@@ -417,8 +344,7 @@ mod tests {
     #[test]
     fn distorted_and_unknown_cameras_are_refused() {
         let distorted = IMAGES.replace(" 1 b.png", " 2 b.png");
-        let refused =
-            model(CAMERAS.as_bytes(), distorted.as_bytes(), "txt").expect_err("distorted");
+        let refused = model(CAMERAS.as_bytes(), distorted.as_bytes(), "txt").expect_err("distorted");
         assert!(refused.to_string().contains("k1 = 0.1"), "{refused}");
         let missing = IMAGES.replace(" 1 b.png", " 5 b.png");
         let refused = model(CAMERAS.as_bytes(), missing.as_bytes(), "txt").expect_err("missing");

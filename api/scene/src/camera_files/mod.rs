@@ -20,11 +20,7 @@ pub use view::{CameraFile, CameraFileError, CameraFileOptions, View, ViewError};
 /// # Errors
 /// Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
 pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
-    let options = CameraFileOptions {
-        size,
-        dataparser: None,
-        undistorted: false,
-    };
+    let options = CameraFileOptions { size, dataparser: None, undistorted: false };
     Ok(read(path, &options)?.views)
 }
 
@@ -36,8 +32,7 @@ pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, Came
     if let Some(folder) = colmap::folder(path) {
         let mut file = colmap::read(&folder, options)?;
         if options.dataparser.is_some() {
-            file.ignored
-                .push("a dataparser's transform is for a transforms.json alone".to_owned());
+            file.ignored.push("a dataparser's transform is for a transforms.json alone".to_owned());
         }
         return Ok(file);
     }
@@ -50,18 +45,12 @@ pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, Came
 }
 
 fn read_text(path: &Path) -> Result<String, CameraFileError> {
-    fs::read_to_string(path).map_err(|source| CameraFileError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    fs::read_to_string(path).map_err(|source| CameraFileError::Io { path: path.to_owned(), source })
 }
 
 fn dataparser(path: &Path) -> Result<Dataparser, CameraFileError> {
     let text = read_text(path)?;
-    serde_json::from_str(&text).map_err(|source| CameraFileError::Json {
-        path: path.to_owned(),
-        source,
-    })
+    serde_json::from_str(&text).map_err(|source| CameraFileError::Json { path: path.to_owned(), source })
 }
 
 fn parse(
@@ -70,13 +59,8 @@ fn parse(
     options: &CameraFileOptions,
     dataparser: Option<&Dataparser>,
 ) -> Result<CameraFile, CameraFileError> {
-    let json = |source| CameraFileError::Json {
-        path: path.to_owned(),
-        source,
-    };
-    let unknown = || CameraFileError::UnknownKind {
-        path: path.to_owned(),
-    };
+    let json = |source| CameraFileError::Json { path: path.to_owned(), source };
+    let unknown = || CameraFileError::UnknownKind { path: path.to_owned() };
     let mut ignored = Vec::new();
     let views: Vec<Result<View, ViewError>> = match text.trim_start().as_bytes().first() {
         Some(b'[') => {
@@ -92,9 +76,7 @@ fn parse(
                 let path: CameraPath = serde_json::from_str(text).map_err(json)?;
                 path.views(options)
             } else {
-                let frames = transforms
-                    .views(options, dataparser, &mut ignored)
-                    .ok_or_else(unknown)?;
+                let frames = transforms.views(options, dataparser, &mut ignored).ok_or_else(unknown)?;
                 frames.collect()
             }
         }
@@ -103,13 +85,7 @@ fn parse(
     let views = views
         .into_iter()
         .enumerate()
-        .map(|(view, result)| {
-            result.map_err(|reason| CameraFileError::View {
-                path: path.to_owned(),
-                view,
-                reason,
-            })
-        })
+        .map(|(view, result)| result.map_err(|reason| CameraFileError::View { path: path.to_owned(), view, reason }))
         .collect::<Result<_, _>>()?;
     Ok(CameraFile { views, ignored })
 }
@@ -140,10 +116,7 @@ impl InriaCamera {
             size,
         }
         .camera()?;
-        Ok(View {
-            name: self.img_name,
-            camera,
-        })
+        Ok(View { name: self.img_name, camera })
     }
 }
 
@@ -155,33 +128,16 @@ mod tests {
         read_with(text, false, None).map(|file| file.views)
     }
 
-    fn read_with(
-        text: &str,
-        undistorted: bool,
-        dataparser: Option<&str>,
-    ) -> Result<CameraFile, CameraFileError> {
-        let options = CameraFileOptions {
-            size: [640, 480],
-            dataparser: None,
-            undistorted,
-        };
-        let dataparser: Option<Dataparser> =
-            dataparser.map(|text| serde_json::from_str(text).expect("JSON"));
-        parse(
-            Path::new("cameras.json"),
-            text,
-            &options,
-            dataparser.as_ref(),
-        )
+    fn read_with(text: &str, undistorted: bool, dataparser: Option<&str>) -> Result<CameraFile, CameraFileError> {
+        let options = CameraFileOptions { size: [640, 480], dataparser: None, undistorted };
+        let dataparser: Option<Dataparser> = dataparser.map(|text| serde_json::from_str(text).expect("JSON"));
+        parse(Path::new("cameras.json"), text, &options, dataparser.as_ref())
     }
 
     #[track_caller]
     fn close(a: Option<[f64; 2]>, b: [f64; 2]) {
         let a = a.expect("in front");
-        assert!(
-            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6),
-            "{a:?} {b:?}"
-        );
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{a:?} {b:?}");
     }
 
     /// A camera that looks along +x of the world: right is -z, down is +y.
@@ -240,9 +196,7 @@ mod tests {
             [{"transform_matrix": []}]}"#;
         assert!(refused(thin).contains("THIN_PRISM_FISHEYE"));
         assert!(refused(r#"{"frames": [{"transform_matrix": []}]}"#).contains("focal"));
-        assert!(
-            refused(r#"{"fl_x": 9, "frames": [{"transform_matrix": []}]}"#).contains("rotation")
-        );
+        assert!(refused(r#"{"fl_x": 9, "frames": [{"transform_matrix": []}]}"#).contains("rotation"));
         for cut in 0..INRIA.len() {
             assert!(read(&INRIA[..cut]).is_err());
         }
@@ -258,23 +212,16 @@ mod tests {
         assert_eq!((camera.model, camera.focal), (Model::Fisheye, [50.0; 2]));
         let distorted = FISHEYE.replace("\"k1\": 0.0", "\"k1\": -0.05, \"p2\": 0.001");
         let refused = read(&distorted).expect_err("it distorts").to_string();
-        assert!(
-            refused.contains("view 0: the lens distorts (k1 = -0.05, p2 = 0.001)"),
-            "{refused}"
-        );
+        assert!(refused.contains("view 0: the lens distorts (k1 = -0.05, p2 = 0.001)"), "{refused}");
         let file = read_with(&distorted, true, None).expect("left out");
         assert_eq!(file.views[0].camera, *camera);
-        assert_eq!(
-            file.ignored,
-            ["the lens's distortion (k1 = -0.05, p2 = 0.001) is left out"]
-        );
+        assert_eq!(file.ignored, ["the lens's distortion (k1 = -0.05, p2 = 0.001) is left out"]);
     }
 
     #[test]
     fn a_dataparsers_transform_takes_cameras_to_the_model() {
         // Half a turn about z, moved by (1, 0, 0), then scaled by 0.5.
-        let dataparser =
-            r#"{"transform": [[-1, 0, 0, 1], [0, -1, 0, 0], [0, 0, 1, 0]], "scale": 0.5}"#;
+        let dataparser = r#"{"transform": [[-1, 0, 0, 1], [0, -1, 0, 0], [0, 0, 1, 0]], "scale": 0.5}"#;
         let file = read_with(FISHEYE, false, Some(dataparser)).expect("a camera");
         let camera = &file.views[0].camera;
         assert_eq!(camera.eye, [0.0, -1.0, 1.5]);
@@ -284,8 +231,7 @@ mod tests {
             "\"w\"",
             "\"applied_transform\": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], \"applied_scale\": 0.25, \"w\"",
         );
-        let dataparser =
-            r#"{"transform": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], "scale": 0.25}"#;
+        let dataparser = r#"{"transform": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], "scale": 0.25}"#;
         let file = read_with(&applied, false, Some(dataparser)).expect("a camera");
         assert_eq!(file.views[0].camera.eye, [1.0, 2.0, 3.0]);
     }
@@ -295,10 +241,7 @@ mod tests {
         let text = r#"{"camera_type": "perspective", "render_height": 100, "render_width": 200, "fps": 24,
             "camera_path": [{"camera_to_world": [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1], "fov": 90}]}"#;
         let camera = &read(text).expect("a camera")[0].camera;
-        assert_eq!(
-            (camera.width, camera.height, camera.eye),
-            (200, 100, [1.0, 2.0, 3.0])
-        );
+        assert_eq!((camera.width, camera.height, camera.eye), (200, 100, [1.0, 2.0, 3.0]));
         assert!((camera.focal[0] - 50.0).abs() < 1e-9);
     }
 }

@@ -104,9 +104,7 @@ impl Frame {
         let own = self.intrinsics;
         let model = own.camera_model.or_else(|| shared.camera_model.clone());
         let model = match model.as_deref() {
-            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
-                Model::Pinhole
-            }
+            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => Model::Pinhole,
             Some("OPENCV_FISHEYE") => Model::Fisheye,
             Some("EQUIRECTANGULAR") => Model::Equirectangular,
             Some(other) => return Err(ViewError::Model(other.to_owned())),
@@ -115,32 +113,19 @@ impl Frame {
             own.w.or(shared.w).unwrap_or(options.size[0].into()),
             own.h.or(shared.h).unwrap_or(options.size[1].into()),
         ];
-        let of_angle =
-            |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / (angle / 2.0).tan());
-        let fx = own
-            .fl_x
-            .or(shared.fl_x)
-            .or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
-        let fy = own
-            .fl_y
-            .or(shared.fl_y)
-            .or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
+        let of_angle = |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / (angle / 2.0).tan());
+        let fx = own.fl_x.or(shared.fl_x).or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
+        let fy = own.fl_y.or(shared.fl_y).or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
         let whole = model == Model::Equirectangular;
         let (fx, fy) = if whole {
             // A panorama fills its picture, whatever intrinsics the file gives.
-            (
-                Some(size[0] / std::f64::consts::TAU),
-                Some(size[1] / std::f64::consts::PI),
-            )
+            (Some(size[0] / std::f64::consts::TAU), Some(size[1] / std::f64::consts::PI))
         } else {
             (fx, fy)
         };
         // Pixels are square unless the file says otherwise.
         let fx = fx.or(fy).ok_or(ViewError::Focal)?;
-        let principal = [
-            own.cx.or(shared.cx).unwrap_or(size[0] / 2.0),
-            own.cy.or(shared.cy).unwrap_or(size[1] / 2.0),
-        ];
+        let principal = [own.cx.or(shared.cx).unwrap_or(size[0] / 2.0), own.cy.or(shared.cy).unwrap_or(size[1] / 2.0)];
         let coefficient = |own: Option<f64>, shared: Option<f64>| own.or(shared).unwrap_or(0.0);
         let distortion = Distortion {
             radial: [
@@ -149,30 +134,13 @@ impl Frame {
                 coefficient(own.k3, shared.k3),
                 coefficient(own.k4, shared.k4),
             ],
-            tangential: [
-                coefficient(own.p1, shared.p1),
-                coefficient(own.p2, shared.p2),
-            ],
+            tangential: [coefficient(own.p1, shared.p1), coefficient(own.p2, shared.p2)],
         };
         distortion.check(options.undistorted || whole, ignored)?;
-        let rows = self
-            .transform_matrix
-            .first_chunk()
-            .ok_or(ViewError::Rotation)?;
+        let rows = self.transform_matrix.first_chunk().ok_or(ViewError::Rotation)?;
         let (rotation, eye) = pose(*rows, placement);
-        let camera = Numbers {
-            model,
-            rotation,
-            eye,
-            focal: [fx, fy.unwrap_or(fx)],
-            principal,
-            size,
-        }
-        .camera()?;
-        Ok(View {
-            name: self.file_path,
-            camera,
-        })
+        let camera = Numbers { model, rotation, eye, focal: [fx, fy.unwrap_or(fx)], principal, size }.camera()?;
+        Ok(View { name: self.file_path, camera })
     }
 }
 
@@ -188,10 +156,7 @@ fn pose(rows: [[f64; 4]; 3], placement: Option<&Placement>) -> ([[f64; 3]; 3], [
     };
     let [x, y, z] = rows;
     let column = |c: usize, sign: f64| [sign * x[c], sign * y[c], sign * z[c]];
-    (
-        [column(0, 1.0), column(1, -1.0), column(2, -1.0)],
-        column(3, 1.0),
-    )
+    ([column(0, 1.0), column(1, -1.0), column(2, -1.0)], column(3, 1.0))
 }
 
 /// A camera_path.json, as the viewer exports it.
@@ -220,17 +185,12 @@ impl CameraPath {
             let half = (frame.fov.to_radians() / 2.0).tan();
             let (model, focal) = match self.camera_type.as_deref() {
                 None | Some("perspective") => (Model::Pinhole, [size[1] / 2.0 / half; 2]),
-                Some("equirectangular") => (
-                    Model::Equirectangular,
-                    [
-                        size[0] / std::f64::consts::TAU,
-                        size[1] / std::f64::consts::PI,
-                    ],
-                ),
+                Some("equirectangular") => {
+                    (Model::Equirectangular, [size[0] / std::f64::consts::TAU, size[1] / std::f64::consts::PI])
+                }
                 Some(other) => return Err(ViewError::Model(other.to_owned())),
             };
-            let rows: &[f64; 16] =
-                (frame.camera_to_world.first_chunk()).ok_or(ViewError::Rotation)?;
+            let rows: &[f64; 16] = (frame.camera_to_world.first_chunk()).ok_or(ViewError::Rotation)?;
             let row = |r: usize| std::array::from_fn(|c| rows[4 * r + c]);
             let (rotation, eye) = pose([row(0), row(1), row(2)], None);
             let camera = Numbers {
@@ -242,10 +202,7 @@ impl CameraPath {
                 size,
             }
             .camera()?;
-            Ok(View {
-                name: String::new(),
-                camera,
-            })
+            Ok(View { name: String::new(), camera })
         };
         self.camera_path.iter().map(view).collect()
     }
@@ -259,9 +216,5 @@ fn orthonormal(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let fixed = [right, down, right.cross(down)];
     let given = DMat3::from_cols_array_2d(&rows);
     let near = given.abs_diff_eq(DMat3::from_cols(fixed[0], fixed[1], fixed[2]), 0.01);
-    if near {
-        fixed.map(<[f64; 3]>::from)
-    } else {
-        rows
-    }
+    if near { fixed.map(<[f64; 3]>::from) } else { rows }
 }

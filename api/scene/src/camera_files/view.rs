@@ -83,9 +83,7 @@ pub enum ViewError {
     #[error("a number is not finite, or beyond binary32")]
     NotFinite,
     /// The lens distorts.
-    #[error(
-        "the lens distorts ({0}), which is drawn only as an ideal lens would see it (--undistorted)"
-    )]
+    #[error("the lens distorts ({0}), which is drawn only as an ideal lens would see it (--undistorted)")]
     Distorted(String),
     /// The rotation is not one.
     #[error("the rotation's rows are not perpendicular unit vectors")]
@@ -125,11 +123,7 @@ pub(super) struct Distortion {
 
 impl Distortion {
     /// Checks that there is none, or that it may be left out, which `ignored` is then told.
-    pub(super) fn check(
-        self,
-        undistorted: bool,
-        ignored: &mut Vec<String>,
-    ) -> Result<(), ViewError> {
+    pub(super) fn check(self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
         let names = ["k1", "k2", "k3", "k4", "p1", "p2"];
         let values = self.radial.iter().chain(&self.tangential);
         let coefficients: Vec<String> = (names.iter().zip(values))
@@ -165,38 +159,20 @@ pub(super) struct Numbers {
 impl Numbers {
     /// The camera.
     pub(super) fn camera(self) -> Result<Camera, ViewError> {
-        let Self {
-            model,
-            rotation,
-            eye,
-            focal,
-            principal,
-            size,
-        } = self;
-        if !size
-            .iter()
-            .all(|s| (1.0..=MAX_SIZE).contains(s) && s.fract() == 0.0)
-        {
+        let Self { model, rotation, eye, focal, principal, size } = self;
+        if !size.iter().all(|s| (1.0..=MAX_SIZE).contains(s) && s.fract() == 0.0) {
             return Err(ViewError::Size);
         }
-        if !focal
-            .iter()
-            .all(|f| (*f as f32) > 0.0 && (*f as f32).is_finite())
-        {
+        if !focal.iter().all(|f| (*f as f32) > 0.0 && (*f as f32).is_finite()) {
             return Err(ViewError::Focal);
         }
-        let finite =
-            eye.iter().all(|x| x.is_finite()) && principal.iter().all(|x| (*x as f32).is_finite());
+        let finite = eye.iter().all(|x| x.is_finite()) && principal.iter().all(|x| (*x as f32).is_finite());
         if !finite {
             return Err(ViewError::NotFinite);
         }
         let orthonormal = (0..3).all(|i| {
             (0..3).all(|j| {
-                let dot: f64 = rotation[i]
-                    .iter()
-                    .zip(rotation[j])
-                    .map(|(a, b)| a * b)
-                    .sum();
+                let dot: f64 = rotation[i].iter().zip(rotation[j]).map(|(a, b)| a * b).sum();
                 (dot - f64::from(u8::from(i == j))).abs() <= TOLERANCE
             })
         });

@@ -88,13 +88,7 @@ impl Origin<'_> {
 impl<'a> Input<'a> {
     /// An input of `len` bytes.
     pub(super) fn new(reader: &'a mut dyn BufRead, len: u64, origin: Origin<'a>) -> Self {
-        Self {
-            reader,
-            len,
-            position: 0,
-            gzip: false,
-            origin,
-        }
+        Self { reader, len, position: 0, gzip: false, origin }
     }
 
     /// The origin of the input.
@@ -121,8 +115,7 @@ impl<'a> Input<'a> {
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<(), Fault> {
         let position = self.position;
         let gzip = self.gzip;
-        self.read_exact(buffer)
-            .map_err(|error| read_fault(error, position, gzip))
+        self.read_exact(buffer).map_err(|error| read_fault(error, position, gzip))
     }
 
     /// Reads `len` bytes, which are allocated as they are read.
@@ -152,25 +145,18 @@ impl<'a> Input<'a> {
     /// Appends the next line to `line`, including its end; at most `limit` bytes.
     pub(super) fn line(&mut self, line: &mut Vec<u8>, limit: u64) -> Result<(), Fault> {
         let (position, gzip) = (self.position, self.gzip);
-        self.take(limit)
-            .read_until(b'\n', line)
-            .map_err(|error| read_fault(error, position, gzip))?;
+        self.take(limit).read_until(b'\n', line).map_err(|error| read_fault(error, position, gzip))?;
         Ok(())
     }
 
     /// The next bytes of the input, which are not consumed.
     pub(super) fn peek(&mut self) -> Result<&[u8], Fault> {
         let (position, gzip) = (self.position, self.gzip);
-        self.reader
-            .fill_buf()
-            .map_err(|error| read_fault(error, position, gzip))
+        self.reader.fill_buf().map_err(|error| read_fault(error, position, gzip))
     }
 
     /// Calls `load` with this input or, if it is a gzip stream, with its contents. Nothing may follow the stream.
-    pub(super) fn unpacked<T>(
-        &mut self,
-        load: impl FnOnce(&mut Input<'_>) -> Result<T, Fault>,
-    ) -> Result<T, Fault> {
+    pub(super) fn unpacked<T>(&mut self, load: impl FnOnce(&mut Input<'_>) -> Result<T, Fault>) -> Result<T, Fault> {
         if self.gzip || !self.peek()?.starts_with(&GZIP_MAGIC) {
             return load(self);
         }
@@ -208,9 +194,7 @@ pub(super) fn is_local(name: &str) -> bool {
     };
     !name.is_empty()
         && !name.contains(['\\', ':', '\0'])
-        && Path::new(name)
-            .components()
-            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+        && Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
         && !name.split('/').any(device)
 }
 
@@ -243,9 +227,7 @@ pub(super) fn read_growing(reader: impl Read, len: u64, known: u64) -> io::Resul
 fn read_fault(error: io::Error, position: u64, gzip: bool) -> Fault {
     match error.kind() {
         ErrorKind::UnexpectedEof => Reason::Truncated.at(Place::Byte(position)),
-        ErrorKind::InvalidInput | ErrorKind::InvalidData if gzip => {
-            Reason::Gzip(error).at(Place::Byte(position))
-        }
+        ErrorKind::InvalidInput | ErrorKind::InvalidData if gzip => Reason::Gzip(error).at(Place::Byte(position)),
         _ => Reason::Io(error).at(Place::Byte(position)),
     }
 }

@@ -100,10 +100,7 @@ impl<'a> File<'a> {
             return Err(too_short(HEADER as u64));
         }
         if bytes[0] != 0 || bytes[1] == 0 {
-            let text = format!(
-                "version {}.{} is not one of those read (0.1 and later)",
-                bytes[0], bytes[1]
-            );
+            let text = format!("version {}.{} is not one of those read (0.1 and later)", bytes[0], bytes[1]);
             return Err(Reason::Unsupported(text).at(Place::Header("version")));
         }
         let level = u16_at(bytes, 20);
@@ -132,20 +129,11 @@ impl<'a> File<'a> {
         if found != expected {
             return Err(Reason::Count { found, expected }.at(Place::Header("splatCount")));
         }
-        Ok(Self {
-            level,
-            range: [bound(36, -COEFFICIENT_RANGE), bound(40, COEFFICIENT_RANGE)],
-            sections,
-        })
+        Ok(Self { level, range: [bound(36, -COEFFICIENT_RANGE), bound(40, COEFFICIENT_RANGE)], sections })
     }
 
     /// Reads record `index` of `section`. Returns position and shape, and writes the coefficients to `sh`.
-    fn read(
-        &self,
-        section: &Section<'_>,
-        index: usize,
-        sh: &mut [[f32; 3]],
-    ) -> ([f32; 3], GaussianShape) {
+    fn read(&self, section: &Section<'_>, index: usize, sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
         let record = &section.records[index * section.stride..][..section.stride];
         let number = |at: usize| match self.level {
             0 => f32_at(record, 4 * at),
@@ -155,10 +143,7 @@ impl<'a> File<'a> {
             std::array::from_fn(number)
         } else {
             // The last bucket that begins at this record or before it.
-            let bucket = section
-                .bucket_starts
-                .partition_point(|start| *start <= index)
-                - 1;
+            let bucket = section.bucket_starts.partition_point(|start| *start <= index) - 1;
             let centre = &section.buckets[bucket * section.bucket_stride..];
             std::array::from_fn(|axis| {
                 let steps = f32::from(u16_at(record, 2 * axis)) - section.middle;
@@ -171,8 +156,7 @@ impl<'a> File<'a> {
             rotation: std::array::from_fn(|i| number(6 + i)),
             opacity: f32::from(record[colour + 3]) / 255.0,
         };
-        sh[0] =
-            std::array::from_fn(|c| ((f64::from(record[colour + c]) / 255.0 - 0.5) / SH_C0) as f32);
+        sh[0] = std::array::from_fn(|c| ((f64::from(record[colour + c]) / 255.0 - 0.5) / SH_C0) as f32);
         let rest = &record[colour + 4..];
         let coefficient = |at: usize| match self.level {
             0 => f32_at(rest, 4 * at),
@@ -201,9 +185,7 @@ impl<'a> Section<'a> {
         let degree = u32::from(u16_at(header, 40));
         if degree > 3 {
             let (found, range) = (degree, "0 to 3");
-            return Err(
-                Reason::Range { found, range }.at(Place::Header("sphericalHarmonicsDegree"))
-            );
+            return Err(Reason::Range { found, range }.at(Place::Header("sphericalHarmonicsDegree")));
         }
         if count > max_count {
             let (found, expected) = (max_count, count);
@@ -216,24 +198,15 @@ impl<'a> Section<'a> {
             _ => 24 + rest,
         };
         // Each factor has at most 32 bits, and the sum three terms.
-        let (sizes, centres, records) = (
-            4 * partial,
-            bucket_stride * bucket_count,
-            stride * max_count,
-        );
+        let (sizes, centres, records) = (4 * partial, bucket_stride * bucket_count, stride * max_count);
         let claimed = start + sizes + centres + records;
         let available = bytes.len() as u64;
         // The last section may have fewer records than its capacity.
         let needed = start + sizes + centres + stride * count;
         if needed > available {
-            return Err(Reason::TooShort {
-                claimed: needed,
-                available,
-            }
-            .at(Place::Header("a section's size")));
+            return Err(Reason::TooShort { claimed: needed, available }.at(Place::Header("a section's size")));
         }
-        let [start, sizes, centres, used] =
-            [start, sizes, centres, stride * count].map(|n| n as usize);
+        let [start, sizes, centres, used] = [start, sizes, centres, stride * count].map(|n| n as usize);
         let (sizes, rest) = bytes[start..].split_at(sizes);
         let (buckets, rest) = rest.split_at(centres);
         let mut section = Self {

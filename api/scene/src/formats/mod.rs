@@ -57,10 +57,7 @@ pub fn open_with<R: Read>(
 }
 
 fn io_error(path: &Path, source: std::io::Error) -> SceneError {
-    SceneError::Io {
-        path: path.to_owned(),
-        source,
-    }
+    SceneError::Io { path: path.to_owned(), source }
 }
 
 /// The file that holds the scene of the folder `path`; `path` itself if it is not such a folder.
@@ -85,12 +82,7 @@ pub fn read(path: &Path, reader: &mut dyn BufRead, len: u64) -> Result<Scene, Sc
 ///
 /// # Errors
 /// As [`open`].
-pub fn read_with(
-    path: &Path,
-    reader: &mut dyn BufRead,
-    len: u64,
-    options: &Options,
-) -> Result<Scene, SceneError> {
+pub fn read_with(path: &Path, reader: &mut dyn BufRead, len: u64, options: &Options) -> Result<Scene, SceneError> {
     Input::new(reader, len, Origin { path, options })
         .unpacked(|input| {
             let format = choose(path, input.peek()?)
@@ -111,10 +103,7 @@ static FORMATS: &[&dyn Format] = &[
     &sog::SogFolder,
     &gltf::Glb,
     &gltf::Gltf,
-    &NotRead {
-        name: "LCC",
-        extensions: &["lcc", "lcc2"],
-    },
+    &NotRead { name: "LCC", extensions: &["lcc", "lcc2"] },
 ];
 
 /// A format of which only the name is known.
@@ -144,24 +133,15 @@ impl Format for NotRead {
 /// The format of the file `path` that begins with `start`. It is chosen by extension (without `gz`), then by magic,
 /// because a format without magic may begin with any bytes.
 fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
-    let extension = |path: &Path| {
-        path.extension()
-            .map(|extension| extension.to_string_lossy().to_ascii_lowercase())
-    };
+    let extension = |path: &Path| path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let extension = match extension(path) {
         Some(gz) if gz == "gz" => path.file_stem().map(Path::new).and_then(extension),
         extension => extension,
     };
-    let by_extension = FORMATS.iter().find(|format| {
-        extension
-            .as_deref()
-            .is_some_and(|extension| format.extensions().contains(&extension))
-    });
-    let by_magic = || {
-        FORMATS
-            .iter()
-            .find(|format| format.magic().is_some_and(|magic| start.starts_with(magic)))
-    };
+    let by_extension = FORMATS
+        .iter()
+        .find(|format| extension.as_deref().is_some_and(|extension| format.extensions().contains(&extension)));
+    let by_magic = || FORMATS.iter().find(|format| format.magic().is_some_and(|magic| start.starts_with(magic)));
     by_extension.or_else(by_magic).copied()
 }
 

@@ -41,8 +41,7 @@ impl Format for Splat {
 
 /// Decodes a record. Returns its position and shape, and writes its colour to `sh`.
 fn gaussian(record: &[u8; RECORD], sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
-    let float =
-        |index: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[4 * index + byte]));
+    let float = |index: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[4 * index + byte]));
     let colour = |channel: usize| ((f64::from(record[24 + channel]) / 255.0 - 0.5) / SH_C0) as f32;
     let shape = GaussianShape {
         scale: std::array::from_fn(|axis| float(3 + axis)),

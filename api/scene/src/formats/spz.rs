@@ -77,13 +77,7 @@ impl Format for Spz {
 
 /// Reads a scene into the frame `into`.
 pub(super) fn load_into(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
-    input.unpacked(|input| {
-        if input.is_compressed() {
-            load_gzip(input, into)
-        } else {
-            load_plain(input, into)
-        }
-    })
+    input.unpacked(|input| if input.is_compressed() { load_gzip(input, into) } else { load_plain(input, into) })
 }
 
 /// Reads versions 1 to 3.
@@ -100,11 +94,7 @@ fn load_gzip(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fau
     }
     let data = input.bytes(claimed)?;
     let end = HEADER as u64 + claimed;
-    let allowed = if header.flags & FLAG_EXTENSIONS != 0 {
-        MAX_EXTENSIONS
-    } else {
-        0
-    };
+    let allowed = if header.flags & FLAG_EXTENSIONS != 0 { MAX_EXTENSIONS } else { 0 };
     let records = input.up_to(allowed + 1)?;
     if records.len() as u64 > allowed {
         return Err(Reason::Trailing.at(Place::Byte(end)));
@@ -153,11 +143,8 @@ fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fa
         return Err(Reason::Range { found, range }.at(Place::Header("tocByteOffset")));
     };
     let records = input.bytes(records)?;
-    let extensions = if parsed.flags & FLAG_EXTENSIONS != 0 {
-        Extensions::parse(&records)
-    } else {
-        Extensions::default()
-    };
+    let extensions =
+        if parsed.flags & FLAG_EXTENSIONS != 0 { Extensions::parse(&records) } else { Extensions::default() };
     let entries = input.bytes((streams * ENTRY) as u64)?;
     let mut arrays = [const { Vec::new() }; 6];
     for (index, entry) in entries.chunks_exact(ENTRY).enumerate() {
@@ -196,12 +183,7 @@ fn zstd(compressed: &[u8], len: u64) -> Result<Vec<u8>, Reason> {
 
 /// Another library's message, on one line.
 pub(super) fn one_line(error: &dyn std::fmt::Display) -> String {
-    error
-        .to_string()
-        .lines()
-        .next()
-        .unwrap_or_default()
-        .to_owned()
+    error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
 fn version(found: u32) -> Fault {
@@ -222,34 +204,25 @@ impl Extensions {
     fn parse(mut records: &[u8]) -> Self {
         let mut extensions = Self::default();
         while let Some((head, rest)) = records.split_first_chunk::<8>() {
-            let [kind, size] =
-                [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
+            let [kind, size] = [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
             let Some((content, rest)) = rest.split_at_checked(size as usize) else {
                 break;
             };
             records = rest;
-            let word = content
-                .first_chunk::<4>()
-                .map(|word| u32::from_le_bytes(*word));
+            let word = content.first_chunk::<4>().map(|word| u32::from_le_bytes(*word));
             match (kind, word) {
                 (COORDINATE_SYSTEM, Some(system @ 1..=16)) => {
                     extensions.coordinates = Some(CoordinateSystem(system));
                 }
-                (COORDINATE_SYSTEM, _) => extensions.notes.note(
-                    "SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed",
-                ),
-                (SAFE_ORBIT_CAMERA, _) => extensions
-                    .notes
-                    .note("the extension SPZ_ADOBE_safe_orbit_camera is ignored"),
-                (kind, _) => extensions
-                    .notes
-                    .note(format!("the extension {kind:#010x} is unknown and ignored")),
+                (COORDINATE_SYSTEM, _) => {
+                    extensions.notes.note("SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed")
+                }
+                (SAFE_ORBIT_CAMERA, _) => extensions.notes.note("the extension SPZ_ADOBE_safe_orbit_camera is ignored"),
+                (kind, _) => extensions.notes.note(format!("the extension {kind:#010x} is unknown and ignored")),
             }
         }
         if !records.is_empty() {
-            extensions
-                .notes
-                .note("bytes that are no extension record are ignored");
+            extensions.notes.note("bytes that are no extension record are ignored");
         }
         extensions
     }
@@ -272,21 +245,13 @@ impl CoordinateSystem {
     /// The matrix from this frame to right-up-front.
     fn matrix(self) -> DMat3 {
         let sign = |bit: u32| {
-            if (self.0 - 1) >> bit & 1 == 1 {
-                1.0
-            } else {
-                -1.0
-            }
+            if (self.0 - 1) >> bit & 1 == 1 { 1.0 } else { -1.0 }
         };
         let [right, height, depth] = [0, 1, 2].map(sign);
         if self.0 <= 8 {
             return DMat3::from_diagonal(DVec3::new(right, height, depth));
         }
-        DMat3::from_cols(
-            DVec3::new(right, 0.0, 0.0),
-            DVec3::new(0.0, 0.0, -depth),
-            DVec3::new(0.0, height, 0.0),
-        )
+        DMat3::from_cols(DVec3::new(right, 0.0, 0.0), DVec3::new(0.0, 0.0, -depth), DVec3::new(0.0, height, 0.0))
     }
 }
 
@@ -330,11 +295,7 @@ impl Header {
     }
 
     fn antialiasing(&self) -> Antialiasing {
-        if self.flags & FLAG_ANTIALIASED != 0 {
-            Antialiasing::Compensated
-        } else {
-            Antialiasing::Off
-        }
+        if self.flags & FLAG_ANTIALIASED != 0 { Antialiasing::Compensated } else { Antialiasing::Off }
     }
 
     /// Bytes of one Gaussian in each of the arrays of positions, opacities, colours, scales, rotations and other
@@ -348,20 +309,12 @@ impl Header {
 
     /// The sizes of the arrays in bytes.
     fn sizes(&self) -> [u64; 6] {
-        self.strides()
-            .map(|stride| stride as u64 * u64::from(self.count))
+        self.strides().map(|stride| stride as u64 * u64::from(self.count))
     }
 
     /// Decodes `arrays`, which have [`Header::sizes`], to a scene in the frame `into`.
-    fn unpack(
-        &self,
-        arrays: [&[u8]; 6],
-        extensions: &Extensions,
-        into: CoordinateSystem,
-    ) -> Result<Scene, Fault> {
-        let from = extensions
-            .coordinates
-            .unwrap_or(CoordinateSystem::RIGHT_UP_BACK);
+    fn unpack(&self, arrays: [&[u8]; 6], extensions: &Extensions, into: CoordinateSystem) -> Result<Scene, Fault> {
+        let from = extensions.coordinates.unwrap_or(CoordinateSystem::RIGHT_UP_BACK);
         let map = into.matrix().transpose() * from.matrix();
         let motion = Motion::new(map, DVec3::ZERO, self.sh_degree);
         let strides = self.strides();
@@ -389,9 +342,7 @@ impl Header {
 
     fn position(&self, bytes: &[u8]) -> [f32; 3] {
         if self.version == 1 {
-            return std::array::from_fn(|axis| {
-                f16::from_le_bytes([bytes[2 * axis], bytes[2 * axis + 1]]).to_f32()
-            });
+            return std::array::from_fn(|axis| f16::from_le_bytes([bytes[2 * axis], bytes[2 * axis + 1]]).to_f32());
         }
         let unit = 1.0 / (1_u64 << self.fractional_bits) as f32;
         std::array::from_fn(|axis| {
@@ -433,19 +384,9 @@ fn smallest_three(word: u32) -> [f32; 4] {
     let which = (word >> 30) as usize;
     let small = [20, 10, 0].map(|shift| {
         let magnitude = ((word >> shift) & 0x1ff) as f32 * FRAC_1_SQRT_2 / 511.0;
-        if (word >> shift) & 0x200 == 0 {
-            magnitude
-        } else {
-            -magnitude
-        }
+        if (word >> shift) & 0x200 == 0 { magnitude } else { -magnitude }
     });
     let largest = complement(&small);
     let mut small = small.into_iter();
-    std::array::from_fn(|i| {
-        if i == which {
-            largest
-        } else {
-            small.next().unwrap_or_default()
-        }
-    })
+    std::array::from_fn(|i| if i == which { largest } else { small.next().unwrap_or_default() })
 }

@@ -44,10 +44,7 @@ pub(super) struct Brush {
 
 impl Brush {
     pub(super) fn new(seed: u64, count: usize) -> Self {
-        Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
-            scene: Scene::with_capacity(3, count),
-        }
+        Self { rng: ChaCha8Rng::seed_from_u64(seed), scene: Scene::with_capacity(3, count) }
     }
 
     pub(super) fn finish(self) -> Scene {

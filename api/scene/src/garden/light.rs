@@ -19,12 +19,9 @@ pub(super) fn sky(direction: DVec3) -> DVec3 {
     let zenith = DVec3::new(0.16, 0.27, 0.50);
     let middle = DVec3::new(0.48, 0.48, 0.62);
     let horizon = DVec3::new(0.98, 0.66, 0.44);
-    let sky = horizon
-        .lerp(middle, smooth(height / 0.22))
-        .lerp(zenith, smooth((height - 0.12) / 0.75));
+    let sky = horizon.lerp(middle, smooth(height / 0.22)).lerp(zenith, smooth((height - 0.12) / 0.75));
     let towards = direction.dot(sun()).max(0.0);
-    sky + DVec3::new(0.55, 0.32, 0.10) * towards.powi(6) * 0.6
-        + DVec3::new(1.0, 0.85, 0.55) * towards.powi(90) * 0.9
+    sky + DVec3::new(0.55, 0.32, 0.10) * towards.powi(6) * 0.6 + DVec3::new(1.0, 0.85, 0.55) * towards.powi(90) * 0.9
 }
 
 /// The colour of a matte surface, lit by sun, sky and ground. `open` is the share of light that reaches it, 0 to 1.
@@ -121,11 +118,7 @@ mod tests {
         let coefficients = lobe(axis, DVec3::ONE);
         let towards = |direction: DVec3| {
             let basis = basis(direction);
-            coefficients
-                .iter()
-                .zip(basis)
-                .map(|(c, b)| c.x * b)
-                .sum::<f64>()
+            coefficients.iter().zip(basis).map(|(c, b)| c.x * b).sum::<f64>()
         };
         assert!((towards(axis) - LOBE.iter().sum::<f64>()).abs() < 1e-9);
         let brightest = (0..500)

@@ -71,10 +71,7 @@ mod tests {
     fn a_garden_is_made_of_proper_gaussians_before_its_camera() {
         let garden = scene(0, 20_000);
         for shape in garden.shapes() {
-            assert!(
-                shape.scale.iter().all(|s| (1e-4..100.0).contains(s)),
-                "{shape:?}"
-            );
+            assert!(shape.scale.iter().all(|s| (1e-4..100.0).contains(s)), "{shape:?}");
             let length: f32 = shape.rotation.iter().map(|c| c * c).sum();
             assert!((length - 1.0).abs() < 1e-5, "{shape:?}");
             assert!((0.0..=1.0).contains(&shape.opacity), "{shape:?}");

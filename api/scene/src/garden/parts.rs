@@ -29,13 +29,7 @@ const ROSE: [DVec3; 2] = [DVec3::new(0.40, 0.12, 0.20), DVec3::new(0.98, 0.58, 0
 const AMBER: [DVec3; 2] = [DVec3::new(0.36, 0.11, 0.02), DVec3::new(0.96, 0.52, 0.12)];
 
 const fn tree(x: f64, z: f64, height: f64, [dark, bright]: [DVec3; 2]) -> Tree {
-    Tree {
-        x,
-        z,
-        height,
-        dark,
-        bright,
-    }
+    Tree { x, z, height, dark, bright }
 }
 
 const TREES: [Tree; 12] = [
@@ -74,10 +68,7 @@ fn shade(x: f64, z: f64) -> f64 {
     TREES.iter().fold(1.0, |open, tree| {
         // The crown's shadow lies opposite the sun.
         let reach = 0.62 * tree.height / sun().y;
-        let (dx, dz) = (
-            x - (tree.x - sun().x * reach),
-            z - (tree.z - sun().z * reach),
-        );
+        let (dx, dz) = (x - (tree.x - sun().x * reach), z - (tree.z - sun().z * reach));
         let along = (dx * sun().x + dz * sun().z) / sun().x.hypot(sun().z);
         let across = dx.hypot(dz).powi(2) - along * along;
         let size = 0.30 * tree.height;
@@ -90,10 +81,7 @@ fn shade(x: f64, z: f64) -> f64 {
 fn haze(colour: DVec3, position: DVec3) -> DVec3 {
     let distance = position.length();
     let along = DVec3::new(position.x, 0.06 * distance, position.z).normalize_or(DVec3::Y);
-    colour.lerp(
-        0.92 * sky_colour(along),
-        smooth((distance - 5.0) / 42.0) * 0.9,
-    )
+    colour.lerp(0.92 * sky_colour(along), smooth((distance - 5.0) / 42.0) * 0.9)
 }
 
 /// Paints the sky: large soft splats on a far dome.
@@ -104,8 +92,7 @@ pub(super) fn sky(brush: &mut Brush, count: usize) {
     let spacing = (4.0 * std::f64::consts::PI / all.max(1) as f64).sqrt();
     for i in 0..count {
         let direction = spread(i, all);
-        let cloud = (7.0 * direction.x + 3.0 * direction.z).sin()
-            * (16.0 * direction.y + 2.5 * direction.x).sin();
+        let cloud = (7.0 * direction.x + 3.0 * direction.z).sin() * (16.0 * direction.y + 2.5 * direction.x).sin();
         let low = smooth(direction.y / 0.08) * (1.0 - smooth((direction.y - 0.15) / 0.3));
         let colour = sky_colour(direction) + DVec3::new(0.16, 0.09, 0.09) * (cloud * low);
         let mut splat = Splat::new(direction * radius, radius * spacing * 0.62, colour);
@@ -200,11 +187,7 @@ pub(super) fn trees(brush: &mut Brush, count: usize) {
     let mut left = count;
     for (i, tree) in TREES.iter().enumerate() {
         let share = (count as f64 * weight(tree) / total) as usize;
-        let share = if i + 1 == TREES.len() {
-            left
-        } else {
-            share.min(left)
-        };
+        let share = if i + 1 == TREES.len() { left } else { share.min(left) };
         left -= share;
         grow(brush, tree, share);
     }
@@ -247,13 +230,10 @@ fn grow(brush: &mut Brush, tree: &Tree, count: usize) {
         let out = brush.even(0.0, 1.0).powf(0.3) + brush.normal(0.06);
         let position = centre + direction * DVec3::new(1.0, 0.8, 1.0) * (radius * out);
         let outwards = ((position - crown) / (0.3 * height)).clamp_length_max(1.0);
-        let normal =
-            (0.6 * direction + 0.7 * outwards + 0.35 * brush.direction()).normalize_or(DVec3::Y);
+        let normal = (0.6 * direction + 0.7 * outwards + 0.35 * brush.direction()).normalize_or(DVec3::Y);
         let open = smooth(0.38 + 0.45 * out * outwards.length() + 0.3 * direction.dot(sun()))
             * (0.75 + 0.25 * smooth(0.5 + 0.6 * outwards.dot(sun())));
-        let albedo = tree
-            .dark
-            .lerp(tree.bright, brush.even(0.35, 1.0) * (0.4 + 0.6 * open));
+        let albedo = tree.dark.lerp(tree.bright, brush.even(0.35, 1.0) * (0.4 + 0.6 * open));
         let lit = leaf(albedo, normal, open);
         let mut splat = Splat::new(position, leaf_size, haze(lit, position));
         splat.rotation = facing(normal, brush.even(0.0, TAU));
@@ -325,11 +305,7 @@ pub(super) fn fireflies(brush: &mut Brush, count: usize) {
     for _ in 0..count {
         let mut position = brush.on_disc(POND + 1.6);
         position.y = brush.even(0.15, 1.7);
-        let mut splat = Splat::new(
-            position,
-            brush.even(0.008, 0.02),
-            DVec3::new(1.0, 0.86, 0.45),
-        );
+        let mut splat = Splat::new(position, brush.even(0.008, 0.02), DVec3::new(1.0, 0.86, 0.45));
         splat.opacity = brush.even(0.35, 0.8);
         brush.paint(&splat);
     }
@@ -351,11 +327,8 @@ fn course(t: f64) -> DVec3 {
 }
 
 fn paint_knot(brush: &mut Brush, count: usize, mirrored: bool) {
-    const TONES: [DVec3; 3] = [
-        DVec3::new(0.80, 0.52, 0.20),
-        DVec3::new(0.76, 0.30, 0.30),
-        DVec3::new(0.20, 0.50, 0.56),
-    ];
+    const TONES: [DVec3; 3] =
+        [DVec3::new(0.80, 0.52, 0.20), DVec3::new(0.76, 0.30, 0.30), DVec3::new(0.20, 0.50, 0.56)];
     const TUBE: f64 = 0.135;
     let horizon = DVec3::new(sun().x, 0.1, sun().z).normalize();
     let size = 1.45 * (13.0 * TUBE / count.max(1) as f64).sqrt().min(0.2);
@@ -363,9 +336,7 @@ fn paint_knot(brush: &mut Brush, count: usize, mirrored: bool) {
         let t = TAU * (i as f64 + brush.even(0.0, 1.0)) / count as f64;
         let (here, ahead) = (course(t), course(t + 1e-3));
         let tangent = (ahead - here).normalize();
-        let side = tangent
-            .cross(DVec3::Y + 0.01 * DVec3::X)
-            .normalize_or(DVec3::X);
+        let side = tangent.cross(DVec3::Y + 0.01 * DVec3::X).normalize_or(DVec3::X);
         // Multiples of the golden angle leave no gaps.
         let (sin, cos) = (2.399_963 * i as f64 % TAU).sin_cos();
         let normal = side * cos + tangent.cross(side) * sin;

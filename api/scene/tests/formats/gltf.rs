@@ -54,18 +54,10 @@ impl Builder {
     }
 
     /// Adds an attribute or replaces it: two elements of `width` components of a type, in `bytes`.
-    fn attribute(
-        &mut self,
-        name: &str,
-        width: usize,
-        (kind, normalized): (u32, bool),
-        bytes: &[u8],
-    ) {
+    fn attribute(&mut self, name: &str, width: usize, (kind, normalized): (u32, bool), bytes: &[u8]) {
         let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][width];
         let view = self.view(bytes);
-        let accessors = self.document["accessors"]
-            .as_array_mut()
-            .expect("accessors");
+        let accessors = self.document["accessors"].as_array_mut().expect("accessors");
         accessors.push(json!({
             "bufferView": view, "componentType": kind, "normalized": normalized, "count": 2, "type": shape,
         }));
@@ -100,11 +92,7 @@ impl Builder {
         json.resize(json.len().next_multiple_of(4), b' ');
         let mut file = b"glTF".to_vec();
         let len = 12 + 8 + json.len() + 8 + self.bytes.len();
-        file.extend(
-            [2, len as u32, json.len() as u32]
-                .map(u32::to_le_bytes)
-                .as_flattened(),
-        );
+        file.extend([2, len as u32, json.len() as u32].map(u32::to_le_bytes).as_flattened());
         file.extend(b"JSON");
         file.extend(json);
         file.extend((self.bytes.len() as u32).to_le_bytes());
@@ -135,9 +123,7 @@ pub fn gltf() -> Vec<u8> {
     let base64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/".as_bytes();
     let mut data = String::from("data:application/octet-stream;base64,");
     for bytes in builder.bytes.chunks(3) {
-        let word = (0..3).fold(0, |word, i| {
-            word << 8 | u32::from(bytes.get(i).copied().unwrap_or(0))
-        });
+        let word = (0..3).fold(0, |word, i| word << 8 | u32::from(bytes.get(i).copied().unwrap_or(0)));
         for i in 0..4 {
             let digit = base64[(word >> (18 - 6 * i) & 63) as usize];
             data.push(if i > bytes.len() { '=' } else { digit.into() });
@@ -174,10 +160,7 @@ fn gltf_values() {
 
 /// `values` as bytes of integers of `size` bytes.
 fn whole(size: usize, values: &[i32]) -> Vec<u8> {
-    values
-        .iter()
-        .flat_map(|v| v.to_le_bytes()[..size].to_vec())
-        .collect()
+    values.iter().flat_map(|v| v.to_le_bytes()[..size].to_vec()).collect()
 }
 
 #[gaurast_runner::test]
@@ -203,11 +186,7 @@ fn every_component_type_of_gltf() {
             file.attribute(SCALE, 3, (kind, normalized), &values);
             let unit = if normalized { 1.0 / max as f32 } else { 1.0 };
             let scene = file.load();
-            close(
-                &scene.shapes()[0].scale,
-                &[0.0, max as f32 * unit, unit],
-                1e-6,
-            );
+            close(&scene.shapes()[0].scale, &[0.0, max as f32 * unit, unit], 1e-6);
         }
     }
     for (kind, size) in [(5120, 1), (5122, 2)] {
@@ -251,8 +230,7 @@ fn nodes_move_gaussians_and_their_colours() {
         close(&scene.shapes()[0].scale, &[0.2, 0.4, 0.6], 1e-6);
         // x becomes y: the coefficients are those of -y, z and -x.
         let [y, z, x] = [1, 2, 3].map(coefficient);
-        let c =
-            |values: [f32; 6], sign: f32| [sign * values[0], sign * values[1], sign * values[2]];
+        let c = |values: [f32; 6], sign: f32| [sign * values[0], sign * values[1], sign * values[2]];
         close(&scene.sh()[1], &c(x, -1.0), 1e-6);
         close(&scene.sh()[2], &c(z, -1.0), 1e-6);
         close(&scene.sh()[3], &c(y, -1.0), 1e-6);
@@ -271,22 +249,12 @@ fn nodes_move_gaussians_and_their_colours() {
 fn what_gltf_says_is_told_or_refused() {
     let mut file = Builder::new();
     file.splatting()["colorSpace"] = json!("lin_rec709_display");
-    assert_eq!(
-        file.load().metadata().color_space,
-        Some(ColorSpace::LinearRec709Display)
-    );
-    for (field, value) in [
-        ("kernel", "customShape"),
-        ("colorSpace", "custom"),
-        ("projection", "fisheye"),
-    ] {
+    assert_eq!(file.load().metadata().color_space, Some(ColorSpace::LinearRec709Display));
+    for (field, value) in [("kernel", "customShape"), ("colorSpace", "custom"), ("projection", "fisheye")] {
         let mut file = Builder::new();
         file.splatting()[field] = json!(value);
         let (place, reason) = file.refusal();
-        assert_eq!(
-            place,
-            Place::Part("mesh 0, primitive 0, KHR_gaussian_splatting".to_owned())
-        );
+        assert_eq!(place, Place::Part("mesh 0, primitive 0, KHR_gaussian_splatting".to_owned()));
         assert!(matches!(reason, Reason::Unsupported(text) if text.contains(value)));
     }
     let mut file = Builder::new();
@@ -300,52 +268,22 @@ fn what_gltf_says_is_told_or_refused() {
         edit(&mut file);
         file.refusal().1
     };
-    assert!(matches!(
-        refused(|f| f.primitive()["mode"] = json!(4)),
-        Reason::Unsupported(_)
-    ));
-    assert!(matches!(
-        refused(|f| f.document["asset"]["version"] = json!("1.0")),
-        Reason::Unsupported(_)
-    ));
-    assert!(matches!(
-        refused(|f| f.document["extensionsRequired"] = json!(["EXT_unknown"])),
-        Reason::Unsupported(_)
-    ));
-    assert!(matches!(
-        refused(|f| f.node()["children"] = json!([0])),
-        Reason::Unsupported(_)
-    ));
-    assert!(matches!(
-        refused(|f| f.node()["mesh"] = json!(9)),
-        Reason::Missing
-    ));
-    assert!(matches!(
-        refused(|f| f.node()["scale"] = json!([0, 1, 1])),
-        Reason::Unsupported(_)
-    ));
-    assert!(matches!(
-        refused(|f| f.document["accessors"][0]["count"] = json!(3)),
-        Reason::TooShort { .. }
-    ));
-    assert!(matches!(
-        refused(|f| f.document["accessors"][1]["count"] = json!(1)),
-        Reason::Count { .. }
-    ));
-    assert!(matches!(
-        refused(|f| f.document["accessors"][0]["count"] = json!(u64::MAX)),
-        Reason::TooShort { .. }
-    ));
+    assert!(matches!(refused(|f| f.primitive()["mode"] = json!(4)), Reason::Unsupported(_)));
+    assert!(matches!(refused(|f| f.document["asset"]["version"] = json!("1.0")), Reason::Unsupported(_)));
+    assert!(matches!(refused(|f| f.document["extensionsRequired"] = json!(["EXT_unknown"])), Reason::Unsupported(_)));
+    assert!(matches!(refused(|f| f.node()["children"] = json!([0])), Reason::Unsupported(_)));
+    assert!(matches!(refused(|f| f.node()["mesh"] = json!(9)), Reason::Missing));
+    assert!(matches!(refused(|f| f.node()["scale"] = json!([0, 1, 1])), Reason::Unsupported(_)));
+    assert!(matches!(refused(|f| f.document["accessors"][0]["count"] = json!(3)), Reason::TooShort { .. }));
+    assert!(matches!(refused(|f| f.document["accessors"][1]["count"] = json!(1)), Reason::Count { .. }));
+    assert!(matches!(refused(|f| f.document["accessors"][0]["count"] = json!(u64::MAX)), Reason::TooShort { .. }));
     assert!(matches!(
         refused(|f| f.document["bufferViews"][0]["byteLength"] = json!(1_u64 << 40)),
         Reason::TooShort { .. }
     ));
     let name = "KHR_gaussian_splatting:SH_DEGREE_1_COEF_1";
     let mut file = Builder::new();
-    file.primitive()["attributes"]
-        .as_object_mut()
-        .expect("attributes")
-        .remove(name);
+    file.primitive()["attributes"].as_object_mut().expect("attributes").remove(name);
     let (place, reason) = file.refusal();
     assert_eq!(place, Place::Part(format!("mesh 0, primitive 0, {name}")));
     assert!(matches!(reason, Reason::Missing));
@@ -354,9 +292,7 @@ fn what_gltf_says_is_told_or_refused() {
     file.primitive()["extensions"] = json!({});
     assert!(matches!(file.refusal().1, Reason::Unsupported(_)));
     let mut file = Builder::new();
-    let primitives = file.document["meshes"][0]["primitives"]
-        .as_array_mut()
-        .expect("primitives");
+    let primitives = file.document["meshes"][0]["primitives"].as_array_mut().expect("primitives");
     primitives.push(json!({"mode": 1, "attributes": {"POSITION": 0}}));
     assert_eq!(file.load().metadata().notes.len(), 1);
 }
@@ -425,8 +361,7 @@ fn sparse_accessors_of_gltf_replace_elements() {
     assert!(matches!(reason, Reason::TooShort { .. }));
     // Zeros take no bytes of the file, and still don't take all memory.
     let mut file = Builder::new();
-    file.document["accessors"][0] =
-        json!({"componentType": 5126, "count": 1_u64 << 40, "type": "VEC3"});
+    file.document["accessors"][0] = json!({"componentType": 5126, "count": 1_u64 << 40, "type": "VEC3"});
     let (place, reason) = file.refusal();
     assert_eq!(place, part(""));
     assert!(reason.to_string().contains("1099511627776 elements"));
@@ -451,11 +386,7 @@ fn compressed_gltf_is_refused_by_the_name_of_its_extension() {
         let expected = format!("its data is compressed by {extension:?}, which is not read");
         assert_eq!(reason.to_string(), expected);
     }
-    for extension in [
-        "EXT_meshopt_compression",
-        "KHR_meshopt_compression",
-        "KHR_draco_mesh_compression",
-    ] {
+    for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression"] {
         let mut file = Builder::new();
         file.document["extensionsRequired"] = json!([extension]);
         let (place, reason) = file.refusal();
@@ -515,13 +446,7 @@ fn spz_in_gltf_is_a_draft_that_is_read() {
         let negated = |c: [f32; 3]| c.map(|v| -v);
         assert_eq!(scene.sh()[1..], [r, negated(g), negated(b)]);
         assert_eq!(scene.metadata().antialiasing, plain.metadata().antialiasing);
-        assert!(
-            scene
-                .metadata()
-                .notes
-                .iter()
-                .any(|note| note.contains(name))
-        );
+        assert!(scene.metadata().notes.iter().any(|note| note.contains(name)));
     }
 }
 
@@ -546,17 +471,10 @@ fn malformed_binary_gltf_is_refused() {
 /// Tests a real file, which has signed scales in four of its primitives; the extension doesn't allow them.
 #[gaurast_runner::test]
 fn a_real_gltf_is_read_without_its_signed_scales() {
-    for name in [
-        "splats/khr_conformance_matrix.gltf",
-        "splats/khr_conformance_matrix.glb",
-    ] {
-        let error = gaurast_scene::open(data(name))
-            .expect_err("signed scales")
-            .to_string();
+    for name in ["splats/khr_conformance_matrix.gltf", "splats/khr_conformance_matrix.glb"] {
+        let error = gaurast_scene::open(data(name)).expect_err("signed scales").to_string();
         assert!(
-            error.contains(
-                "mesh 4, primitive 0, KHR_gaussian_splatting:SCALE: its type is signed byte"
-            ),
+            error.contains("mesh 4, primitive 0, KHR_gaussian_splatting:SCALE: its type is signed byte"),
             "{error}"
         );
     }
@@ -576,17 +494,12 @@ fn a_real_gltf_is_read_without_its_signed_scales() {
                 let sign = if k == 0 { 1.0 } else { TURN[k - 1] };
                 let base = if k < known { k as f32 } else { 0.0 };
                 let step = if k < known { 0.1 } else { 0.0 };
-                close(
-                    rgb,
-                    &[1.0, 2.0, 3.0].map(|c| sign * (base + step * c)),
-                    1e-5,
-                );
+                close(rgb, &[1.0, 2.0, 3.0].map(|c| sign * (base + step * c)), 1e-5);
             }
         }
     }
     let opacities: Vec<_> = scene.shapes().iter().map(|shape| shape.opacity).collect();
     close(&opacities[..4], &[0.25; 4], 1e-6);
-    let error =
-        gaurast_scene::open(data("splats/khr_extensible_fallback.gltf")).expect_err("a kernel");
+    let error = gaurast_scene::open(data("splats/khr_extensible_fallback.gltf")).expect_err("a kernel");
     assert!(error.to_string().contains("customShape"), "{error}");
 }

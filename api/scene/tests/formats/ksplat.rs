@@ -19,15 +19,7 @@ pub fn file(level: u16) -> Vec<u8> {
     put(20, &level.to_le_bytes());
     put(36, &(-2_f32).to_le_bytes());
     put(40, &2_f32.to_le_bytes());
-    let section = [
-        (0, 3_u32),
-        (4, 3),
-        (8, 2),
-        (12, 2),
-        (24, 0),
-        (32, 1),
-        (36, 1),
-    ];
+    let section = [(0, 3_u32), (4, 3), (8, 2), (12, 2), (24, 0), (32, 1), (36, 1)];
     for (at, value) in section {
         put(4096 + at, &value.to_le_bytes());
     }
@@ -82,9 +74,7 @@ fn ksplat_values_at_every_level() {
             } else {
                 // The third is in the second bucket.
                 let sign = if i == 2 { -1.0 } else { 1.0 };
-                [0.0, 1.0, 2.0].map(|axis: f32| {
-                    sign * (axis + 1.0) + (100.0 * f - 1000.0 * axis) * 2.5 / 32767.0
-                })
+                [0.0, 1.0, 2.0].map(|axis: f32| sign * (axis + 1.0) + (100.0 * f - 1000.0 * axis) * 2.5 / 32767.0)
             };
             close(&scene.positions()[i], &expected, 1e-5);
             let shape = scene.shapes()[i];
@@ -102,11 +92,7 @@ fn ksplat_values_at_every_level() {
                 close(&sh[1 + k], &[value(k), value(3 + k), value(6 + k)], 1e-6);
             }
             for k in 0..5 {
-                close(
-                    &sh[4 + k],
-                    &[value(9 + k), value(14 + k), value(19 + k)],
-                    1e-6,
-                );
+                close(&sh[4 + k], &[value(9 + k), value(14 + k), value(19 + k)], 1e-6);
             }
         }
     }
@@ -123,41 +109,17 @@ fn malformed_ksplat_is_refused_with_place_and_reason() {
     let (place, reason) = refused(0, &[1]);
     assert_eq!(place, Place::Header("version"));
     assert!(matches!(reason, Reason::Unsupported(_)));
-    assert!(matches!(
-        refused(20, &[3]).1,
-        Reason::Range { found: 3, .. }
-    ));
+    assert!(matches!(refused(20, &[3]).1, Reason::Range { found: 3, .. }));
     assert!(matches!(refused(4, &huge).1, Reason::TooShort { .. }));
-    assert!(matches!(
-        refused(16, &[4]).1,
-        Reason::Count {
-            found: 3,
-            expected: 4
-        }
-    ));
+    assert!(matches!(refused(16, &[4]).1, Reason::Count { found: 3, expected: 4 }));
     assert!(matches!(refused(4096, &huge).1, Reason::Count { .. }));
     for at in [12, 36] {
-        assert!(matches!(
-            refused(4096 + at, &huge).1,
-            Reason::TooShort { .. }
-        ));
+        assert!(matches!(refused(4096 + at, &huge).1, Reason::TooShort { .. }));
     }
-    assert!(matches!(
-        refused(4096 + 40, &[4]).1,
-        Reason::Range { found: 4, .. }
-    ));
+    assert!(matches!(refused(4096 + 40, &[4]).1, Reason::Range { found: 4, .. }));
     // Buckets whose capacity is less than the number of records.
-    assert!(matches!(
-        refused(4096 + 8, &[1]).1,
-        Reason::Count {
-            found: 2,
-            expected: 3
-        }
-    ));
-    assert!(matches!(
-        refusal("a.ksplat", &[0, 1]).1,
-        Reason::TooShort { .. }
-    ));
+    assert!(matches!(refused(4096 + 8, &[1]).1, Reason::Count { found: 2, expected: 3 }));
+    assert!(matches!(refusal("a.ksplat", &[0, 1]).1, Reason::TooShort { .. }));
 }
 
 #[gaurast_runner::test]

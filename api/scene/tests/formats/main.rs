@@ -37,13 +37,7 @@ fn splat_values() {
     close(&colour, &[1.0, 0.0, 0.2], 1e-6);
 
     file.pop();
-    assert!(matches!(
-        refusal("a.splat", &file).1,
-        Reason::Records {
-            len: 31,
-            record: 32
-        }
-    ));
+    assert!(matches!(refusal("a.splat", &file).1, Reason::Records { len: 31, record: 32 }));
     assert!(matches!(refusal("a.splat", &[]).1, Reason::Empty));
 }
 
@@ -62,31 +56,22 @@ const REAL_SCENES: [(&str, usize, u32); 10] = [
 ];
 
 fn real_scenes() -> Vec<Variant> {
-    let variant = |(file, ..): (&'static str, usize, u32)| Variant {
-        name: file.to_owned(),
-        needs: vec![Need::Data(file)],
-    };
+    let variant =
+        |(file, ..): (&'static str, usize, u32)| Variant { name: file.to_owned(), needs: vec![Need::Data(file)] };
     REAL_SCENES.map(variant).into()
 }
 
 #[gaurast_runner::test(each = real_scenes())]
 fn real_scenes_are_read(case: &Case) {
-    let (file, count, degree) = REAL_SCENES
-        .into_iter()
-        .find(|(file, ..)| *file == case.variant())
-        .expect("a scene");
+    let (file, count, degree) = REAL_SCENES.into_iter().find(|(file, ..)| *file == case.variant()).expect("a scene");
     let scene = gaurast_scene::open(gaurast_runner::data(file)).expect("a good file");
     assert_eq!((scene.len(), scene.sh_degree()), (count, degree));
-    let sane = scene
-        .positions()
-        .iter()
-        .zip(scene.shapes())
-        .filter(|(p, s)| {
-            p.iter().all(|c| c.abs() < 1e3)
-                && s.scale.iter().all(|c| (0.0..1e2).contains(c))
-                && (0.0..=1.0).contains(&s.opacity)
-                && s.rotation.iter().any(|c| c.abs() > 1e-3)
-        });
+    let sane = scene.positions().iter().zip(scene.shapes()).filter(|(p, s)| {
+        p.iter().all(|c| c.abs() < 1e3)
+            && s.scale.iter().all(|c| (0.0..1e2).contains(c))
+            && (0.0..=1.0).contains(&s.opacity)
+            && s.rotation.iter().any(|c| c.abs() > 1e-3)
+    });
     assert!(sane.count() > count * 99 / 100);
 }
 
@@ -106,17 +91,11 @@ fn formats_that_are_not_read_and_unknown_ones_are_named() {
     assert!(error.to_string().contains(".splat"), "{error}");
     // Without a name, some formats cannot be told.
     let error = read("standard input", b"hello").expect_err("unknown");
-    let hint =
-        "of these, .splat, .ksplat, .json, .gltf are known by the names of their files alone";
+    let hint = "of these, .splat, .ksplat, .json, .gltf are known by the names of their files alone";
     assert!(error.to_string().contains(hint), "{error}");
     let (properties, rows) = distinct(0, 1);
     let file = ply(Encoding::Little, &properties, &rows);
-    assert_eq!(
-        read("no extension", &file)
-            .expect("by its first bytes")
-            .len(),
-        1
-    );
+    assert_eq!(read("no extension", &file).expect("by its first bytes").len(), 1);
     let missing = gaurast_scene::open(Path::new("no/such/file.ply")).expect_err("missing");
     assert!(matches!(missing, SceneError::Io { .. }));
 }
@@ -191,10 +170,7 @@ fn compressed_files_are_what_they_hold() {
     // A header that claims more than the file can hold, and a gzip bomb after a valid scene.
     let text = String::from_utf8_lossy(&plain[..60]).replace("vertex 3", "vertex 99999999");
     let claim = gzip(&[text.as_bytes(), &plain[60..]].concat());
-    assert!(matches!(
-        refusal("a.ply.gz", &claim).1,
-        Reason::TooShort { .. }
-    ));
+    assert!(matches!(refusal("a.ply.gz", &claim).1, Reason::TooShort { .. }));
     let bomb = gzip(&[plain, vec![0; 64 << 20]].concat());
     assert!(matches!(refusal("a.ply.gz", &bomb).1, Reason::Trailing));
 }
@@ -253,12 +229,7 @@ type Packed = (&'static str, Pack, Vec<(String, Vec<u8>)>);
 static PARTS: LazyLock<[Packed; 5]> = LazyLock::new(|| {
     let (properties, rows) = distinct(1, 2);
     let spz = |degree, stride: usize| {
-        let body = [
-            spz_header(3, 2, degree, 2),
-            vec![99; 2 * stride],
-            vec![1; 20],
-        ]
-        .concat();
+        let body = [spz_header(3, 2, degree, 2), vec![99; 2 * stride], vec![1; 20]].concat();
         vec![(String::new(), body)]
     };
     let ply = vec![(String::new(), ply(Encoding::Little, &properties, &rows))];

@@ -26,11 +26,7 @@ fn text() -> String {
 
 /// The square in a binary PLY file.
 pub fn binary(big_endian: bool) -> Vec<u8> {
-    let format = if big_endian {
-        "binary_big_endian"
-    } else {
-        "binary_little_endian"
-    };
+    let format = if big_endian { "binary_big_endian" } else { "binary_little_endian" };
     let mut file = header(format).into_bytes();
     let word = |bytes: [u8; 4]| {
         let mut bytes = bytes;
@@ -45,10 +41,7 @@ pub fn binary(big_endian: bool) -> Vec<u8> {
     }
     for face in [&[0, 1, 2, 3][..], &[0, 2, 1]] {
         file.extend([7, face.len() as u8]);
-        file.extend(
-            face.iter()
-                .flat_map(|index: &i32| word(index.to_le_bytes())),
-        );
+        file.extend(face.iter().flat_map(|index: &i32| word(index.to_le_bytes())));
     }
     file
 }
@@ -61,11 +54,7 @@ fn strip(mode: u32, indices: &[u16]) -> Vec<u8> {
 /// The same file after a change of its document.
 fn strip_with(mode: u32, indices: &[u16], change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let strip = [CORNERS[0], CORNERS[1], CORNERS[3], CORNERS[2]];
-    let mut bytes: Vec<u8> = strip
-        .as_flattened()
-        .iter()
-        .flat_map(|c| c.to_le_bytes())
-        .collect();
+    let mut bytes: Vec<u8> = strip.as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
     let at = bytes.len();
     bytes.extend(indices.iter().flat_map(|index| index.to_le_bytes()));
     let mut document = json!({
@@ -87,17 +76,8 @@ fn strip_with(mode: u32, indices: &[u16], change: impl FnOnce(&mut Value)) -> Ve
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();
-    let words = |words: &[usize]| -> Vec<u8> {
-        words
-            .iter()
-            .flat_map(|w| (*w as u32).to_le_bytes())
-            .collect()
-    };
-    file.extend(words(&[
-        2,
-        12 + 8 + json.len() + 8 + bytes.len(),
-        json.len(),
-    ]));
+    let words = |words: &[usize]| -> Vec<u8> { words.iter().flat_map(|w| (*w as u32).to_le_bytes()).collect() };
+    file.extend(words(&[2, 12 + 8 + json.len() + 8 + bytes.len(), json.len()]));
     file.extend(b"JSON");
     file.extend(json);
     file.extend(words(&[bytes.len()]));
@@ -113,10 +93,7 @@ pub fn glb() -> Vec<u8> {
 
 /// The positions of the triangles, three by three.
 fn positions(mesh: &Mesh) -> Vec<[f32; 3]> {
-    mesh.vertices()
-        .iter()
-        .map(|vertex| vertex.position)
-        .collect()
+    mesh.vertices().iter().map(|vertex| vertex.position).collect()
 }
 
 #[gaurast_runner::test]
@@ -131,28 +108,18 @@ fn faces_of_ply_files_are_triangles() {
         assert_eq!(vertex.normal, [0., 0., 1.]);
     }
     let (place, reason) = refusal("a.ply", text().replace("7 3 0 2 1", "7 3 0 2 4").as_bytes());
-    let face = Place::Property {
-        element: "face".to_owned(),
-        property: "vertex_indices".to_owned(),
-    };
+    let face = Place::Property { element: "face".to_owned(), property: "vertex_indices".to_owned() };
     assert_eq!(place, face);
-    assert!(
-        reason.to_string().contains("vertex 4 is not one of the 4"),
-        "{reason}"
-    );
+    assert!(reason.to_string().contains("vertex 4 is not one of the 4"), "{reason}");
     let negative = text().replace("7 3 0 2 1", "7 3 0 2 -1");
     assert_eq!(refusal("a.ply", negative.as_bytes()).0, face);
     let scalar = text().replace("list uchar int", "int");
-    assert!(matches!(
-        refusal("a.ply", scalar.as_bytes()).1,
-        Reason::Type { .. }
-    ));
+    assert!(matches!(refusal("a.ply", scalar.as_bytes()).1, Reason::Type { .. }));
     // Faces do not make a mesh of Gaussians.
     let (properties, rows) = distinct(0, 1);
     let gaussians = String::from_utf8(ply(Encoding::Ascii, &properties, &rows)).expect("text");
     let faces = "element face 0\nproperty list uchar int vertex_indices\nend_header";
-    let scene =
-        read("a.ply", gaussians.replace("end_header", faces).as_bytes()).expect("a good file");
+    let scene = read("a.ply", gaussians.replace("end_header", faces).as_bytes()).expect("a good file");
     assert_eq!((scene.len(), scene.mesh().triangles()), (1, 0));
 }
 
@@ -168,10 +135,7 @@ fn triangles_of_gltf_files_are_in_the_scenes_frame() {
     let vertex = scene.mesh().vertices()[0];
     assert_eq!(vertex.normal, [0., 0., -1.]);
     close(&vertex.color, &[1.0, 0.5, 0.0], 1e-5);
-    assert_eq!(
-        scene.metadata().notes,
-        ["textures of meshes are ignored, and their materials' colours are taken"]
-    );
+    assert_eq!(scene.metadata().notes, ["textures of meshes are ignored, and their materials' colours are taken"]);
     let list = read("a.glb", &strip(4, &[0, 1, 2, 3])).expect("a good file");
     assert_eq!(positions(list.mesh()), [0, 1, 3].map(at));
     let fan = read("a.glb", &strip(6, &[0, 1, 3, 2])).expect("a good file");
@@ -190,15 +154,9 @@ fn triangles_of_gltf_files_are_in_the_scenes_frame() {
     let list = read("a.glb", &sparse).expect("a good file");
     assert_eq!(positions(list.mesh()), [0, 2, 0].map(at));
     let (place, reason) = refusal("a.glb", &strip(4, &[0, 1, 9]));
-    assert_eq!(
-        place,
-        Place::Part("mesh 0, primitive 0, indices".to_owned())
-    );
+    assert_eq!(place, Place::Part("mesh 0, primitive 0, indices".to_owned()));
     assert!(reason.to_string().contains("vertex 9"), "{reason}");
-    assert!(matches!(
-        refusal("a.glb", &strip(1, &[0, 1])).1,
-        Reason::Unsupported(_)
-    ));
+    assert!(matches!(refusal("a.glb", &strip(1, &[0, 1])).1, Reason::Unsupported(_)));
 }
 
 #[gaurast_runner::test]
@@ -206,16 +164,10 @@ fn meshes_are_placed_among_gaussians() {
     let (properties, rows) = distinct(1, 2);
     let gaussians = read("a.ply", &ply(Encoding::Little, &properties, &rows)).expect("a good file");
     let mesh = read("b.ply", &binary(false)).expect("a good file");
-    let transform = Transform {
-        scale: 2.0,
-        rotation: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
-        translation: DVec3::X,
-    };
+    let transform =
+        Transform { scale: 2.0, rotation: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), translation: DVec3::X };
     let check = |scene: &Scene| {
-        assert_eq!(
-            (scene.positions(), scene.sh_degree()),
-            (gaussians.positions(), 1)
-        );
+        assert_eq!((scene.positions(), scene.sh_degree()), (gaussians.positions(), 1));
         assert_eq!(scene.mesh().triangles(), 3);
         // The corner (2, 0, 1) becomes (4, 0, 2), then (0, 4, 2), then (1, 4, 2).
         close(&scene.mesh().vertices()[1].position, &[1., 4., 2.], 1e-5);
@@ -229,10 +181,7 @@ fn meshes_are_placed_among_gaussians() {
     scene.append(&gaussians, &Transform::default());
     check(&scene);
     let extent = gaurast_scene::Extent::of(&scene);
-    assert!(
-        extent.centre[1] + extent.half[1] >= 4.0 - 1e-5,
-        "{extent:?}"
-    );
+    assert!(extent.centre[1] + extent.half[1] >= 4.0 - 1e-5, "{extent:?}");
     assert_eq!(gaurast_scene::info::Info::new(&scene).triangles, 3);
 }
 

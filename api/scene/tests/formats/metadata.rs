@@ -15,8 +15,7 @@ fn commented(comments: &[&str], absent: &str) -> Vec<u8> {
     let properties: Vec<_> = properties.iter().filter(kept).cloned().collect();
     let file = String::from_utf8(ply(Encoding::Ascii, &properties, &rows)).expect("text");
     let lines: Vec<_> = comments.iter().map(|c| format!("comment {c}\n")).collect();
-    file.replace("element vertex", &(lines.concat() + "element vertex"))
-        .into_bytes()
+    file.replace("element vertex", &(lines.concat() + "element vertex")).into_bytes()
 }
 
 #[gaurast_runner::test]
@@ -33,16 +32,8 @@ fn ply_comments_say_how_a_scene_was_trained() {
         (&["antialiased 0"], Some(Off), Some(Volume)),
         (&["antialiased 1"], Some(Compensated), Some(Volume)),
         (&["antialiased maybe"], None, None),
-        (
-            &["antialiased 1", "SplatRenderMode: default"],
-            Some(Off),
-            Some(Volume),
-        ),
-        (
-            &["SplatRenderMode: default", "antialiased 1"],
-            Some(Compensated),
-            Some(Volume),
-        ),
+        (&["antialiased 1", "SplatRenderMode: default"], Some(Off), Some(Volume)),
+        (&["SplatRenderMode: default", "antialiased 1"], Some(Compensated), Some(Volume)),
     ] {
         let scene = read("a.ply", &commented(comments, "")).expect("a good file");
         let metadata = scene.metadata();
@@ -55,10 +46,7 @@ fn ply_comments_say_how_a_scene_was_trained() {
     let unknown = commented(&["antialiased 1", "SplatRenderMode: wavy"], "");
     let scene = read("a.ply", &unknown).expect("a good file");
     assert_eq!(scene.antialiasing(), Compensated);
-    assert_eq!(
-        scene.metadata().notes,
-        [r#"the render mode "wavy" is unknown and ignored"#]
-    );
+    assert_eq!(scene.metadata().notes, [r#"the render mode "wavy" is unknown and ignored"#]);
 }
 
 #[gaurast_runner::test]
@@ -87,10 +75,7 @@ fn the_antialiased_bit_of_spz_is_told() {
 
 #[gaurast_runner::test]
 fn real_spz_files_are_antialiased() {
-    for file in [
-        "splats/yashica-t4-top8192.spz",
-        "splats/leica-sofort-top8192.spz",
-    ] {
+    for file in ["splats/yashica-t4-top8192.spz", "splats/leica-sofort-top8192.spz"] {
         let scene = gaurast_scene::open(data(file)).expect(file);
         assert_eq!(scene.antialiasing(), Antialiasing::Compensated, "{file}");
     }

@@ -32,16 +32,8 @@ fn ply_values_in_every_encoding_degree_and_order() {
                 }
             }
             // The same columns in another order, with an unknown one among them.
-            let reversed: Vec<String> = properties
-                .iter()
-                .rev()
-                .cloned()
-                .chain(["nx".to_owned()])
-                .collect();
-            let rows: Vec<Vec<f32>> = rows
-                .iter()
-                .map(|row| row.iter().rev().copied().chain([9.0]).collect())
-                .collect();
+            let reversed: Vec<String> = properties.iter().rev().cloned().chain(["nx".to_owned()]).collect();
+            let rows: Vec<Vec<f32>> = rows.iter().map(|row| row.iter().rev().copied().chain([9.0]).collect()).collect();
             let other = read("a.ply", &ply(encoding, &reversed, &rows)).expect("a good file");
             assert_eq!(scene, other, "{encoding:?}, degree {degree}");
         }
@@ -64,10 +56,7 @@ fn ply_keeps_non_finite_values_and_passes_over_other_elements() {
     let text = String::from_utf8(ply(Encoding::Ascii, &properties, &rows)).expect("text");
     let text = text
         .replace("element vertex", &format!("{before}element vertex"))
-        .replace(
-            "end_header\n",
-            &format!("{after}end_header\n0.5 1\n0.5 2\n"),
-        );
+        .replace("end_header\n", &format!("{after}end_header\n0.5 1\n0.5 2\n"));
     let scene = read("a.ply", (text + "3 0 1 2\n").as_bytes()).expect("a good file");
     assert_eq!(scene.positions()[1][..], rows[1][..3]);
 }
@@ -77,11 +66,7 @@ fn malformed_ply_is_refused_with_place_and_reason() {
     let (properties, rows) = distinct(1, 2);
     let good = ply(Encoding::Little, &properties, &rows);
     let text = |from: &str, to: &str| {
-        let header = good
-            .windows(11)
-            .position(|w| w == b"end_header\n")
-            .expect("it ends")
-            + 11;
+        let header = good.windows(11).position(|w| w == b"end_header\n").expect("it ends") + 11;
         let edited = String::from_utf8_lossy(&good[..header]).replacen(from, to, 1);
         [edited.as_bytes(), &good[header..]].concat()
     };
@@ -91,33 +76,22 @@ fn malformed_ply_is_refused_with_place_and_reason() {
     assert!(matches!(reason, Reason::Magic { .. }));
 
     let (place, reason) = refusal("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\n");
-    assert!(matches!(
-        (place, reason),
-        (Place::Header(_), Reason::Truncated)
-    ));
+    assert!(matches!((place, reason), (Place::Header(_), Reason::Truncated)));
 
-    let (place, reason) = refusal(
-        "a.ply",
-        &text("format binary_little_endian", "format ternary"),
-    );
+    let (place, reason) = refusal("a.ply", &text("format binary_little_endian", "format ternary"));
     assert_eq!(place, Place::Line(2));
     assert!(matches!(reason, Reason::Header(_)));
 
     let (place, reason) = refusal("a.ply", &text("element vertex 2", "element vertex 3"));
     assert_eq!(place, Place::Element("vertex".to_owned()));
     let (claimed, available) = (3 * 23 * 4, 2 * 23 * 4);
-    assert!(
-        matches!(reason, Reason::TooShort { claimed: c, available: a }
-        if (c, a) == (claimed, available))
-    );
+    assert!(matches!(reason, Reason::TooShort { claimed: c, available: a }
+        if (c, a) == (claimed, available)));
 
     // Far more than any machine could allocate.
     for count in ["18446744073709551615", "4611686018427387904", "99999999999"] {
         let claim = text("element vertex 2", &format!("element vertex {count}"));
-        assert!(matches!(
-            refusal("a.ply", &claim).1,
-            Reason::TooShort { .. }
-        ));
+        assert!(matches!(refusal("a.ply", &claim).1, Reason::TooShort { .. }));
     }
     let claim = text("element vertex 2", "element vertex 99999999999999999999999");
     assert!(matches!(refusal("a.ply", &claim).1, Reason::Header(_)));
@@ -125,10 +99,7 @@ fn malformed_ply_is_refused_with_place_and_reason() {
     let (_, reason) = refusal("a.ply", &text("property float y", "property float x"));
     assert!(matches!(reason, Reason::Twice));
 
-    let (place, reason) = refusal(
-        "a.ply",
-        &text("property float f_rest_4", "property float f_rest_9"),
-    );
+    let (place, reason) = refusal("a.ply", &text("property float f_rest_4", "property float f_rest_9"));
     assert_eq!(place, property("f_rest_4"));
     assert!(matches!(reason, Reason::Missing));
 
@@ -140,35 +111,17 @@ fn malformed_ply_is_refused_with_place_and_reason() {
     assert!(matches!(reason, Reason::Number(word) if word == "zero"));
     let (place, reason) = refusal("a.ply", (ascii.trim_end().to_owned() + " 1").as_bytes());
     assert_eq!(place, Place::Line(end));
-    assert!(matches!(
-        reason,
-        Reason::Values {
-            found: 24,
-            expected: 23
-        }
-    ));
+    assert!(matches!(reason, Reason::Values { found: 24, expected: 23 }));
 }
 
 #[gaurast_runner::test]
 fn malformed_ply_fixtures_are_refused() {
     let refused: &[(&str, Place, IsReason)] = &[
-        ("list-property", property("opacity"), |r| {
-            matches!(r, Reason::List)
-        }),
-        ("missing-opacity", property("opacity"), |r| {
-            matches!(r, Reason::Missing)
-        }),
-        ("non-contiguous-sh", property("f_rest_2"), |r| {
-            matches!(r, Reason::Missing)
-        }),
-        (
-            "sh-count-not-rgb",
-            Place::Element("vertex".to_owned()),
-            |r| matches!(r, Reason::ShCount(2)),
-        ),
-        ("empty-vertex", Place::Element("vertex".to_owned()), |r| {
-            matches!(r, Reason::Empty)
-        }),
+        ("list-property", property("opacity"), |r| matches!(r, Reason::List)),
+        ("missing-opacity", property("opacity"), |r| matches!(r, Reason::Missing)),
+        ("non-contiguous-sh", property("f_rest_2"), |r| matches!(r, Reason::Missing)),
+        ("sh-count-not-rgb", Place::Element("vertex".to_owned()), |r| matches!(r, Reason::ShCount(2))),
+        ("empty-vertex", Place::Element("vertex".to_owned()), |r| matches!(r, Reason::Empty)),
     ];
     let fixtures = data("fixtures");
     for (name, expected, is_reason) in refused {
@@ -226,11 +179,7 @@ fn compressed_ply_values() {
 
     let plain = read("a.compressed.ply", &compressed_ply(false, false)).expect("a good file");
     assert_eq!(plain.sh_degree(), 0);
-    close(
-        &plain.sh()[0].map(|c| 0.5 + SH_C0 * c),
-        &[1.0, 0.0, 0.2],
-        1e-6,
-    );
+    close(&plain.sh()[0].map(|c| 0.5 + SH_C0 * c), &[1.0, 0.0, 0.2], 1e-6);
 
     let text = compressed_ply(true, false);
     let edit = |from: &str, to: &str| {
@@ -241,20 +190,8 @@ fn compressed_ply_values() {
     };
     let (place, reason) = refusal("a.ply", &edit("uint packed_scale", "float packed_scale"));
     assert_eq!(place, property("packed_scale"));
-    assert!(matches!(
-        reason,
-        Reason::Type {
-            expected: "uint",
-            ..
-        }
-    ));
+    assert!(matches!(reason, Reason::Type { expected: "uint", .. }));
     let (place, reason) = refusal("a.ply", &edit("element chunk 1", "element chunk 0"));
     assert_eq!(place, Place::Element("chunk".to_owned()));
-    assert!(matches!(
-        reason,
-        Reason::Count {
-            found: 0,
-            expected: 1
-        }
-    ));
+    assert!(matches!(reason, Reason::Count { found: 0, expected: 1 }));
 }

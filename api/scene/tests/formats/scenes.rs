@@ -55,15 +55,7 @@ fn scenes_of_several_degrees_have_the_greatest() {
         whole.append(&part, &Transform::default());
         assert_eq!(whole.sh_degree() as usize, first.max(second));
         let stride = whole.sh_stride();
-        for (i, (own, k)) in [
-            (&scene(first), 0),
-            (&scene(first), 1),
-            (&part, 0),
-            (&part, 1),
-        ]
-        .into_iter()
-        .enumerate()
-        {
+        for (i, (own, k)) in [(&scene(first), 0), (&scene(first), 1), (&part, 0), (&part, 1)].into_iter().enumerate() {
             let sh = &whole.sh()[i * stride..(i + 1) * stride];
             let (stored, rest) = sh.split_at(own.sh_stride());
             assert_eq!(stored, &own.sh()[k * own.sh_stride()..][..own.sh_stride()]);
@@ -88,21 +80,14 @@ fn what_the_parts_of_a_scene_disagree_in_is_not_told() {
     whole.append(&with(Antialiasing::Off), &Transform::default());
     assert_eq!(whole.metadata().antialiasing, None);
     let notes = &whole.metadata().notes;
-    assert!(
-        notes.len() == 1 && notes[0].contains("antialiasing"),
-        "{notes:?}"
-    );
+    assert!(notes.len() == 1 && notes[0].contains("antialiasing"), "{notes:?}");
 }
 
 #[gaurast_runner::test]
 fn info_counts_what_a_scene_holds() {
     let mut scene = Scene::with_capacity(0, 0);
     let mut push = |position, scale, opacity| {
-        let shape = GaussianShape {
-            scale,
-            rotation: [1.0, 0.0, 0.0, 0.0],
-            opacity,
-        };
+        let shape = GaussianShape { scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity };
         scene.push(position, shape, &[[0.0; 3]]);
     };
     push([1.0, -2.0, 3.0], [0.02, 0.01, 0.03], 0.0);
@@ -115,13 +100,8 @@ fn info_counts_what_a_scene_holds() {
     assert_eq!((info.gaussians, info.sh_degree, info.non_finite), (6, 0, 2));
     assert_eq!(info.bytes, 6 * (12 + 32 + 12));
     let bounds = info.bounds.expect("finite centres");
-    assert_eq!(
-        (bounds.min, bounds.max),
-        ([-1.0, -2.0, 0.0], [1.0, 5.0, 9.0])
-    );
-    let counts = |bars: &[gaurast_scene::info::Bar]| -> Vec<usize> {
-        bars.iter().map(|bar| bar.count).collect()
-    };
+    assert_eq!((bounds.min, bounds.max), ([-1.0, -2.0, 0.0], [1.0, 5.0, 9.0]));
+    let counts = |bars: &[gaurast_scene::info::Bar]| -> Vec<usize> { bars.iter().map(|bar| bar.count).collect() };
     assert_eq!(counts(&info.opacities), [1, 0, 0, 0, 0, 1, 0, 0, 0, 2]);
     assert_eq!(counts(&info.scales), [1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1]);
     let json = serde_json::to_value(&info).expect("JSON");

@@ -15,12 +15,7 @@ use super::support::*;
 fn webp(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
     image_webp::WebPEncoder::new(&mut bytes)
-        .encode(
-            texels.as_flattened(),
-            width,
-            height,
-            image_webp::ColorType::Rgba8,
-        )
+        .encode(texels.as_flattened(), width, height, image_webp::ColorType::Rgba8)
         .expect("it fits");
     bytes
 }
@@ -30,11 +25,7 @@ fn zip(entries: &[(String, Vec<u8>)], deflate: bool) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut archive = rawzip::ZipArchiveWriter::new(&mut bytes);
     for (name, content) in entries {
-        let method = if deflate {
-            rawzip::CompressionMethod::DEFLATE
-        } else {
-            rawzip::CompressionMethod::STORE
-        };
+        let method = if deflate { rawzip::CompressionMethod::DEFLATE } else { rawzip::CompressionMethod::STORE };
         let file = archive.new_file(name).compression_method(method);
         let (mut entry, config) = file.start().expect("memory takes it");
         let descriptor = if deflate {
@@ -57,19 +48,13 @@ fn zip(entries: &[(String, Vec<u8>)], deflate: bool) -> Vec<u8> {
 
 /// The files of a scene of version 1 or 2: two Gaussians of degree 1 in images of 2x1 pixels.
 pub fn entries(version: u32) -> Vec<(String, Vec<u8>)> {
-    let codebook =
-        |scale: f64| -> Vec<f64> { (0..256).map(|i| f64::from(i - 128) * scale).collect() };
+    let codebook = |scale: f64| -> Vec<f64> { (0..256).map(|i| f64::from(i - 128) * scale).collect() };
     let image = |name: &str, texels: [[u8; 4]; 2]| (format!("{name}.webp"), webp(2, 1, &texels));
     let mut palette = vec![[0; 4]; 192];
     for (k, texel) in palette.iter_mut().enumerate().take(6) {
         *texel = [10 * k as u8, 10 * k as u8 + 1, 10 * k as u8 + 2, 255];
     }
-    let files = |names: &[&str]| {
-        names
-            .iter()
-            .map(|n| format!("{n}.webp"))
-            .collect::<Vec<_>>()
-    };
+    let files = |names: &[&str]| names.iter().map(|n| format!("{n}.webp")).collect::<Vec<_>>();
     let mut meta = json!({
         "means": {"mins": [-1.0, 0.0, 2.0], "maxs": [1.0, 0.5, 2.0], "files": files(&["means_l", "means_u"])},
         "scales": {"files": files(&["scales"])},
@@ -138,16 +123,8 @@ fn check_geometry(scene: &Scene) {
         close(found, expected, 1e-5);
     }
     let [half, middle] = [std::f32::consts::FRAC_1_SQRT_2, 0.002_773];
-    close(
-        &scene.shapes()[0].rotation,
-        &[0.0, half, middle, -half],
-        1e-5,
-    );
-    close(
-        &scene.shapes()[1].rotation,
-        &[-half, half, 0.0, middle],
-        1e-5,
-    );
+    close(&scene.shapes()[0].rotation, &[0.0, half, middle, -half], 1e-5);
+    close(&scene.shapes()[1].rotation, &[-half, half, 0.0, middle], 1e-5);
 }
 
 #[gaurast_runner::test]
@@ -177,17 +154,9 @@ fn sog_values_of_both_versions() {
     let scene = read("a.sog", &archive(1)).expect("a good file");
     check_geometry(&scene);
     let exp = |byte: u8| (f64::from(byte) * 0.02 - 5.1).exp() as f32;
-    close(
-        &scene.shapes()[0].scale,
-        &[exp(100), exp(110), exp(120)],
-        1e-6,
-    );
+    close(&scene.shapes()[0].scale, &[exp(100), exp(110), exp(120)], 1e-6);
     let sigmoid = |x: f64| (1.0 / (1.0 + (-x).exp())) as f32;
-    close(
-        &scene.shapes().each_opacity(),
-        &[sigmoid(0.02 * 51.0 - 2.55), sigmoid(2.55)],
-        1e-6,
-    );
+    close(&scene.shapes().each_opacity(), &[sigmoid(0.02 * 51.0 - 2.55), sigmoid(2.55)], 1e-6);
     close(&scene.sh()[0], &[1.28, 1.6, 0.96], 1e-6);
     close(&scene.sh()[1], &[-0.975, -0.965, -0.955], 1e-6);
 }
@@ -205,29 +174,19 @@ impl EachOpacity for [gaurast_scene::GaussianShape] {
 
 #[gaurast_runner::test]
 fn the_model_of_sog_is_told() {
-    let load =
-        |model: Value| read("a.sog", &edited(2, |meta| meta["model"] = model)).expect("good");
+    let load = |model: Value| read("a.sog", &edited(2, |meta| meta["model"] = model)).expect("good");
     let scene = load(json!("antialiased"));
     assert_eq!(scene.antialiasing(), Antialiasing::Compensated);
     assert_eq!(load(json!("2dgs")).geometry(), Geometry::Surfel);
-    assert_eq!(
-        load(json!("default")).metadata().antialiasing,
-        Some(Antialiasing::Off)
-    );
+    assert_eq!(load(json!("default")).metadata().antialiasing, Some(Antialiasing::Off));
     let unknown = load(json!("wavy"));
     assert_eq!(unknown.metadata().antialiasing, None);
-    assert_eq!(
-        unknown.metadata().notes,
-        [r#"the model "wavy" is unknown and ignored"#]
-    );
+    assert_eq!(unknown.metadata().notes, [r#"the model "wavy" is unknown and ignored"#]);
 }
 
 #[gaurast_runner::test]
 fn the_null_that_begins_a_codebook_is_guessed() {
-    let scene = read(
-        "a.sog",
-        &edited(2, |meta| meta["sh0"]["codebook"][0] = Value::Null),
-    );
+    let scene = read("a.sog", &edited(2, |meta| meta["sh0"]["codebook"][0] = Value::Null));
     let red = scene.expect("a good file").sh()[4][0];
     close(&[red], &[0.03125 * (-127.0 - 254.0 / 255.0)], 1e-6);
 }
@@ -281,20 +240,13 @@ fn streamed_sog_is_read_at_a_level() {
         let options = Options { level };
         gaurast_scene::open_with(folder.path(), &options, |file, _| file)
     };
-    let positions =
-        |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| unit.positions()[*i]).collect() };
-    assert_eq!(
-        load(0).expect("level 0").positions(),
-        positions(&[0, 1, 0, 1])
-    );
+    let positions = |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| unit.positions()[*i]).collect() };
+    assert_eq!(load(0).expect("level 0").positions(), positions(&[0, 1, 0, 1]));
     let coarse = load(1).expect("level 1");
     assert_eq!(coarse.positions(), positions(&[1, 0, 1]));
     assert_eq!(coarse.sh()[..4], unit.sh()[4..]);
     let error = load(2).expect_err("no such level").to_string();
-    assert!(
-        error.ends_with("lodLevels: level 2 is not one of the scene's 2 levels"),
-        "{error}"
-    );
+    assert!(error.ends_with("lodLevels: level 2 is not one of the scene's 2 levels"), "{error}");
 }
 
 #[gaurast_runner::test]
@@ -314,29 +266,14 @@ fn malformed_sog_is_refused_with_place_and_reason() {
     }
     let (place, reason) = refused(|meta| meta["count"] = json!(3));
     assert_eq!(place, entry("means_l.webp"));
-    assert!(matches!(
-        reason,
-        Reason::Pixels {
-            width: 2,
-            height: 1,
-            expected: 3
-        }
-    ));
+    assert!(matches!(reason, Reason::Pixels { width: 2, height: 1, expected: 3 }));
     let (place, reason) = refused(|meta| meta["count"] = json!(0));
     assert!(matches!((place, reason), (p, Reason::Empty) if p == part("count")));
     let (place, reason) = refused(|meta| meta["scales"]["files"] = json!([]));
     assert!(matches!((place, reason), (p, Reason::Missing) if p == part("scales.files")));
     let (place, reason) = refused(|meta| meta["scales"]["files"] = json!(["none.webp"]));
     assert!(matches!((place, reason), (p, Reason::Missing) if p == entry("none.webp")));
-    for name in [
-        "../scales.webp",
-        "/scales.webp",
-        "a\\b",
-        "NUL",
-        "com1.webp",
-        "",
-        "C:x",
-    ] {
+    for name in ["../scales.webp", "/scales.webp", "a\\b", "NUL", "com1.webp", "", "C:x"] {
         let file = edited(2, |meta| meta["scales"]["files"] = json!([name]));
         let (place, reason) = refusal("a.sog", &file);
         assert!(matches!((place, reason), (p, Reason::Name) if p == entry(name)));
@@ -356,10 +293,7 @@ fn malformed_sog_is_refused_with_place_and_reason() {
     assert!(matches!(reason, Reason::Pixels { width: 4096, .. }));
 
     let mut bad_sum = archive(2);
-    let at = bad_sum
-        .windows(8)
-        .position(|w| w == b"\"mins\":[")
-        .expect("the document");
+    let at = bad_sum.windows(8).position(|w| w == b"\"mins\":[").expect("the document");
     bad_sum[at + 8] ^= 1;
     assert!(matches!(refusal("a.sog", &bad_sum).1, Reason::Zip(_)));
 }
@@ -370,27 +304,15 @@ fn sog_fixtures_are_what_their_names_say() {
     let refused: &[(&str, IsReason)] = &[
         ("bad-bands", |r| matches!(r, Reason::Unsupported(_))),
         ("bad-zip", |r| matches!(r, Reason::Zip(_))),
-        ("count-exceeds-plane", |r| {
-            matches!(r, Reason::Pixels { .. })
-        }),
+        ("count-exceeds-plane", |r| matches!(r, Reason::Pixels { .. })),
         ("device-plane-name", |r| matches!(r, Reason::Name)),
         ("escaping-plane-name", |r| matches!(r, Reason::Name)),
         ("huge-count", |r| matches!(r, Reason::Unsupported(_))),
         ("huge-version", |r| matches!(r, Reason::Version { .. })),
         ("malformed-meta", |r| matches!(r, Reason::Json(_))),
         ("no-meta", |r| matches!(r, Reason::Missing)),
-        ("short-codebook", |r| {
-            matches!(
-                r,
-                Reason::Count {
-                    found: 255,
-                    expected: 256
-                }
-            )
-        }),
-        ("version-3", |r| {
-            matches!(r, Reason::Version { found: 3, .. })
-        }),
+        ("short-codebook", |r| matches!(r, Reason::Count { found: 255, expected: 256 })),
+        ("version-3", |r| matches!(r, Reason::Version { found: 3, .. })),
     ];
     for (name, is_reason) in refused {
         let path = fixtures.join(format!("{name}.sog"));
@@ -416,21 +338,13 @@ fn sog_fixtures_are_what_their_names_say() {
         let position = [f + 0.5, f + 0.25, 1.0 - 2.0 * f];
         close(&scene.positions()[i], &position, 1e-4);
         let shape = scene.shapes()[i];
-        close(
-            &shape.scale,
-            &[0.01, 0.02, 0.05].map(|s| s * (f + 1.0)),
-            1e-6,
-        );
+        close(&shape.scale, &[0.01, 0.02, 0.05].map(|s| s * (f + 1.0)), 1e-6);
         close(&[shape.opacity], &[0.25 * (f + 1.0)], 2.5e-3);
         let sh = &scene.sh()[16 * i..16 * (i + 1)];
         close(&sh[0], &[0.1, -0.2, 0.3].map(|c| c * (f + 1.0)), 1e-6);
         for (k, sign) in TURN.iter().enumerate() {
             let base = f + k as f32 / 100.0;
-            close(
-                &sh[1 + k],
-                &[0.0, 0.001, 0.002].map(|c| sign * (base + c)),
-                1e-6,
-            );
+            close(&sh[1 + k], &[0.0, 0.001, 0.002].map(|c| sign * (base + c)), 1e-6);
         }
     }
 }
@@ -441,21 +355,12 @@ fn sog_fixtures_are_what_their_names_say() {
 fn sog_files_agree_with_the_same_scenes_in_other_formats() {
     let agree = |a: &[f32], b: &[f32], tolerance: f32| {
         for (a, b) in a.iter().zip(b) {
-            assert!(
-                (a - b).abs() <= tolerance * (1.0 + b.abs()),
-                "{a} against {b}"
-            );
+            assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{a} against {b}");
         }
     };
     for (sog, other) in [
-        (
-            "fixtures/equiv-degree1-offgrid.sog",
-            "fixtures/equiv-degree1-offgrid-binary-le.ply",
-        ),
-        (
-            "fixtures/equiv-degree3-exact.sog",
-            "fixtures/equiv-degree3-exact-v2.spz",
-        ),
+        ("fixtures/equiv-degree1-offgrid.sog", "fixtures/equiv-degree1-offgrid-binary-le.ply"),
+        ("fixtures/equiv-degree3-exact.sog", "fixtures/equiv-degree3-exact-v2.spz"),
     ] {
         let [a, b] = [sog, other].map(|file| gaurast_scene::open(data(file)).expect(file));
         assert_eq!((a.len(), a.sh_degree()), (b.len(), b.sh_degree()), "{sog}");

@@ -9,10 +9,7 @@ use super::support::*;
 fn malformed_spz_is_refused_with_place_and_reason() {
     let body = [7; 19];
     let good = |flags| [spz_header(2, 1, 0, flags), body.to_vec()].concat();
-    assert_eq!(
-        read("a.spz", &gzip(&good(0))).expect("a good file").len(),
-        1
-    );
+    assert_eq!(read("a.spz", &gzip(&good(0))).expect("a good file").len(), 1);
 
     let trailing = [good(0), b"EXTRA!".to_vec()].concat();
     let (place, reason) = refusal("a.spz", &gzip(&trailing));
@@ -20,10 +17,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     assert!(matches!(reason, Reason::Trailing));
     // With the flag, the following bytes are extension records.
     let extended = [good(2), b"EXTRA!".to_vec()].concat();
-    assert_eq!(
-        read("a.spz", &gzip(&extended)).expect("a good file").len(),
-        1
-    );
+    assert_eq!(read("a.spz", &gzip(&extended)).expect("a good file").len(), 1);
     let junk = [gzip(&good(0)), b"JUNK".to_vec()].concat();
     assert!(matches!(refusal("a.spz", &junk).1, Reason::Trailing));
 
@@ -37,10 +31,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     assert_eq!(place, Place::Header("version"));
     assert!(matches!(reason, Reason::Version { found: 4, .. }));
     for version in 1..4 {
-        let (place, reason) = refusal(
-            "a.spz",
-            &[spz_header(version, 1, 0, 0), body.to_vec()].concat(),
-        );
+        let (place, reason) = refusal("a.spz", &[spz_header(version, 1, 0, 0), body.to_vec()].concat());
         assert_eq!(place, Place::Header("version"));
         assert!(matches!(reason, Reason::Unsupported(_)));
     }
@@ -53,10 +44,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     // A file whose header claims as much as its size could hold, but which holds less.
     let claim = gzip(&spz_header(2, 1800, 0, 0));
     let (place, reason) = refusal("a.spz", &claim);
-    assert!(matches!(
-        (place, reason),
-        (Place::Byte(16), Reason::Truncated)
-    ));
+    assert!(matches!((place, reason), (Place::Byte(16), Reason::Truncated)));
 }
 
 #[gaurast_runner::test]
@@ -69,13 +57,9 @@ fn malformed_spz_fixtures_are_refused() {
         ("huge-count-v2", |r| matches!(r, Reason::TooShort { .. })),
         ("plaintext-v2", |r| matches!(r, Reason::Unsupported(_))),
         ("sh-degree-5-v2", |r| matches!(r, Reason::ShDegree(5))),
-        ("trailing-decompressed-v2", |r| {
-            matches!(r, Reason::Trailing)
-        }),
+        ("trailing-decompressed-v2", |r| matches!(r, Reason::Trailing)),
         ("truncated-gzip-header", |r| matches!(r, Reason::Truncated)),
-        ("version-0", |r| {
-            matches!(r, Reason::Version { found: 0, .. })
-        }),
+        ("version-0", |r| matches!(r, Reason::Version { found: 0, .. })),
     ];
     let fixtures = data("fixtures");
     for (name, is_reason) in refused {
@@ -95,18 +79,10 @@ fn spz_fixture_holds_the_values_that_made_it() {
     let path = data("fixtures/equiv-degree3-exact-v2.spz");
     let scene = gaurast_scene::open(&path).expect("a good file");
     assert_eq!((scene.len(), scene.sh_degree()), (4, 3));
-    let rotations: [[f32; 4]; 4] = [
-        [1.0, 0.0, 0.0, 0.0],
-        [0.9, 0.3, -0.2, 0.1],
-        [0.6, -0.5, 0.5, -0.377],
-        [0.5, 0.5, -0.5, 0.5],
-    ];
+    let rotations: [[f32; 4]; 4] =
+        [[1.0, 0.0, 0.0, 0.0], [0.9, 0.3, -0.2, 0.1], [0.6, -0.5, 0.5, -0.377], [0.5, 0.5, -0.5, 0.5]];
     for (n, i) in (0_i32..4).enumerate() {
-        let units = [
-            (i - 1) * 1024 + 37,
-            (1 - i) * 2048 - 61,
-            (i * i - 2) * 512 + 13,
-        ];
+        let units = [(i - 1) * 1024 + 37, (1 - i) * 2048 - 61, (i * i - 2) * 512 + 13];
         let [x, y, z] = units.map(|u| u as f32 / 4096.0);
         assert_eq!(scene.positions()[n], [x, -y, -z]);
         let steps = [i - 16, 8 - 2 * i, 3 * i];
@@ -117,25 +93,13 @@ fn spz_fixture_holds_the_values_that_made_it() {
         let [w, x, y, z] = rotations[n].map(|c| c / length);
         close(&shape.rotation, &[w, x, -y, -z], 8e-3);
         let bytes = [40 + 7 * i, 128 + 3 * i, 210 - 11 * i];
-        close(
-            &scene.sh()[16 * n],
-            &bytes.map(|b| (b as f32 - 127.5) / 38.25),
-            1e-5,
-        );
+        close(&scene.sh()[16 * n], &bytes.map(|b| (b as f32 - 127.5) / 38.25), 1e-5);
         for (k, sign) in TURN.iter().enumerate() {
             let k_i = k as i32;
-            let bytes = [
-                13 * k_i + 5 * i,
-                200 - 9 * k_i + 4 * i,
-                128 + 17 * k_i - 6 * i,
-            ]
-            .map(|b| 1 + b.rem_euclid(255));
+            let bytes =
+                [13 * k_i + 5 * i, 200 - 9 * k_i + 4 * i, 128 + 17 * k_i - 6 * i].map(|b| 1 + b.rem_euclid(255));
             let expected = bytes.map(|b| sign * (b as f32 - 128.0) / 128.0);
-            assert_eq!(
-                scene.sh()[16 * n + 1 + k],
-                expected,
-                "coefficient {k} of {n}"
-            );
+            assert_eq!(scene.sh()[16 * n + 1 + k], expected, "coefficient {k} of {n}");
         }
     }
 }
@@ -161,11 +125,7 @@ fn spz_and_ply_of_one_gaussian_agree() {
         file.extend(colour);
         file.extend(scales);
         if version < 3 {
-            file.extend(
-                quaternion[1..]
-                    .iter()
-                    .map(|c| (c * 127.5 + 127.5).round() as u8),
-            );
+            file.extend(quaternion[1..].iter().map(|c| (c * 127.5 + 127.5).round() as u8));
         } else {
             // The largest is y (index 1); x and z are zero, w is at its maximum.
             file.extend((1_u32 << 30 | 511).to_le_bytes());
@@ -180,9 +140,7 @@ fn spz_and_ply_of_one_gaussian_agree() {
         row.push((opacity / (1.0 - opacity)).ln());
         row.extend(colour.map(|b| (f32::from(b) - 127.5) / 38.25));
         for channel in 0..3 {
-            row.extend(
-                (0..15).map(|k| TURN[k] * (f32::from(rest[3 * k + channel]) - 128.0) / 128.0),
-            );
+            row.extend((0..15).map(|k| TURN[k] * (f32::from(rest[3 * k + channel]) - 128.0) / 128.0));
         }
         let (properties, _) = distinct(3, 0);
         let ply = read("a.ply", &ply(Encoding::Little, &properties, &[row])).expect("a good file");
@@ -259,11 +217,7 @@ fn version_4_of(degree: u8, flags: u8, records: &[u8], arrays: &[Vec<u8>]) -> Ve
 fn arrays(degree: u8) -> Vec<Vec<u8>> {
     let rest = 3 * ((usize::from(degree) + 1).pow(2) - 1);
     let array = |size: usize| (0..2 * size).map(|i| (37 * i + size) as u8).collect();
-    [9, 1, 3, 3, 4, rest]
-        .into_iter()
-        .filter(|size| *size > 0)
-        .map(array)
-        .collect()
+    [9, 1, 3, 3, 4, rest].into_iter().filter(|size| *size > 0).map(array).collect()
 }
 
 /// A file of version 4 with two Gaussians.
@@ -285,26 +239,17 @@ fn version_4_of_spz_is_version_3_otherwise_stored() {
 #[gaurast_runner::test]
 fn the_small_files_of_version_4_are_read() {
     for name in ["a", "b"] {
-        let scene =
-            gaurast_scene::open(data("formats").join(format!("v4-{name}.spz"))).expect(name);
+        let scene = gaurast_scene::open(data("formats").join(format!("v4-{name}.spz"))).expect(name);
         assert_eq!((scene.len(), scene.sh_degree()), (4, 0));
         // The splats are at the corners of a tetrahedron of 24-bit steps, all of one opacity.
-        let opacity = if name == "a" {
-            181.0 / 255.0
-        } else {
-            230.0 / 255.0
-        };
+        let opacity = if name == "a" { 181.0 / 255.0 } else { 230.0 / 255.0 };
         for shape in scene.shapes() {
             close(&[shape.opacity], &[opacity], 1e-6);
             close(&[shape.rotation.iter().map(|c| c * c).sum()], &[1.0], 1e-5);
         }
     }
     let raw = gaurast_scene::open(data("formats/raw-not-gzipped.spz")).expect_err("no gzip");
-    assert!(
-        raw.to_string()
-            .ends_with("header, version: version 2 is not compressed with gzip"),
-        "{raw}"
-    );
+    assert!(raw.to_string().ends_with("header, version: version 2 is not compressed with gzip"), "{raw}");
 }
 
 #[gaurast_runner::test]
@@ -318,13 +263,7 @@ fn malformed_version_4_of_spz_is_refused_with_place_and_reason() {
     assert!(matches!(refused(11, 0x70).1, Reason::TooShort { .. }));
     let (place, reason) = refused(15, 5);
     assert_eq!(place, Place::Header("numStreams"));
-    assert!(matches!(
-        reason,
-        Reason::Count {
-            found: 5,
-            expected: 6
-        }
-    ));
+    assert!(matches!(reason, Reason::Count { found: 5, expected: 6 }));
     let (place, reason) = refused(16, 31);
     assert_eq!(place, Place::Header("tocByteOffset"));
     assert!(matches!(reason, Reason::Range { found: 31, .. }));
@@ -342,13 +281,7 @@ fn malformed_version_4_of_spz_is_refused_with_place_and_reason() {
     arrays[0].extend(vec![0; 100_000]);
     let mut file = version_4_of(0, 0, &[], &arrays);
     file[40..48].copy_from_slice(&18_u64.to_le_bytes());
-    assert!(matches!(
-        refusal("a.spz", &file).1,
-        Reason::Count {
-            found: 19,
-            expected: 18
-        }
-    ));
+    assert!(matches!(refusal("a.spz", &file).1, Reason::Count { found: 19, expected: 18 }));
 }
 
 /// A record of an extension.
@@ -365,8 +298,7 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
     let plain = read("a.spz", &version_4(4, 0)).expect("a good file");
     // For each frame, the directions of x, y and z, in order. A scene's are right, down and forward.
     let frames = [
-        "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD",
-        "RBD", "LBU", "RBU",
+        "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU",
     ];
     let raw = {
         let [x, y, z] = plain.positions()[0];
@@ -392,9 +324,7 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
         assert_eq!(scene.shapes()[0].scale, plain.shapes()[0].scale);
         assert!(scene.metadata().notes.is_empty());
         // The function of degree 2 that is z^2 minus the mean of x^2 and y^2, in the file's frame.
-        let energy = |scene: &gaurast_scene::Scene| -> f32 {
-            scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum()
-        };
+        let energy = |scene: &gaurast_scene::Scene| -> f32 { scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum() };
         close(&[energy(&scene)], &[energy(&plain)], 1e-4);
         if frame == "RUB" {
             assert_eq!(scene, plain);
@@ -430,11 +360,7 @@ fn other_spz_extensions_are_named() {
     let four = version_4_of(0, 2, &records, &arrays(0));
     let body = [spz_header(3, 2, 0, 2), arrays(0).concat(), records].concat();
     for file in [four, gzip(&body)] {
-        let notes = read("a.spz", &file)
-            .expect("a good file")
-            .metadata()
-            .notes
-            .clone();
+        let notes = read("a.spz", &file).expect("a good file").metadata().notes.clone();
         assert_eq!(notes.len(), 4, "{notes:?}");
         assert!(notes[0].contains("SPZ_ADOBE_safe_orbit_camera"));
         assert!(notes[1].contains("0x12340001"));

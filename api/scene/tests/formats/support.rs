@@ -13,9 +13,7 @@ pub type IsReason = fn(&Reason) -> bool;
 pub const SH_C0: f32 = 0.282_094_8;
 
 /// Signs of the coefficients of a scene rotated half a turn around x, bands 1 to 3.
-pub const TURN: [f32; 15] = [
-    -1., -1., 1., -1., 1., 1., -1., 1., -1., 1., -1., -1., 1., -1., 1.,
-];
+pub const TURN: [f32; 15] = [-1., -1., 1., -1., 1., 1., -1., 1., -1., 1., -1., -1., 1., -1., 1.];
 
 pub fn read(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     gaurast_scene::read(Path::new(name), &mut Cursor::new(bytes), bytes.len() as u64)
@@ -37,10 +35,7 @@ pub fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 pub fn property(name: &str) -> Place {
-    Place::Property {
-        element: "vertex".to_owned(),
-        property: name.to_owned(),
-    }
+    Place::Property { element: "vertex".to_owned(), property: name.to_owned() }
 }
 
 /// An encoding of PLY payloads, for `ply`.
@@ -52,8 +47,8 @@ pub enum Encoding {
 }
 
 pub const REQUIRED: [&str; 14] = [
-    "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity",
-    "f_dc_0", "f_dc_1", "f_dc_2",
+    "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1",
+    "f_dc_2",
 ];
 
 /// A PLY file of float properties.
@@ -86,17 +81,10 @@ pub fn ply(encoding: Encoding, properties: &[String], rows: &[Vec<f32>]) -> Vec<
 /// Properties and rows of a scene of `count` Gaussians with distinct values.
 pub fn distinct(degree: usize, count: usize) -> (Vec<String>, Vec<Vec<f32>>) {
     let rest = 3 * ((degree + 1).pow(2) - 1);
-    let properties: Vec<String> = REQUIRED
-        .iter()
-        .map(ToString::to_string)
-        .chain((0..rest).map(|i| format!("f_rest_{i}")))
-        .collect();
+    let properties: Vec<String> =
+        REQUIRED.iter().map(ToString::to_string).chain((0..rest).map(|i| format!("f_rest_{i}"))).collect();
     let rows = (0..count)
-        .map(|row| {
-            (0..properties.len())
-                .map(|column| 0.01 * (column as f32 + 1.0) - 0.1 * row as f32)
-                .collect()
-        })
+        .map(|row| (0..properties.len()).map(|column| 0.01 * (column as f32 + 1.0) - 0.1 * row as f32).collect())
         .collect();
     (properties, rows)
 }
@@ -104,11 +92,7 @@ pub fn distinct(degree: usize, count: usize) -> (Vec<String>, Vec<Vec<f32>>) {
 /// A compressed PLY of one chunk with two Gaussians.
 pub fn compressed_ply(coloured: bool, sh: bool) -> Vec<u8> {
     let axes = |prefix: &str, names: [&str; 3]| {
-        ["min", "max"].map(|end| {
-            names
-                .map(|n| format!("property float {end}_{prefix}{n}\n"))
-                .concat()
-        })
+        ["min", "max"].map(|end| names.map(|n| format!("property float {end}_{prefix}{n}\n")).concat())
     };
     let mut header = "ply\nformat binary_little_endian 1.0\nelement chunk 1\n".to_owned();
     header += &axes("", ["x", "y", "z"]).concat();
@@ -127,9 +111,7 @@ pub fn compressed_ply(coloured: bool, sh: bool) -> Vec<u8> {
         }
     }
     let mut file = (header + "end_header\n").into_bytes();
-    let bounds = [
-        -1.0_f32, -2.0, -3.0, 1.0, 2.0, 3.0, -4.0, -4.0, -4.0, 0.0, 0.0, 0.0,
-    ];
+    let bounds = [-1.0_f32, -2.0, -3.0, 1.0, 2.0, 3.0, -4.0, -4.0, -4.0, 0.0, 0.0, 0.0];
     let colours = [0.0_f32, 0.0, 0.0, 2.0, 2.0, 2.0];
     for value in bounds.iter().chain(colours.iter().filter(|_| coloured)) {
         file.extend(value.to_le_bytes());

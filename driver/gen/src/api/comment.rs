@@ -22,11 +22,7 @@ pub(super) struct Comments<'a> {
 impl Comments<'_> {
     /// The documentation of a thing with a C name, with the name as its alias.
     pub(super) fn item(&self, name: &str, comment: &str, of: Option<&Structure>) -> String {
-        let text = if comment.trim().is_empty() {
-            format!("/// `{name}`.\n")
-        } else {
-            self.text(comment, of)
-        };
+        let text = if comment.trim().is_empty() { format!("/// `{name}`.\n") } else { self.text(comment, of) };
         format!("{text}#[doc(alias = \"{name}\")]\n")
     }
 
@@ -85,11 +81,7 @@ impl Comments<'_> {
         } else {
             return format!("`{name}`");
         };
-        if self.path.is_empty() {
-            format!("[`{to}`]")
-        } else {
-            format!("[`{to}`]({}{to})", self.path)
-        }
+        if self.path.is_empty() { format!("[`{to}`]") } else { format!("[`{to}`]({}{to})", self.path) }
     }
 
     /// The path of a value of one of the extension's enums.

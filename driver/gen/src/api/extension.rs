@@ -5,8 +5,8 @@ use crate::registry;
 use crate::rust::{file_of, snake_case};
 use std::path::{Path, PathBuf};
 use vk_parse::{
-    EnumSpec, EnumsChild, ExtensionChild, InterfaceItem, RegistryChild, TypeMember,
-    TypeMemberMarkup, TypeSpec, TypesChild,
+    EnumSpec, EnumsChild, ExtensionChild, InterfaceItem, RegistryChild, TypeMember, TypeMemberMarkup, TypeSpec,
+    TypesChild,
 };
 
 /// The tag that ends the names of the extension's own things.
@@ -171,11 +171,10 @@ impl Extension {
                 _ => {}
             }
         }
-        read.add_extension(extension)
-            .ok_or_else(|| Error::Registry {
-                path: PathBuf::from(path),
-                reason: "it has no extension with a number and a revision".to_owned(),
-            })?;
+        read.add_extension(extension).ok_or_else(|| Error::Registry {
+            path: PathBuf::from(path),
+            reason: "it has no extension with a number and a revision".to_owned(),
+        })?;
         Ok(read)
     }
 
@@ -201,16 +200,12 @@ impl Extension {
                                 comment,
                             });
                         }
-                        EnumSpec::Bitpos { bitpos, .. } => made.values.push(Value {
-                            name: value.name,
-                            value: 1 << bitpos,
-                            comment,
-                        }),
-                        EnumSpec::Value { value: number, .. } => self.constants.push(Constant {
-                            name: value.name,
-                            value: number,
-                            comment,
-                        }),
+                        EnumSpec::Bitpos { bitpos, .. } => {
+                            made.values.push(Value { name: value.name, value: 1 << bitpos, comment })
+                        }
+                        EnumSpec::Value { value: number, .. } => {
+                            self.constants.push(Constant { name: value.name, value: number, comment })
+                        }
                         _ => {}
                     }
                 }
@@ -235,17 +230,13 @@ impl Extension {
                     continue;
                 };
                 match value.spec {
-                    EnumSpec::Offset {
-                        offset, extends, ..
-                    } => self.added.push(Added {
+                    EnumSpec::Offset { offset, extends, .. } => self.added.push(Added {
                         name: value.name,
                         of: extends,
                         value: first + offset,
                         comment: value.comment.unwrap_or_default(),
                     }),
-                    EnumSpec::Value { value: text, .. }
-                        if value.name.ends_with("_SPEC_VERSION") =>
-                    {
+                    EnumSpec::Value { value: text, .. } if value.name.ends_with("_SPEC_VERSION") => {
                         self.revision = text;
                     }
                     _ => {}
@@ -273,12 +264,7 @@ fn structure(ty: TypesChild) -> Option<Structure> {
         name: ty.name?,
         structure_type: None,
         is_returned: ty.returnedonly.as_deref() == Some("true"),
-        extends: ty
-            .structextends
-            .iter()
-            .flat_map(|names| names.split(','))
-            .map(str::to_owned)
-            .collect(),
+        extends: ty.structextends.iter().flat_map(|names| names.split(',')).map(str::to_owned).collect(),
         members: Vec::new(),
         comment: String::new(),
     };
@@ -334,10 +320,7 @@ impl Member {
             ty: words.pop().unwrap_or_default().to_owned(),
             is_const: words.contains(&"const"),
             is_pointer: declaration.contains('*'),
-            lengths: lengths
-                .split(['[', ']'])
-                .filter_map(|length| length.parse().ok())
-                .collect(),
+            lengths: lengths.split(['[', ']']).filter_map(|length| length.parse().ok()).collect(),
             counted_by: None,
             comment: String::new(),
         }

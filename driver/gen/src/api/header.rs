@@ -18,17 +18,10 @@ pub(super) fn write(extension: &Extension) -> String {
         "/* Values that the extension adds to core enums; block {first} + n, extension number {number}. */"
     );
     for added in &extension.added {
-        let _ = writeln!(
-            text,
-            "#define {} (({}){})",
-            added.name, added.of, added.value
-        );
+        let _ = writeln!(text, "#define {} (({}){})", added.name, added.of, added.value);
     }
     text.push('\n');
-    extension
-        .enums
-        .iter()
-        .for_each(|of| add_enum(&mut text, of));
+    extension.enums.iter().for_each(|of| add_enum(&mut text, of));
     for structure in &extension.structures {
         add_structure(&mut text, structure);
     }
@@ -72,11 +65,7 @@ fn add_enum(text: &mut String, of: &Enum) {
     let name = &of.name;
     let _ = writeln!(text, "typedef enum {name} {{");
     for value in &of.values {
-        let number = if of.is_flags {
-            format!("{:#010x}", value.value)
-        } else {
-            value.value.to_string()
-        };
+        let number = if of.is_flags { format!("{:#010x}", value.value) } else { value.value.to_string() };
         let _ = writeln!(text, "    {} = {number},", value.name);
     }
     let whole = snake_case(name.trim_end_matches(TAG)).to_uppercase();
@@ -105,30 +94,16 @@ fn add_structure(text: &mut String, structure: &Structure) {
 fn add_commands(text: &mut String, extension: &Extension) {
     for command in &extension.commands {
         let parameters = command.parameters.iter();
-        let parameters: Vec<String> = parameters
-            .map(|parameter| format!("{} {}", parameter.c_type(), parameter.name))
-            .collect();
-        let _ = writeln!(
-            text,
-            "typedef void (VKAPI_PTR *PFN_{})({});",
-            command.name,
-            parameters.join(", ")
-        );
+        let parameters: Vec<String> =
+            parameters.map(|parameter| format!("{} {}", parameter.c_type(), parameter.name)).collect();
+        let _ = writeln!(text, "typedef void (VKAPI_PTR *PFN_{})({});", command.name, parameters.join(", "));
     }
-    text.push_str(
-        "\n#ifndef VK_NO_PROTOTYPES\n/* Not exported by the loader: get it with vkGetDeviceProcAddr. */\n",
-    );
+    text.push_str("\n#ifndef VK_NO_PROTOTYPES\n/* Not exported by the loader: get it with vkGetDeviceProcAddr. */\n");
     for command in &extension.commands {
         let parameters = command.parameters.iter();
-        let parameters: Vec<String> = parameters
-            .map(|parameter| format!("    {:43} {}", parameter.c_type(), parameter.name))
-            .collect();
-        let _ = writeln!(
-            text,
-            "VKAPI_ATTR void VKAPI_CALL {}(\n{});",
-            command.name,
-            parameters.join(",\n")
-        );
+        let parameters: Vec<String> =
+            parameters.map(|parameter| format!("    {:43} {}", parameter.c_type(), parameter.name)).collect();
+        let _ = writeln!(text, "VKAPI_ATTR void VKAPI_CALL {}(\n{});", command.name, parameters.join(",\n"));
     }
     text.push_str("#endif\n\n");
 }

@@ -45,10 +45,7 @@ pub(super) fn write(extension: &Extension) -> String {
 }
 
 fn of_structure<'a>(extension: &Extension, structure: &'a Structure) -> List<'a> {
-    let mut list = List {
-        text: String::new(),
-        of: &structure.name,
-    };
+    let mut list = List { text: String::new(), of: &structure.name };
     if let Some(value) = &structure.structure_type {
         list.add("sType", "sType", &format!("`sType` must be `{value}`."));
         if structure.extends.is_empty() {
@@ -67,59 +64,38 @@ fn of_structure<'a>(extension: &Extension, structure: &'a Structure) -> List<'a>
 }
 
 fn of_command<'a>(extension: &Extension, command: &'a Command) -> List<'a> {
-    let mut list = List {
-        text: String::new(),
-        of: &command.name,
-    };
+    let mut list = List { text: String::new(), of: &command.name };
     for parameter in &command.parameters {
         let Member { name, ty, .. } = parameter;
         let statement = match &parameter.counted_by {
-            _ if ty == "VkCommandBuffer" => {
-                Some(format!("`{name}` must be a valid `{ty}` handle."))
+            _ if ty == "VkCommandBuffer" => Some(format!("`{name}` must be a valid `{ty}` handle.")),
+            Some(count) => {
+                Some(format!("`{name}` must be a valid pointer to an array of `{count}` valid `{ty}` structures."))
             }
-            Some(count) => Some(format!(
-                "`{name}` must be a valid pointer to an array of `{count}` valid `{ty}` structures."
-            )),
-            None if parameter.is_pointer => Some(format!(
-                "`{name}` must be a valid pointer to a valid `{ty}` structure."
-            )),
+            None if parameter.is_pointer => {
+                Some(format!("`{name}` must be a valid pointer to a valid `{ty}` structure."))
+            }
             None => value(extension, parameter),
         };
         if let Some(statement) = statement {
             list.add(name, "parameter", &statement);
         }
     }
-    list.add(
-        "commandBuffer",
-        "recording",
-        "`commandBuffer` must be in the recording state.",
-    );
+    list.add("commandBuffer", "recording", "`commandBuffer` must be in the recording state.");
     let queues = command.queues.replace(',', " or ");
     list.add(
         "commandBuffer",
         "cmdpool",
-        &format!(
-            "The `VkCommandPool` that `commandBuffer` was allocated from must support {queues} operations."
-        ),
+        &format!("The `VkCommandPool` that `commandBuffer` was allocated from must support {queues} operations."),
     );
     match command.render_pass.as_str() {
-        "inside" => list.add_of_command(
-            "renderpass",
-            "It must only be called inside of a render pass instance.",
-        ),
-        "outside" => list.add_of_command(
-            "renderpass",
-            "It must only be called outside of a render pass instance.",
-        ),
+        "inside" => list.add_of_command("renderpass", "It must only be called inside of a render pass instance."),
+        "outside" => list.add_of_command("renderpass", "It must only be called outside of a render pass instance."),
         _ => {}
     }
     for parameter in &command.parameters {
         if let Some(count) = &parameter.counted_by {
-            list.add(
-                count,
-                "arraylength",
-                &format!("`{count}` must be greater than 0."),
-            );
+            list.add(count, "arraylength", &format!("`{count}` must be greater than 0."));
         }
     }
     list

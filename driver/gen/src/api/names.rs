@@ -45,19 +45,10 @@ pub(super) fn write(extension: &Extension) -> Result<String, Error> {
 
 fn add_structure(layout: &mut String, structure: &Structure) {
     let c = &structure.name;
-    let lifetime = if structure.structure_type.is_some() {
-        "<'_>"
-    } else {
-        ""
-    };
+    let lifetime = if structure.structure_type.is_some() { "<'_>" } else { "" };
     let rust = format!("{}{lifetime}", rust_name(c));
     let _ = writeln!(layout, "(\"sizeof({c})\", size_of::<{rust}>()),");
     for member in &structure.members {
-        let _ = writeln!(
-            layout,
-            "(\"offsetof({c}, {})\", offset_of!({rust}, {})),",
-            member.name,
-            member.rust_name()
-        );
+        let _ = writeln!(layout, "(\"offsetof({c}, {})\", offset_of!({rust}, {})),", member.name, member.rust_name());
     }
 }

@@ -1,9 +1,7 @@
 //! Writes the extension in Rust, in the form of the extensions that ash contains.
 
 use super::comment::Comments;
-use super::extension::{
-    Command, Enum, Extension, Member, Structure, TAG, rust_constant, rust_file, rust_name,
-};
+use super::extension::{Command, Enum, Extension, Member, Structure, TAG, rust_constant, rust_file, rust_name};
 use crate::error::Error;
 use crate::rust::snake_case;
 use std::collections::BTreeSet;
@@ -48,14 +46,8 @@ fn rust_type(member: &Member) -> String {
 }
 
 /// The module of structures, enums, constants and function types.
-pub(super) fn definitions(
-    extension: &Extension,
-    defaults: &BTreeSet<String>,
-) -> Result<String, Error> {
-    let comments = Comments {
-        extension,
-        path: "",
-    };
+pub(super) fn definitions(extension: &Extension, defaults: &BTreeSet<String>) -> Result<String, Error> {
+    let comments = Comments { extension, path: "" };
     let mut code = String::new();
     for constant in &extension.constants {
         let _ = writeln!(
@@ -63,10 +55,7 @@ pub(super) fn definitions(
             "{}pub const {}: u32 = {};\n",
             comments.item(&constant.name, &constant.comment, None),
             rust_constant(&constant.name),
-            constant
-                .value
-                .replace(['(', ')', 'U'], "")
-                .replace('~', "!")
+            constant.value.replace(['(', ')', 'U'], "").replace('~', "!")
         );
     }
     for added in &extension.added {
@@ -144,23 +133,11 @@ fn indented(text: &str, by: usize) -> String {
     indented
 }
 
-fn add_structure(
-    code: &mut String,
-    comments: Comments<'_>,
-    structure: &Structure,
-    defaults: &BTreeSet<String>,
-) {
+fn add_structure(code: &mut String, comments: Comments<'_>, structure: &Structure, defaults: &BTreeSet<String>) {
     let name = rust_name(&structure.name);
     let is_tagged = structure.structure_type.is_some();
-    let (declared, any) = if is_tagged {
-        ("<'a>", "<'_>")
-    } else {
-        ("", "")
-    };
-    let has_floats = structure
-        .members
-        .iter()
-        .any(|member| matches!(&*member.ty, "float" | "double"));
+    let (declared, any) = if is_tagged { ("<'a>", "<'_>") } else { ("", "") };
+    let has_floats = structure.members.iter().any(|member| matches!(&*member.ty, "float" | "double"));
     let traits = match (is_tagged, has_floats) {
         (true, _) => "Copy, Clone, Debug",
         (false, true) => "Copy, Clone, Debug, PartialEq",
@@ -173,17 +150,10 @@ fn add_structure(
             "pNext" => "The next structure of the chain, or null.",
             _ => &member.comment,
         };
-        let _ = writeln!(
-            fields,
-            "{}pub {}",
-            comments.text(comment, Some(structure)),
-            declaration(member)
-        );
+        let _ = writeln!(fields, "{}pub {}", comments.text(comment, Some(structure)), declaration(member));
     }
     if is_tagged {
-        fields.push_str(
-            "/// The lifetime of the `p_next` chain.\npub _marker: PhantomData<&'a ()>,\n",
-        );
+        fields.push_str("/// The lifetime of the `p_next` chain.\npub _marker: PhantomData<&'a ()>,\n");
     }
     let _ = writeln!(
         code,
@@ -195,22 +165,12 @@ fn add_structure(
     );
     if let Some(structure_type) = &structure.structure_type {
         let extends = structure.extends.iter();
-        let extends: String = extends
-            .map(|name| format!(", Extends{}", rust_name(name)))
-            .collect();
-        let _ = writeln!(
-            code,
-            "tagged_structure!({name} = {}{extends});\n",
-            rust_constant(structure_type)
-        );
+        let extends: String = extends.map(|name| format!(", Extends{}", rust_name(name))).collect();
+        let _ = writeln!(code, "tagged_structure!({name} = {}{extends});\n", rust_constant(structure_type));
     }
     if !defaults.contains(name) {
         let values: String = structure.members.iter().map(default_value).collect();
-        let marker = if is_tagged {
-            "_marker: PhantomData,"
-        } else {
-            ""
-        };
+        let marker = if is_tagged { "_marker: PhantomData," } else { "" };
         let _ = writeln!(
             code,
             "impl Default for {name}{any} {{
@@ -259,20 +219,14 @@ fn setters(structure: &Structure) -> String {
 
 /// The module of the extension's name and functions.
 pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
-    let comments = Comments {
-        extension,
-        path: "crate::vk::",
-    };
+    let comments = Comments { extension, path: "crate::vk::" };
     let (mut calls, mut pointers, mut loads) = (String::new(), String::new(), String::new());
     for command in &extension.commands {
         add_command(&mut calls, comments, command);
         let (name, field) = (&command.name, field_name(command));
         let _ = writeln!(pointers, "/// `{name}`.\npub {field}: PFN_{name},");
-        let parameters: String = command
-            .parameters
-            .iter()
-            .map(|parameter| format!("_{}", declaration(parameter)))
-            .collect();
+        let parameters: String =
+            command.parameters.iter().map(|parameter| format!("_{}", declaration(parameter))).collect();
         let _ = writeln!(
             loads,
             "{field}: {{
@@ -295,18 +249,11 @@ pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
         .flat_map(|command| {
             let types = command.parameters.iter().map(|parameter| &parameter.ty);
             let types = types.filter(|ty| ty.ends_with(TAG));
-            types
-                .map(|ty| rust_name(ty).to_owned())
-                .chain([format!("PFN_{}", command.name)])
+            types.map(|ty| rust_name(ty).to_owned()).chain([format!("PFN_{}", command.name)])
         })
         .collect();
     let types: Vec<String> = types.into_iter().collect();
-    let Extension {
-        name,
-        number,
-        revision,
-        ..
-    } = extension;
+    let Extension { name, number, revision, .. } = extension;
     rust_file(
         &format!(
             "//! `{name}`: names, version and device-level functions.
@@ -403,11 +350,7 @@ fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
         let counts = |array: &&Member| array.counted_by.as_ref() == Some(&parameter.name);
         if let Some(array) = command.parameters.iter().find(counts) {
             let array = array.rust_name();
-            let _ = write!(
-                arguments,
-                "{}.len() as u32,",
-                array.trim_start_matches("p_")
-            );
+            let _ = write!(arguments, "{}.len() as u32,", array.trim_start_matches("p_"));
             continue;
         }
         let pointee = ty.strip_prefix("*const ");

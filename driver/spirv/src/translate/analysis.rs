@@ -40,9 +40,7 @@ impl Analysis {
     /// Analyses a function and all that it calls.
     pub fn new(module: &Module, globals: &Globals, entry: usize) -> Result<Self, Error> {
         let mut analysis = Self::default();
-        analysis
-            .roots
-            .extend(globals.variables.keys().map(|id| (*id, *id)));
+        analysis.roots.extend(globals.variables.keys().map(|id| (*id, *id)));
         analysis.visit(module, globals, entry, &mut Vec::new())?;
         analysis.spread_memory();
         Ok(analysis)
@@ -63,30 +61,21 @@ impl Analysis {
         let function = &module.sections.functions[index];
         let definition = &function.definition;
         if callers.contains(&index) {
-            return Err(Diagnostic::Malformed("the function calls itself".into())
-                .locate(definition.reference()));
+            return Err(Diagnostic::Malformed("the function calls itself".into()).locate(definition.reference()));
         }
         if callers.len() >= MAX_CALL_DEPTH {
-            return Err(
-                Diagnostic::Unsupported("calls are nested too deeply".into())
-                    .locate(definition.reference()),
-            );
+            return Err(Diagnostic::Unsupported("calls are nested too deeply".into()).locate(definition.reference()));
         }
         if self.trees.contains_key(&index) {
             return Ok(());
         }
         if function.parameters.len() > MAX_PARAMETERS {
-            return Err(
-                Diagnostic::Malformed("there are too many parameters".into())
-                    .locate(definition.reference()),
-            );
+            return Err(Diagnostic::Malformed("there are too many parameters".into()).locate(definition.reference()));
         }
         callers.push(index);
         let instructions = || function.blocks.iter().flat_map(|block| &block.instructions);
         for call in instructions().filter(|it| it.opcode == Op::FunctionCall) {
-            let callee = call
-                .id(0)
-                .map_err(|diagnostic| diagnostic.locate(call.reference()))?;
+            let callee = call.id(0).map_err(|diagnostic| diagnostic.locate(call.reference()))?;
             match module.functions.get(&callee) {
                 Some(callee) => self.visit(module, globals, *callee, callers)?,
                 None => {
@@ -99,12 +88,10 @@ impl Analysis {
         for parameter in &function.parameters {
             let id = parameter.result_id.unwrap_or(0);
             self.roots.insert(id, id);
-            self.pointer_types
-                .extend(parameter.result_type.map(|ty| (id, ty)));
+            self.pointer_types.extend(parameter.result_type.map(|ty| (id, ty)));
         }
         for it in instructions() {
-            self.instruction(module, globals, it)
-                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            self.instruction(module, globals, it).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
         }
         let tree = self
             .structurize(module, globals, function)
@@ -154,9 +141,7 @@ impl Analysis {
                 };
                 let parameters = &module.sections.functions[*callee].parameters;
                 for (parameter, argument) in parameters.iter().zip(it.ids(1)) {
-                    if let (Some(parameter), Some(root)) =
-                        (parameter.result_id, self.roots.get(&argument))
-                    {
+                    if let (Some(parameter), Some(root)) = (parameter.result_id, self.roots.get(&argument)) {
                         self.arguments.entry(parameter).or_default().push(*root);
                     }
                 }
@@ -202,13 +187,7 @@ impl Analysis {
     }
 
     /// Adds the variables and pointer parameters that an instruction stores to.
-    fn stores(
-        &self,
-        module: &Module,
-        globals: &Globals,
-        it: &Instruction,
-        into: &mut Vec<u32>,
-    ) -> Result<()> {
+    fn stores(&self, module: &Module, globals: &Globals, it: &Instruction, into: &mut Vec<u32>) -> Result<()> {
         let root = |id: u32| self.roots.get(&id).copied();
         match it.opcode {
             Op::Store | Op::CopyMemory => into.extend(root(it.id(0)?)),
@@ -224,9 +203,7 @@ impl Analysis {
                 let parameters = &module.sections.functions[*callee].parameters;
                 let arguments = it.ids(1);
                 for stored in tree.modified.iter() {
-                    let position = parameters
-                        .iter()
-                        .position(|parameter| parameter.result_id == Some(*stored));
+                    let position = parameters.iter().position(|parameter| parameter.result_id == Some(*stored));
                     into.extend(match position {
                         Some(position) => arguments.get(position).copied().and_then(root),
                         None => globals.variables.contains_key(stored).then_some(*stored),
@@ -250,12 +227,10 @@ fn indexes_array(globals: &Globals, mut ty: u32, indices: &[u32]) -> bool {
                 }
                 *element
             }
-            Ok(Type::Struct(members)) => {
-                match constant.and_then(|index| members.get(index as usize)) {
-                    Some(member) => member.ty,
-                    None => return false,
-                }
-            }
+            Ok(Type::Struct(members)) => match constant.and_then(|index| members.get(index as usize)) {
+                Some(member) => member.ty,
+                None => return false,
+            },
             Ok(Type::RuntimeArray { element, .. }) => *element,
             Ok(Type::Matrix { column, .. }) => *column,
             _ => return false,

@@ -70,19 +70,11 @@ fn read_modify_write(t: &mut Translator, it: &Instruction, pointer: &Pointer) ->
         Op::AtomicIIncrement => (AtomicOp::IAdd, one(t)),
         Op::AtomicIDecrement => {
             let one = one(t);
-            (
-                AtomicOp::IAdd,
-                t.emit
-                    .op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[one]),
-            )
+            (AtomicOp::IAdd, t.emit.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[one]))
         }
         Op::AtomicISub => {
             let value = t.reg(it.id(3)?)?;
-            (
-                AtomicOp::IAdd,
-                t.emit
-                    .op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[value]),
-            )
+            (AtomicOp::IAdd, t.emit.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[value]))
         }
         Op::AtomicCompareExchange => {
             comparator = Some(t.reg(it.id(5)?)?);
@@ -113,30 +105,21 @@ fn apply(
                 _ => return unsupported("atomics on narrow integers"),
             };
             mark_written(t, place);
-            Ok(t.emit
-                .builder
-                .atomic(op, place.at(0), format, value, comparator))
+            Ok(t.emit.builder.atomic(op, place.at(0), format, value, comparator))
         }
-        Pointer::Texel {
-            image,
-            image_type,
-            coordinate,
-            sample,
-        } => {
+        Pointer::Texel { image, image_type, coordinate, sample } => {
             mark_binding_written(t, *image);
             let dst = t.emit.builder.value(scalar.register());
-            t.emit
-                .builder
-                .statement(Statement::ImageAtomic(Box::new(ImageAtomic {
-                    dst: Some(dst),
-                    op,
-                    image: *image,
-                    shape: image_type.shape()?,
-                    coordinate: coordinate.clone(),
-                    sample: image_type.multisampled.then_some(*sample),
-                    value,
-                    comparator,
-                })));
+            t.emit.builder.statement(Statement::ImageAtomic(Box::new(ImageAtomic {
+                dst: Some(dst),
+                op,
+                image: *image,
+                shape: image_type.shape()?,
+                coordinate: coordinate.clone(),
+                sample: image_type.multisampled.then_some(*sample),
+                value,
+                comparator,
+            })));
             Ok(dst)
         }
         _ => malformed("atomics on this pointer"),
@@ -144,49 +127,33 @@ fn apply(
 }
 
 fn load_texel(t: &mut Translator, pointer: &Pointer) -> Result<Reg> {
-    let Pointer::Texel {
-        image,
-        image_type,
-        coordinate,
-        sample,
-    } = pointer
-    else {
+    let Pointer::Texel { image, image_type, coordinate, sample } = pointer else {
         return malformed("the pointer isn't to a texel");
     };
     let dst = t.emit.builder.value(isa::ir::Type::B32);
-    t.emit
-        .builder
-        .statement(Statement::ImageRead(Box::new(ImageRead {
-            dst: [Some(dst), None, None, None],
-            image: *image,
-            shape: image_type.shape()?,
-            coordinate: coordinate.clone(),
-            level: None,
-            sample: image_type.multisampled.then_some(*sample),
-        })));
+    t.emit.builder.statement(Statement::ImageRead(Box::new(ImageRead {
+        dst: [Some(dst), None, None, None],
+        image: *image,
+        shape: image_type.shape()?,
+        coordinate: coordinate.clone(),
+        level: None,
+        sample: image_type.multisampled.then_some(*sample),
+    })));
     Ok(dst)
 }
 
 fn store_texel(t: &mut Translator, pointer: &Pointer, value: Reg) -> Result<()> {
-    let Pointer::Texel {
-        image,
-        image_type,
-        coordinate,
-        sample,
-    } = pointer
-    else {
+    let Pointer::Texel { image, image_type, coordinate, sample } = pointer else {
         return malformed("the pointer isn't to a texel");
     };
     mark_binding_written(t, *image);
     let zero = t.emit.u32(0);
-    t.emit
-        .builder
-        .statement(Statement::ImageWrite(Box::new(ImageWrite {
-            image: *image,
-            shape: image_type.shape()?,
-            coordinate: coordinate.clone(),
-            sample: image_type.multisampled.then_some(*sample),
-            texel: [value, zero, zero, zero],
-        })));
+    t.emit.builder.statement(Statement::ImageWrite(Box::new(ImageWrite {
+        image: *image,
+        shape: image_type.shape()?,
+        coordinate: coordinate.clone(),
+        sample: image_type.multisampled.then_some(*sample),
+        texel: [value, zero, zero, zero],
+    })));
     Ok(())
 }

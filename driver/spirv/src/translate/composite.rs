@@ -28,9 +28,7 @@ impl Matrix {
 
     /// A row.
     pub fn row(&self, row: usize) -> Vec<Reg> {
-        (0..self.columns)
-            .map(|column| self.at(row, column))
-            .collect()
+        (0..self.columns).map(|column| self.at(row, column)).collect()
     }
 
     /// A column.
@@ -40,11 +38,7 @@ impl Matrix {
 
     /// Rows and columns exchanged.
     pub fn transposed(&self) -> Self {
-        Self {
-            columns: self.rows,
-            rows: self.columns,
-            regs: (0..self.rows).flat_map(|row| self.row(row)).collect(),
-        }
+        Self { columns: self.rows, rows: self.columns, regs: (0..self.rows).flat_map(|row| self.row(row)).collect() }
     }
 }
 
@@ -147,11 +141,7 @@ fn part(t: &Translator, mut ty: u32, indices: &[u32]) -> Result<(usize, usize)> 
 /// A matrix operand.
 pub fn matrix(t: &mut Translator, id: u32) -> Result<Matrix> {
     let (columns, rows, _, _) = t.globals.types.matrix(t.type_of(id)?)?;
-    Ok(Matrix {
-        columns: columns as usize,
-        rows: rows as usize,
-        regs: t.regs(id)?,
-    })
+    Ok(Matrix { columns: columns as usize, rows: rows as usize, regs: t.regs(id)? })
 }
 
 /// Translates `OpDot` and products with matrices.
@@ -180,9 +170,7 @@ pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
         Op::MatrixTimesVector => {
             let (matrix, vector) = (matrix(t, first)?, t.regs(second)?);
             let scalar = result_scalar(t, it)?;
-            (0..matrix.rows)
-                .map(|row| dot(t, scalar, &matrix.row(row), &vector, contract))
-                .collect::<Result<_>>()?
+            (0..matrix.rows).map(|row| dot(t, scalar, &matrix.row(row), &vector, contract)).collect::<Result<_>>()?
         }
         Op::VectorTimesMatrix => {
             let (vector, matrix) = (t.regs(first)?, matrix(t, second)?);
@@ -226,29 +214,17 @@ fn result_scalar(t: &Translator, it: &Instruction) -> Result<Scalar> {
 }
 
 /// The sum of products; halves are rounded once, at the end.
-pub fn dot(
-    t: &mut Translator,
-    scalar: Scalar,
-    a: &[Reg],
-    b: &[Reg],
-    contract: bool,
-) -> Result<Reg> {
+pub fn dot(t: &mut Translator, scalar: Scalar, a: &[Reg], b: &[Reg], contract: bool) -> Result<Reg> {
     if a.len() != b.len() || a.is_empty() {
         return malformed("the operands differ in size");
     }
-    let mut sum = t
-        .emit
-        .op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[a[0], b[0]]);
+    let mut sum = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[a[0], b[0]]);
     for (a, b) in a.iter().zip(b).skip(1) {
         sum = if contract {
-            t.emit
-                .op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[*a, *b, sum])
+            t.emit.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[*a, *b, sum])
         } else {
-            let product = t
-                .emit
-                .op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[*a, *b]);
-            t.emit
-                .op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[sum, product])
+            let product = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[*a, *b]);
+            t.emit.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[sum, product])
         };
     }
     Ok(t.emit.wrap_to_width(scalar, sum))
@@ -261,31 +237,17 @@ fn cross_product(t: &mut Translator, scalar: Scalar, [a, b, c, d]: [Reg; 4]) -> 
 }
 
 /// The determinant of the remaining rows and columns of a square matrix.
-fn minor(
-    t: &mut Translator,
-    scalar: Scalar,
-    matrix: &Matrix,
-    rows: &[usize],
-    columns: &[usize],
-) -> Result<Reg> {
+fn minor(t: &mut Translator, scalar: Scalar, matrix: &Matrix, rows: &[usize], columns: &[usize]) -> Result<Reg> {
     match (rows, columns) {
         ([row], [column]) => Ok(matrix.at(*row, *column)),
         ([r0, r1], [c0, c1]) => {
             let at = |row: &usize, column: &usize| matrix.at(*row, *column);
-            Ok(cross_product(
-                t,
-                scalar,
-                [at(r0, c0), at(r1, c1), at(r0, c1), at(r1, c0)],
-            ))
+            Ok(cross_product(t, scalar, [at(r0, c0), at(r1, c1), at(r0, c1), at(r1, c0)]))
         }
         ([first, rest @ ..], _) if rows.len() == columns.len() => {
             let mut sum = None;
             for (index, column) in columns.iter().enumerate() {
-                let others: Vec<usize> = columns
-                    .iter()
-                    .copied()
-                    .filter(|other| other != column)
-                    .collect();
+                let others: Vec<usize> = columns.iter().copied().filter(|other| other != column).collect();
                 let minor = minor(t, scalar, matrix, rest, &others)?;
                 let term = t.emit.mul(scalar, matrix.at(*first, *column), minor);
                 sum = Some(match sum {
@@ -323,20 +285,14 @@ pub fn inverse(t: &mut Translator, scalar: Scalar, matrix: &Matrix) -> Result<Ve
     if size != matrix.columns {
         return malformed("the matrix isn't square");
     }
-    let all =
-        |without: usize| -> Vec<usize> { (0..size).filter(|index| *index != without).collect() };
+    let all = |without: usize| -> Vec<usize> { (0..size).filter(|index| *index != without).collect() };
     let mut adjugate = Vec::with_capacity(size * size);
     for column in 0..size {
         for row in 0..size {
             // Element (row, column) of the adjugate is the cofactor (column, row).
             let minor = minor(t, working, matrix, &all(column), &all(row))?;
             let odd = (row + column) % 2 == 1;
-            adjugate.push(if odd {
-                t.emit
-                    .op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[minor])
-            } else {
-                minor
-            });
+            adjugate.push(if odd { t.emit.op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[minor]) } else { minor });
         }
     }
     let first_row: Vec<Reg> = (0..size).map(|column| matrix.at(0, column)).collect();

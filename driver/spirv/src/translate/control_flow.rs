@@ -71,12 +71,7 @@ pub struct ControlFlow<'a> {
 impl<'a> ControlFlow<'a> {
     /// The state at the beginning of a translation.
     pub fn new(t: Translator<'a>) -> Self {
-        Self {
-            t,
-            phis: HashMap::new(),
-            calls: Vec::new(),
-            depth: 0,
-        }
+        Self { t, phis: HashMap::new(), calls: Vec::new(), depth: 0 }
     }
 
     /// Translates the entry point's function and assigns the outputs at its end.
@@ -85,13 +80,8 @@ impl<'a> ControlFlow<'a> {
         let locate = |diagnostic: Diagnostic| diagnostic.locate(definition.reference());
         vertex_memory::allocate(&mut self.t).map_err(locate)?;
         variables::global_variables(&mut self.t)?;
-        if !self.t.module.sections.functions[function]
-            .parameters
-            .is_empty()
-        {
-            return Err(locate(Diagnostic::Malformed(
-                "the entry point has parameters".into(),
-            )));
+        if !self.t.module.sections.functions[function].parameters.is_empty() {
+            return Err(locate(Diagnostic::Malformed("the entry point has parameters".into())));
         }
         self.inline(function).map_err(locate)?;
         variables::assign_outputs(&mut self.t).map_err(locate)
@@ -138,12 +128,7 @@ impl<'a> ControlFlow<'a> {
         };
         self.t.emit.charge_budget(CALL_COST)?;
         self.declare_phis(function)?;
-        let modified: Vec<u32> = tree
-            .modified
-            .iter()
-            .copied()
-            .filter(|root| self.outlives(function, *root))
-            .collect();
+        let modified: Vec<u32> = tree.modified.iter().copied().filter(|root| self.outlives(function, *root)).collect();
         let returns = self.begin_merge(&modified, tree.returns)?;
         let scope = tree.early_return.then(|| self.t.emit.builder.begin_scope());
         self.calls.push(Call {
@@ -170,8 +155,7 @@ impl<'a> ControlFlow<'a> {
     /// Tells if a variable that a function stores to exists outside it.
     fn outlives(&self, function: usize, root: u32) -> bool {
         let parameters = &self.t.module.sections.functions[function].parameters;
-        self.t.globals.variables.contains_key(&root)
-            || parameters.iter().any(|it| it.result_id == Some(root))
+        self.t.globals.variables.contains_key(&root) || parameters.iter().any(|it| it.result_id == Some(root))
     }
 
     fn block(&self, index: usize) -> Result<&'a Block> {
@@ -212,12 +196,7 @@ impl<'a> ControlFlow<'a> {
             Node::Block(index) => self.instructions(*index),
             Node::Edge(edge) => self.emit_edge(edge),
             Node::Exit(index) => self.emit_exit(*index),
-            Node::If {
-                merge_point,
-                scope,
-                modified,
-                ..
-            } => {
+            Node::If { merge_point, scope, modified, .. } => {
                 self.begin_merge_point(*merge_point, modified)?;
                 match scope {
                     None => self.emit_if(node)?,
@@ -232,19 +211,9 @@ impl<'a> ControlFlow<'a> {
                 }
                 self.end_merge_point(*merge_point)
             }
-            Node::Switch {
-                block,
-                selector,
-                construct,
-                cases,
-                merge_point,
-                modified,
-            } => {
+            Node::Switch { block, selector, construct, cases, merge_point, modified } => {
                 let terminator = self.terminator(*block)?;
-                let selector = self
-                    .t
-                    .reg(*selector)
-                    .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
+                let selector = self.t.reg(*selector).map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
                 self.emit_switch(selector, *construct, cases, *merge_point, modified)
             }
             Node::Loop { .. } => self.emit_loop(node),
@@ -262,10 +231,7 @@ impl<'a> ControlFlow<'a> {
                     _ => instruction(&mut self.t, it),
                 }
                 .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
-                self.t
-                    .emit
-                    .charge_budget(0)
-                    .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+                self.t.emit.charge_budget(0).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             }
         }
         Ok(())
@@ -310,14 +276,8 @@ impl<'a> ControlFlow<'a> {
         let variables = match self.call_mut()?.result_variables.clone() {
             Some(variables) => variables,
             None => {
-                let types: Vec<_> = regs
-                    .iter()
-                    .map(|reg| self.t.emit.builder.type_of(*reg))
-                    .collect();
-                types
-                    .into_iter()
-                    .map(|ty| self.t.emit.builder.variable(ty))
-                    .collect()
+                let types: Vec<_> = regs.iter().map(|reg| self.t.emit.builder.type_of(*reg)).collect();
+                types.into_iter().map(|ty| self.t.emit.builder.variable(ty)).collect()
             }
         };
         if variables.len() != regs.len() {
@@ -332,25 +292,14 @@ impl<'a> ControlFlow<'a> {
 
     /// The branches of a selection.
     fn emit_if(&mut self, node: &Node) -> Result<()> {
-        let Node::If {
-            block,
-            condition,
-            then,
-            otherwise,
-            modified,
-            ..
-        } = node
-        else {
+        let Node::If { block, condition, then, otherwise, modified, .. } = node else {
             return Ok(());
         };
         let Some(condition) = condition else {
             return self.emit_nodes(then);
         };
         let terminator = self.terminator(*block)?;
-        let condition = self
-            .t
-            .reg(*condition)
-            .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
+        let condition = self.t.reg(*condition).map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
         match self.t.emit.known(condition) {
             // A specialization constant may decide a branch.
             Some(0) => self.emit_nodes(otherwise),
@@ -411,10 +360,7 @@ impl<'a> ControlFlow<'a> {
         let all = || cases.iter().map(|case| case.values.as_slice());
         if self.t.emit.builder.type_of(selector) != Type::B64 {
             let narrowed = |values: &[u64]| values.iter().map(|value| *value as u32).collect();
-            return Ok(WordSelector {
-                reg: selector,
-                values: all().map(narrowed).collect(),
-            });
+            return Ok(WordSelector { reg: selector, values: all().map(narrowed).collect() });
         }
         let mut reg = self.t.emit.u32(u32::MAX);
         let mut numbered = Vec::with_capacity(cases.len());
@@ -431,23 +377,11 @@ impl<'a> ControlFlow<'a> {
             }
             numbered.push((first..next).collect());
         }
-        Ok(WordSelector {
-            reg,
-            values: numbered,
-        })
+        Ok(WordSelector { reg, values: numbered })
     }
 
     fn emit_loop(&mut self, node: &Node) -> Result<()> {
-        let Node::Loop {
-            construct,
-            body,
-            continuing,
-            header,
-            continues,
-            merge,
-            modified,
-        } = node
-        else {
+        let Node::Loop { construct, body, continuing, header, continues, merge, modified } = node else {
             return Ok(());
         };
         self.begin_merge_point(Some(*header), modified)?;
@@ -499,17 +433,11 @@ impl<'a> ControlFlow<'a> {
             if it.opcode != Op::Phi {
                 continue;
             }
-            let scalars = self
-                .t
-                .globals
-                .types
-                .flatten(it.ty()?)
-                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            let scalars =
+                self.t.globals.types.flatten(it.ty()?).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             self.t.emit.charge_budget(scalars.len())?;
-            let regs: Rc<[Reg]> = scalars
-                .iter()
-                .map(|scalar| self.t.emit.builder.variable(scalar.register()))
-                .collect();
+            let regs: Rc<[Reg]> =
+                scalars.iter().map(|scalar| self.t.emit.builder.variable(scalar.register())).collect();
             self.phis.insert(it.result()?, regs.clone());
             self.t.define(it, regs.to_vec())?;
         }
@@ -530,10 +458,7 @@ impl<'a> ControlFlow<'a> {
                 let diagnostic = Diagnostic::Malformed("a predecessor is missing".into());
                 return Err(diagnostic.locate(it.reference()).into());
             };
-            let regs = self
-                .t
-                .regs(source)
-                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            let regs = self.t.regs(source).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             let Some(variables) = self.phis.get(&it.result()?) else {
                 return malformed("a phi isn't declared");
             };
@@ -547,20 +472,14 @@ impl<'a> ControlFlow<'a> {
     }
 
     fn promoted_of(&self, modified: &[u32]) -> Vec<usize> {
-        let mut variables: Vec<usize> = modified
-            .iter()
-            .filter_map(|root| self.t.promoted.find(*root))
-            .collect();
+        let mut variables: Vec<usize> = modified.iter().filter_map(|root| self.t.promoted.find(*root)).collect();
         variables.sort_unstable();
         variables.dedup();
         variables
     }
 
     fn begin_merge(&mut self, modified: &[u32], edges: usize) -> Result<MergeVariables> {
-        let mut merge = MergeVariables {
-            variables: Vec::new(),
-            assigns: edges > 1,
-        };
+        let mut merge = MergeVariables { variables: Vec::new(), assigns: edges > 1 };
         if edges == 0 {
             return Ok(merge);
         }
@@ -579,11 +498,7 @@ impl<'a> ControlFlow<'a> {
         Ok(merge)
     }
 
-    fn begin_merge_point(
-        &mut self,
-        merge_point: Option<MergePoint>,
-        modified: &[u32],
-    ) -> Result<()> {
+    fn begin_merge_point(&mut self, merge_point: Option<MergePoint>, modified: &[u32]) -> Result<()> {
         if let Some(merge_point) = merge_point {
             let edges = self.call_mut()?.tree.edges[merge_point];
             let merge = self.begin_merge(modified, edges)?;
@@ -593,11 +508,7 @@ impl<'a> ControlFlow<'a> {
     }
 
     /// Assigns the variables of a merge point, and these pairs, in parallel, at an edge that reaches it.
-    fn assign_at_merge(
-        &mut self,
-        merge: &mut MergeVariables,
-        pairs: &mut Vec<(Reg, Reg)>,
-    ) -> Result<()> {
+    fn assign_at_merge(&mut self, merge: &mut MergeVariables, pairs: &mut Vec<(Reg, Reg)>) -> Result<()> {
         for (variable, regs) in &mut merge.variables {
             if merge.assigns {
                 for (index, assigned) in regs.iter().enumerate() {
@@ -612,11 +523,7 @@ impl<'a> ControlFlow<'a> {
         Ok(())
     }
 
-    fn assign_at_merge_point(
-        &mut self,
-        merge_point: MergePoint,
-        mut pairs: Vec<(Reg, Reg)>,
-    ) -> Result<()> {
+    fn assign_at_merge_point(&mut self, merge_point: MergePoint, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
         let Some(mut merge) = self.call_mut()?.merge_points.remove(&merge_point) else {
             return malformed("a branch to a construct that isn't open");
         };
@@ -643,15 +550,9 @@ impl<'a> ControlFlow<'a> {
 
     fn save(&mut self, modified: &[u32]) -> Result<Saved> {
         let variables = self.promoted_of(modified);
-        let count = variables
-            .iter()
-            .map(|variable| self.t.promoted.variables[*variable].now.len())
-            .sum();
+        let count = variables.iter().map(|variable| self.t.promoted.variables[*variable].now.len()).sum();
         self.t.emit.charge_budget(count)?;
-        Ok(variables
-            .into_iter()
-            .map(|variable| (variable, self.t.promoted.variables[variable].now.clone()))
-            .collect())
+        Ok(variables.into_iter().map(|variable| (variable, self.t.promoted.variables[variable].now.clone())).collect())
     }
 
     fn restore(&mut self, saved: &Saved) {
@@ -669,19 +570,10 @@ fn parallel_copy(emit: &mut Emitter, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
     for (index, (_, src)) in pairs.iter().enumerate() {
         readers.entry(*src).or_default().push(index);
     }
-    let mut waiting: HashMap<Reg, usize> = readers
-        .iter()
-        .map(|(reg, readers)| (*reg, readers.len()))
-        .collect();
-    let by_dst: HashMap<Reg, usize> = pairs
-        .iter()
-        .enumerate()
-        .map(|(index, (dst, _))| (*dst, index))
-        .collect();
+    let mut waiting: HashMap<Reg, usize> = readers.iter().map(|(reg, readers)| (*reg, readers.len())).collect();
+    let by_dst: HashMap<Reg, usize> = pairs.iter().enumerate().map(|(index, (dst, _))| (*dst, index)).collect();
     let mut done = vec![false; pairs.len()];
-    let mut ready: VecDeque<usize> = (0..pairs.len())
-        .filter(|index| !readers.contains_key(&pairs[*index].0))
-        .collect();
+    let mut ready: VecDeque<usize> = (0..pairs.len()).filter(|index| !readers.contains_key(&pairs[*index].0)).collect();
     let mut next_cycle = 0;
     loop {
         while let Some(index) = ready.pop_front() {

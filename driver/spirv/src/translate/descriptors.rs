@@ -21,25 +21,19 @@ pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Resu
         Some(end) if end <= MAX_DESCRIPTORS => t.next_resource_slot = end,
         _ => return unsupported("too many descriptors"),
     }
-    let is_unsized = matches!(
-        t.globals.types.get(variable.pointee)?,
-        Type::RuntimeArray { .. }
-    );
+    let is_unsized = matches!(t.globals.types.get(variable.pointee)?, Type::RuntimeArray { .. });
     let mut ty = variable.pointee;
     while let Type::Array { .. } | Type::RuntimeArray { .. } = t.globals.types.get(ty)? {
         ty = descriptors(t, ty)?.0;
     }
-    let (Some(set), Some(binding)) = (
-        t.module.literal(id, Decoration::DescriptorSet),
-        t.module.literal(id, Decoration::Binding),
-    ) else {
+    let (Some(set), Some(binding)) =
+        (t.module.literal(id, Decoration::DescriptorSet), t.module.literal(id, Decoration::Binding))
+    else {
         return malformed("the variable has no descriptor set and binding");
     };
     let (kind, image) = descriptor_kind(t, variable.class, ty)?;
     let size = match kind {
-        DescriptorKind::UniformBuffer | DescriptorKind::StorageBuffer => {
-            t.globals.types.explicit_size(ty)?
-        }
+        DescriptorKind::UniformBuffer | DescriptorKind::StorageBuffer => t.globals.types.explicit_size(ty)?,
         _ => 0,
     };
     t.interface.descriptors.push(ShaderBinding {
@@ -58,11 +52,7 @@ pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Resu
         }),
         name: descriptor_name(t, id, ty),
     });
-    Ok(Binding {
-        slot,
-        count,
-        index: None,
-    })
+    Ok(Binding { slot, count, index: None })
 }
 
 /// The name of a descriptor variable; that of its type for a block without an instance name.
@@ -71,11 +61,7 @@ fn descriptor_name(t: &Translator, id: u32, ty: u32) -> Option<String> {
     name.map(str::to_owned)
 }
 
-fn descriptor_kind(
-    t: &Translator,
-    class: StorageClass,
-    ty: u32,
-) -> Result<(DescriptorKind, Option<ImageUse>)> {
+fn descriptor_kind(t: &Translator, class: StorageClass, ty: u32) -> Result<(DescriptorKind, Option<ImageUse>)> {
     use DescriptorKind as Kind;
     let buffer_block = t.module.has(ty, Decoration::BufferBlock);
     Ok(match (t.globals.types.get(ty)?, class) {
@@ -94,9 +80,7 @@ fn descriptor_kind(
             (kind, Some(image_use(t, image)?))
         }
         (Type::SampledImage { image }, _) => match t.globals.types.get(*image)? {
-            Type::Image(image) if image.dim == Dim::DimBuffer => {
-                (Kind::UniformTexelBuffer, Some(image_use(t, image)?))
-            }
+            Type::Image(image) if image.dim == Dim::DimBuffer => (Kind::UniformTexelBuffer, Some(image_use(t, image)?)),
             Type::Image(image) => (Kind::CombinedImageSampler, Some(image_use(t, image)?)),
             _ => return malformed("a sampled image of no image"),
         },
@@ -109,10 +93,7 @@ fn image_use(t: &Translator, image: &ImageType) -> Result<ImageUse> {
     if scalar.is_wide() {
         return unsupported("images of 64-bit components");
     }
-    Ok(ImageUse {
-        shape: image.shape()?,
-        numeric: scalar.at_interface(),
-    })
+    Ok(ImageUse { shape: image.shape()?, numeric: scalar.at_interface() })
 }
 
 /// The element type and length of an array of descriptors.
@@ -142,20 +123,11 @@ pub fn descriptor_count(t: &Translator, mut ty: u32) -> Result<u32> {
 }
 
 /// The pointer to a descriptor of some type.
-pub fn resource(
-    t: &mut Translator,
-    binding: Binding,
-    class: StorageClass,
-    ty: u32,
-) -> Result<Pointer> {
+pub fn resource(t: &mut Translator, binding: Binding, class: StorageClass, ty: u32) -> Result<Pointer> {
     Ok(match t.globals.types.get(ty)? {
-        Type::Struct(_) => Pointer::Memory(MemoryRef {
-            space: Space::Buffer(binding),
-            base: None,
-            offset: 0,
-            layout: EXPLICIT,
-            ty,
-        }),
+        Type::Struct(_) => {
+            Pointer::Memory(MemoryRef { space: Space::Buffer(binding), base: None, offset: 0, layout: EXPLICIT, ty })
+        }
         _ => Pointer::Resource { binding, class, ty },
     })
 }

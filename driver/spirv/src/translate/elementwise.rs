@@ -40,50 +40,28 @@ struct Elementwise {
 }
 
 const fn plain(narrow: Ir, wide: Ir) -> Elementwise {
-    Elementwise {
-        narrow,
-        wide,
-        extension: Extension::Own,
-        exchange: false,
-        negate: false,
-        wrap: false,
-    }
+    Elementwise { narrow, wide, extension: Extension::Own, exchange: false, negate: false, wrap: false }
 }
 
 const fn wrapped(narrow: Ir, wide: Ir) -> Elementwise {
-    Elementwise {
-        wrap: true,
-        ..plain(narrow, wide)
-    }
+    Elementwise { wrap: true, ..plain(narrow, wide) }
 }
 
 impl Elementwise {
     const fn signed(self) -> Self {
-        Self {
-            extension: Extension::Sign,
-            ..self
-        }
+        Self { extension: Extension::Sign, ..self }
     }
 
     const fn unsigned(self) -> Self {
-        Self {
-            extension: Extension::Zero,
-            ..self
-        }
+        Self { extension: Extension::Zero, ..self }
     }
 
     const fn exchanged(self) -> Self {
-        Self {
-            exchange: true,
-            ..self
-        }
+        Self { exchange: true, ..self }
     }
 
     const fn negated(self) -> Self {
-        Self {
-            negate: true,
-            ..self
-        }
+        Self { negate: true, ..self }
     }
 
     /// The row of a SPIR-V operation.
@@ -192,9 +170,7 @@ impl Elementwise {
             if self.exchange {
                 src.reverse();
             }
-            let mut reg = t
-                .emit
-                .op(op_for_width(scalars[0], self.narrow, self.wide), &src);
+            let mut reg = t.emit.op(op_for_width(scalars[0], self.narrow, self.wide), &src);
             if self.negate {
                 reg = t.emit.op(Ir::BNot, &[reg]);
             }
@@ -222,12 +198,7 @@ fn extend(t: &mut Translator, extension: Extension, scalars: &[Scalar], src: &[R
 type Operands = (Vec<Scalar>, Vec<Rc<[Reg]>>);
 
 /// `count` operands of an instruction, from a position on.
-pub fn operands(
-    t: &mut Translator,
-    it: &Instruction,
-    first: usize,
-    count: usize,
-) -> Result<Operands> {
+pub fn operands(t: &mut Translator, it: &Instruction, first: usize, count: usize) -> Result<Operands> {
     let mut scalars = Vec::with_capacity(count);
     let mut all: Vec<Rc<[Reg]>> = Vec::with_capacity(count);
     for index in first..first + count {
@@ -265,15 +236,11 @@ pub fn elementwise(t: &mut Translator, it: &Instruction) -> Result<()> {
     match it.opcode {
         Op::FAdd => add(t, it),
         Op::FMul => multiply(t, it),
-        Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended => {
-            extended_arithmetic(t, it)
-        }
+        Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended => extended_arithmetic(t, it),
         Op::ShiftLeftLogical | Op::ShiftRightLogical | Op::ShiftRightArithmetic => shift(t, it),
-        Op::BitReverse
-        | Op::BitCount
-        | Op::BitFieldInsert
-        | Op::BitFieldSExtract
-        | Op::BitFieldUExtract => bit_operation(t, it),
+        Op::BitReverse | Op::BitCount | Op::BitFieldInsert | Op::BitFieldSExtract | Op::BitFieldUExtract => {
+            bit_operation(t, it)
+        }
         Op::Any => fold_bools(t, it, Ir::BOr),
         Op::All => fold_bools(t, it, Ir::BAnd),
         Op::Select => select(t, it),
@@ -305,12 +272,8 @@ fn add(t: &mut Translator, it: &Instruction) -> Result<()> {
         let find = |reg, other| Some((t.emit.product(reg)?, other));
         let fused = find(a, b).or_else(|| find(b, a)).filter(|_| contract);
         let sum = match fused {
-            Some(((x, y), z)) => t
-                .emit
-                .op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[x, y, z]),
-            None => t
-                .emit
-                .op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]),
+            Some(((x, y), z)) => t.emit.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[x, y, z]),
+            None => t.emit.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]),
         };
         t.emit.wrap_to_width(scalar, sum)
     })
@@ -341,9 +304,7 @@ fn select(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
     t.emit.charge_budget(a.len())?;
     let condition = |index: usize| conditions[index % conditions.len()];
-    let regs = (0..a.len())
-        .map(|index| t.emit.select(condition(index), a[index], b[index]))
-        .collect();
+    let regs = (0..a.len()).map(|index| t.emit.select(condition(index), a[index], b[index])).collect();
     t.define(it, regs)
 }
 
@@ -391,21 +352,11 @@ fn word_halves(t: &mut Translator, opcode: Op, a: Reg, b: Reg) -> Halves {
         Op::UMulExtended => (Ir::IMul, Ir::UMulHi),
         _ => (Ir::IMul, Ir::SMulHi),
     };
-    Halves {
-        low: t.emit.op(low, &[a, b]),
-        high: t.emit.op(high, &[a, b]),
-    }
+    Halves { low: t.emit.op(low, &[a, b]), high: t.emit.op(high, &[a, b]) }
 }
 
 /// Extended arithmetic on 8 or 16 bits: 32 bits hold the whole result, and the high half is extracted.
-fn narrow_halves(
-    t: &mut Translator,
-    opcode: Op,
-    scalar: Scalar,
-    width: u32,
-    a: Reg,
-    b: Reg,
-) -> Halves {
+fn narrow_halves(t: &mut Translator, opcode: Op, scalar: Scalar, width: u32, a: Reg, b: Reg) -> Halves {
     let extend = |t: &mut Translator, reg| match opcode {
         Op::SMulExtended => t.emit.sign_extend(scalar, reg),
         _ => t.emit.zero_extend(scalar, reg),
@@ -422,10 +373,7 @@ fn narrow_halves(
         let by = t.emit.u32(width);
         t.emit.op(Ir::SShr, &[whole, by])
     };
-    Halves {
-        low: t.emit.wrap_to_width(scalar, whole),
-        high: t.emit.wrap_to_width(scalar, high),
-    }
+    Halves { low: t.emit.wrap_to_width(scalar, whole), high: t.emit.wrap_to_width(scalar, high) }
 }
 
 /// Extended arithmetic on 64 bits.
@@ -488,11 +436,7 @@ fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (result, _) = t.globals.types.vector(it.ty()?)?;
     each(t, it, 0, 2, |t, scalars, src| {
         let scalar = scalars[0];
-        let by = if scalars[1].is_wide() {
-            t.emit.op(Ir::Low32, &[src[1]])
-        } else {
-            src[1]
-        };
+        let by = if scalars[1].is_wide() { t.emit.op(Ir::Low32, &[src[1]]) } else { src[1] };
         let (narrow, wide, a) = match it.opcode {
             Op::ShiftLeftLogical => (Ir::Shl, Ir::Shl64, src[0]),
             Op::ShiftRightLogical => (Ir::UShr, Ir::UShr64, t.emit.zero_extend(scalar, src[0])),
@@ -524,10 +468,7 @@ fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
     let field = match opcode {
         Op::BitReverse | Op::BitCount => None,
         // Offset and count are one for all components.
-        _ => Some(BitField {
-            offset: bit_number(t, it.id(next)?)?,
-            count: bit_number(t, it.id(next + 1)?)?,
-        }),
+        _ => Some(BitField { offset: bit_number(t, it.id(next)?)?, count: bit_number(t, it.id(next + 1)?)? }),
     };
     let mut regs = Vec::with_capacity(base.len());
     for (index, base) in base.iter().enumerate() {
@@ -572,11 +513,7 @@ fn bit_count(t: &mut Translator, scalar: Scalar, base: Reg, result: Scalar) -> R
         let base = t.emit.zero_extend(scalar, base);
         t.emit.op(Ir::BitCount, &[base])
     };
-    if result.is_wide() {
-        t.emit.op(Ir::UToU64, &[count])
-    } else {
-        count
-    }
+    if result.is_wide() { t.emit.op(Ir::UToU64, &[count]) } else { count }
 }
 
 fn reversed_bits(t: &mut Translator, scalar: Scalar, width: u32, base: Reg) -> Reg {
@@ -598,18 +535,10 @@ fn reversed_bits(t: &mut Translator, scalar: Scalar, width: u32, base: Reg) -> R
     }
 }
 
-fn bit_field(
-    t: &mut Translator,
-    opcode: Op,
-    base: Reg,
-    insert: Option<Reg>,
-    field: BitField,
-) -> Reg {
+fn bit_field(t: &mut Translator, opcode: Op, base: Reg, insert: Option<Reg>, field: BitField) -> Reg {
     let BitField { offset, count } = field;
     match (opcode, insert) {
-        (_, Some(insert)) => t
-            .emit
-            .op(Ir::BitfieldInsert, &[base, insert, offset, count]),
+        (_, Some(insert)) => t.emit.op(Ir::BitfieldInsert, &[base, insert, offset, count]),
         (Op::BitFieldSExtract, _) => t.emit.op(Ir::BitfieldSExtract, &[base, offset, count]),
         _ => t.emit.op(Ir::BitfieldUExtract, &[base, offset, count]),
     }
@@ -639,11 +568,7 @@ fn wide_bit_field(
             t.emit.op(Ir::Or64, &[kept, moved])
         }
         _ => {
-            let shift = if opcode == Op::BitFieldSExtract {
-                Ir::SShr64
-            } else {
-                Ir::UShr64
-            };
+            let shift = if opcode == Op::BitFieldSExtract { Ir::SShr64 } else { Ir::UShr64 };
             let left = t.emit.op(Ir::ISub, &[above, offset]);
             let top = t.emit.op(Ir::Shl64, &[base, left]);
             let extracted = t.emit.op(shift, &[top, above]);
@@ -662,19 +587,14 @@ pub fn glsl_elementwise(t: &mut Translator, it: &Instruction, op: G) -> Result<(
         G::Radians => scaled(t, it, std::f64::consts::PI / 180.0),
         G::Degrees => scaled(t, it, 180.0 / std::f64::consts::PI),
         G::FClamp | G::NClamp => glsl_each(t, it, 3, |t, scalar, src| {
-            let low = t
-                .emit
-                .op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &src[..2]);
-            t.emit
-                .op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[low, src[2]])
+            let low = t.emit.op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &src[..2]);
+            t.emit.op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[low, src[2]])
         }),
         G::SClamp => clamp_integers(t, it, Extension::Sign),
         G::UClamp => clamp_integers(t, it, Extension::Zero),
         G::FMix => glsl_each(t, it, 3, mix),
         G::Step => glsl_each(t, it, 2, |t, scalar, src| {
-            let below = t
-                .emit
-                .op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[src[1], src[0]]);
+            let below = t.emit.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[src[1], src[0]]);
             let (one, zero) = (t.emit.float(scalar, 1.0), t.emit.float(scalar, 0.0));
             t.emit.select(below, zero, one)
         }),
@@ -750,26 +670,16 @@ fn mix(t: &mut Translator, scalar: Scalar, src: &[Reg]) -> Reg {
     let one = t.emit.float(scalar, 1.0);
     let rest = t.emit.minus(scalar, one, src[2]);
     let near = t.emit.mul(scalar, src[0], rest);
-    t.emit.op(
-        op_for_width(scalar, Ir::FFma, Ir::FFma64),
-        &[src[1], src[2], near],
-    )
+    t.emit.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[src[1], src[2], near])
 }
 
 fn smooth_step(t: &mut Translator, scalar: Scalar, src: &[Reg]) -> Reg {
     let (zero, one) = (t.emit.float(scalar, 0.0), t.emit.float(scalar, 1.0));
     let (two, three) = (t.emit.float(scalar, 2.0), t.emit.float(scalar, 3.0));
-    let (top, span) = (
-        t.emit.minus(scalar, src[2], src[0]),
-        t.emit.minus(scalar, src[1], src[0]),
-    );
+    let (top, span) = (t.emit.minus(scalar, src[2], src[0]), t.emit.minus(scalar, src[1], src[0]));
     let x = t.emit.over(scalar, top, span);
-    let x = t
-        .emit
-        .op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &[x, zero]);
-    let x = t
-        .emit
-        .op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[x, one]);
+    let x = t.emit.op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &[x, zero]);
+    let x = t.emit.op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[x, one]);
     let twice = t.emit.mul(scalar, two, x);
     let slope = t.emit.minus(scalar, three, twice);
     let square = t.emit.mul(scalar, x, x);
@@ -784,18 +694,11 @@ pub fn conversion(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
     let (to, _) = t.globals.types.vector(it.ty()?)?;
     let (from, regs) = t.vector(it.id(0)?)?;
-    let truncates = opcode == Op::FConvert
-        && to == (Scalar::Float { width: 16 })
-        && t.module.rounds_towards_zero(it.result()?);
+    let truncates =
+        opcode == Op::FConvert && to == (Scalar::Float { width: 16 }) && t.module.rounds_towards_zero(it.result()?);
     let regs = regs
         .iter()
-        .map(|reg| {
-            if truncates {
-                Ok(truncate_to_half(t, from, *reg))
-            } else {
-                convert(t, opcode, from, to, *reg)
-            }
-        })
+        .map(|reg| if truncates { Ok(truncate_to_half(t, from, *reg)) } else { convert(t, opcode, from, to, *reg) })
         .collect::<Result<_>>()?;
     t.define(it, regs)
 }
@@ -803,11 +706,7 @@ pub fn conversion(t: &mut Translator, it: &Instruction) -> Result<()> {
 /// A float rounded towards zero to binary16.
 fn truncate_to_half(t: &mut Translator, from: Scalar, reg: Reg) -> Reg {
     // The bit that rounding to odd may set is below those of a binary16.
-    let exact = if from.is_wide() {
-        round_to_odd(t, reg)
-    } else {
-        reg
-    };
+    let exact = if from.is_wide() { round_to_odd(t, reg) } else { reg };
     let half = t.emit.op(Ir::FToF16, &[exact]);
     let near = t.emit.op(Ir::F16ToF, &[half]);
     let [found, wanted] = [near, exact].map(|reg| t.emit.op(Ir::FAbs, &[reg]));
@@ -838,11 +737,7 @@ fn convert(t: &mut Translator, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -
         }
         Op::ConvertSToF | Op::ConvertUToF => {
             let signed = opcode == Op::ConvertSToF;
-            let reg = if signed {
-                t.emit.sign_extend(from, reg)
-            } else {
-                t.emit.zero_extend(from, reg)
-            };
+            let reg = if signed { t.emit.sign_extend(from, reg) } else { t.emit.zero_extend(from, reg) };
             let op = match (signed, wide) {
                 (true, (false, false)) => Ir::SToF,
                 (true, (false, true)) => Ir::SToF64,
@@ -858,11 +753,7 @@ fn convert(t: &mut Translator, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -
         }
         Op::UConvert | Op::SConvert => {
             let signed = opcode == Op::SConvert;
-            let reg = if signed {
-                t.emit.sign_extend(from, reg)
-            } else {
-                t.emit.zero_extend(from, reg)
-            };
+            let reg = if signed { t.emit.sign_extend(from, reg) } else { t.emit.zero_extend(from, reg) };
             match wide {
                 (false, true) if signed => t.emit.op(Ir::SToS64, &[reg]),
                 (false, true) => t.emit.op(Ir::UToU64, &[reg]),
@@ -895,10 +786,7 @@ fn round_to_odd(t: &mut Translator, reg: Reg) -> Reg {
     let near = t.emit.op(Ir::F64ToF, &[reg]);
     let back = t.emit.op(Ir::FToF64, &[near]);
     let inexact = t.emit.op(Ir::FNe64, &[back, reg]);
-    let (found, exact) = (
-        t.emit.op(Ir::FAbs64, &[back]),
-        t.emit.op(Ir::FAbs64, &[reg]),
-    );
+    let (found, exact) = (t.emit.op(Ir::FAbs64, &[back]), t.emit.op(Ir::FAbs64, &[reg]));
     let outwards = t.emit.op(Ir::FLt64, &[exact, found]);
     let one = t.emit.u32(1);
     let below = t.emit.op(Ir::ISub, &[near, one]);
@@ -965,10 +853,7 @@ fn typed_bits(t: &mut Translator, scalar: Scalar, reg: Reg) -> Reg {
 fn pack_words(t: &mut Translator, scalar: Scalar, regs: &[Reg]) -> Vec<Reg> {
     let width = scalar.bits();
     if width == 64 {
-        return regs
-            .iter()
-            .flat_map(|reg| [Ir::Low32, Ir::High32].map(|half| t.emit.op(half, &[*reg])))
-            .collect();
+        return regs.iter().flat_map(|reg| [Ir::Low32, Ir::High32].map(|half| t.emit.op(half, &[*reg]))).collect();
     }
     let mut words = Vec::new();
     for group in regs.chunks((32 / width.max(8)) as usize) {
@@ -993,10 +878,7 @@ fn pack_words(t: &mut Translator, scalar: Scalar, regs: &[Reg]) -> Vec<Reg> {
 fn unpack_words(t: &mut Translator, scalar: Scalar, count: u32, words: &[Reg]) -> Vec<Reg> {
     let width = scalar.bits();
     if width == 64 {
-        return words
-            .chunks_exact(2)
-            .map(|pair| t.emit.op(Ir::Join64, pair))
-            .collect();
+        return words.chunks_exact(2).map(|pair| t.emit.op(Ir::Join64, pair)).collect();
     }
     (0..count)
         .filter_map(|index| {

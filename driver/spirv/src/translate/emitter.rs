@@ -32,12 +32,7 @@ pub struct Emitter {
 impl Emitter {
     /// An emitter of an empty program.
     pub fn new() -> Self {
-        Self {
-            builder: Builder::new(),
-            constants: HashMap::new(),
-            products: HashMap::new(),
-            statements: 0,
-        }
+        Self { builder: Builder::new(), constants: HashMap::new(), products: HashMap::new(), statements: 0 }
     }
 
     /// The words of a 64-bit register, the lower one first.
@@ -92,11 +87,7 @@ impl Emitter {
 
     /// A float constant.
     pub fn float(&mut self, scalar: Scalar, value: f64) -> Reg {
-        if scalar.is_wide() {
-            self.f64(value)
-        } else {
-            self.f32(value as f32)
-        }
+        if scalar.is_wide() { self.f64(value) } else { self.f32(value as f32) }
     }
 
     /// The bits of a register that holds a constant of 32 bits.
@@ -148,10 +139,7 @@ impl Emitter {
     pub fn divided(&mut self, reg: Reg, by: u32) -> (Reg, Reg) {
         if by.is_power_of_two() {
             let (shift, mask) = (self.u32(by.trailing_zeros()), self.u32(by - 1));
-            (
-                self.op(Ir::UShr, &[reg, shift]),
-                self.op(Ir::And, &[reg, mask]),
-            )
+            (self.op(Ir::UShr, &[reg, shift]), self.op(Ir::And, &[reg, mask]))
         } else {
             let by = self.u32(by);
             (self.op(Ir::UDiv, &[reg, by]), self.op(Ir::URem, &[reg, by]))
@@ -161,18 +149,9 @@ impl Emitter {
     /// Brings a result into its type's range: narrow integers wrap, halves are rounded.
     pub fn wrap_to_width(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
-            Scalar::Int {
-                width: 8,
-                signed: true,
-            } => self.op(Ir::SExt8, &[reg]),
-            Scalar::Int {
-                width: 16,
-                signed: true,
-            } => self.op(Ir::SExt16, &[reg]),
-            Scalar::Int {
-                width: width @ (8 | 16),
-                ..
-            } => self.low_bits(reg, width),
+            Scalar::Int { width: 8, signed: true } => self.op(Ir::SExt8, &[reg]),
+            Scalar::Int { width: 16, signed: true } => self.op(Ir::SExt16, &[reg]),
+            Scalar::Int { width: width @ (8 | 16), .. } => self.low_bits(reg, width),
             Scalar::Float { width: 16 } => self.op(Ir::RoundToF16, &[reg]),
             _ => reg,
         }
@@ -186,14 +165,8 @@ impl Emitter {
     /// An integer operand, sign-extended whatever its type's signedness is.
     pub fn sign_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
-            Scalar::Int {
-                width: 8,
-                signed: false,
-            } => self.op(Ir::SExt8, &[reg]),
-            Scalar::Int {
-                width: 16,
-                signed: false,
-            } => self.op(Ir::SExt16, &[reg]),
+            Scalar::Int { width: 8, signed: false } => self.op(Ir::SExt8, &[reg]),
+            Scalar::Int { width: 16, signed: false } => self.op(Ir::SExt16, &[reg]),
             _ => reg,
         }
     }
@@ -201,10 +174,7 @@ impl Emitter {
     /// An integer operand, zero-extended.
     pub fn zero_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
-            Scalar::Int {
-                width: width @ (8 | 16),
-                signed: true,
-            } => self.low_bits(reg, width),
+            Scalar::Int { width: width @ (8 | 16), signed: true } => self.low_bits(reg, width),
             _ => reg,
         }
     }

@@ -30,9 +30,7 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
             let mut regs = Vec::with_capacity(a.len());
             for (a, b) in a.iter().zip(b.iter()) {
                 let b = ldexp_exponent(t, exponent, *b);
-                let reg = t
-                    .emit
-                    .op(op_for_width(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
+                let reg = t.emit.op(op_for_width(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
                 regs.push(t.emit.wrap_to_width(scalar, reg));
             }
             t.define(it, regs)
@@ -47,13 +45,9 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
             };
             t.define(it, regs)
         }
-        G::Length
-        | G::Distance
-        | G::Normalize
-        | G::Cross
-        | G::FaceForward
-        | G::Reflect
-        | G::Refract => geometric(t, it, op),
+        G::Length | G::Distance | G::Normalize | G::Cross | G::FaceForward | G::Reflect | G::Refract => {
+            geometric(t, it, op)
+        }
         G::PackSnorm4x8
         | G::PackUnorm4x8
         | G::PackSnorm2x16
@@ -66,9 +60,7 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
         | G::UnpackUnorm2x16
         | G::UnpackHalf2x16
         | G::UnpackDouble2x32 => unpack(t, it, op),
-        G::InterpolateAtCentroid | G::InterpolateAtSample | G::InterpolateAtOffset => {
-            interpolate(t, it, op)
-        }
+        G::InterpolateAtCentroid | G::InterpolateAtSample | G::InterpolateAtOffset => interpolate(t, it, op),
         _ => glsl_elementwise(t, it, op),
     }
 }
@@ -79,10 +71,7 @@ fn ldexp_exponent(t: &mut Translator, scalar: Scalar, exponent: Reg) -> Reg {
     if !scalar.is_wide() {
         return t.emit.sign_extend(scalar, exponent);
     }
-    let (least, most) = (
-        t.emit.u64((-MOST).cast_unsigned()),
-        t.emit.u64(MOST.cast_unsigned()),
-    );
+    let (least, most) = (t.emit.u64((-MOST).cast_unsigned()), t.emit.u64(MOST.cast_unsigned()));
     let exponent = t.emit.op(Ir::SMax64, &[exponent, least]);
     let exponent = t.emit.op(Ir::SMin64, &[exponent, most]);
     t.emit.op(Ir::Low32, &[exponent])
@@ -93,24 +82,17 @@ fn split_float(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     let (mut first, mut second) = (Vec::new(), Vec::new());
     for x in x.iter() {
         if matches!(op, G::Modf | G::ModfStruct) {
-            let whole = t
-                .emit
-                .op(op_for_width(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
+            let whole = t.emit.op(op_for_width(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
             let fraction = t.emit.minus(scalar, *x, whole);
             // An infinity has no fraction; zero has the sign of x.
-            let infinite = t
-                .emit
-                .op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
+            let infinite = t.emit.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
             let zero = t.emit.float(scalar, 0.0);
             first.push(t.emit.select(infinite, zero, fraction));
             second.push(whole);
         } else {
             let significand = op_for_width(scalar, Ir::FFrexpSignificand, Ir::FFrexpSignificand64);
             first.push(t.emit.op(significand, &[*x]));
-            second.push(t.emit.op(
-                op_for_width(scalar, Ir::FFrexpExponent, Ir::FFrexpExponent64),
-                &[*x],
-            ));
+            second.push(t.emit.op(op_for_width(scalar, Ir::FFrexpExponent, Ir::FFrexpExponent64), &[*x]));
         }
     }
     if matches!(op, G::Modf | G::Frexp) {
@@ -124,13 +106,10 @@ fn split_float(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
 
 fn length(t: &mut Translator, scalar: Scalar, x: &[Reg]) -> Result<Reg> {
     if let [one] = x {
-        return Ok(t
-            .emit
-            .op(op_for_width(scalar, Ir::FAbs, Ir::FAbs64), &[*one]));
+        return Ok(t.emit.op(op_for_width(scalar, Ir::FAbs, Ir::FAbs64), &[*one]));
     }
     let square = dot(t, scalar, x, x, true)?;
-    Ok(t.emit
-        .op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[square]))
+    Ok(t.emit.op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[square]))
 }
 
 fn geometric(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
@@ -168,9 +147,7 @@ fn geometric(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
         G::FaceForward => {
             let along = dot(t, scalar, &operands[2], &operands[1], true)?;
             let zero = t.emit.float(scalar, 0.0);
-            let facing = t
-                .emit
-                .op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[along, zero]);
+            let facing = t.emit.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[along, zero]);
             x.iter()
                 .map(|x| {
                     let away = t.emit.op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[*x]);
@@ -192,36 +169,20 @@ fn geometric(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
         }
         _ => refract(t, it, scalar, x, &operands[1])?,
     };
-    let regs = regs
-        .into_iter()
-        .map(|reg| t.emit.wrap_to_width(scalar, reg))
-        .collect();
+    let regs = regs.into_iter().map(|reg| t.emit.wrap_to_width(scalar, reg)).collect();
     t.define(it, regs)
 }
 
-fn refract(
-    t: &mut Translator,
-    it: &Instruction,
-    scalar: Scalar,
-    i: &[Reg],
-    n: &[Reg],
-) -> Result<Vec<Reg>> {
+fn refract(t: &mut Translator, it: &Instruction, scalar: Scalar, i: &[Reg], n: &[Reg]) -> Result<Vec<Reg>> {
     let eta = t.reg(it.id(4)?)?;
     let (zero, one) = (t.emit.float(scalar, 0.0), t.emit.float(scalar, 1.0));
     let along = dot(t, scalar, n, i, true)?;
-    let (along_2, eta_2) = (
-        t.emit.mul(scalar, along, along),
-        t.emit.mul(scalar, eta, eta),
-    );
+    let (along_2, eta_2) = (t.emit.mul(scalar, along, along), t.emit.mul(scalar, eta, eta));
     let rest = t.emit.minus(scalar, one, along_2);
     let rest = t.emit.mul(scalar, eta_2, rest);
     let k = t.emit.minus(scalar, one, rest);
-    let total = t
-        .emit
-        .op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[k, zero]);
-    let root = t
-        .emit
-        .op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[k]);
+    let total = t.emit.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[k, zero]);
+    let root = t.emit.op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[k]);
     let forward = t.emit.mul(scalar, eta, along);
     let factor = t.emit.plus(scalar, forward, root);
     Ok(i.iter()
@@ -294,11 +255,7 @@ fn unpack(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     let mut regs = Vec::with_capacity(count as usize);
     for index in 0..count {
         let (at, width) = (t.emit.u32(bits * index), t.emit.u32(bits));
-        let extract = if signed {
-            Ir::BitfieldSExtract
-        } else {
-            Ir::BitfieldUExtract
-        };
+        let extract = if signed { Ir::BitfieldSExtract } else { Ir::BitfieldUExtract };
         let part = t.emit.op(extract, &[x, at, width]);
         if op == G::UnpackHalf2x16 {
             regs.push(t.emit.op(Ir::F16ToF, &[part]));

@@ -1,9 +1,7 @@
 //! Images and samplers.
 
 use isa::ir::Type as IrType;
-use isa::ir::{
-    Binding, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, Statement,
-};
+use isa::ir::{Binding, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, Statement};
 use isa::op::Op as Ir;
 use spirv::ImageOperands as ImageOperandMask;
 use spirv::{Dim, Op};
@@ -158,15 +156,9 @@ fn texels(t: &mut Translator, count: usize) -> [Option<Reg>; 4] {
 }
 
 /// Defines the result of a read or sample, rounded if its type requires it.
-fn define_texel(
-    t: &mut Translator,
-    it: &Instruction,
-    regs: impl Iterator<Item = Reg>,
-) -> Result<()> {
+fn define_texel(t: &mut Translator, it: &Instruction, regs: impl Iterator<Item = Reg>) -> Result<()> {
     let (scalar, count) = t.globals.types.vector(it.ty()?)?;
-    let regs = regs
-        .take(count as usize)
-        .map(|reg| t.emit.wrap_to_width(scalar, reg));
+    let regs = regs.take(count as usize).map(|reg| t.emit.wrap_to_width(scalar, reg));
     let regs = regs.collect();
     t.define(it, regs)
 }
@@ -220,46 +212,24 @@ fn sample(t: &mut Translator, it: &Instruction, sample_op: &SampleOp) -> Result<
         let mut regs = Vec::with_capacity(4);
         for offset in image_operands.offsets.chunks_exact(2).take(4) {
             let dst = t.emit.builder.value(IrType::B32);
-            t.emit
-                .builder
-                .statement(make([None, None, None, Some(dst)], offset.to_vec()));
+            t.emit.builder.statement(make([None, None, None, Some(dst)], offset.to_vec()));
             regs.push(dst);
         }
         return define_texel(t, it, regs.into_iter());
     }
-    let offset = image_operands
-        .offset
-        .get(..axes)
-        .unwrap_or_default()
-        .to_vec();
-    let dst = texels(
-        t,
-        if sample_op.compare && !sample_op.gather {
-            1
-        } else {
-            4
-        },
-    );
+    let offset = image_operands.offset.get(..axes).unwrap_or_default().to_vec();
+    let dst = texels(t, if sample_op.compare && !sample_op.gather { 1 } else { 4 });
     t.emit.builder.statement(make(dst, offset));
     define_texel(t, it, dst.into_iter().flatten())
 }
 
-fn lod(
-    t: &mut Translator,
-    sample_op: &SampleOp,
-    image_operands: &ImageOperands,
-    shape: ImageShape,
-) -> Result<Lod> {
+fn lod(t: &mut Translator, sample_op: &SampleOp, image_operands: &ImageOperands, shape: ImageShape) -> Result<Lod> {
     let axes = shape.dimension.coordinates();
     if let Some((dx, dy)) = &image_operands.gradient {
         let (Some(dx), Some(dy)) = (dx.get(..axes), dy.get(..axes)) else {
             return malformed("the gradient has too few components");
         };
-        return Ok(Lod::Gradient {
-            dx: dx.to_vec(),
-            dy: dy.to_vec(),
-            minimum: image_operands.minimum,
-        });
+        return Ok(Lod::Gradient { dx: dx.to_vec(), dy: dy.to_vec(), minimum: image_operands.minimum });
     }
     if sample_op.explicit {
         return match image_operands.lod {
@@ -273,10 +243,7 @@ fn lod(
         let zero = t.emit.f32(0.0);
         return Ok(Lod::Explicit(level.unwrap_or(zero)));
     }
-    Ok(Lod::Implicit {
-        bias: image_operands.bias,
-        minimum: image_operands.minimum,
-    })
+    Ok(Lod::Implicit { bias: image_operands.bias, minimum: image_operands.minimum })
 }
 
 fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
@@ -295,16 +262,14 @@ fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
     }
     let dst = texels(t, 4);
-    t.emit
-        .builder
-        .statement(Statement::ImageRead(Box::new(ImageRead {
-            dst,
-            image,
-            shape,
-            coordinate,
-            level: image_operands.lod,
-            sample: image_operands.sample,
-        })));
+    t.emit.builder.statement(Statement::ImageRead(Box::new(ImageRead {
+        dst,
+        image,
+        shape,
+        coordinate,
+        level: image_operands.lod,
+        sample: image_operands.sample,
+    })));
     define_texel(t, it, dst.into_iter().flatten())
 }
 
@@ -331,15 +296,13 @@ fn write_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     let zero = t.emit.u32(0);
     let image_operands = image_operands(t, it, 3)?;
     mark_binding_written(t, image);
-    t.emit
-        .builder
-        .statement(Statement::ImageWrite(Box::new(ImageWrite {
-            image,
-            shape,
-            coordinate,
-            sample: image_operands.sample,
-            texel: std::array::from_fn(|index| regs.get(index).copied().unwrap_or(zero)),
-        })));
+    t.emit.builder.statement(Statement::ImageWrite(Box::new(ImageWrite {
+        image,
+        shape,
+        coordinate,
+        sample: image_operands.sample,
+        texel: std::array::from_fn(|index| regs.get(index).copied().unwrap_or(zero)),
+    })));
     Ok(())
 }
 
@@ -353,12 +316,7 @@ fn texel_pointer(t: &mut Translator, it: &Instruction) -> Result<()> {
     };
     let coordinate = coordinate(t, it.id(1)?, image_type.shape()?.coordinates())?;
     let sample = t.reg(it.id(2)?)?;
-    let pointer = Pointer::Texel {
-        image: binding,
-        image_type,
-        coordinate,
-        sample,
-    };
+    let pointer = Pointer::Texel { image: binding, image_type, coordinate, sample };
     t.define_as(it, Value::Pointer(pointer.into()))
 }
 
@@ -366,31 +324,21 @@ fn query_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (image, image_type) = image_operand(t, it.id(0)?)?;
     let shape = image_type.shape()?;
     let query = match it.opcode {
-        Op::ImageQuerySizeLod => ImageQuery::Size {
-            level: Some(t.reg(it.id(1)?)?),
-        },
+        Op::ImageQuerySizeLod => ImageQuery::Size { level: Some(t.reg(it.id(1)?)?) },
         Op::ImageQuerySize => ImageQuery::Size { level: None },
         Op::ImageQueryLevels => ImageQuery::Levels,
         Op::ImageQuerySamples => ImageQuery::Samples,
         _ => match t.value(it.id(0)?)? {
-            Value::SampledImage(_, _, sampler) => ImageQuery::Lod {
-                sampler,
-                coordinate: coordinate(t, it.id(1)?, shape.dimension.coordinates())?,
-            },
+            Value::SampledImage(_, _, sampler) => {
+                ImageQuery::Lod { sampler, coordinate: coordinate(t, it.id(1)?, shape.dimension.coordinates())? }
+            }
             _ => return malformed("the first operand isn't a sampled image"),
         },
     };
     let (_, count) = t.globals.types.vector(it.ty()?)?;
-    let dst: Vec<Reg> = (0..count)
-        .map(|_| t.emit.builder.value(IrType::B32))
-        .collect();
+    let dst: Vec<Reg> = (0..count).map(|_| t.emit.builder.value(IrType::B32)).collect();
     let is_size = matches!(query, ImageQuery::Size { .. });
-    t.emit.builder.statement(Statement::ImageQuery {
-        dst: dst.clone(),
-        image,
-        shape,
-        query,
-    });
+    t.emit.builder.statement(Statement::ImageQuery { dst: dst.clone(), image, shape, query });
     let mut regs = dst;
     // The device treats a storage cube as an array of faces.
     if is_size

@@ -11,8 +11,7 @@ use super::emitter::Emitter;
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::interface::{
-    BuiltIn, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling,
-    ScalarType, Stage,
+    BuiltIn, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling, ScalarType, Stage,
 };
 use crate::module::Module;
 use crate::types::{Member, Scalar, Type as SpirvType};
@@ -26,36 +25,17 @@ const MAX_BUILT_IN_SCALARS: u32 = 64;
 /// The source of a scalar of an input, or the target of one of an output.
 #[derive(Clone, Copy, Debug)]
 pub enum IoLocation {
-    Location {
-        location: u32,
-        component: u32,
-        interpolation: Interpolation,
-        sampling: Sampling,
-        index: u32,
-    },
-    BuiltIn {
-        built_in: Spirv,
-        component: u32,
-    },
+    Location { location: u32, component: u32, interpolation: Interpolation, sampling: Sampling, index: u32 },
+    BuiltIn { built_in: Spirv, component: u32 },
 }
 
 impl IoLocation {
     /// The location of the second word of a 64-bit scalar whose first word is here.
     fn second(self) -> Self {
         match self {
-            Self::Location {
-                location,
-                component,
-                interpolation,
-                sampling,
-                index,
-            } => Self::Location {
-                location,
-                component: component + 1,
-                interpolation,
-                sampling,
-                index,
-            },
+            Self::Location { location, component, interpolation, sampling, index } => {
+                Self::Location { location, component: component + 1, interpolation, sampling, index }
+            }
             built_in => built_in,
         }
     }
@@ -104,12 +84,7 @@ pub struct InputsOutputs<'a> {
 
 impl<'a> InputsOutputs<'a> {
     /// The interface of an entry point, still without inputs and outputs.
-    pub fn new(
-        module: &'a Module,
-        globals: &'a Globals,
-        interface: &Interface,
-        subgroup_size: u32,
-    ) -> Self {
+    pub fn new(module: &'a Module, globals: &'a Globals, interface: &Interface, subgroup_size: u32) -> Self {
         Self {
             module,
             globals,
@@ -150,10 +125,7 @@ impl<'a> InputsOutputs<'a> {
             if scalars > MAX_BUILT_IN_SCALARS {
                 return unsupported("a built-in of this many elements");
             }
-            let one = |component| IoLocation::BuiltIn {
-                built_in,
-                component,
-            };
+            let one = |component| IoLocation::BuiltIn { built_in, component };
             return Ok((0..scalars).map(one).collect());
         }
         let number = |decoration| self.module.literal(variable, decoration);
@@ -188,11 +160,7 @@ impl<'a> InputsOutputs<'a> {
                     into.push(IoLocation::Location {
                         location: location + at / 4,
                         component: at % 4,
-                        interpolation: if flat {
-                            Interpolation::Flat
-                        } else {
-                            cursor.interpolation
-                        },
+                        interpolation: if flat { Interpolation::Flat } else { cursor.interpolation },
                         sampling: cursor.sampling,
                         index: cursor.index,
                     });
@@ -201,11 +169,7 @@ impl<'a> InputsOutputs<'a> {
                 cursor.location = Some(location + end.div_ceil(4));
                 Ok(())
             }
-            SpirvType::Matrix {
-                column: element,
-                count,
-            }
-            | SpirvType::Array { element, count, .. } => {
+            SpirvType::Matrix { column: element, count } | SpirvType::Array { element, count, .. } => {
                 (0..*count).try_for_each(|_| self.place(*element, cursor, into))
             }
             SpirvType::Struct(members) => {
@@ -231,10 +195,7 @@ impl<'a> InputsOutputs<'a> {
     ) -> Result<()> {
         if let Some(built_in) = member.built_in {
             let scalars = self.globals.types.scalars(member.ty)?;
-            into.extend((0..scalars).map(|component| IoLocation::BuiltIn {
-                built_in,
-                component,
-            }));
+            into.extend((0..scalars).map(|component| IoLocation::BuiltIn { built_in, component }));
             return Ok(());
         }
         let number = |decoration| self.module.member_literal(ty, index, decoration);
@@ -258,39 +219,24 @@ impl<'a> InputsOutputs<'a> {
     }
 
     /// The register of an input, created when it is first read.
-    pub fn input(
-        &mut self,
-        emit: &mut Emitter,
-        source: InputSource,
-        scalar: ScalarType,
-        rate: Rate,
-    ) -> Reg {
+    pub fn input(&mut self, emit: &mut Emitter, source: InputSource, scalar: ScalarType, rate: Rate) -> Reg {
         if let Some(reg) = self.registers.get(&source) {
             return *reg;
         }
         let ty = match scalar {
             ScalarType::Bool => Type::Bool,
-            ScalarType::Float { width: 64 }
-            | ScalarType::Int { width: 64 }
-            | ScalarType::Uint { width: 64 } => Type::B64,
+            ScalarType::Float { width: 64 } | ScalarType::Int { width: 64 } | ScalarType::Uint { width: 64 } => {
+                Type::B64
+            }
             _ => Type::B32,
         };
         let reg = emit.builder.input(self.inputs.len() as u32, ty, rate);
-        self.inputs.push(Input {
-            source,
-            numeric: scalar,
-        });
+        self.inputs.push(Input { source, numeric: scalar });
         self.registers.insert(source, reg);
         reg
     }
 
-    fn built_in_input(
-        &mut self,
-        emit: &mut Emitter,
-        built_in: BuiltIn,
-        component: u32,
-        scalar: ScalarType,
-    ) -> Reg {
+    fn built_in_input(&mut self, emit: &mut Emitter, built_in: BuiltIn, component: u32, scalar: ScalarType) -> Reg {
         let rate = match built_in {
             BuiltIn::BaseVertex
             | BuiltIn::BaseInstance
@@ -301,10 +247,7 @@ impl<'a> InputsOutputs<'a> {
             | BuiltIn::NumWorkgroups => Rate::Uniform,
             _ => Rate::Varying,
         };
-        let source = InputSource::BuiltIn {
-            built_in,
-            component,
-        };
+        let source = InputSource::BuiltIn { built_in, component };
         self.input(emit, source, scalar, rate)
     }
 
@@ -313,12 +256,7 @@ impl<'a> InputsOutputs<'a> {
         if self.stage != Stage::Fragment {
             return malformed("there are no fragments in this stage");
         }
-        Ok(self.built_in_input(
-            emit,
-            BuiltIn::FragCoord,
-            component,
-            ScalarType::Float { width: 32 },
-        ))
+        Ok(self.built_in_input(emit, BuiltIn::FragCoord, component, ScalarType::Float { width: 32 }))
     }
 
     /// The layer of the fragment.
@@ -327,32 +265,17 @@ impl<'a> InputsOutputs<'a> {
     }
 
     /// The register of a scalar of an input variable.
-    pub fn input_scalar(
-        &mut self,
-        emit: &mut Emitter,
-        variable: u32,
-        index: usize,
-        scalar: Scalar,
-    ) -> Result<Reg> {
+    pub fn input_scalar(&mut self, emit: &mut Emitter, variable: u32, index: usize, scalar: Scalar) -> Result<Reg> {
         let locations = self.locations(variable)?;
         match locations.get(index).copied() {
             // The device reads attributes of 64 bits whole.
-            Some(place @ IoLocation::Location { .. })
-                if scalar.is_wide() && self.stage != Stage::Vertex =>
-            {
+            Some(place @ IoLocation::Location { .. }) if scalar.is_wide() && self.stage != Stage::Vertex => {
                 let words = place.words(scalar).into_iter();
-                let words: Vec<_> = words
-                    .map(|(word, numeric)| self.word(emit, word, numeric))
-                    .collect();
+                let words: Vec<_> = words.map(|(word, numeric)| self.word(emit, word, numeric)).collect();
                 Ok(emit.op(Ir::Join64, &words))
             }
-            Some(place @ IoLocation::Location { .. }) => {
-                Ok(self.word(emit, place, scalar.at_interface()))
-            }
-            Some(IoLocation::BuiltIn {
-                built_in,
-                component,
-            }) => {
+            Some(place @ IoLocation::Location { .. }) => Ok(self.word(emit, place, scalar.at_interface())),
+            Some(IoLocation::BuiltIn { built_in, component }) => {
                 let reg = self.built_in(emit, built_in, component, scalar)?;
                 if emit.builder.type_of(reg) != scalar.register() {
                     return malformed(format!("built-in {built_in:?} is of another type"));
@@ -365,33 +288,15 @@ impl<'a> InputsOutputs<'a> {
 
     /// The register of an input at a location.
     fn word(&mut self, emit: &mut Emitter, place: IoLocation, numeric: ScalarType) -> Reg {
-        let IoLocation::Location {
-            location,
-            component,
-            interpolation,
-            sampling,
-            ..
-        } = place
-        else {
+        let IoLocation::Location { location, component, interpolation, sampling, .. } = place else {
             return emit.constant(Type::B32, 0);
         };
         self.per_sample |= sampling == Sampling::Sample;
-        let source = InputSource::Location {
-            location,
-            component,
-            interpolation,
-            sampling,
-        };
+        let source = InputSource::Location { location, component, interpolation, sampling };
         self.input(emit, source, numeric, Rate::Varying)
     }
 
-    fn built_in(
-        &mut self,
-        emit: &mut Emitter,
-        built_in: Spirv,
-        component: u32,
-        scalar: Scalar,
-    ) -> Result<Reg> {
+    fn built_in(&mut self, emit: &mut Emitter, built_in: Spirv, component: u32, scalar: Scalar) -> Result<Reg> {
         let given = match built_in {
             Spirv::VertexIndex => BuiltIn::VertexIndex,
             Spirv::InstanceIndex => BuiltIn::InstanceIndex,
@@ -425,12 +330,7 @@ impl<'a> InputsOutputs<'a> {
         Ok(self.built_in_input(emit, given, component, scalar.at_interface()))
     }
 
-    fn computed_built_in(
-        &mut self,
-        emit: &mut Emitter,
-        built_in: Spirv,
-        component: u32,
-    ) -> Result<Reg> {
+    fn computed_built_in(&mut self, emit: &mut Emitter, built_in: Spirv, component: u32) -> Result<Reg> {
         let [x, y, z] = self.workgroup_size;
         let invocations = x * y * z;
         let size = self.subgroup_size;
@@ -445,12 +345,7 @@ impl<'a> InputsOutputs<'a> {
             Spirv::LocalInvocationId => self.local_id(emit, axis),
             Spirv::GlobalInvocationId => {
                 let local = self.local_id(emit, axis);
-                let group = self.built_in_input(
-                    emit,
-                    BuiltIn::WorkgroupId,
-                    component,
-                    ScalarType::Uint { width: 32 },
-                );
+                let group = self.built_in_input(emit, BuiltIn::WorkgroupId, component, ScalarType::Uint { width: 32 });
                 let each = emit.u32([x, y, z][axis]);
                 let first = emit.op(Ir::IMul, &[group, each]);
                 emit.op(Ir::IAdd, &[first, local])
@@ -513,11 +408,7 @@ impl<'a> InputsOutputs<'a> {
         let below = emit.select(before, zero, below);
         let up_to = emit.op(Ir::Or, &[below, bit]);
         let limit = self.subgroup_size.saturating_sub(32 * word).min(32);
-        let existing = if limit == 32 {
-            u32::MAX
-        } else {
-            (1 << limit) - 1
-        };
+        let existing = if limit == 32 { u32::MAX } else { (1 << limit) - 1 };
         let existing = emit.u32(existing);
         match which {
             Spirv::SubgroupEqMask => bit,
@@ -535,13 +426,7 @@ impl<'a> InputsOutputs<'a> {
     }
 
     /// Assigns a register to the output at a location.
-    pub fn write_output(
-        &mut self,
-        emit: &mut Emitter,
-        location: IoLocation,
-        scalar: Scalar,
-        reg: Reg,
-    ) -> Result<()> {
+    pub fn write_output(&mut self, emit: &mut Emitter, location: IoLocation, scalar: Scalar, reg: Reg) -> Result<()> {
         let regs = match scalar.is_wide() {
             false => vec![reg],
             true => emit.words(reg).to_vec(),
@@ -563,20 +448,10 @@ impl<'a> InputsOutputs<'a> {
 /// The target of an output's scalar.
 pub fn output_target(location: IoLocation) -> Result<OutputTarget> {
     Ok(match location {
-        IoLocation::Location {
-            location,
-            component,
-            index,
-            ..
-        } => OutputTarget::Location {
-            location,
-            component,
-            index,
-        },
-        IoLocation::BuiltIn {
-            built_in,
-            component,
-        } => OutputTarget::BuiltIn {
+        IoLocation::Location { location, component, index, .. } => {
+            OutputTarget::Location { location, component, index }
+        }
+        IoLocation::BuiltIn { built_in, component } => OutputTarget::BuiltIn {
             built_in: match built_in {
                 Spirv::Position => BuiltIn::Position,
                 Spirv::PointSize => BuiltIn::PointSize,

@@ -77,10 +77,9 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         Op::Load => load(t, it),
         Op::Store => store(t, it),
         Op::CopyMemory => copy_memory(t, it),
-        Op::AccessChain
-        | Op::InBoundsAccessChain
-        | Op::PtrAccessChain
-        | Op::InBoundsPtrAccessChain => access_chain(t, it),
+        Op::AccessChain | Op::InBoundsAccessChain | Op::PtrAccessChain | Op::InBoundsPtrAccessChain => {
+            access_chain(t, it)
+        }
         Op::ArrayLength => array_length(t, it),
         Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff => compare_pointers(t, it),
         Op::ExtInst => extended(t, it),
@@ -161,9 +160,7 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::AtomicFAddEXT
         | Op::AtomicFMinEXT
         | Op::AtomicFMaxEXT => atomic(t, it),
-        Op::SDot | Op::UDot | Op::SUDot | Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => {
-            integer_dot(t, it)
-        }
+        Op::SDot | Op::UDot | Op::SUDot | Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => integer_dot(t, it),
         op if is_image(op) => image(t, it),
         op if is_subgroup(op) => subgroup(t, it),
         _ => elementwise(t, it),

@@ -81,23 +81,17 @@ fn factors(t: &mut Translator, id: u32, signed: bool) -> Result<Vec<Reg>> {
     let (scalar, regs) = t.vector(id)?;
     match (scalar, &*regs) {
         (Scalar::Int { width: 32, .. }, [word]) => {
-            let extract = if signed {
-                Ir::BitfieldSExtract
-            } else {
-                Ir::BitfieldUExtract
-            };
+            let extract = if signed { Ir::BitfieldSExtract } else { Ir::BitfieldUExtract };
             let bytes = (0..4).map(|index| {
                 let (at, width) = (t.emit.u32(8 * index), t.emit.u32(8));
                 let byte = t.emit.op(extract, &[*word, at, width]);
-                t.emit
-                    .op(if signed { Ir::SToS64 } else { Ir::UToU64 }, &[byte])
+                t.emit.op(if signed { Ir::SToS64 } else { Ir::UToU64 }, &[byte])
             });
             Ok(bytes.collect())
         }
-        (Scalar::Int { .. }, regs) if regs.len() > 1 => Ok(regs
-            .iter()
-            .map(|reg| widened(t, scalar, *reg, signed))
-            .collect()),
+        (Scalar::Int { .. }, regs) if regs.len() > 1 => {
+            Ok(regs.iter().map(|reg| widened(t, scalar, *reg, signed)).collect())
+        }
         _ => unsupported("a dot product of these operands"),
     }
 }
@@ -143,10 +137,7 @@ fn saturated_sum(t: &mut Translator, width: u32, signed: bool, a: Reg, b: Reg) -
         }
         (_, true) => {
             let most = (1_i64 << (width - 1)) - 1;
-            let (least, most) = (
-                t.emit.u64((!most).cast_unsigned()),
-                t.emit.u64(most.cast_unsigned()),
-            );
+            let (least, most) = (t.emit.u64((!most).cast_unsigned()), t.emit.u64(most.cast_unsigned()));
             let sum = t.emit.op(Ir::SMax64, &[sum, least]);
             t.emit.op(Ir::SMin64, &[sum, most])
         }

@@ -16,16 +16,7 @@ fn sample_offsets(samples: u32) -> &'static [[i8; 2]] {
     match samples {
         2 => &[[4, 4], [-4, -4]],
         4 => &[[-2, -6], [6, -2], [-6, 2], [2, 6]],
-        8 => &[
-            [1, -3],
-            [-1, 3],
-            [5, 1],
-            [-3, -5],
-            [-5, 5],
-            [-7, -1],
-            [3, 7],
-            [7, -7],
-        ],
+        8 => &[[1, -3], [-1, 3], [5, 1], [-3, -5], [-5, 5], [-7, -1], [3, 7], [7, -7]],
         16 => &[
             [1, 1],
             [-1, -3],
@@ -129,11 +120,7 @@ fn interpolated(t: &mut Translator, interpolant: Interpolant, point: Point) -> R
 }
 
 /// As [`interpolated`], for a part whose place is constant.
-fn interpolated_part(
-    t: &mut Translator,
-    interpolant: Interpolant,
-    point: Point,
-) -> Result<Vec<Reg>> {
+fn interpolated_part(t: &mut Translator, interpolant: Interpolant, point: Point) -> Result<Vec<Reg>> {
     let Point::Offset([dx, dy]) = point else {
         return read_input(t, interpolant, Sampling::Centroid);
     };
@@ -181,22 +168,14 @@ fn sample_offset(t: &mut Translator, sample: Reg) -> [Reg; 2] {
 }
 
 /// Reads a part of an input, evaluated at another point of the pixel.
-fn read_input(
-    t: &mut Translator,
-    interpolant: Interpolant,
-    sampling: Sampling,
-) -> Result<Vec<Reg>> {
+fn read_input(t: &mut Translator, interpolant: Interpolant, sampling: Sampling) -> Result<Vec<Reg>> {
     let scalars = t.globals.types.flatten(interpolant.ty)?;
     t.emit.charge_budget(scalars.len())?;
     let locations = t.io.locations(interpolant.variable)?;
     let mut regs = Vec::with_capacity(scalars.len());
     for (offset, scalar) in scalars.into_iter().enumerate() {
-        let Some(IoLocation::Location {
-            location,
-            component,
-            interpolation,
-            ..
-        }) = locations.get(interpolant.start + offset)
+        let Some(IoLocation::Location { location, component, interpolation, .. }) =
+            locations.get(interpolant.start + offset)
         else {
             return unsupported("interpolation of a built-in");
         };
@@ -216,31 +195,15 @@ fn read_input(
 
 /// The part of an input variable to which a pointer points.
 fn interpolant<'a>(t: &Translator, pointer: &'a Pointer) -> Option<Interpolant<'a>> {
-    let Pointer::PromotedVariable {
-        variable,
-        start,
-        indices,
-        ty,
-    } = pointer
-    else {
+    let Pointer::PromotedVariable { variable, start, indices, ty } = pointer else {
         return None;
     };
-    Some(Interpolant {
-        variable: t.promoted.variables[*variable].input?,
-        start: *start,
-        indices,
-        ty: *ty,
-    })
+    Some(Interpolant { variable: t.promoted.variables[*variable].input?, start: *start, indices, ty: *ty })
 }
 
 /// The interpolation of an interpolant.
 fn interpolation_of(t: &mut Translator, interpolant: Interpolant) -> Option<Interpolation> {
-    match t
-        .io
-        .locations(interpolant.variable)
-        .ok()?
-        .get(interpolant.start)?
-    {
+    match t.io.locations(interpolant.variable).ok()?.get(interpolant.start)? {
         IoLocation::Location { interpolation, .. } => Some(*interpolation),
         IoLocation::BuiltIn { .. } => None,
     }

@@ -59,18 +59,9 @@ pub fn copy_memory(t: &mut Translator, it: &Instruction) -> Result<()> {
 /// Loads the value to which a pointer points.
 pub fn load_from(t: &mut Translator, pointer: &Pointer) -> Result<Vec<Reg>> {
     match pointer {
-        Pointer::PromotedVariable {
-            variable,
-            start,
-            indices,
-            ty,
-        } => {
+        Pointer::PromotedVariable { variable, start, indices, ty } => {
             let count = t.globals.types.scalars(*ty)? as usize;
-            let part = PromotedPart {
-                variable: *variable,
-                start: *start,
-                indices,
-            };
+            let part = PromotedPart { variable: *variable, start: *start, indices };
             t.promoted.read(&mut t.emit, &mut t.io, part, count)
         }
         Pointer::Memory(place) => load_place(t, place),
@@ -81,20 +72,11 @@ pub fn load_from(t: &mut Translator, pointer: &Pointer) -> Result<Vec<Reg>> {
 /// Stores a value to which a pointer points.
 pub fn store_to(t: &mut Translator, pointer: &Pointer, regs: &[Reg]) -> Result<()> {
     match pointer {
-        Pointer::PromotedVariable {
-            variable,
-            start,
-            indices,
-            ty,
-        } => {
+        Pointer::PromotedVariable { variable, start, indices, ty } => {
             if regs.len() != t.globals.types.scalars(*ty)? as usize {
                 return malformed("the object doesn't fit the pointer");
             }
-            let part = PromotedPart {
-                variable: *variable,
-                start: *start,
-                indices,
-            };
+            let part = PromotedPart { variable: *variable, start: *start, indices };
             t.promoted.write(&mut t.emit, &mut t.io, part, regs, None)
         }
         Pointer::Memory(place) => store_place(t, place, regs),
@@ -107,10 +89,7 @@ fn load_place(t: &mut Translator, place: &MemoryRef) -> Result<Vec<Reg>> {
     t.emit.charge_budget(scalars.len())?;
     let mut loaded = vec![None; scalars.len()];
     for run in runs(t, place, &scalars)? {
-        let regs = t
-            .emit
-            .builder
-            .load(place.at(run.offset), run.format, run.places.len());
+        let regs = t.emit.builder.load(place.at(run.offset), run.format, run.places.len());
         for (reg, index) in regs.into_iter().zip(run.places) {
             loaded[index] = Some(loaded_scalar(t, scalars[index], place.layout, reg));
         }
@@ -129,11 +108,8 @@ fn store_place(t: &mut Translator, place: &MemoryRef, regs: &[Reg]) -> Result<()
     t.emit.charge_budget(scalars.len())?;
     mark_written(t, place);
     for run in runs(t, place, &scalars)? {
-        let src: Vec<Reg> = run
-            .places
-            .iter()
-            .map(|index| stored_scalar(t, scalars[*index], place.layout, regs[*index]))
-            .collect();
+        let src: Vec<Reg> =
+            run.places.iter().map(|index| stored_scalar(t, scalars[*index], place.layout, regs[*index])).collect();
         t.emit.builder.store(place.at(run.offset), run.format, &src);
     }
     Ok(())
@@ -156,31 +132,18 @@ fn runs(t: &Translator, place: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<Con
             Some(run)
                 if run.format == format
                     && run.places.len() < MAX_ELEMENTS
-                    && run
-                        .offset
-                        .checked_add(format.bytes() * run.places.len() as u32)
-                        == Some(offset) =>
+                    && run.offset.checked_add(format.bytes() * run.places.len() as u32) == Some(offset) =>
             {
                 run.places.push(index);
             }
-            _ => runs.push(ContiguousAccess {
-                offset,
-                format,
-                places: vec![index],
-            }),
+            _ => runs.push(ContiguousAccess { offset, format, places: vec![index] }),
         }
     }
     Ok(runs)
 }
 
 /// The byte offsets of a type's scalars.
-fn add_offsets(
-    t: &Translator,
-    ty: u32,
-    layout: MemoryLayout,
-    start: u32,
-    into: &mut Vec<u32>,
-) -> Result<()> {
+fn add_offsets(t: &Translator, ty: u32, layout: MemoryLayout, start: u32, into: &mut Vec<u32>) -> Result<()> {
     let types = &t.globals.types;
     let at = |index: u32, stride: u32| start.saturating_add(index.saturating_mul(stride));
     match types.get(ty)? {
@@ -195,32 +158,17 @@ fn add_offsets(
             let (scalar, rows) = types.vector(*column)?;
             let bytes = scalar_bytes(scalar, layout);
             let (column_stride, component_stride) = match layout {
-                MemoryLayout {
-                    explicit: false, ..
-                } => (bytes * rows, None),
-                MemoryLayout {
-                    matrix: Some((stride, true)),
-                    ..
-                } => (bytes, Some(stride)),
-                MemoryLayout {
-                    matrix: Some((stride, false)),
-                    ..
-                } => (stride, None),
+                MemoryLayout { explicit: false, .. } => (bytes * rows, None),
+                MemoryLayout { matrix: Some((stride, true)), .. } => (bytes, Some(stride)),
+                MemoryLayout { matrix: Some((stride, false)), .. } => (stride, None),
                 _ => return malformed("the matrix has no stride"),
             };
-            let layout = MemoryLayout {
-                component_stride,
-                ..layout
-            };
+            let layout = MemoryLayout { component_stride, ..layout };
             for index in 0..*count {
                 add_offsets(t, *column, layout, at(index, column_stride), into)?;
             }
         }
-        Type::Array {
-            element,
-            count,
-            stride,
-        } => {
+        Type::Array { element, count, stride } => {
             let stride = if layout.explicit {
                 match stride {
                     Some(stride) => *stride,
@@ -244,12 +192,8 @@ fn add_offsets(
                 } else {
                     natural
                 };
-                let inner = MemoryLayout {
-                    matrix: member
-                        .matrix_stride
-                        .map(|stride| (stride, member.row_major)),
-                    ..layout
-                };
+                let inner =
+                    MemoryLayout { matrix: member.matrix_stride.map(|stride| (stride, member.row_major)), ..layout };
                 add_offsets(t, member.ty, inner, start.saturating_add(offset), into)?;
                 let size = types.tight_size(member.ty).unwrap_or(0);
                 natural = natural.saturating_add(u32::try_from(size).unwrap_or(u32::MAX));

@@ -38,16 +38,14 @@ mod vertex_places;
 use std::collections::HashMap;
 
 use isa::ir::MAX_LANES;
-use spirv::{
-    AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel, StorageClass,
-};
+use spirv::{AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel, StorageClass};
 
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::{Globals, Specialization};
 use crate::instruction::Instruction;
 use crate::interface::{
-    DepthMode, Domain, InputPrimitive, Interface, OutputPrimitive, PrimitiveModes, Shader, Spacing,
-    Stage, TransformFeedback, VertexExchange,
+    DepthMode, Domain, InputPrimitive, Interface, OutputPrimitive, PrimitiveModes, Shader, Spacing, Stage,
+    TransformFeedback, VertexExchange,
 };
 use crate::module::Module;
 use analysis::Analysis;
@@ -78,19 +76,11 @@ pub fn translate(
     options: &Options,
 ) -> Result<Shader, Error> {
     std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new()
-            .name("gaurast-shader".into())
-            .stack_size(STACK_BYTES);
+        let thread = std::thread::Builder::new().name("gaurast-shader".into()).stack_size(STACK_BYTES);
         let translation = thread
-            .spawn_scoped(scope, || {
-                translate_here(module, name, stage, specialization, options)
-            })
-            .map_err(|error| Error::NoThread {
-                reason: error.to_string(),
-            })?;
-        translation
-            .join()
-            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            .spawn_scoped(scope, || translate_here(module, name, stage, specialization, options))
+            .map_err(|error| Error::NoThread { reason: error.to_string() })?;
+        translation.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
@@ -105,11 +95,7 @@ fn translate_here(
     let globals = Globals::new(module, specialization)?;
     let declaration = find_entry(module, name, stage)?;
     let entry = declaration.id(1).map_err(|_| no_entry(name, stage))?;
-    let function = module
-        .functions
-        .get(&entry)
-        .copied()
-        .ok_or_else(|| no_entry(name, stage))?;
+    let function = module.functions.get(&entry).copied().ok_or_else(|| no_entry(name, stage))?;
     let mut analysis = Analysis::new(module, &globals, function)?;
     // An output with an initializer is written although no code names it.
     let named = declaration.ids(3);
@@ -139,18 +125,12 @@ fn translate_here(
 }
 
 /// The interface of an entry point with its execution modes, still without inputs and outputs.
-fn execution_modes(
-    module: &Module,
-    globals: &Globals,
-    entry: u32,
-    stage: Stage,
-) -> Result<Interface, Error> {
+fn execution_modes(module: &Module, globals: &Globals, entry: u32, stage: Stage) -> Result<Interface, Error> {
     let mut interface = empty_interface(stage);
     let mut is_early_and_late = false;
     for it in &module.sections.execution_modes {
         if it.id(0).ok() == Some(entry) {
-            execution_mode(globals, it, &mut interface)
-                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            execution_mode(globals, it, &mut interface).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             let mode = it.enumerant(1, ExecutionMode::from_u32);
             is_early_and_late |= mode == Some(ExecutionMode::EarlyAndLateFragmentTestsAMD);
         }
@@ -164,10 +144,7 @@ fn execution_modes(
         let [x, y, z] = interface.workgroup_size.map(u64::from);
         let limit = MAX_LANES as u64;
         if x.saturating_mul(y).saturating_mul(z) > limit || x * y * z == 0 {
-            return Err(Error::TooLarge {
-                what: "invocations of a workgroup",
-                limit,
-            });
+            return Err(Error::TooLarge { what: "invocations of a workgroup", limit });
         }
     }
     Ok(interface)
@@ -176,8 +153,7 @@ fn execution_modes(
 /// The workgroup's size from the constant with the built-in decoration, which overrides the execution mode.
 fn built_in_workgroup_size(module: &Module, globals: &Globals) -> Option<[u32; 3]> {
     let mut constants = globals.constants.iter();
-    let (_, constant) =
-        constants.find(|(id, _)| module.built_in(**id) == Some(BuiltIn::WorkgroupSize))?;
+    let (_, constant) = constants.find(|(id, _)| module.built_in(**id) == Some(BuiltIn::WorkgroupSize))?;
     match *constant.bits {
         [x, y, z] => Some([x as u32, y as u32, z as u32]),
         _ => None,
@@ -219,12 +195,7 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
 }
 
 /// An execution mode of tessellation and geometry stages.
-fn primitive_mode(
-    it: &Instruction,
-    mode: ExecutionMode,
-    stage: Stage,
-    modes: &mut PrimitiveModes,
-) -> Result<()> {
+fn primitive_mode(it: &Instruction, mode: ExecutionMode, stage: Stage, modes: &mut PrimitiveModes) -> Result<()> {
     match mode {
         ExecutionMode::Triangles if stage == Stage::Geometry => {
             modes.input = Some(InputPrimitive::Triangles);
@@ -263,10 +234,7 @@ fn finish(mut t: Translator, declaration: &Instruction, named: &[u32]) -> Result
     t.interface.per_sample = t.io.per_sample || variables::has_an_input_of_samples(&t, named);
     t.interface.inputs = t.io.inputs;
     t.interface.outputs = t.io.outputs;
-    Ok(Shader {
-        program: t.emit.builder.finish()?,
-        interface: t.interface,
-    })
+    Ok(Shader { program: t.emit.builder.finish()?, interface: t.interface })
 }
 
 fn empty_interface(stage: Stage) -> Interface {
@@ -290,10 +258,7 @@ fn empty_interface(stage: Stage) -> Interface {
 }
 
 fn no_entry(name: &str, stage: Stage) -> Error {
-    Error::NoEntryPoint {
-        name: name.into(),
-        stage,
-    }
+    Error::NoEntryPoint { name: name.into(), stage }
 }
 
 /// The declaration of an entry point.
@@ -308,9 +273,7 @@ fn find_entry<'a>(module: &'a Module, name: &str, stage: Stage) -> Result<&'a In
     };
     let mut entries = module.sections.entry_points.iter();
     entries
-        .find(|it| {
-            it.enumerant(0, ExecutionModel::from_u32) == Some(model) && it.string(2) == Some(name)
-        })
+        .find(|it| it.enumerant(0, ExecutionModel::from_u32) == Some(model) && it.string(2) == Some(name))
         .ok_or_else(|| no_entry(name, stage))
 }
 
@@ -326,9 +289,7 @@ fn check_capabilities(module: &Module) -> Result<(), Error> {
     }
     let model = module.sections.memory_model.as_ref();
     let Some(model) = model else {
-        return Err(Error::Binary {
-            reason: "there is no memory model".into(),
-        });
+        return Err(Error::Binary { reason: "there is no memory model".into() });
     };
     let addressing = model.enumerant(0, AddressingModel::from_u32);
     let memory = model.enumerant(1, MemoryModel::from_u32);

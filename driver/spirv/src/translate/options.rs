@@ -13,10 +13,6 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            subgroup_size: 64,
-            samples: 1,
-            unsized_descriptors: 1,
-        }
+        Self { subgroup_size: 64, samples: 1, unsized_descriptors: 1 }
     }
 }

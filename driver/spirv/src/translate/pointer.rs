@@ -40,13 +40,9 @@ fn index(t: &mut Translator, id: u32) -> Result<Index> {
     }
     let (scalar, regs) = t.vector(id)?;
     match (scalar, &*regs) {
-        (Scalar::Int { width: 64, .. }, [reg]) => Ok(Index::Dynamic {
-            reg: t.emit.op(Ir::Low32, &[*reg]),
-            scalar: Scalar::Int {
-                width: 32,
-                signed: true,
-            },
-        }),
+        (Scalar::Int { width: 64, .. }, [reg]) => {
+            Ok(Index::Dynamic { reg: t.emit.op(Ir::Low32, &[*reg]), scalar: Scalar::Int { width: 32, signed: true } })
+        }
         (Scalar::Int { .. }, [reg]) => Ok(Index::Dynamic { reg: *reg, scalar }),
         _ => malformed(format!("index %{id} isn't an integer")),
     }
@@ -63,12 +59,7 @@ fn next_element(t: &mut Translator, pointer: Pointer, ty: u32, element: Index) -
 
 fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result<Pointer> {
     match pointer {
-        Pointer::PromotedVariable {
-            variable,
-            start,
-            mut indices,
-            ty,
-        } => {
+        Pointer::PromotedVariable { variable, start, mut indices, ty } => {
             let (part, start) = match index {
                 Index::Constant(index) if has_part(t, ty, index) => {
                     let (part, before) = t.globals.types.part(ty, index)?;
@@ -82,20 +73,11 @@ fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result
                     };
                     let (part, count) = elements(t, ty)?;
                     let scalars = t.globals.types.scalars(part)?;
-                    indices.push(DynamicIndex {
-                        index,
-                        count,
-                        scalars,
-                    });
+                    indices.push(DynamicIndex { index, count, scalars });
                     (part, start)
                 }
             };
-            Ok(Pointer::PromotedVariable {
-                variable,
-                start,
-                indices,
-                ty: part,
-            })
+            Ok(Pointer::PromotedVariable { variable, start, indices, ty: part })
         }
         Pointer::Memory(place) => Ok(Pointer::Memory(place_of_part(t, place, index)?)),
         Pointer::Resource { binding, class, ty } => {
@@ -118,10 +100,7 @@ fn has_part(t: &Translator, ty: u32, index: u32) -> bool {
 fn elements(t: &Translator, ty: u32) -> Result<(u32, u32)> {
     match t.globals.types.get(ty)? {
         Type::Vector { element, count }
-        | Type::Matrix {
-            column: element,
-            count,
-        }
+        | Type::Matrix { column: element, count }
         | Type::Array { element, count, .. } => Ok((*element, *count)),
         _ => malformed("an index that isn't constant into what isn't an array"),
     }
@@ -138,9 +117,7 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
                 return malformed(format!("there is no member {number}"));
             };
             let offset = if place.layout.explicit {
-                place.layout.matrix = member
-                    .matrix_stride
-                    .map(|stride| (stride, member.row_major));
+                place.layout.matrix = member.matrix_stride.map(|stride| (stride, member.row_major));
                 match member.offset {
                     Some(offset) => offset,
                     None => return malformed(format!("member {number} has no offset")),
@@ -156,10 +133,7 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
             place.ty = member.ty;
             Ok(place)
         }
-        Type::Array {
-            element, stride, ..
-        }
-        | Type::RuntimeArray { element, stride } => {
+        Type::Array { element, stride, .. } | Type::RuntimeArray { element, stride } => {
             let (element, stride) = (*element, *stride);
             let stride = if place.layout.explicit {
                 match stride {
@@ -178,13 +152,8 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
             place.ty = column;
             let bytes = scalar_bytes(scalar, place.layout);
             let stride = match place.layout {
-                MemoryLayout {
-                    explicit: false, ..
-                } => bytes * rows,
-                MemoryLayout {
-                    matrix: Some((stride, row_major)),
-                    ..
-                } => {
+                MemoryLayout { explicit: false, .. } => bytes * rows,
+                MemoryLayout { matrix: Some((stride, row_major)), .. } => {
                     place.layout.component_stride = row_major.then_some(stride);
                     if row_major { bytes } else { stride }
                 }
@@ -256,11 +225,7 @@ fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) 
             if first + u64::from(each) > u64::from(array.count) {
                 return malformed("the index is beyond the end of the array of descriptors");
             }
-            return Ok(Binding {
-                slot: array.slot + first as u32,
-                count: each,
-                index: None,
-            });
+            return Ok(Binding { slot: array.slot + first as u32, count: each, index: None });
         }
         Index::Constant(index) => t.emit.u32(index),
         Index::Dynamic { reg, .. } => reg,
@@ -270,34 +235,19 @@ fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) 
     if let Some(outer) = array.index {
         element = t.emit.op(Ir::IAdd, &[outer, element]);
     }
-    Ok(Binding {
-        index: Some(element),
-        ..array
-    })
+    Ok(Binding { index: Some(element), ..array })
 }
 
 /// Translates `OpArrayLength`.
 pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
     let pointer = t.pointer(it.id(0)?)?;
     let member = it.number(1)?;
-    let Pointer::Memory(MemoryRef {
-        space: Space::Buffer(buffer),
-        offset: before,
-        base,
-        ty,
-        ..
-    }) = pointer
-    else {
+    let Pointer::Memory(MemoryRef { space: Space::Buffer(buffer), offset: before, base, ty, .. }) = pointer else {
         return malformed("the operand isn't a pointer to a buffer");
     };
     let (array, _) = t.globals.types.part(ty, member)?;
-    let (
-        Type::RuntimeArray {
-            stride: Some(stride),
-            ..
-        },
-        Type::Struct(members),
-    ) = (t.globals.types.get(array)?, t.globals.types.get(ty)?)
+    let (Type::RuntimeArray { stride: Some(stride), .. }, Type::Struct(members)) =
+        (t.globals.types.get(array)?, t.globals.types.get(ty)?)
     else {
         return malformed("the member isn't an array with a stride");
     };

@@ -32,11 +32,7 @@ pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
     let Some(equal) = equal else {
         return malformed("the pointers have no values");
     };
-    let result = if it.opcode == Op::PtrEqual {
-        equal
-    } else {
-        t.emit.op(Ir::BNot, &[equal])
-    };
+    let result = if it.opcode == Op::PtrEqual { equal } else { t.emit.op(Ir::BNot, &[equal]) };
     t.define(it, vec![result])
 }
 
@@ -53,11 +49,8 @@ fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]
         }
         _ => return unsupported("the difference of these pointers"),
     };
-    let elements = if result.is_wide() {
-        t.emit.op(Ir::SToS64, &[elements])
-    } else {
-        t.emit.wrap_to_width(result, elements)
-    };
+    let elements =
+        if result.is_wide() { t.emit.op(Ir::SToS64, &[elements]) } else { t.emit.wrap_to_width(result, elements) };
     t.define(it, vec![elements])
 }
 

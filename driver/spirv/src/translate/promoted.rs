@@ -38,11 +38,7 @@ pub struct PromotedPart<'a> {
 impl PromotedPart<'_> {
     /// The part selected by an element of its first dynamic index.
     fn element(&self, dynamic: &DynamicIndex, element: u32) -> Self {
-        Self {
-            start: self.start + (element * dynamic.scalars) as usize,
-            indices: &self.indices[1..],
-            ..*self
-        }
+        Self { start: self.start + (element * dynamic.scalars) as usize, indices: &self.indices[1..], ..*self }
     }
 }
 
@@ -104,13 +100,7 @@ impl PromotedVariables {
         Ok(reg)
     }
 
-    fn write_scalar(
-        &mut self,
-        emit: &Emitter,
-        variable: usize,
-        index: usize,
-        reg: Reg,
-    ) -> Result<()> {
+    fn write_scalar(&mut self, emit: &Emitter, variable: usize, index: usize, reg: Reg) -> Result<()> {
         let found = &mut self.variables[variable];
         match found.scalars.get(index) {
             Some(scalar) if scalar.register() == emit.builder.type_of(reg) => {

@@ -144,26 +144,10 @@ pub fn structurize(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
 
 /// A construct around the block being walked.
 enum Frame {
-    Selection {
-        construct: Construct,
-        merge: usize,
-        merge_point: MergePoint,
-    },
-    Case {
-        construct: Construct,
-        merge: Option<(usize, MergePoint)>,
-        next: Option<(usize, MergePoint)>,
-    },
-    LoopBody {
-        construct: Construct,
-        merge: Option<(usize, MergePoint)>,
-        continues: (usize, MergePoint),
-    },
-    LoopContinuing {
-        construct: Construct,
-        merge: Option<(usize, MergePoint)>,
-        header: (usize, MergePoint),
-    },
+    Selection { construct: Construct, merge: usize, merge_point: MergePoint },
+    Case { construct: Construct, merge: Option<(usize, MergePoint)>, next: Option<(usize, MergePoint)> },
+    LoopBody { construct: Construct, merge: Option<(usize, MergePoint)>, continues: (usize, MergePoint) },
+    LoopContinuing { construct: Construct, merge: Option<(usize, MergePoint)>, header: (usize, MergePoint) },
 }
 
 /// Walks a function's blocks.
@@ -296,15 +280,9 @@ impl Structurizer<'_> {
     /// The merge point at the end of the innermost construct, if the block is that end.
     fn end_of_construct(&self, to: usize) -> Option<MergePoint> {
         let (block, merge_point) = match self.frames.last()? {
-            Frame::Selection {
-                merge, merge_point, ..
-            } => (*merge, *merge_point),
-            Frame::Case {
-                next: Some(next), ..
-            } => *next,
-            Frame::Case {
-                merge: Some(merge), ..
-            } => *merge,
+            Frame::Selection { merge, merge_point, .. } => (*merge, *merge_point),
+            Frame::Case { next: Some(next), .. } => *next,
+            Frame::Case { merge: Some(merge), .. } => *merge,
             Frame::Case { .. } => return None,
             Frame::LoopBody { continues, .. } => *continues,
             Frame::LoopContinuing { header, .. } => *header,
@@ -315,9 +293,7 @@ impl Structurizer<'_> {
     /// The jump to a block from anywhere within the enclosing constructs.
     fn jump(&self, to: usize) -> Option<(Jump, MergePoint)> {
         let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match merge {
-            Some((block, merge_point)) if *block == to => {
-                Some((Jump::Break(construct), *merge_point))
-            }
+            Some((block, merge_point)) if *block == to => Some((Jump::Break(construct), *merge_point)),
             _ => None,
         };
         let innermost = self.frames.len().saturating_sub(1);
@@ -325,25 +301,14 @@ impl Structurizer<'_> {
         frames.find_map(|(depth, frame)| match frame {
             // The innermost construct is left by reaching its end.
             Frame::Selection { .. } if depth == innermost => None,
-            Frame::Selection {
-                construct,
-                merge,
-                merge_point,
-            } => leave(&Some((*merge, *merge_point)), *construct),
-            Frame::Case {
-                construct, merge, ..
+            Frame::Selection { construct, merge, merge_point } => leave(&Some((*merge, *merge_point)), *construct),
+            Frame::Case { construct, merge, .. } | Frame::LoopContinuing { construct, merge, .. } => {
+                leave(merge, *construct)
             }
-            | Frame::LoopContinuing {
-                construct, merge, ..
-            } => leave(merge, *construct),
-            Frame::LoopBody {
-                construct,
-                continues,
-                ..
-            } if continues.0 == to => Some((Jump::Continue(*construct), continues.1)),
-            Frame::LoopBody {
-                construct, merge, ..
-            } => leave(merge, *construct),
+            Frame::LoopBody { construct, continues, .. } if continues.0 == to => {
+                Some((Jump::Continue(*construct), continues.1))
+            }
+            Frame::LoopBody { construct, merge, .. } => leave(merge, *construct),
         })
     }
 
@@ -358,30 +323,18 @@ impl Structurizer<'_> {
             self.broken.insert(construct);
         }
         let merge_point = Some(merge_point);
-        Node::Edge(Edge {
-            from,
-            to,
-            jump,
-            merge_point,
-        })
+        Node::Edge(Edge { from, to, jump, merge_point })
     }
 
     /// Adds a branch at the end of a list.
     fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
-        let end = self
-            .end_of_construct(to)
-            .map(|merge_point| (Jump::None, merge_point));
+        let end = self.end_of_construct(to).map(|merge_point| (Jump::None, merge_point));
         if let Some(leaving) = end.or_else(|| self.jump(to)) {
             let edge = self.edge(from, to, leaving);
             nodes.push(edge);
             return Ok(None);
         }
-        nodes.push(Node::Edge(Edge {
-            from,
-            to,
-            jump: Jump::None,
-            merge_point: None,
-        }));
+        nodes.push(Node::Edge(Edge { from, to, jump: Jump::None, merge_point: None }));
         Ok(Some(to))
     }
 
@@ -416,11 +369,7 @@ impl Structurizer<'_> {
         let merge_point = (!self.is_target(merge)).then(|| self.add_merge_point());
         let construct = self.add_construct();
         if let Some(merge_point) = merge_point {
-            self.frames.push(Frame::Selection {
-                construct,
-                merge,
-                merge_point,
-            });
+            self.frames.push(Frame::Selection { construct, merge, merge_point });
         }
         self.begin_modified();
         let condition = (then != otherwise).then_some(condition);
@@ -441,9 +390,7 @@ impl Structurizer<'_> {
             merge_point,
             modified: self.end_modified(),
         });
-        Ok(merge_point
-            .filter(|merge_point| self.edges[*merge_point] > 0)
-            .map(|_| merge))
+        Ok(merge_point.filter(|merge_point| self.edges[*merge_point] > 0).map(|_| merge))
     }
 
     /// Adds a conditional branch without a merge block: at least one of its targets leaves a construct.
@@ -495,18 +442,10 @@ impl Structurizer<'_> {
         let (header, merge_join) = (self.add_merge_point(), self.add_merge_point());
         self.edges[header] += 1;
         let shared = continues == head;
-        let continue_join = if shared {
-            header
-        } else {
-            self.add_merge_point()
-        };
+        let continue_join = if shared { header } else { self.add_merge_point() };
         let leave = (!self.is_target(merge)).then_some((merge, merge_join));
         self.begin_modified();
-        self.frames.push(Frame::LoopBody {
-            construct,
-            merge: leave,
-            continues: (continues, continue_join),
-        });
+        self.frames.push(Frame::LoopBody { construct, merge: leave, continues: (continues, continue_join) });
         let mut body = Vec::new();
         if let Some(next) = self.straight(head, &mut body)? {
             self.region(next, &mut body)?;
@@ -514,11 +453,7 @@ impl Structurizer<'_> {
         self.frames.pop();
         let mut continuing = Vec::new();
         if !shared && self.edges[continue_join] > 0 {
-            self.frames.push(Frame::LoopContinuing {
-                construct,
-                merge: leave,
-                header: (head, header),
-            });
+            self.frames.push(Frame::LoopContinuing { construct, merge: leave, header: (head, header) });
             self.region(continues, &mut continuing)?;
             self.frames.pop();
         }
@@ -534,12 +469,7 @@ impl Structurizer<'_> {
         Ok((self.edges[merge_join] > 0).then_some(merge))
     }
 
-    fn switch(
-        &mut self,
-        block: usize,
-        terminator: &Instruction,
-        nodes: &mut Vec<Node>,
-    ) -> Result<Option<usize>> {
+    fn switch(&mut self, block: usize, terminator: &Instruction, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
         let Some(merge) = self.selection_merge(block)? else {
             return malformed("there is no merge block");
         };
@@ -552,18 +482,10 @@ impl Structurizer<'_> {
         let mut built = Vec::with_capacity(cases.len());
         let mut entry = None;
         for (position, (which, fallthrough)) in order.iter().enumerate() {
-            let Target {
-                block: target,
-                values,
-                default,
-            } = std::mem::take(&mut cases[*which]);
+            let Target { block: target, values, default } = std::mem::take(&mut cases[*which]);
             let next = fallthrough.then(|| order.get(position + 1)).flatten();
             let next = next.map(|(next, _)| (cases[*next].block, self.add_merge_point()));
-            self.frames.push(Frame::Case {
-                construct,
-                merge: leave,
-                next,
-            });
+            self.frames.push(Frame::Case { construct, merge: leave, next });
             let mut body = Vec::new();
             if entry.is_some() {
                 self.region(target, &mut body)?;
@@ -571,21 +493,10 @@ impl Structurizer<'_> {
                 body = self.arm(block, target)?;
             }
             self.frames.pop();
-            built.push(Case {
-                values,
-                default,
-                body,
-                fallthrough: next.is_some(),
-                entry,
-            });
+            built.push(Case { values, default, body, fallthrough: next.is_some(), entry });
             entry = next.map(|(to, merge_point)| {
                 self.edges[merge_point] += 1;
-                let edge = Edge {
-                    from: block,
-                    to,
-                    jump: Jump::None,
-                    merge_point: Some(merge_point),
-                };
+                let edge = Edge { from: block, to, jump: Jump::None, merge_point: Some(merge_point) };
                 (merge_point, edge)
             });
         }
@@ -597,9 +508,7 @@ impl Structurizer<'_> {
             merge_point,
             modified: self.end_modified(),
         });
-        Ok(merge_point
-            .filter(|merge_point| self.edges[*merge_point] > 0)
-            .map(|_| merge))
+        Ok(merge_point.filter(|merge_point| self.edges[*merge_point] > 0).map(|_| merge))
     }
 }
 
@@ -622,10 +531,7 @@ impl Structurizer<'_> {
         let mut values = HashSet::new();
         let mut target = |block| -> usize {
             *by_block.entry(block).or_insert_with(|| {
-                targets.push(Target {
-                    block,
-                    ..Target::default()
-                });
+                targets.push(Target { block, ..Target::default() });
                 targets.len() - 1
             })
         };
@@ -665,9 +571,7 @@ impl Structurizer<'_> {
                 continue;
             }
             for next in self.reachable_cases(case.block, merge, &which)? {
-                if falls_into[index]
-                    .replace(next)
-                    .is_some_and(|other| other != next)
+                if falls_into[index].replace(next).is_some_and(|other| other != next)
                     || std::mem::replace(&mut fallen_into[next], true)
                 {
                     return malformed("cases fall through to each other in no order");
@@ -689,12 +593,7 @@ impl Structurizer<'_> {
     }
 
     /// The other cases that a case reaches without leaving the switch.
-    fn reachable_cases(
-        &mut self,
-        start: usize,
-        merge: usize,
-        which: &HashMap<usize, usize>,
-    ) -> Result<HashSet<usize>> {
+    fn reachable_cases(&mut self, start: usize, merge: usize, which: &HashMap<usize, usize>) -> Result<HashSet<usize>> {
         let mut found = HashSet::new();
         let mut seen = HashSet::from([start]);
         let mut waiting = vec![start];

@@ -58,10 +58,7 @@ pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
             let regs = t.regs(it.id(first)?)?;
             let mut all = None;
             for reg in regs.iter() {
-                let equal = t
-                    .emit
-                    .builder
-                    .subgroup(SubgroupOp::AllEqual, Some(*reg), None);
+                let equal = t.emit.builder.subgroup(SubgroupOp::AllEqual, Some(*reg), None);
                 all = Some(match all {
                     Some(all) => t.emit.op(Ir::BAnd, &[all, equal]),
                     None => equal,
@@ -72,32 +69,19 @@ pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
         Op::GroupNonUniformBroadcastFirst | Op::SubgroupFirstInvocationKHR => {
             move_lanes(t, it, SubgroupOp::BroadcastFirst, first, None)
         }
-        Op::GroupNonUniformBroadcast
-        | Op::GroupNonUniformShuffle
-        | Op::SubgroupReadInvocationKHR => {
+        Op::GroupNonUniformBroadcast | Op::GroupNonUniformShuffle | Op::SubgroupReadInvocationKHR => {
             move_lanes(t, it, SubgroupOp::Shuffle, first, Some(first + 1))
         }
-        Op::GroupNonUniformShuffleXor => {
-            move_lanes(t, it, SubgroupOp::ShuffleXor, first, Some(first + 1))
-        }
-        Op::GroupNonUniformShuffleUp => {
-            move_lanes(t, it, SubgroupOp::ShuffleUp, first, Some(first + 1))
-        }
-        Op::GroupNonUniformShuffleDown => {
-            move_lanes(t, it, SubgroupOp::ShuffleDown, first, Some(first + 1))
-        }
-        Op::GroupNonUniformQuadBroadcast => {
-            move_lanes(t, it, SubgroupOp::QuadBroadcast, first, Some(first + 1))
-        }
+        Op::GroupNonUniformShuffleXor => move_lanes(t, it, SubgroupOp::ShuffleXor, first, Some(first + 1)),
+        Op::GroupNonUniformShuffleUp => move_lanes(t, it, SubgroupOp::ShuffleUp, first, Some(first + 1)),
+        Op::GroupNonUniformShuffleDown => move_lanes(t, it, SubgroupOp::ShuffleDown, first, Some(first + 1)),
+        Op::GroupNonUniformQuadBroadcast => move_lanes(t, it, SubgroupOp::QuadBroadcast, first, Some(first + 1)),
         Op::GroupNonUniformQuadSwap => {
             let direction = t.literal(it.id(2)?)?;
             let across = t.emit.u32(direction.min(2) + 1);
             let regs = t.regs(it.id(1)?)?;
             let op = SubgroupOp::QuadSwap;
-            let moved = regs
-                .iter()
-                .map(|reg| t.emit.builder.subgroup(op, Some(*reg), Some(across)))
-                .collect();
+            let moved = regs.iter().map(|reg| t.emit.builder.subgroup(op, Some(*reg), Some(across))).collect();
             t.define(it, moved)
         }
         Op::GroupNonUniformBallot | Op::SubgroupBallotKHR => {
@@ -129,22 +113,13 @@ fn vote(t: &mut Translator, it: &Instruction, op: SubgroupOp, operand: usize) ->
     t.define(it, vec![reg])
 }
 
-fn move_lanes(
-    t: &mut Translator,
-    it: &Instruction,
-    op: SubgroupOp,
-    value: usize,
-    index: Option<usize>,
-) -> Result<()> {
+fn move_lanes(t: &mut Translator, it: &Instruction, op: SubgroupOp, value: usize, index: Option<usize>) -> Result<()> {
     let regs = t.regs(it.id(value)?)?;
     let index = match index {
         Some(index) => Some(t.reg(it.id(index)?)?),
         None => None,
     };
-    let moved = regs
-        .iter()
-        .map(|reg| t.emit.builder.subgroup(op, Some(*reg), index))
-        .collect();
+    let moved = regs.iter().map(|reg| t.emit.builder.subgroup(op, Some(*reg), index)).collect();
     t.define(it, moved)
 }
 
@@ -237,10 +212,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
         return malformed("there is no group operation");
     };
     let operation = match group {
-        GroupOperation::Reduce => SubgroupOp::Reduce {
-            op,
-            cluster: t.options.subgroup_size,
-        },
+        GroupOperation::Reduce => SubgroupOp::Reduce { op, cluster: t.options.subgroup_size },
         GroupOperation::InclusiveScan => SubgroupOp::InclusiveScan(op),
         GroupOperation::ExclusiveScan => SubgroupOp::ExclusiveScan(op),
         GroupOperation::ClusteredReduce => SubgroupOp::Reduce {
@@ -263,11 +235,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
                 _ => *reg,
             };
             let reg = t.emit.builder.subgroup(operation, Some(reg), None);
-            let reg = if signed {
-                clamped(t, scalar, op, reg)
-            } else {
-                reg
-            };
+            let reg = if signed { clamped(t, scalar, op, reg) } else { reg };
             t.emit.wrap_to_width(scalar, reg)
         })
         .collect();
@@ -276,11 +244,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
 
 /// The identity of a minimum or maximum of narrow integers: the 32-bit identity clamped to the type's range.
 fn clamped(t: &mut Translator, scalar: Scalar, op: Ir, reg: Reg) -> Reg {
-    let Scalar::Int {
-        width: width @ (8 | 16),
-        ..
-    } = scalar
-    else {
+    let Scalar::Int { width: width @ (8 | 16), .. } = scalar else {
         return reg;
     };
     let most = (1 << (width - 1)) - 1;

@@ -5,9 +5,7 @@ use spirv::{Decoration, StorageClass};
 use super::inputs_outputs::output_target;
 use super::translator::Translator;
 use crate::error::{Result, malformed, unsupported};
-use crate::interface::{
-    CapturedScalar, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS, TransformFeedback,
-};
+use crate::interface::{CapturedScalar, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS, TransformFeedback};
 use crate::types::{Scalar, Type, Types};
 
 /// The bytes of a word.
@@ -58,20 +56,13 @@ pub fn describe(t: &mut Translator, named: &[u32]) -> Result<()> {
             capture_variable(t, id, ty, &mut captured)?;
         }
     }
-    captured
-        .scalars
-        .sort_by_key(|scalar| (scalar.buffer, scalar.offset));
+    captured.scalars.sort_by_key(|scalar| (scalar.buffer, scalar.offset));
     check(&captured)?;
     t.interface.transform_feedback = Some(captured);
     Ok(())
 }
 
-fn capture_variable(
-    t: &mut Translator,
-    id: u32,
-    ty: u32,
-    captured: &mut TransformFeedback,
-) -> Result<()> {
+fn capture_variable(t: &mut Translator, id: u32, ty: u32, captured: &mut TransformFeedback) -> Result<()> {
     let types = &t.globals.types;
     let place = Place::new(|decoration| t.module.literal(id, decoration));
     let (block, copies) = match types.get(ty)? {
@@ -111,10 +102,7 @@ fn place_scalars(types: &Types, ty: u32, offset: &mut u32, into: &mut Vec<u32>) 
             }
         }
         Type::Vector { element, count }
-        | Type::Matrix {
-            column: element,
-            count,
-        }
+        | Type::Matrix { column: element, count }
         | Type::Array { element, count, .. } => {
             for _ in 0..*count {
                 place_scalars(types, *element, offset, into)?;
@@ -142,9 +130,7 @@ fn capture(
     };
     let stream = place.stream.unwrap_or(0);
     if buffer as usize >= MAX_TRANSFORM_FEEDBACK_BUFFERS || stream as usize >= MAX_VERTEX_STREAMS {
-        return unsupported(format!(
-            "%{id} is captured in buffer {buffer} from stream {stream}"
-        ));
+        return unsupported(format!("%{id} is captured in buffer {buffer} from stream {stream}"));
     }
     captured.streams[buffer as usize] = stream;
     if let Some(stride) = place.stride {
@@ -160,10 +146,7 @@ fn capture(
     let locations = t.io.locations(id)?;
     let parts = scalars.into_iter().zip(offsets);
     for ((scalar, offset), location) in parts.zip(&locations[first as usize..]) {
-        if !matches!(
-            scalar,
-            Scalar::Int { width: 32 | 64, .. } | Scalar::Float { width: 32 | 64 }
-        ) {
+        if !matches!(scalar, Scalar::Int { width: 32 | 64, .. } | Scalar::Float { width: 32 | 64 }) {
             return unsupported(format!("%{id} is captured, and not of 32 or 64 bits"));
         }
         for (number, (word, _)) in (0..).zip(location.words(scalar)) {
@@ -182,13 +165,9 @@ fn check(captured: &TransformFeedback) -> Result<()> {
     for scalar in &captured.scalars {
         let stride = captured.strides[scalar.buffer as usize];
         let end = scalar.offset.saturating_add(WORD_BYTES);
-        let is_aligned =
-            scalar.offset.is_multiple_of(WORD_BYTES) && stride.is_multiple_of(WORD_BYTES);
+        let is_aligned = scalar.offset.is_multiple_of(WORD_BYTES) && stride.is_multiple_of(WORD_BYTES);
         if !is_aligned || end > stride {
-            return malformed(format!(
-                "an output is captured at byte {} of {stride}",
-                scalar.offset
-            ));
+            return malformed(format!("an output is captured at byte {} of {stride}", scalar.offset));
         }
     }
     let mut pairs = captured.scalars.windows(2);

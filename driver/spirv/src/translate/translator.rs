@@ -82,11 +82,7 @@ impl Translator<'_> {
     /// An undefined value of a type. Undefined images, samplers and pointers read as zero.
     pub fn undefined(&mut self, ty: u32) -> Result<Value> {
         let index = self.emit.u32(0);
-        let nowhere = Binding {
-            slot: 0,
-            count: 0,
-            index: Some(index),
-        };
+        let nowhere = Binding { slot: 0, count: 0, index: Some(index) };
         let types = &self.globals.types;
         Ok(match types.get(ty)? {
             Type::Image(image) => Value::Image(nowhere, *image),
@@ -109,11 +105,7 @@ impl Translator<'_> {
                 let scalars = types.flatten(ty)?;
                 self.emit.charge_budget(scalars.len())?;
                 let zeros = scalars.iter();
-                Value::Regs(
-                    zeros
-                        .map(|it| self.emit.constant(it.register(), 0))
-                        .collect(),
-                )
+                Value::Regs(zeros.map(|it| self.emit.constant(it.register(), 0)).collect())
             }
         })
     }
@@ -163,10 +155,7 @@ impl Translator<'_> {
         self.emit.charge_budget(regs.len())?;
         let scalars = self.globals.types.flatten(ty)?;
         let fits = scalars.len() == regs.len()
-            && scalars
-                .iter()
-                .zip(&regs)
-                .all(|(scalar, reg)| scalar.register() == self.emit.builder.type_of(*reg));
+            && scalars.iter().zip(&regs).all(|(scalar, reg)| scalar.register() == self.emit.builder.type_of(*reg));
         if !fits {
             return malformed("the operands don't fit the result type");
         }
@@ -238,15 +227,8 @@ fn place_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> {
 /// The pointer that registers encode.
 fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Pointer> {
     let (class, pointee) = t.globals.types.pointer(ty)?;
-    let at = |space, base, layout| {
-        Pointer::Memory(MemoryRef {
-            space,
-            base: Some(base),
-            offset: 0,
-            layout,
-            ty: pointee,
-        })
-    };
+    let at =
+        |space, base, layout| Pointer::Memory(MemoryRef { space, base: Some(base), offset: 0, layout, ty: pointee });
     match (class, regs) {
         (StorageClass::PhysicalStorageBuffer, [address]) => {
             t.interface.uses_addresses = true;
@@ -255,11 +237,8 @@ fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Point
         (StorageClass::StorageBuffer, [slot, bytes]) => {
             let layout = pointee_layout(t, pointee, EXPLICIT)?;
             let one = t.emit.u32(1);
-            let binding = Binding {
-                slot: 0,
-                count: t.next_resource_slot,
-                index: Some(t.emit.op(Ir::ISub, &[*slot, one])),
-            };
+            let binding =
+                Binding { slot: 0, count: t.next_resource_slot, index: Some(t.emit.op(Ir::ISub, &[*slot, one])) };
             Ok(at(Space::Buffer(binding), *bytes, layout))
         }
         (StorageClass::Workgroup, [bytes]) => {
@@ -283,19 +262,11 @@ fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
 /// The layout of the target of a variable pointer, of which only the type is known: all members of a matrix type must
 /// have the same layout.
 fn pointee_layout(t: &Translator, pointee: u32, layout: MemoryLayout) -> Result<MemoryLayout> {
-    let Some(matrix) = t
-        .globals
-        .types
-        .matrix_in(pointee)
-        .filter(|_| layout.explicit)
-    else {
+    let Some(matrix) = t.globals.types.matrix_in(pointee).filter(|_| layout.explicit) else {
         return Ok(layout);
     };
     match t.globals.types.matrix_layout(matrix) {
-        Some(layout_of_all) => Ok(MemoryLayout {
-            matrix: Some(layout_of_all),
-            ..layout
-        }),
+        Some(layout_of_all) => Ok(MemoryLayout { matrix: Some(layout_of_all), ..layout }),
         None => unsupported("a variable pointer to a matrix that has several layouts"),
     }
 }
@@ -347,9 +318,5 @@ pub fn workgroup_blocks(t: &Translator) -> impl Iterator<Item = u32> {
 
 /// The layout of workgroup memory: explicit if an entry point's workgroup variables are blocks, because then all are.
 pub fn workgroup_layout(t: &Translator) -> MemoryLayout {
-    if workgroup_blocks(t).next().is_some() {
-        EXPLICIT
-    } else {
-        TIGHT
-    }
+    if workgroup_blocks(t).next().is_some() { EXPLICIT } else { TIGHT }
 }

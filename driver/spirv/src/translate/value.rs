@@ -67,11 +67,7 @@ pub struct MemoryRef {
 impl MemoryRef {
     /// The address `bytes` further on.
     pub fn at(&self, bytes: u32) -> Address {
-        Address {
-            space: self.space,
-            base: self.base,
-            offset: self.offset.saturating_add(bytes),
-        }
+        Address { space: self.space, base: self.base, offset: self.offset.saturating_add(bytes) }
     }
 }
 
@@ -87,26 +83,14 @@ pub struct MemoryLayout {
 }
 
 /// The layout of memory that the application sees, outside matrices.
-pub const EXPLICIT: MemoryLayout = MemoryLayout {
-    explicit: true,
-    matrix: None,
-    component_stride: None,
-};
+pub const EXPLICIT: MemoryLayout = MemoryLayout { explicit: true, matrix: None, component_stride: None };
 
 /// The layout of workgroup and private memory.
-pub const TIGHT: MemoryLayout = MemoryLayout {
-    explicit: false,
-    matrix: None,
-    component_stride: None,
-};
+pub const TIGHT: MemoryLayout = MemoryLayout { explicit: false, matrix: None, component_stride: None };
 
 /// The format of a scalar in memory.
 pub fn scalar_format(scalar: Scalar, layout: MemoryLayout) -> Format {
-    if layout.explicit {
-        scalar.format()
-    } else {
-        scalar.tight_format()
-    }
+    if layout.explicit { scalar.format() } else { scalar.tight_format() }
 }
 
 /// Bytes of a scalar in memory.

@@ -16,10 +16,7 @@ use crate::types::Type;
 
 /// Reports whether variables of a storage class may be held in registers.
 fn is_in_registers(class: StorageClass) -> bool {
-    matches!(
-        class,
-        StorageClass::Function | StorageClass::Private | StorageClass::Input | StorageClass::Output
-    )
+    matches!(class, StorageClass::Function | StorageClass::Private | StorageClass::Input | StorageClass::Output)
 }
 
 /// Creates all variables outside functions that are used, with resource variables in order of set and binding.
@@ -37,15 +34,11 @@ pub fn global_variables(t: &mut Translator) -> Result<(), Error> {
         };
         if let Err(diagnostic) = made {
             let mut declarations = t.module.sections.globals.iter();
-            return Err(
-                match (declarations.find(|it| it.result_id == Some(id)), diagnostic) {
-                    (Some(declaration), diagnostic) => diagnostic.locate(declaration.reference()),
-                    (None, Diagnostic::Located(error)) => error,
-                    (None, Diagnostic::Malformed(reason) | Diagnostic::Unsupported(reason)) => {
-                        Error::Binary { reason }
-                    }
-                },
-            );
+            return Err(match (declarations.find(|it| it.result_id == Some(id)), diagnostic) {
+                (Some(declaration), diagnostic) => diagnostic.locate(declaration.reference()),
+                (None, Diagnostic::Located(error)) => error,
+                (None, Diagnostic::Malformed(reason) | Diagnostic::Unsupported(reason)) => Error::Binary { reason },
+            });
         }
     }
     Ok(())
@@ -58,24 +51,15 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
     };
     let GlobalVariable { class, pointee, .. } = variable;
     let pointer = match class {
-        StorageClass::Private if t.analysis.in_memory.contains(&id) => {
-            private_variable(t, id, pointee)?
-        }
-        StorageClass::Input | StorageClass::Output
-            if let Some(place) = t.vertex_memory.place(id) =>
-        {
+        StorageClass::Private if t.analysis.in_memory.contains(&id) => private_variable(t, id, pointee)?,
+        StorageClass::Input | StorageClass::Output if let Some(place) = t.vertex_memory.place(id) => {
             Pointer::Memory(place)
         }
         _ if is_in_registers(class) => {
             let input = (class == StorageClass::Input).then_some(id);
             let variable = t.promote(pointee, input)?;
             t.promoted.bind(id, variable);
-            Pointer::PromotedVariable {
-                variable,
-                start: 0,
-                indices: Vec::new(),
-                ty: pointee,
-            }
+            Pointer::PromotedVariable { variable, start: 0, indices: Vec::new(), ty: pointee }
         }
         StorageClass::Workgroup => {
             let layout = workgroup_layout(t);
@@ -85,13 +69,7 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
                 let bytes = tight_bytes(t, pointee)?;
                 t.emit.builder.allocate_shared(bytes, 8)
             };
-            Pointer::Memory(MemoryRef {
-                space: Space::Shared,
-                base: None,
-                offset,
-                layout,
-                ty: pointee,
-            })
+            Pointer::Memory(MemoryRef { space: Space::Shared, base: None, offset, layout, ty: pointee })
         }
         StorageClass::PushConstant => Pointer::Memory(MemoryRef {
             space: Space::PushConstants,
@@ -127,13 +105,7 @@ fn private_variable(t: &mut Translator, id: u32, pointee: u32) -> Result<Pointer
     }
     let bytes = tight_bytes(t, pointee)?;
     let offset = t.emit.builder.allocate_private(bytes);
-    Ok(Pointer::Memory(MemoryRef {
-        space: Space::Private,
-        base: None,
-        offset,
-        layout: TIGHT,
-        ty: pointee,
-    }))
+    Ok(Pointer::Memory(MemoryRef { space: Space::Private, base: None, offset, layout: TIGHT, ty: pointee }))
 }
 
 /// Translates `OpVariable` in a function.
@@ -141,9 +113,7 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     let id = it.result()?;
     let (class, pointee) = t.globals.types.pointer(it.ty()?)?;
     if class != StorageClass::Function {
-        return unsupported(format!(
-            "a variable of storage class {class:?} in a function"
-        ));
+        return unsupported(format!("a variable of storage class {class:?} in a function"));
     }
     t.promoted.unbind(id);
     let pointer = if t.analysis.in_memory.contains(&id) {
@@ -151,12 +121,7 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     } else {
         let variable = t.promote(pointee, None)?;
         t.promoted.bind(id, variable);
-        Pointer::PromotedVariable {
-            variable,
-            start: 0,
-            indices: Vec::new(),
-            ty: pointee,
-        }
+        Pointer::PromotedVariable { variable, start: 0, indices: Vec::new(), ty: pointee }
     };
     if let Ok(initializer) = it.id(1) {
         let regs = t.regs(initializer)?;
@@ -216,8 +181,7 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
 /// Reports whether an entry point's interface, by its ids, has an input that differs between samples. Such an input
 /// requires a run for each sample, even if no code reads it.
 pub fn has_an_input_of_samples(t: &Translator, interface: &[u32]) -> bool {
-    let is_of_sample =
-        |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
+    let is_of_sample = |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
     interface.iter().any(|id| {
         let Some(variable) = t.globals.variables.get(id) else {
             return false;

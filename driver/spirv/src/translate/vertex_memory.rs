@@ -15,8 +15,7 @@ use super::vertex_places::{Array, Emission, Region};
 use crate::error::{Result, malformed};
 use crate::instruction::Instruction;
 use crate::interface::{
-    InputSource, MAX_VERTEX_STREAMS, MemoryScalar, Output, OutputTarget, ScalarType, Stage,
-    VertexMemory,
+    InputSource, MAX_VERTEX_STREAMS, MemoryScalar, Output, OutputTarget, ScalarType, Stage, VertexMemory,
 };
 use crate::types::{Scalar, Type};
 
@@ -108,12 +107,7 @@ fn region(t: &Translator, class: StorageClass) -> Result<Region> {
                 _ => return malformed(format!("%{id} isn't an array over vertices")),
             },
         };
-        region.arrays.push(Array {
-            variable: id,
-            ty,
-            offset: region.stride,
-            vertex_stride,
-        });
+        region.arrays.push(Array { variable: id, ty, offset: region.stride, vertex_stride });
         region.stride = region.stride.saturating_add(bytes(variable.pointee)?);
     }
     Ok(region)
@@ -133,9 +127,7 @@ fn sharing(t: &Translator, id: u32, class: StorageClass, ty: u32) -> Sharing {
     }
     match t.module.built_in(id) {
         Some(BuiltIn::TessLevelOuter | BuiltIn::TessLevelInner) => Sharing::Patch,
-        Some(
-            BuiltIn::Position | BuiltIn::PointSize | BuiltIn::ClipDistance | BuiltIn::CullDistance,
-        ) => Sharing::Vertex,
+        Some(BuiltIn::Position | BuiltIn::PointSize | BuiltIn::ClipDistance | BuiltIn::CullDistance) => Sharing::Vertex,
         Some(_) => Sharing::Invocation,
         None if is_of_patch(t, id, ty) => Sharing::Patch,
         None => Sharing::Vertex,
@@ -171,22 +163,14 @@ fn emitted_variables(t: &Translator) -> Vec<u32> {
 fn vertex_bytes(t: &Translator, variables: &[u32]) -> Result<u32> {
     let mut bytes = VERTEX_HEADER;
     for id in variables {
-        let size = t
-            .globals
-            .types
-            .tight_size(t.globals.variables[id].pointee)?;
+        let size = t.globals.types.tight_size(t.globals.variables[id].pointee)?;
         bytes = bytes.saturating_add(narrow(size));
     }
     Ok(bytes)
 }
 
 /// Chooses the size of a batch and reserves its memory. Returns the number of a lane's primitive or patch.
-fn begin_batch(
-    t: &mut Translator,
-    inputs: &mut Region,
-    outputs: &mut Region,
-    vertices: u32,
-) -> Reg {
+fn begin_batch(t: &mut Translator, inputs: &mut Region, outputs: &mut Region, vertices: u32) -> Reg {
     let each = inputs.stride.saturating_add(outputs.stride).max(1);
     let most = (BATCH_BYTES / each).max(1);
     let exchange = &mut t.interface.exchange;
@@ -247,10 +231,7 @@ fn variable(t: &mut Translator, value: Reg) -> Reg {
 /// The output that counts the emitted vertices.
 fn count_output(t: &mut Translator) -> Reg {
     let slot = t.io.outputs.len() as u32;
-    t.io.outputs.push(Output {
-        target: OutputTarget::VertexCount,
-        numeric: ScalarType::Uint { width: 32 },
-    });
+    t.io.outputs.push(Output { target: OutputTarget::VertexCount, numeric: ScalarType::Uint { width: 32 } });
     t.emit.builder.output(slot, IrType::B32)
 }
 
@@ -287,14 +268,7 @@ pub fn emit_vertex(t: &mut Translator, stream: u32) -> Result<()> {
     let Some(emission) = &t.vertex_memory.emission else {
         return malformed("this stage emits no vertices");
     };
-    let Emission {
-        max_vertices,
-        vertex_bytes,
-        next,
-        count,
-        ref begins_strip,
-        ref variables,
-    } = *emission;
+    let Emission { max_vertices, vertex_bytes, next, count, ref begins_strip, ref variables } = *emission;
     let (begins_strip, variables) = (begins_strip[stream as usize], variables.clone());
     let header = match stream {
         0 => begins_strip,
@@ -324,11 +298,7 @@ pub fn emit_vertex(t: &mut Translator, stream: u32) -> Result<()> {
     let fits = t.emit.op(Ir::ULt, &[count, all]);
     let base = t.emit.select(fits, next, nowhere);
     for (part, regs) in (0..).zip(stored.chunks(MAX_ELEMENTS)) {
-        let address = Address {
-            space: Space::Shared,
-            base: Some(base),
-            offset: part * 4 * MAX_ELEMENTS as u32,
-        };
+        let address = Address { space: Space::Shared, base: Some(base), offset: part * 4 * MAX_ELEMENTS as u32 };
         t.emit.builder.store(address, Format::B32, regs);
     }
     for (variable, step) in [(next, size), (count, one)] {
@@ -382,11 +352,7 @@ fn arrays(t: &mut Translator, region: &Region) -> Result<VertexMemory> {
             }
         }
     }
-    Ok(VertexMemory {
-        start: region.start,
-        stride: region.stride,
-        scalars,
-    })
+    Ok(VertexMemory { start: region.start, stride: region.stride, scalars })
 }
 
 /// The scalars that a geometry stage's vertices have.

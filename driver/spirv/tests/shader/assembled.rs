@@ -16,26 +16,15 @@ fn run(name: &str, operands: &[&BufferRange], words: usize) -> Vec<u32> {
         .zip(operands.iter().copied().chain([&results]))
         .map(|(binding, range)| ((0, binding, 0), range))
         .collect();
-    Dispatch {
-        buffers: &all,
-        ..Dispatch::new(&shader, [1, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &all, ..Dispatch::new(&shader, [1, 1, 1]) }.run().unwrap();
     contents(&results)
 }
 
 /// As [`run`], over one buffer of 64-bit operands and with rows of 64-bit results.
 fn run_wide(name: &str, operands: &[u64], rows: usize) -> Vec<Vec<u64>> {
-    let words: Vec<u32> = operands
-        .iter()
-        .flat_map(|value| [*value as u32, (*value >> 32) as u32])
-        .collect();
+    let words: Vec<u32> = operands.iter().flat_map(|value| [*value as u32, (*value >> 32) as u32]).collect();
     let results = run(name, &[&buffer(&words)], 2 * LANES * rows);
-    let results: Vec<u64> = results
-        .chunks_exact(2)
-        .map(|pair| u64::from(pair[1]) << 32 | u64::from(pair[0]))
-        .collect();
+    let results: Vec<u64> = results.chunks_exact(2).map(|pair| u64::from(pair[1]) << 32 | u64::from(pair[0])).collect();
     results.chunks(LANES).map(<[u64]>::to_vec).collect()
 }
 
@@ -77,11 +66,7 @@ fn extended_arithmetic_of_all_widths() {
             };
             let expected = low(whole >> (width * (index as u32 % 2)), width);
             // The bits of a signed result beyond its width are ignored.
-            assert_eq!(
-                low(u128::from(*found), width),
-                expected,
-                "row {index}, lane {lane}: {a:#x} {b:#x}"
-            );
+            assert_eq!(low(u128::from(*found), width), expected, "row {index}, lane {lane}: {a:#x} {b:#x}");
         }
     }
 }
@@ -125,16 +110,10 @@ fn conversions_round_as_they_are_decorated() {
         wide.push(sign * mantissa * 2f64.powi(exponent));
     }
     let narrow: Vec<u32> = wide.iter().map(|it| (*it as f32).to_bits()).collect();
-    let words: Vec<u32> = wide
-        .iter()
-        .flat_map(|it| [it.to_bits() as u32, (it.to_bits() >> 32) as u32])
-        .collect();
+    let words: Vec<u32> = wide.iter().flat_map(|it| [it.to_bits() as u32, (it.to_bits() >> 32) as u32]).collect();
     let operands = [&buffer(&narrow), &buffer(&words)];
     let results = run("towards_zero.comp", &operands, 2 * LANES);
-    let results: Vec<u16> = results
-        .iter()
-        .flat_map(|word| [*word as u16, (*word >> 16) as u16])
-        .collect();
+    let results: Vec<u16> = results.iter().flat_map(|word| [*word as u16, (*word >> 16) as u16]).collect();
     for (lane, value) in wide.iter().enumerate() {
         let float = *value as f32;
         let expected = [
@@ -163,25 +142,19 @@ fn bit_fields_with_wide_offsets_and_exponents() {
             64
         }
     };
-    let offsets: Vec<u64> = (0..LANES)
-        .map(|lane| random.below(most(lane)) as u64)
-        .collect();
+    let offsets: Vec<u64> = (0..LANES).map(|lane| random.below(most(lane)) as u64).collect();
     let counts: Vec<u64> = (0..LANES)
         .map(|lane| match lane {
             0 => 0,
             lane => random.below(most(lane) - offsets[lane] as usize + 1) as u64,
         })
         .collect();
-    let mut exponents: Vec<u64> = (0..LANES)
-        .map(|_| (random.below(300) as i64 - 150).cast_unsigned())
-        .collect();
+    let mut exponents: Vec<u64> = (0..LANES).map(|_| (random.below(300) as i64 - 150).cast_unsigned()).collect();
     let far = [i64::MAX, i64::MIN, 1 << 32, -1 << 32, (1 << 40) + 3, 0];
     exponents[..6].copy_from_slice(&far.map(i64::cast_unsigned));
     operands.extend(offsets.iter().chain(&counts).chain(&exponents));
     let rows = run_wide("bit_fields.comp", &operands, 13);
-    for (lane, ((offset, count), exponent)) in
-        offsets.iter().zip(&counts).zip(&exponents).enumerate()
-    {
+    for (lane, ((offset, count), exponent)) in offsets.iter().zip(&counts).zip(&exponents).enumerate() {
         let (base, insert) = (operands[lane], operands[LANES + lane]);
         let mask = low(u128::MAX, *count as u32);
         for (first, width) in [(0, 32), (3, 16), (6, 64)] {
@@ -197,17 +170,9 @@ fn bit_fields_with_wide_offsets_and_exponents() {
                 count => signed(field, *count as u32) as u64,
             };
             let what = format!("lane {lane}: {base:#x} {insert:#x} {offset} {count}, {width} bits");
-            assert_eq!(
-                rows[first][lane],
-                kept | low(u128::from(moved), width),
-                "{what}"
-            );
+            assert_eq!(rows[first][lane], kept | low(u128::from(moved), width), "{what}");
             assert_eq!(rows[first + 1][lane], field, "{what}");
-            assert_eq!(
-                rows[first + 2][lane],
-                low(u128::from(sign), width),
-                "{what}"
-            );
+            assert_eq!(rows[first + 2][lane], low(u128::from(sign), width), "{what}");
         }
         assert_eq!(rows[9][lane], u64::from(base.count_ones()));
         assert_eq!(rows[10][lane], base.reverse_bits());
@@ -292,16 +257,8 @@ fn pointers_are_chosen_at_run_time() {
         let chosen = if is_odd { &first } else { &second };
         assert_eq!(row(0)[at], chosen[at + 2], "moved, lane {at}");
         assert_eq!(row(1)[at], chosen[at], "returned, lane {at}");
-        assert_eq!(
-            row(2)[at],
-            chosen[at..at + 3].iter().sum::<u32>(),
-            "lane {at}"
-        );
-        assert_eq!(
-            row(3)[at],
-            if is_odd { 65 } else { 0 },
-            "compared, lane {at}"
-        );
+        assert_eq!(row(2)[at], chosen[at..at + 3].iter().sum::<u32>(), "lane {at}");
+        assert_eq!(row(3)[at], if is_odd { 65 } else { 0 }, "compared, lane {at}");
         assert_eq!(row(4)[at], 2, "distance, lane {at}");
         let shared = if is_odd { at } else { 128 * at };
         assert_eq!(row(5)[at], shared as u32, "workgroup memory, lane {at}");
@@ -341,22 +298,14 @@ fn additions_of_1_4_are_translated() {
     for at in 0..LANES {
         let is_odd = at % 2 == 1;
         let element = |pair: usize, index: usize| source[16 * pair + 4 + 4 * index];
-        assert_eq!(
-            row(0)[at],
-            source[16 * at] + element(at, at % 3),
-            "copied, lane {at}"
-        );
+        assert_eq!(row(0)[at], source[16 * at] + element(at, at % 3), "copied, lane {at}");
         let chosen = if is_odd { at } else { 0 };
         assert_eq!(row(1)[at], element(chosen, 2), "chosen, lane {at}");
         assert_eq!(row(2)[at], 70_001 & 0xffff, "narrowed, lane {at}");
         assert_eq!(row(3)[at], if is_odd { 28 } else { 6 }, "looped, lane {at}");
         assert_eq!(row(4)[at], element(at, 2), "copied in memory, lane {at}");
         let low = at as u32 % 4;
-        assert_eq!(
-            row(5)[at],
-            (low + 2).pow(2) * (low + 1),
-            "looked up, lane {at}"
-        );
+        assert_eq!(row(5)[at], (low + 2).pow(2) * (low + 1), "looked up, lane {at}");
     }
 }
 
@@ -369,11 +318,7 @@ fn older_subgroup_operations_are_the_newer_ones() {
         let (lane, own, first) = (at as usize, at % SIZE, at / SIZE * SIZE);
         assert_eq!(row(0)[lane], 0xaaaa, "ballot, lane {at}");
         assert_eq!(row(1)[lane], first + 64 * (first + 3), "moved, lane {at}");
-        assert_eq!(
-            row(2)[lane],
-            if first == 0 { 2 } else { 6 },
-            "voted, lane {at}"
-        );
+        assert_eq!(row(2)[lane], if first == 0 { 2 } else { 6 }, "voted, lane {at}");
         assert_eq!(row(3)[lane], own + 64 * SIZE, "numbered, lane {at}");
         assert_eq!(row(4)[lane], 1 << own, "equal, lane {at}");
         assert_eq!(row(5)[lane], (1 << own) - 1, "below, lane {at}");
@@ -451,28 +396,17 @@ fn descriptor_arrays_without_a_length_need_their_capability() {
     let attempt = |words: &[u32]| {
         let module = Module::parse(words).unwrap();
         let specialization = Specialization::default();
-        let options = gaurast_spirv::Options {
-            unsized_descriptors: 5,
-            ..crate::common::OPTIONS
-        };
+        let options = gaurast_spirv::Options { unsized_descriptors: 5, ..crate::common::OPTIONS };
         let stage = gaurast_spirv::Stage::Compute;
         gaurast_spirv::translate(&module, "main", stage, &specialization, &options)
     };
     let shader = attempt(&words).unwrap();
-    let counts: Vec<(u32, bool)> = shader
-        .interface
-        .descriptors
-        .iter()
-        .map(|it| (it.count, it.is_unsized))
-        .collect();
+    let counts: Vec<(u32, bool)> = shader.interface.descriptors.iter().map(|it| (it.count, it.is_unsized)).collect();
     assert_eq!(counts, [(5, true), (1, false)]);
     let lacking = without(&words, spirv::Capability::RuntimeDescriptorArray);
     assert_ne!(lacking, words);
     let refused = attempt(&lacking).unwrap_err().to_string();
-    assert!(
-        refused.contains("needs RuntimeDescriptorArray"),
-        "{refused}"
-    );
+    assert!(refused.contains("needs RuntimeDescriptorArray"), "{refused}");
 }
 
 /// Tests the capabilities of Vulkan 1.3 that need no feature.

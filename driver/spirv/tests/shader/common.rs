@@ -5,27 +5,20 @@ use std::sync::Arc;
 
 use devmem::{Allocation, BufferRange};
 use fearless_simd::Level;
-use gaurast_spirv::{
-    BuiltIn, InputSource, Module, Options, Shader, Specialization, Stage, translate,
-};
+use gaurast_spirv::{BuiltIn, InputSource, Module, Options, Shader, Specialization, Stage, translate};
 use isa::Options as ExecOptions;
 use isa::machine::{Executable, LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::{GlobalMemory, NoGlobalMemory, Resources, words};
 
 /// The folder of the shaders.
 pub fn folder() -> PathBuf {
-    [env!("CARGO_MANIFEST_DIR"), "tests", "shaders"]
-        .iter()
-        .collect()
+    [env!("CARGO_MANIFEST_DIR"), "tests", "shaders"].iter().collect()
 }
 
 /// The checked-in SPIR-V of a shader; with `.opt` after its name, spirv-opt's output.
 pub fn words_of(name: &str) -> Vec<u32> {
     let bytes = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
-    bytes
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
-        .collect()
+    bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect()
 }
 
 /// The stage in a shader's file name.
@@ -52,11 +45,7 @@ pub fn all_shaders() -> Vec<String> {
 }
 
 /// The options of the tests' translations.
-pub const OPTIONS: Options = Options {
-    subgroup_size: 16,
-    samples: 4,
-    unsized_descriptors: 1,
-};
+pub const OPTIONS: Options = Options { subgroup_size: 16, samples: 4, unsized_descriptors: 1 };
 
 /// Translates a checked-in shader.
 pub fn translated(name: &str, specialization: &Specialization) -> Shader {
@@ -70,11 +59,7 @@ pub fn buffer(data: &[u32]) -> BufferRange {
     let size = 4 * data.len() as u64;
     let memory = Allocation::new_zeroed(size.max(4)).unwrap();
     memory.write(0, data).unwrap();
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 /// A buffer with these floats.
@@ -138,24 +123,13 @@ impl<'a> Dispatch<'a> {
             }
         }
         let push = words(self.push);
-        let resources = Resources {
-            buffers: &bound,
-            push_constants: &push,
-            global: self.global,
-            ..Resources::default()
-        };
-        let watchdog = Watchdog {
-            limit: self.limit,
-            ..Watchdog::default()
-        };
+        let resources =
+            Resources { buffers: &bound, push_constants: &push, global: self.global, ..Resources::default() };
+        let watchdog = Watchdog { limit: self.limit, ..Watchdog::default() };
         let [x, y, z] = self.groups;
         for id in (0..x * y * z).map(|index| [index % x, index / x % y, index / x / y]) {
             for (slot, input) in (0..).zip(&self.shader.interface.inputs) {
-                let InputSource::BuiltIn {
-                    built_in,
-                    component,
-                } = input.source
-                else {
+                let InputSource::BuiltIn { built_in, component } = input.source else {
                     panic!("a compute shader with locations");
                 };
                 machine.fill_input(
@@ -167,12 +141,7 @@ impl<'a> Dispatch<'a> {
                     },
                 );
             }
-            machine.run(
-                &LaneMask::first(invocations),
-                &LaneMask::none(),
-                &resources,
-                watchdog,
-            )?;
+            machine.run(&LaneMask::first(invocations), &LaneMask::none(), &resources, watchdog)?;
         }
         Ok(())
     }

@@ -15,11 +15,7 @@ fn binaries() -> Vec<Variant> {
 
 /// Translates the variant's binary of a shader.
 fn translated(case: &Case, name: &str, specialization: &Specialization) -> Shader {
-    let suffix = if case.variant() == OPTIMIZED {
-        ".opt"
-    } else {
-        ""
-    };
+    let suffix = if case.variant() == OPTIMIZED { ".opt" } else { "" };
     common::translated(&format!("{name}{suffix}"), specialization)
 }
 
@@ -31,10 +27,7 @@ fn close(found: &[f32], expected: &[f32], tolerance: f32) {
     assert_eq!(found.len(), expected.len());
     for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
         let error = (found - expected).abs();
-        assert!(
-            error <= tolerance * expected.abs().max(1.0),
-            "element {index}: {found} instead of {expected}"
-        );
+        assert!(error <= tolerance * expected.abs().max(1.0), "element {index}: {found} instead of {expected}");
     }
 }
 
@@ -83,19 +76,14 @@ fn matrix_product_with_a_specialized_tile(case: &Case) {
         let (a, b) = (matrix(), matrix());
         let (buffer_a, buffer_b, c) = (floats(&a), floats(&b), floats(&vec![0.0; n * n]));
         Dispatch {
-            buffers: &[
-                ((0, 0, 0), &buffer_a),
-                ((0, 1, 0), &buffer_b),
-                ((0, 2, 0), &c),
-            ],
+            buffers: &[((0, 0, 0), &buffer_a), ((0, 1, 0), &buffer_b), ((0, 2, 0), &c)],
             push: &bytes(&[n as u32]),
             ..Dispatch::new(&shader, [groups, groups, 1])
         }
         .run()
         .unwrap();
-        let expected: Vec<f32> = (0..n * n)
-            .map(|at| (0..n).map(|k| a[at / n * n + k] * b[k * n + at % n]).sum())
-            .collect();
+        let expected: Vec<f32> =
+            (0..n * n).map(|at| (0..n).map(|k| a[at / n * n + k] * b[k * n + at % n]).sum()).collect();
         close(&float_contents(&c), &expected, 1e-5);
     }
 }
@@ -106,12 +94,9 @@ fn prefix_sum(case: &Case) {
     let mut random = Random(3);
     let values: Vec<u32> = (0..512).map(|_| random.next() % 1000).collect();
     let (sums, totals) = (buffer(&values), buffer(&[0; 2]));
-    Dispatch {
-        buffers: &[((0, 0, 0), &sums), ((0, 1, 0), &totals)],
-        ..Dispatch::new(&shader, [2, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &[((0, 0, 0), &sums), ((0, 1, 0), &totals)], ..Dispatch::new(&shader, [2, 1, 1]) }
+        .run()
+        .unwrap();
     let mut expected = Vec::new();
     let mut expected_totals = Vec::new();
     for group in values.chunks(256) {
@@ -136,11 +121,7 @@ fn n_body(case: &Case) {
     let (step, softening) = (0.01_f32, 0.1_f32);
     let settings = floats(&[step, softening]);
     Dispatch {
-        buffers: &[
-            ((0, 0, 0), &before),
-            ((0, 1, 0), &after),
-            ((0, 2, 0), &settings),
-        ],
+        buffers: &[((0, 0, 0), &before), ((0, 1, 0), &after), ((0, 2, 0), &settings)],
         ..Dispatch::new(&shader, [2, 1, 1])
     }
     .run()
@@ -190,8 +171,7 @@ fn blur(case: &Case) {
             for dx in -radius..=radius {
                 let x = (at % width + dx).clamp(0, width - 1);
                 let y = (at / width + dy).clamp(0, height - 1);
-                let weight =
-                    weights[dx.unsigned_abs() as usize] * weights[dy.unsigned_abs() as usize];
+                let weight = weights[dx.unsigned_abs() as usize] * weights[dy.unsigned_abs() as usize];
                 for (c, sum) in sum.iter_mut().enumerate() {
                     *sum += weight * image[4 * (y * width + x) as usize + c];
                 }
@@ -209,12 +189,7 @@ fn radix_sort(case: &Case) {
     let mut random = Random(17);
     let keys: Vec<u32> = (0..512).map(|_| random.next()).collect();
     let sorted = buffer(&keys);
-    Dispatch {
-        buffers: &[((0, 0, 0), &sorted)],
-        ..Dispatch::new(&shader, [2, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &[((0, 0, 0), &sorted)], ..Dispatch::new(&shader, [2, 1, 1]) }.run().unwrap();
     let mut expected = keys;
     expected.chunks_mut(256).for_each(<[u32]>::sort_unstable);
     assert_eq!(contents(&sorted), expected);
@@ -253,11 +228,7 @@ mod control {
     pub fn collatz(mut n: u32) -> u32 {
         let mut steps = 0;
         loop {
-            n = if n & 1 == 0 {
-                n / 2
-            } else {
-                n.wrapping_mul(3).wrapping_add(1)
-            };
+            n = if n & 1 == 0 { n / 2 } else { n.wrapping_mul(3).wrapping_add(1) };
             steps += 1;
             if n == 1 || steps >= 200 {
                 return steps;
@@ -305,20 +276,12 @@ fn control_flow(case: &Case) {
     let mut inputs: Vec<u32> = (0..256).collect();
     inputs.extend((0..256).map(|_| random.next() >> 1));
     let (source, results) = (buffer(&inputs), buffer(&vec![0; 4 * inputs.len()]));
-    Dispatch {
-        buffers: &[((0, 0, 0), &source), ((0, 1, 0), &results)],
-        ..Dispatch::new(&shader, [8, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &[((0, 0, 0), &source), ((0, 1, 0), &results)], ..Dispatch::new(&shader, [8, 1, 1]) }
+        .run()
+        .unwrap();
     let results = contents(&results);
     for (x, found) in inputs.iter().zip(results.chunks(4)) {
-        let expected = [
-            control::switched(*x),
-            control::early(*x),
-            control::collatz(x + 1),
-            control::nested(*x),
-        ];
+        let expected = [control::switched(*x), control::early(*x), control::collatz(x + 1), control::nested(*x)];
         assert_eq!(found, expected, "x = {x}");
     }
 }
@@ -338,8 +301,7 @@ fn dynamic_indices_and_layouts(case: &Case) {
     for matrix in 0..2 {
         for column in 0..2 {
             for row in 0..2 {
-                block[8 + 8 * matrix + 4 * column + row] =
-                    (100 * matrix + 10 * column + row) as f32;
+                block[8 + 8 * matrix + 4 * column + row] = (100 * matrix + 10 * column + row) as f32;
             }
         }
     }
@@ -364,12 +326,7 @@ fn dynamic_indices_and_layouts(case: &Case) {
     items.resize(12 * 36, 0);
     let (block, items) = (floats(&block), buffer(&items));
     Dispatch {
-        buffers: &[
-            ((0, 0, 0), &index),
-            ((0, 1, 0), &results),
-            ((0, 2, 0), &block),
-            ((0, 3, 0), &items),
-        ],
+        buffers: &[((0, 0, 0), &index), ((0, 1, 0), &results), ((0, 2, 0), &block), ((0, 3, 0), &items)],
         ..Dispatch::new(&shader, [1, 1, 1])
     }
     .run()
@@ -401,11 +358,7 @@ fn dynamic_indices_and_layouts(case: &Case) {
         let stored = &items[12 * (4 + i)..12 * (5 + i)];
         assert_eq!(stored[0] as usize, k);
         let stored: Vec<f32> = stored.iter().map(|bits| f32::from_bits(*bits)).collect();
-        close(
-            &stored[1..7],
-            &[&expected[6..9], &expected[..3]].concat(),
-            1e-5,
-        );
+        close(&stored[1..7], &[&expected[6..9], &expected[..3]].concat(), 1e-5);
         close(&stored[8..11], &expected[3..6], 1e-5);
     }
 }
@@ -414,12 +367,7 @@ fn dynamic_indices_and_layouts(case: &Case) {
 fn atomics(case: &Case) {
     let shader = translated(case, "atomics.comp", &Specialization::default());
     let cells = buffer(&[0; 20]);
-    Dispatch {
-        buffers: &[((0, 0, 0), &cells)],
-        ..Dispatch::new(&shader, [2, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &[((0, 0, 0), &cells)], ..Dispatch::new(&shader, [2, 1, 1]) }.run().unwrap();
     let found = contents(&cells);
     for (cell, sum) in found[..16].iter().enumerate() {
         let expected: u32 = (0..128).filter(|i| i % 16 == cell as u32).sum();
@@ -432,12 +380,7 @@ fn atomics(case: &Case) {
 fn subgroups(case: &Case) {
     let shader = translated(case, "subgroup.comp", &Specialization::default());
     let results = buffer(&[0; 24 * 64]);
-    Dispatch {
-        buffers: &[((0, 0, 0), &results)],
-        ..Dispatch::new(&shader, [1, 1, 1])
-    }
-    .run()
-    .unwrap();
+    Dispatch { buffers: &[((0, 0, 0), &results)], ..Dispatch::new(&shader, [1, 1, 1]) }.run().unwrap();
     for (i, found) in (0..).zip(contents(&results).chunks(24)) {
         let (lane, group) = (i % 16, i / 16);
         let first = 16 * group;
@@ -476,9 +419,7 @@ fn subgroups(case: &Case) {
 #[gaurast_runner::test(each = binaries())]
 fn descriptor_arrays_and_runtime_lengths(case: &Case) {
     let shader = translated(case, "descriptor_arrays.comp", &Specialization::default());
-    let arrays: Vec<_> = (0..4)
-        .map(|n| buffer(&vec![n + 1; 3 + n as usize]))
-        .collect();
+    let arrays: Vec<_> = (0..4).map(|n| buffer(&vec![n + 1; 3 + n as usize])).collect();
     let results = buffer(&[0; 4]);
     Dispatch {
         buffers: &[
@@ -506,9 +447,7 @@ fn wide_and_narrow_types(case: &Case) {
     let d: Vec<f64> = (0..16).map(|i| f64::from(i) * 1.7).collect();
     let l: Vec<i64> = (0..16).map(|_| i64::from(random.next()) << 20).collect();
     let u: Vec<u64> = (0..16).map(|_| u64::from(random.next())).collect();
-    let h: Vec<half::f16> = (0..16)
-        .map(|i| half::f16::from_f32(i as f32 * 0.3))
-        .collect();
+    let h: Vec<half::f16> = (0..16).map(|i| half::f16::from_f32(i as f32 * 0.3)).collect();
     let s: Vec<i16> = (0..16).map(|_| random.next() as i16).collect();
     let b: Vec<u8> = (0..16).map(|_| random.next() as u8).collect();
     let c: Vec<i8> = (0..16).map(|_| random.next() as i8).collect();
@@ -519,33 +458,16 @@ fn wide_and_narrow_types(case: &Case) {
     bytes.extend(s.iter().flat_map(|x| x.to_le_bytes()));
     bytes.extend(b.iter());
     bytes.extend(c.iter().map(|x| x.cast_unsigned()));
-    let data: Vec<u32> = bytes
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
-        .collect();
+    let data: Vec<u32> = bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect();
     let range = buffer(&data);
-    Dispatch {
-        buffers: &[((0, 0, 0), &range)],
-        ..Dispatch::new(&shader, [1, 1, 1])
-    }
-    .run()
-    .unwrap();
-    let found: Vec<u8> = contents(&range)
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .collect();
+    Dispatch { buffers: &[((0, 0, 0), &range)], ..Dispatch::new(&shader, [1, 1, 1]) }.run().unwrap();
+    let found: Vec<u8> = contents(&range).iter().flat_map(|word| word.to_le_bytes()).collect();
     for i in 0..16 {
         let wide = |base: usize| -> [u8; 8] { found[base + 8 * i..][..8].try_into().unwrap() };
         let pair = |base: usize| -> [u8; 2] { found[base + 2 * i..][..2].try_into().unwrap() };
         assert_eq!(f64::from_le_bytes(wide(0)), d[i].sqrt() * 2.0 + i as f64);
-        assert_eq!(
-            i64::from_le_bytes(wide(128)),
-            l[i] / -3 + ((i as i64) << 40)
-        );
-        assert_eq!(
-            u64::from_le_bytes(wide(256)),
-            u[i].wrapping_mul(0x1_0000_0001) >> 3
-        );
+        assert_eq!(i64::from_le_bytes(wide(128)), l[i] / -3 + ((i as i64) << 40));
+        assert_eq!(u64::from_le_bytes(wide(256)), u[i].wrapping_mul(0x1_0000_0001) >> 3);
         let product = half::f16::from_f32(h[i].to_f32() * 1.5);
         let expected = half::f16::from_f32(product.to_f32() + 0.25);
         assert_eq!(half::f16::from_le_bytes(pair(384)), expected);
@@ -561,9 +483,7 @@ fn device_addresses(case: &Case) {
     impl isa::resources::GlobalMemory for OneBuffer {
         fn find(&self, address: u64) -> Option<(&devmem::BufferRange, u64)> {
             let begin = 1 << 40;
-            (begin..begin + self.0.size)
-                .contains(&address)
-                .then_some((&self.0, begin))
+            (begin..begin + self.0.size).contains(&address).then_some((&self.0, begin))
         }
     }
     let shader = translated(case, "addresses.comp", &Specialization::default());

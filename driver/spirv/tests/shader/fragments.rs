@@ -18,11 +18,7 @@ fn pixel(lane: usize) -> [f32; 2] {
 
 /// Runs a shader; `input` gives the bits of an input in a lane. Returns the outputs by location, each of four floats.
 fn run(shader: &Shader, input: impl Fn(InputSource, usize) -> u32) -> Vec<[[f32; 4]; LANES]> {
-    let options = ExecOptions {
-        lanes: LANES,
-        subgroup_size: LANES,
-        ..ExecOptions::new(Level::new())
-    };
+    let options = ExecOptions { lanes: LANES, subgroup_size: LANES, ..ExecOptions::new(Level::new()) };
     let executable = Executable::new(shader.program.clone(), &options).unwrap();
     let mut machine = Machine::new(Arc::new(executable));
     for (slot, it) in (0..).zip(&shader.interface.inputs) {
@@ -31,22 +27,10 @@ fn run(shader: &Shader, input: impl Fn(InputSource, usize) -> u32) -> Vec<[[f32;
         }
     }
     let all = LaneMask::first(LANES);
-    machine
-        .run(
-            &all,
-            &LaneMask::none(),
-            &Resources::default(),
-            Watchdog::default(),
-        )
-        .unwrap();
+    machine.run(&all, &LaneMask::none(), &Resources::default(), Watchdog::default()).unwrap();
     let mut outputs = Vec::new();
     for (slot, it) in (0..).zip(&shader.interface.outputs) {
-        let OutputTarget::Location {
-            location,
-            component,
-            ..
-        } = it.target
-        else {
+        let OutputTarget::Location { location, component, .. } = it.target else {
             panic!("{it:?}");
         };
         outputs.resize(outputs.len().max(location as usize + 1), [[0.0; 4]; LANES]);
@@ -77,29 +61,13 @@ fn check_chosen_inputs(shader: &Shader, own: [f32; 2]) {
     let offset = |lane: usize| [lane as f32 / 32.0 - 0.25, 0.4 - lane as f32 / 32.0];
     let outputs = run(shader, |source, lane| match source {
         InputSource::Location { location: 7, .. } => chosen(lane) as u32,
-        InputSource::Location {
-            location: 8,
-            component,
-            ..
-        } => offset(lane)[component as usize].to_bits(),
-        InputSource::Location {
-            location,
-            component,
-            sampling,
-            ..
-        } => {
+        InputSource::Location { location: 8, component, .. } => offset(lane)[component as usize].to_bits(),
+        InputSource::Location { location, component, sampling, .. } => {
             let value = varying(location, component, moved(lane, own));
-            let more = if sampling == Sampling::Centroid {
-                AT_CENTROID
-            } else {
-                0.0
-            };
+            let more = if sampling == Sampling::Centroid { AT_CENTROID } else { 0.0 };
             (value + more).to_bits()
         }
-        InputSource::BuiltIn {
-            built_in: BuiltIn::FragCoord,
-            component,
-        } => match component {
+        InputSource::BuiltIn { built_in: BuiltIn::FragCoord, component } => match component {
             0 | 1 => moved(lane, own)[component as usize].to_bits(),
             _ => 1_f32.to_bits(),
         },
@@ -112,28 +80,12 @@ fn check_chosen_inputs(shader: &Shader, own: [f32; 2]) {
             let by = [0.5 + by[0], 0.5 + by[1]];
             varying(location, component, moved(lane, by))
         };
-        let centroid =
-            |location, component| varying(location, component, moved(lane, own)) + AT_CENTROID;
+        let centroid = |location, component| varying(location, component, moved(lane, own)) + AT_CENTROID;
         let (offset, sample) = (offset(lane), [-6.0 / 16.0, 2.0 / 16.0]);
         let expected = [
-            [
-                at(element, 0, offset),
-                at(element, 1, offset),
-                at(element, 1, offset),
-                at(6, 2, offset),
-            ],
-            [
-                at(element, 0, sample),
-                at(element, 1, sample),
-                centroid(element, 0),
-                centroid(element, 1),
-            ],
-            [
-                at(6, 3, offset),
-                at(6, 2, offset),
-                centroid(6, 1),
-                centroid(6, 0),
-            ],
+            [at(element, 0, offset), at(element, 1, offset), at(element, 1, offset), at(6, 2, offset)],
+            [at(element, 0, sample), at(element, 1, sample), centroid(element, 0), centroid(element, 1)],
+            [at(6, 3, offset), at(6, 2, offset), centroid(6, 1), centroid(6, 0)],
         ];
         for (location, expected) in expected.iter().enumerate() {
             for (component, expected) in expected.iter().enumerate() {

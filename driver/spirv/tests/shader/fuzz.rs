@@ -97,14 +97,8 @@ fn mutated_modules_never_panic(case: &Case) {
             runs += 1;
         }
     }
-    assert!(
-        survivors > runs / 20,
-        "mutations should leave some modules valid: {survivors} of {runs}"
-    );
-    assert!(
-        slowest < Duration::from_secs(5),
-        "a module took {slowest:?}"
-    );
+    assert!(survivors > runs / 20, "mutations should leave some modules valid: {survivors} of {runs}");
+    assert!(slowest < Duration::from_secs(5), "a module took {slowest:?}");
 }
 
 #[gaurast_runner::test(each = shards(4), alone)]
@@ -116,10 +110,7 @@ fn modules_cut_off_anywhere_are_refused(case: &Case) {
         }
         let words = words_of(&name);
         for length in 0..words.len() {
-            assert!(
-                !attempt(&name, &words[..length]),
-                "{name} cut to {length} words"
-            );
+            assert!(!attempt(&name, &words[..length]), "{name} cut to {length} words");
         }
     }
 }

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use crate::common::{OPTIONS, folder, translated, words_of};
 use fearless_simd::Level;
 use gaurast_spirv::{
-    BuiltIn, DepthMode, DescriptorKind, Domain, InputPrimitive, InputSource, Interface,
-    Interpolation, Module, OutputPrimitive, OutputTarget, PrimitiveModes, Sampling, ScalarType,
-    Spacing, Specialization, Stage, VertexMemory, translate,
+    BuiltIn, DepthMode, DescriptorKind, Domain, InputPrimitive, InputSource, Interface, Interpolation, Module,
+    OutputPrimitive, OutputTarget, PrimitiveModes, Sampling, ScalarType, Spacing, Specialization, Stage, VertexMemory,
+    translate,
 };
 use isa::Options as ExecOptions;
 use isa::machine::{Executable, LaneMask, Machine, Watchdog};
@@ -22,19 +22,11 @@ fn interface(name: &str) -> Interface {
 }
 
 fn outputs(interface: &Interface) -> Vec<OutputTarget> {
-    interface
-        .outputs
-        .iter()
-        .map(|output| output.target)
-        .collect()
+    interface.outputs.iter().map(|output| output.target).collect()
 }
 
 fn location(location: u32, component: u32) -> OutputTarget {
-    OutputTarget::Location {
-        location,
-        component,
-        index: 0,
-    }
+    OutputTarget::Location { location, component, index: 0 }
 }
 
 #[gaurast_runner::test]
@@ -42,10 +34,7 @@ fn a_vertex_shader_reads_only_what_it_uses() {
     let found = interface("triangle.vert");
     assert_eq!(found.locations_read(), [(0, FLOAT), (1, FLOAT)]);
     assert_eq!(found.push_constants, Some(16..80));
-    let position = |component| OutputTarget::BuiltIn {
-        built_in: BuiltIn::Position,
-        component,
-    };
+    let position = |component| OutputTarget::BuiltIn { built_in: BuiltIn::Position, component };
     // Of the block of built-ins, only the position is written.
     let mut written = outputs(&found);
     written.sort_by_key(|target| format!("{target:?}"));
@@ -57,34 +46,18 @@ fn a_vertex_shader_reads_only_what_it_uses() {
 #[gaurast_runner::test]
 fn matrices_arrays_and_blocks_take_consecutive_locations() {
     let found = interface("block.vert");
-    let read: Vec<u32> = found
-        .locations_read()
-        .iter()
-        .map(|(location, _)| *location)
-        .collect();
+    let read: Vec<u32> = found.locations_read().iter().map(|(location, _)| *location).collect();
     assert_eq!(read, [0, 1, 2, 4]);
-    let packed = found.inputs.iter().any(|input| {
-        matches!(
-            input.source,
-            InputSource::Location {
-                location: 4,
-                component: 2,
-                ..
-            }
-        )
-    });
+    let packed = found
+        .inputs
+        .iter()
+        .any(|input| matches!(input.source, InputSource::Location { location: 4, component: 2, .. }));
     assert!(packed, "component 1 and 2 of location 4");
     let written = outputs(&found);
     for expected in [(2, 0), (2, 2), (3, 0), (4, 0), (5, 0)] {
-        assert!(
-            written.contains(&location(expected.0, expected.1)),
-            "{expected:?}"
-        );
+        assert!(written.contains(&location(expected.0, expected.1)), "{expected:?}");
     }
-    let distance = |component| OutputTarget::BuiltIn {
-        built_in: BuiltIn::ClipDistance,
-        component,
-    };
+    let distance = |component| OutputTarget::BuiltIn { built_in: BuiltIn::ClipDistance, component };
     assert!(written.contains(&distance(1)) && !written.contains(&distance(0)));
 }
 
@@ -96,12 +69,9 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
             .inputs
             .iter()
             .find_map(|input| match input.source {
-                InputSource::Location {
-                    location,
-                    interpolation,
-                    sampling,
-                    ..
-                } if location == at => Some((interpolation, sampling)),
+                InputSource::Location { location, interpolation, sampling, .. } if location == at => {
+                    Some((interpolation, sampling))
+                }
                 _ => None,
             })
             .unwrap()
@@ -112,19 +82,10 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
     assert!(found.discards && !found.has_side_effects && !found.early_fragment_tests);
     assert_eq!(found.depth, DepthMode::Replacing);
     assert_eq!(found.descriptors.len(), 1);
-    assert_eq!(
-        found.descriptors[0].kind,
-        DescriptorKind::CombinedImageSampler
-    );
+    assert_eq!(found.descriptors[0].kind, DescriptorKind::CombinedImageSampler);
     assert_eq!(found.descriptors[0].name.as_deref(), Some("textures"));
-    let id = found
-        .outputs
-        .iter()
-        .find(|output| output.target == location(1, 0));
-    assert_eq!(
-        id.map(|output| output.numeric),
-        Some(ScalarType::Uint { width: 32 })
-    );
+    let id = found.outputs.iter().find(|output| output.target == location(1, 0));
+    assert_eq!(id.map(|output| output.numeric), Some(ScalarType::Uint { width: 32 }));
 
     let found = interface("early_and_late.frag");
     assert!(found.early_fragment_tests, "nothing needs a late test");
@@ -139,11 +100,7 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
         .inputs
         .iter()
         .filter_map(|input| match input.source {
-            InputSource::Location {
-                location: 0,
-                sampling,
-                ..
-            } => Some(sampling),
+            InputSource::Location { location: 0, sampling, .. } => Some(sampling),
             _ => None,
         })
         .collect();
@@ -154,11 +111,8 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
 fn descriptors_have_their_kinds_and_resource_slots() {
     use DescriptorKind::*;
     let found = interface("images.comp");
-    let kinds: Vec<(u32, DescriptorKind, bool)> = found
-        .descriptors
-        .iter()
-        .map(|it| (it.binding, it.kind, it.writable))
-        .collect();
+    let kinds: Vec<(u32, DescriptorKind, bool)> =
+        found.descriptors.iter().map(|it| (it.binding, it.kind, it.writable)).collect();
     let expected = [
         (0, StorageImage, false),
         (1, StorageImage, true),
@@ -171,11 +125,7 @@ fn descriptors_have_their_kinds_and_resource_slots() {
     ];
     assert_eq!(kinds, expected);
     let found = interface("descriptor_arrays.comp");
-    let points: Vec<(u32, u32, u32)> = found
-        .descriptors
-        .iter()
-        .map(|it| (it.set, it.slot, it.count))
-        .collect();
+    let points: Vec<(u32, u32, u32)> = found.descriptors.iter().map(|it| (it.set, it.slot, it.count)).collect();
     assert_eq!(points, [(0, 0, 1), (1, 1, 4)]);
     assert_eq!(found.descriptors[1].size, 4);
 }
@@ -196,9 +146,7 @@ fn spirv_reflect_sees_the_same_entry_point() {
 fn places(memory: &VertexMemory) -> Vec<(OutputTarget, u32, Option<u32>)> {
     let words = |bytes| bytes / 4;
     let scalars = memory.scalars.iter();
-    scalars
-        .map(|it| (it.target, words(it.offset), it.vertex_stride.map(words)))
-        .collect()
+    scalars.map(|it| (it.target, words(it.offset), it.vertex_stride.map(words))).collect()
 }
 
 #[gaurast_runner::test]
@@ -222,25 +170,14 @@ fn a_geometry_shader_stores_the_vertices_that_it_emits() {
     // A vertex is a word, the position, sizes and distances of the block, the layer, the colour and two values; what is
     // never written is not named.
     let outputs = places(&exchange.outputs);
-    let strides: HashSet<_> = outputs
-        .iter()
-        .map(|(_, _, stride)| stride.unwrap())
-        .collect();
+    let strides: HashSet<_> = outputs.iter().map(|(_, _, stride)| stride.unwrap()).collect();
     assert_eq!(strides.len(), 1);
     let stride = *strides.iter().next().unwrap();
     assert_eq!(exchange.outputs.stride, 4 * 20 * stride);
     let written: HashSet<_> = outputs.iter().map(|(target, ..)| *target).collect();
-    let built_in = |built_in, component| OutputTarget::BuiltIn {
-        built_in,
-        component,
-    };
+    let built_in = |built_in, component| OutputTarget::BuiltIn { built_in, component };
     let expected = (0..4)
-        .flat_map(|component| {
-            [
-                built_in(BuiltIn::Position, component),
-                location(0, component),
-            ]
-        })
+        .flat_map(|component| [built_in(BuiltIn::Position, component), location(0, component)])
         .chain([built_in(BuiltIn::Layer, 0), location(2, 0), location(3, 0)]);
     assert_eq!(written, expected.collect());
     let mut offsets: Vec<_> = outputs.iter().map(|(_, offset, _)| *offset).collect();
@@ -283,21 +220,15 @@ fn tessellation_shaders_share_vertices_and_patches() {
 #[gaurast_runner::test]
 fn a_vertex_shader_transforms() {
     let shader = translated("triangle.vert", &Specialization::default());
-    let options = ExecOptions {
-        lanes: 16,
-        subgroup_size: 16,
-        ..ExecOptions::new(Level::new())
-    };
+    let options = ExecOptions { lanes: 16, subgroup_size: 16, ..ExecOptions::new(Level::new()) };
     let executable = Executable::new(shader.program.clone(), &options).unwrap();
     let mut machine = Machine::new(Arc::new(executable));
     for (slot, input) in (0..).zip(&shader.interface.inputs) {
         for lane in 0..16 {
             let value = match input.source {
-                InputSource::Location {
-                    location,
-                    component,
-                    ..
-                } => (10 * location + component + 100 * lane as u32) as f32,
+                InputSource::Location { location, component, .. } => {
+                    (10 * location + component + 100 * lane as u32) as f32
+                }
                 InputSource::BuiltIn { .. } | InputSource::Patch => {
                     machine.set_input(slot, lane, 7);
                     continue;
@@ -310,14 +241,9 @@ fn a_vertex_shader_transforms() {
     let mut push = vec![0_u8; 16];
     push.extend((0..16).flat_map(|n| (n as f32).to_le_bytes()));
     let push = words(&push);
-    let resources = Resources {
-        push_constants: &push,
-        ..Resources::default()
-    };
+    let resources = Resources { push_constants: &push, ..Resources::default() };
     let all = LaneMask::first(16);
-    machine
-        .run(&all, &LaneMask::none(), &resources, Watchdog::default())
-        .unwrap();
+    machine.run(&all, &LaneMask::none(), &resources, Watchdog::default()).unwrap();
     for (slot, output) in (0..).zip(&shader.interface.outputs) {
         for lane in 0..16 {
             let x = 100.0 * lane as f32;
@@ -329,11 +255,7 @@ fn a_vertex_shader_transforms() {
                     column(0) * x + column(1) * (x + 1.0) + column(2) * 7.0 + column(3)
                 }
             };
-            assert_eq!(
-                f32::from_bits(machine.output(slot, lane)),
-                expected,
-                "{output:?}"
-            );
+            assert_eq!(f32::from_bits(machine.output(slot, lane)), expected, "{output:?}");
         }
     }
 }
@@ -345,9 +267,7 @@ fn captured_outputs_have_places_in_buffers() {
     assert_eq!(captured.strides, [32, 20, 16, 16]);
     assert_eq!(captured.streams, [2, 1, 0, 0]);
     let scalars = captured.scalars.iter();
-    let found: Vec<_> = scalars
-        .map(|it| (it.buffer, it.offset, it.target))
-        .collect();
+    let found: Vec<_> = scalars.map(|it| (it.buffer, it.offset, it.target)).collect();
     // The members of a block have a location each. A number of 64 bits is two words, at a multiple of 8, as is the
     // structure that it is in.
     let expected = [
@@ -372,10 +292,7 @@ fn captured_outputs_have_places_in_buffers() {
 fn captured_with_offset(offset: u32) -> Vec<u32> {
     let mut words = words_of("captured.geom");
     // OpMemberDecorate %Block 0 Offset 8
-    let at = words
-        .windows(5)
-        .position(|it| it[0] == 5 << 16 | 72 && it[2..] == [0, 35, 8])
-        .expect("the decoration");
+    let at = words.windows(5).position(|it| it[0] == 5 << 16 | 72 && it[2..] == [0, 35, 8]).expect("the decoration");
     words[at + 4] = offset;
     words
 }
@@ -389,13 +306,7 @@ fn captured_outputs_lie_apart_and_inside_their_vertex() {
         (0, "two outputs are captured at one place"),
     ] {
         let module = Module::parse(&captured_with_offset(offset)).expect("a module");
-        let translated = translate(
-            &module,
-            "main",
-            Stage::Geometry,
-            &Specialization::default(),
-            &OPTIONS,
-        );
+        let translated = translate(&module, "main", Stage::Geometry, &Specialization::default(), &OPTIONS);
         let error = translated.map(|_| ()).expect_err(reason).to_string();
         assert!(error.contains(reason), "{offset}: {error}");
     }

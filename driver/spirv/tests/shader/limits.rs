@@ -3,9 +3,7 @@
 
 use crate::common::OPTIONS;
 use gaurast_spirv::{Error, Module, Shader, Specialization, Stage, translate};
-use spirv::{
-    AddressingModel, Capability, ExecutionMode, ExecutionModel, MAGIC_NUMBER, MemoryModel, Op,
-};
+use spirv::{AddressingModel, Capability, ExecutionMode, ExecutionModel, MAGIC_NUMBER, MemoryModel, Op};
 
 // The ids of all modules: the types of void, of a function and of bool, and the constant of the subgroup scope.
 const VOID: u32 = 1;
@@ -27,8 +25,7 @@ impl Builder {
     }
 
     fn op(&mut self, op: Op, operands: &[u32]) {
-        self.words
-            .push((operands.len() as u32 + 1) << 16 | op as u32);
+        self.words.push((operands.len() as u32 + 1) << 16 | op as u32);
         self.words.extend_from_slice(operands);
     }
 
@@ -72,31 +69,16 @@ impl Builder {
 
 /// A module whose functions `body` emits; `body` returns the id of the entry point's function.
 fn module(body: impl FnOnce(&mut Builder) -> u32) -> Vec<u32> {
-    let mut functions = Builder {
-        words: Vec::new(),
-        next_id: SUBGROUP + 1,
-    };
+    let mut functions = Builder { words: Vec::new(), next_id: SUBGROUP + 1 };
     let main = body(&mut functions);
     let bound = functions.next_id;
-    let mut it = Builder {
-        words: vec![MAGIC_NUMBER, 0x0001_0300, 0, bound, 0],
-        next_id: bound,
-    };
+    let mut it = Builder { words: vec![MAGIC_NUMBER, 0x0001_0300, 0, bound, 0], next_id: bound };
     it.op(Op::Capability, &[Capability::Shader as u32]);
     it.op(Op::Capability, &[Capability::GroupNonUniform as u32]);
-    it.op(
-        Op::MemoryModel,
-        &[AddressingModel::Logical as u32, MemoryModel::GLSL450 as u32],
-    );
+    it.op(Op::MemoryModel, &[AddressingModel::Logical as u32, MemoryModel::GLSL450 as u32]);
     let name = u32::from_le_bytes(*b"main");
-    it.op(
-        Op::EntryPoint,
-        &[ExecutionModel::GLCompute as u32, main, name, 0],
-    );
-    it.op(
-        Op::ExecutionMode,
-        &[main, ExecutionMode::LocalSize as u32, 1, 1, 1],
-    );
+    it.op(Op::EntryPoint, &[ExecutionModel::GLCompute as u32, main, name, 0]);
+    it.op(Op::ExecutionMode, &[main, ExecutionMode::LocalSize as u32, 1, 1, 1]);
     it.op(Op::TypeVoid, &[VOID]);
     it.op(Op::TypeFunction, &[FUNCTION, VOID]);
     it.op(Op::TypeBool, &[BOOL]);

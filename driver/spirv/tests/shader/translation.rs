@@ -32,18 +32,9 @@ struct Tool {
     version: &'static str,
 }
 
-const COMPILER: Tool = Tool {
-    program: "glslangValidator",
-    version: "Glslang Version: 11:12.",
-};
-const ASSEMBLER: Tool = Tool {
-    program: "spirv-as",
-    version: "SPIRV-Tools v2023.1",
-};
-const OPTIMIZER: Tool = Tool {
-    program: "spirv-opt",
-    version: "SPIRV-Tools v2023.1",
-};
+const COMPILER: Tool = Tool { program: "glslangValidator", version: "Glslang Version: 11:12." };
+const ASSEMBLER: Tool = Tool { program: "spirv-as", version: "SPIRV-Tools v2023.1" };
+const OPTIMIZER: Tool = Tool { program: "spirv-opt", version: "SPIRV-Tools v2023.1" };
 
 impl Tool {
     const fn need(&self) -> Need {
@@ -52,13 +43,9 @@ impl Tool {
 
     /// Ends the test as ignored if the program has another version, whose output may differ.
     fn require_version(&self) {
-        let output = Command::new(self.program)
-            .arg("--version")
-            .output()
-            .unwrap();
+        let output = Command::new(self.program).arg("--version").output().unwrap();
         // spirv-opt prints it to standard error.
-        let text =
-            String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         if !text.contains(self.version) {
             let found = text.lines().next().unwrap_or_default();
             let reason = format!("the kept binaries are of \"{}\", not {found}", self.version);
@@ -69,13 +56,7 @@ impl Tool {
     /// Runs the program, which must succeed. Returns the contents of its output file.
     fn output(&self, arguments: &[&str], input: &Path) -> Vec<u8> {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let output = Command::new(self.program)
-            .args(arguments)
-            .arg(input)
-            .arg("-o")
-            .arg(file.path())
-            .output()
-            .unwrap();
+        let output = Command::new(self.program).args(arguments).arg(input).arg("-o").arg(file.path()).output().unwrap();
         let message = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success(), "{}: {message}", input.display());
         std::fs::read(file.path()).unwrap()
@@ -99,10 +80,7 @@ fn compiled(name: &str) -> Vec<u8> {
 /// Asserts that a checked-in binary equals `fresh`.
 fn assert_kept(name: &str, fresh: &[u8]) {
     let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
-    assert!(
-        comparable(&kept) == comparable(fresh),
-        "{name}.spv isn't what its source compiles to"
-    );
+    assert!(comparable(&kept) == comparable(fresh), "{name}.spv isn't what its source compiles to");
 }
 
 #[gaurast_runner::test(needs = [COMPILER.need(), ASSEMBLER.need()])]
@@ -137,17 +115,12 @@ const KEPT: [&str; 3] = ["triangle.vert", "mandelbrot.comp", "matrix_product.com
 #[gaurast_runner::test]
 fn disassemblies_are_as_kept() {
     for name in KEPT {
-        let text = translated(name, &Specialization::default())
-            .program
-            .to_string();
+        let text = translated(name, &Specialization::default()).program.to_string();
         let path = folder().join(format!("{name}.ir"));
         if std::env::var_os("GAURAST_BLESS").is_some() {
             std::fs::write(&path, &text).unwrap();
         }
         let kept = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(
-            text, kept,
-            "{name}: run with GAURAST_BLESS=1 to keep the new disassembly"
-        );
+        assert_eq!(text, kept, "{name}: run with GAURAST_BLESS=1 to keep the new disassembly");
     }
 }

@@ -5,25 +5,11 @@ use simdevice::texture::IDENTITY;
 use simdevice::{Allocation, image};
 
 fn view(format: Format, samples: u32) -> Arc<ImageView> {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [8, 8, 1],
-        mip_levels: 1,
-        array_layers: 1,
-        samples,
-    };
+    let desc = ImageDesc { kind: ImageKind::D2, format, extent: [8, 8, 1], mip_levels: 1, array_layers: 1, samples };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     let image = Arc::new(image::Image::new(desc, memory, 0).unwrap());
     Arc::new(ImageView {
-        view: image::ImageView {
-            image,
-            format,
-            base_mip_level: 0,
-            level_count: 1,
-            base_layer: 0,
-            layer_count: 1,
-        },
+        view: image::ImageView { image, format, base_mip_level: 0, level_count: 1, base_layer: 0, layer_count: 1 },
         aspect: format.aspects()[0],
         swizzle: IDENTITY,
     })
@@ -43,12 +29,7 @@ fn begun(views: Vec<Arc<ImageView>>, subpasses: Vec<Subpass>) -> RenderPassInsta
         render_pass: Arc::new(render_pass),
         views,
         clear_values: Vec::new(),
-        area: Rect {
-            x: 0,
-            y: 0,
-            width: 8,
-            height: 8,
-        },
+        area: Rect { x: 0, y: 0, width: 8, height: 8 },
         layers: 1,
     }
 }
@@ -69,12 +50,7 @@ const DEPTH: Format = Format::D24UnormS8Uint;
 
 #[test]
 fn attachments_are_resolved_aspect_by_aspect() {
-    let views = vec![
-        view(COLOR, 4),
-        view(COLOR, 1),
-        view(DEPTH, 4),
-        view(DEPTH, 1),
-    ];
+    let views = vec![view(COLOR, 4), view(COLOR, 1), view(DEPTH, 4), view(DEPTH, 1)];
     let subpass = Subpass {
         color: vec![None, Some(0)],
         resolve: vec![None, Some(1)],
@@ -99,11 +75,7 @@ fn attachments_are_resolved_aspect_by_aspect() {
 #[test]
 fn what_is_resolved_fits_where_it_goes() {
     for target in [view(Format::R8G8B8A8Uint, 1), view(COLOR, 4)] {
-        let subpass = Subpass {
-            color: vec![Some(0)],
-            resolve: vec![Some(1)],
-            ..Subpass::default()
-        };
+        let subpass = Subpass { color: vec![Some(0)], resolve: vec![Some(1)], ..Subpass::default() };
         let pass = begun(vec![view(COLOR, 4), target], vec![subpass]);
         assert!(matches!(pass.subpass(0), Err(Error::InvalidUsage { .. })));
     }
@@ -112,11 +84,7 @@ fn what_is_resolved_fits_where_it_goes() {
 #[test]
 fn attachments_have_as_many_samples_as_one_another() {
     let with_depth = |samples| {
-        let subpass = Subpass {
-            color: vec![None, Some(0)],
-            depth_stencil: Some(1),
-            ..Subpass::default()
-        };
+        let subpass = Subpass { color: vec![None, Some(0)], depth_stencil: Some(1), ..Subpass::default() };
         begun(vec![view(COLOR, 4), view(DEPTH, samples)], vec![subpass]).subpass(0)
     };
     assert!(with_depth(4).is_ok());
@@ -143,15 +111,8 @@ fn attachments_have_as_many_samples_as_one_another() {
 #[test]
 fn attachments_that_are_read_first_are_cleared_first() {
     let subpasses = vec![
-        Subpass {
-            color: vec![Some(0)],
-            input: vec![Some(1), Some(0)],
-            ..Subpass::default()
-        },
-        Subpass {
-            color: vec![Some(1)],
-            ..Subpass::default()
-        },
+        Subpass { color: vec![Some(0)], input: vec![Some(1), Some(0)], ..Subpass::default() },
+        Subpass { color: vec![Some(1)], ..Subpass::default() },
     ];
     let pass = begun(vec![view(COLOR, 1), view(DEPTH, 1)], subpasses);
     let mut packets = pass.clears_before_reads(0).unwrap().into_iter();
@@ -177,12 +138,8 @@ fn suspended_rendering_is_resolved_where_it_ends() {
         resolve: Some((view(COLOR, 1), ResolveMode::Average)),
     };
     let resolves = |flags| {
-        let dynamic = DynamicRendering {
-            flags,
-            layers: 1,
-            color: vec![Some(attachment.clone())],
-            ..DynamicRendering::default()
-        };
+        let dynamic =
+            DynamicRendering { flags, layers: 1, color: vec![Some(attachment.clone())], ..DynamicRendering::default() };
         let found = rendering(dynamic.packet().unwrap());
         found.color[0].as_ref().unwrap().resolve.is_some()
     };

@@ -27,10 +27,7 @@ pub(crate) fn bindings(
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, DescriptorSetNotBound> {
-    let mut bindings = Bindings {
-        push_constants: push_constants.to_vec(),
-        ..Bindings::default()
-    };
+    let mut bindings = Bindings { push_constants: push_constants.to_vec(), ..Bindings::default() };
     if let Some(addresses) = &resources.addresses {
         let table = addresses.table();
         if resources.writes {
@@ -79,10 +76,8 @@ fn place(
         }
         Descriptor::TexelBuffer(view) => {
             mark_written(used, &view.range.memory, bindings);
-            *element(&mut bindings.images, slot) = ImageBinding::TexelBuffer(TexelBuffer {
-                range: view.range.clone(),
-                format: view.format,
-            });
+            *element(&mut bindings.images, slot) =
+                ImageBinding::TexelBuffer(TexelBuffer { range: view.range.clone(), format: view.format });
         }
         Descriptor::Image { view, sampler } => {
             if let Some(view) = view {
@@ -102,11 +97,7 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     let view = view.view.clone();
     match kind {
         DescriptorKind::StorageImage => ImageBinding::Storage(StorageImage { view }),
-        _ => ImageBinding::Sampled(SampledImage {
-            view,
-            aspect,
-            swizzle,
-        }),
+        _ => ImageBinding::Sampled(SampledImage { view, aspect, swizzle }),
     }
 }
 
@@ -147,24 +138,8 @@ pub(crate) enum DispatchError {
 ///
 /// # Errors
 /// [`DispatchError`] where bound state that the dispatch needs is missing.
-pub(crate) fn dispatch(
-    state: &State,
-    base: [u32; 3],
-    count: [u32; 3],
-) -> Result<Packet, DispatchError> {
-    let pipeline = state
-        .compute_pipeline
-        .as_ref()
-        .ok_or(DispatchError::Pipeline)?;
-    let bindings = bindings(
-        &pipeline.resources,
-        &state.compute_sets,
-        &state.push_constants,
-    )?;
-    Ok(Packet::Dispatch(Box::new(Dispatch {
-        program: Arc::clone(&pipeline.program),
-        base,
-        count,
-        bindings,
-    })))
+pub(crate) fn dispatch(state: &State, base: [u32; 3], count: [u32; 3]) -> Result<Packet, DispatchError> {
+    let pipeline = state.compute_pipeline.as_ref().ok_or(DispatchError::Pipeline)?;
+    let bindings = bindings(&pipeline.resources, &state.compute_sets, &state.push_constants)?;
+    Ok(Packet::Dispatch(Box::new(Dispatch { program: Arc::clone(&pipeline.program), base, count, bindings })))
 }

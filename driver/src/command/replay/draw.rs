@@ -38,9 +38,7 @@ pub(crate) enum DrawError {
         cameras: usize,
     },
     /// The camera's model is not enabled.
-    #[error(
-        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-90079)"
-    )]
+    #[error("the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-90079)")]
     CameraModel(CameraModel),
     /// The camera's model doesn't support the pipeline's modes.
     #[error(
@@ -49,9 +47,7 @@ pub(crate) enum DrawError {
     )]
     ModeOfCameraModel(CameraModel),
     /// No uniform buffer is bound for the camera.
-    #[error(
-        "no uniform buffer is bound at set {set}, binding {binding}, where the camera should be"
-    )]
+    #[error("no uniform buffer is bound at set {set}, binding {binding}, where the camera should be")]
     CameraBuffer {
         /// The descriptor set.
         set: u32,
@@ -91,9 +87,7 @@ pub(crate) enum DrawError {
     #[error("the pipeline's {0:?} is dynamic and was not set")]
     Dynamic(vk::DynamicState),
     /// A dynamic state has a value that a pipeline could not have.
-    #[error(
-        "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-90060)"
-    )]
+    #[error("a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-90060)")]
     DynamicValue(String),
     /// There are more Gaussians than a draw may have.
     #[error(
@@ -131,9 +125,7 @@ pub(super) fn attribute_stream(
     pipeline: &GraphicsPipeline,
     source: &AttributeSource,
 ) -> Result<AttributeStream, DrawError> {
-    let bound = state
-        .vertex_buffer(source.binding)
-        .ok_or(DrawError::VertexBuffer(source.binding))?;
+    let bound = state.vertex_buffer(source.binding).ok_or(DrawError::VertexBuffer(source.binding))?;
     let dynamic_stride = bound.stride.filter(|_| pipeline.dynamic_stride);
     Ok(AttributeStream {
         buffer: bound.range.clone(),
@@ -148,10 +140,7 @@ pub(super) fn attribute_stream(
 ///
 /// # Errors
 /// [`DrawError::Dynamic`] if none is set, [`DrawError::VertexInput`] for sources that don't fit the program.
-fn dynamic_sources(
-    state: &State,
-    locations: &[(u32, ScalarType)],
-) -> Result<Vec<AttributeSource>, DrawError> {
+fn dynamic_sources(state: &State, locations: &[(u32, ScalarType)]) -> Result<Vec<AttributeSource>, DrawError> {
     let missing = DrawError::Dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
     let input = state.vertex_input.as_ref().ok_or(missing)?;
     stages::attributes(input, locations).map_err(|error| DrawError::VertexInput(error.to_string()))
@@ -161,19 +150,12 @@ fn dynamic_sources(
 ///
 /// # Errors
 /// [`DrawError::IndexBuffer`].
-pub(super) fn indices(
-    state: &State,
-    draw: &DrawParameters,
-) -> Result<Option<IndexStream>, DrawError> {
+pub(super) fn indices(state: &State, draw: &DrawParameters) -> Result<Option<IndexStream>, DrawError> {
     let Some(vertex_offset) = draw.vertex_offset else {
         return Ok(None);
     };
     let bound = state.index_buffer.as_ref().ok_or(DrawError::IndexBuffer)?;
-    Ok(Some(IndexStream {
-        buffer: bound.range.clone(),
-        index_size: bound.index_size,
-        vertex_offset,
-    }))
+    Ok(Some(IndexStream { buffer: bound.range.clone(), index_size: bound.index_size, vertex_offset }))
 }
 
 /// The packet of one draw.
@@ -196,8 +178,7 @@ pub(super) fn primitives(
         .unwrap_or(&primitives.attributes)
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
-    let bindings =
-        |resources| descriptors::bindings(resources, &state.graphics_sets, &state.push_constants);
+    let bindings = |resources| descriptors::bindings(resources, &state.graphics_sets, &state.push_constants);
     Ok(Packet::Draw(Box::new(simdevice::packet::Draw {
         pipeline: Arc::clone(&primitives.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
@@ -220,18 +201,12 @@ pub(super) fn primitives(
 }
 
 /// The fixed-function state. It is computed again only if something in it has changed since the last draw.
-fn draw_state(
-    state: &mut State,
-    primitives: &PrimitivePipeline,
-) -> Result<Arc<DrawState>, DrawError> {
+fn draw_state(state: &mut State, primitives: &PrimitivePipeline) -> Result<Arc<DrawState>, DrawError> {
     if let Some(fixed) = primitives.state.as_ref().or(state.draw_state.as_ref()) {
         return Ok(Arc::clone(fixed));
     }
     let mut fixed = primitives.fixed.clone();
-    state
-        .dynamic_states
-        .apply(&primitives.dynamic, &mut fixed)
-        .map_err(DrawError::Dynamic)?;
+    state.dynamic_states.apply(&primitives.dynamic, &mut fixed).map_err(DrawError::Dynamic)?;
     if !fixed.draw.rasterizer_discard {
         if let Some(count) = dynamic_count(primitives.viewports, state.viewport_count) {
             fixed.draw.viewports = set(&state.viewports, count).ok_or(DrawError::Viewport)?;
@@ -241,10 +216,7 @@ fn draw_state(
         }
         let (viewports, scissors) = (fixed.draw.viewports.len(), fixed.draw.scissors.len());
         if viewports != scissors {
-            return Err(DrawError::ScissorCount {
-                viewports,
-                scissors,
-            });
+            return Err(DrawError::ScissorCount { viewports, scissors });
         }
     }
     let converted = Arc::new(fixed.draw_state());
@@ -263,12 +235,7 @@ fn dynamic_count(origin: ViewportSource, set: Option<u32>) -> Option<u32> {
 
 /// The first `count` values; None if there are none or one of them is not set.
 fn set<T: Copy>(slots: &[Option<T>], count: u32) -> Option<Vec<T>> {
-    slots
-        .get(..count as usize)
-        .filter(|slots| !slots.is_empty())?
-        .iter()
-        .copied()
-        .collect()
+    slots.get(..count as usize).filter(|slots| !slots.is_empty())?.iter().copied().collect()
 }
 
 /// Reads the number of draws.
@@ -279,11 +246,7 @@ pub(super) fn read_count(range: &BufferRange) -> Option<u32> {
 }
 
 /// Reads `VkDrawIndirectCommand` or `VkDrawIndexedIndirectCommand`.
-pub(super) fn read_draw(
-    parameters: &BufferRange,
-    offset: u64,
-    indexed: bool,
-) -> Option<DrawParameters> {
+pub(super) fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) -> Option<DrawParameters> {
     let mut words = [0u32; 5];
     let words = &mut words[..if indexed { 5 } else { 4 }];
     if offset.checked_add(size_of_val(words) as u64)? > parameters.size {
@@ -292,20 +255,12 @@ pub(super) fn read_draw(
     let offset = parameters.offset.checked_add(offset)?;
     parameters.memory.read(offset, words).ok()?;
     Some(match *words {
-        [count, instance_count, first, vertex_offset, first_instance] => DrawParameters {
-            vertex_offset: Some(vertex_offset as i32),
-            first,
-            count,
-            first_instance,
-            instance_count,
-        },
-        [count, instance_count, first, first_instance] => DrawParameters {
-            vertex_offset: None,
-            first,
-            count,
-            first_instance,
-            instance_count,
-        },
+        [count, instance_count, first, vertex_offset, first_instance] => {
+            DrawParameters { vertex_offset: Some(vertex_offset as i32), first, count, first_instance, instance_count }
+        }
+        [count, instance_count, first, first_instance] => {
+            DrawParameters { vertex_offset: None, first, count, first_instance, instance_count }
+        }
         _ => return None,
     })
 }

@@ -13,13 +13,11 @@ use crate::pipeline::gaussian::{
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin,
-    GaussianFragmentStage, ModelAttributes, PrimitiveBindings,
+    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage,
+    ModelAttributes, PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
-use simdevice::state::gaussian::{
-    Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState,
-};
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState};
 use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
@@ -112,36 +110,24 @@ fn shaded(
     parameters: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
-    let attributes = projection
-        .attributes
-        .iter()
-        .map(|source| attribute_stream(state, pipeline, source));
-    let bindings = descriptors::bindings(
-        &projection.resources,
-        &state.graphics_sets,
-        &state.push_constants,
-    )?;
+    let attributes = projection.attributes.iter().map(|source| attribute_stream(state, pipeline, source));
+    let bindings = descriptors::bindings(&projection.resources, &state.graphics_sets, &state.push_constants)?;
     let viewport = state.viewport(gaussian).ok_or(DrawError::Viewport)?;
-    Ok(Packet::GaussianAppendDraw(Box::new(
-        simdevice::packet::Draw {
-            pipeline: Arc::clone(&projection.programs),
-            attributes: attributes.collect::<Result<_, _>>()?,
-            vertex_bindings: bindings,
-            primitive_bindings: PrimitiveBindings::default(),
-            fragment_bindings: Bindings::default(),
-            indices: indices(state, parameters)?,
-            first: parameters.first,
-            count: parameters.count,
-            first_instance: parameters.first_instance,
-            instance_count: parameters.instance_count,
-            draw_index,
-            transform_feedback: None,
-            state: Arc::new(DrawState {
-                viewports: vec![viewport],
-                ..DrawState::new(Topology::PointList, [0; 2])
-            }),
-        },
-    )))
+    Ok(Packet::GaussianAppendDraw(Box::new(simdevice::packet::Draw {
+        pipeline: Arc::clone(&projection.programs),
+        attributes: attributes.collect::<Result<_, _>>()?,
+        vertex_bindings: bindings,
+        primitive_bindings: PrimitiveBindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: indices(state, parameters)?,
+        first: parameters.first,
+        count: parameters.count,
+        first_instance: parameters.first_instance,
+        instance_count: parameters.instance_count,
+        draw_index,
+        transform_feedback: None,
+        state: Arc::new(DrawState { viewports: vec![viewport], ..DrawState::new(Topology::PointList, [0; 2]) }),
+    })))
 }
 
 /// The cameras of a draw's views, in the order of views, after a check that their models' features are enabled: one for
@@ -151,9 +137,9 @@ fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Cam
     let views = (0..u32::BITS).filter(|view| gaussian.view_mask >> view & 1 == 1);
     let cameras = match source.len() {
         0 => return Err(DrawError::Camera),
-        count if count > 1 && gaussian.view_mask != 0 => views
-            .map(|view| source.get(view, count))
-            .collect::<Result<Vec<_>, _>>()?,
+        count if count > 1 && gaussian.view_mask != 0 => {
+            views.map(|view| source.get(view, count)).collect::<Result<Vec<_>, _>>()?
+        }
         count => vec![source.get(0, count)?],
     };
     for camera in &cameras {
@@ -172,8 +158,7 @@ fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), Draw
         CameraModel::Pinhole | CameraModel::Orthographic => true,
         CameraModel::Fisheye => state.geometry == GaussianGeometry::Volume,
         CameraModel::Equirectangular => {
-            state.geometry == GaussianGeometry::Volume
-                && state.precision == GaussianPrecision::Float32
+            state.geometry == GaussianGeometry::Volume && state.precision == GaussianPrecision::Float32
         }
     };
     match is_seen {
@@ -197,23 +182,11 @@ impl<'a> Cameras<'a> {
         let (set, binding, count) = match source {
             CameraSource::None => return Ok(Self::None),
             CameraSource::Command => return Ok(Self::Set(&state.cameras)),
-            CameraSource::UniformBuffer {
-                set,
-                binding,
-                count,
-            } => (set, binding, count),
+            CameraSource::UniformBuffer { set, binding, count } => (set, binding, count),
         };
-        let bound = state
-            .graphics_sets
-            .get(set)
-            .ok_or(DescriptorSetNotBound(set))?;
-        let range = bound
-            .buffer(binding)
-            .ok_or(DrawError::CameraBuffer { set, binding })?;
-        Ok(Self::Buffer {
-            range,
-            count: count as usize,
-        })
+        let bound = state.graphics_sets.get(set).ok_or(DescriptorSetNotBound(set))?;
+        let range = bound.buffer(binding).ok_or(DrawError::CameraBuffer { set, binding })?;
+        Ok(Self::Buffer { range, count: count as usize })
     }
 
     fn len(&self) -> usize {
@@ -232,30 +205,22 @@ impl<'a> Cameras<'a> {
             Self::None => Ok(Camera::default()),
             Self::Set(cameras) => cameras.get(number).copied().ok_or(none),
             Self::Buffer { count, .. } if number >= *count => Err(none),
-            Self::Buffer { range, .. } => camera::read(range, number)
-                .map_err(|error| DrawError::CameraData(error.to_string())),
+            Self::Buffer { range, .. } => {
+                camera::read(range, number).map_err(|error| DrawError::CameraData(error.to_string()))
+            }
         }
     }
 }
 
 /// The state of the pipeline, with its dynamic parts filled in.
-fn fixed_state(
-    state: &State,
-    gaussian: &GaussianPipeline,
-) -> Result<Arc<GaussianState>, DrawError> {
+fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, DrawError> {
     if gaussian.dynamic.is_empty() {
         return Ok(Arc::clone(&gaussian.state));
     }
     let mut fixed = gaussian.fixed.clone();
-    state
-        .dynamic_states
-        .apply(&gaussian.dynamic, &mut fixed)
-        .map_err(DrawError::Dynamic)?;
+    state.dynamic_states.apply(&gaussian.dynamic, &mut fixed).map_err(DrawError::Dynamic)?;
     let set = fixed.gaussian_state();
-    gaussian
-        .dynamic_rules
-        .check(&set)
-        .map_err(|error| DrawError::DynamicValue(error.to_string()))?;
+    gaussian.dynamic_rules.check(&set).map_err(|error| DrawError::DynamicValue(error.to_string()))?;
     Ok(Arc::new(set))
 }
 
@@ -265,11 +230,7 @@ fn upright(viewport: Viewport) -> Viewport {
     if viewport.height >= 0.0 {
         return viewport;
     }
-    Viewport {
-        y: viewport.y + viewport.height,
-        height: -viewport.height,
-        ..viewport
-    }
+    Viewport { y: viewport.y + viewport.height, height: -viewport.height, ..viewport }
 }
 
 /// The stream of a coefficient of a buffer of spherical harmonics.
@@ -309,11 +270,7 @@ fn attributes(
         rotation: stream(&sources.rotation)?,
         opacity: stream(&sources.opacity)?,
         spherical_harmonics: match &sources.spherical_harmonics {
-            HarmonicsSource::Attributes(sources) => sources
-                .iter()
-                .take(count)
-                .map(stream)
-                .collect::<Result<_, _>>()?,
+            HarmonicsSource::Attributes(sources) => sources.iter().take(count).map(stream).collect::<Result<_, _>>()?,
             HarmonicsSource::Buffer => {
                 let bound = state.harmonics.as_ref().ok_or(DrawError::Harmonics)?;
                 (0..count as u64).map(|k| coefficient(bound, k)).collect()
@@ -336,14 +293,7 @@ mod tests {
 
     #[test]
     fn a_negative_height_moves_the_corner() {
-        let viewport = Viewport {
-            x: 3.0,
-            y: 90.0,
-            width: 50.0,
-            height: -80.0,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
+        let viewport = Viewport { x: 3.0, y: 90.0, width: 50.0, height: -80.0, min_depth: 0.0, max_depth: 1.0 };
         let upright = upright(viewport);
         assert_eq!((upright.y, upright.height), (10.0, 80.0));
         assert_eq!((upright.x, upright.width), (3.0, 50.0));

@@ -75,21 +75,11 @@ pub(super) fn replay(commands: &[Command], execution: &mut Execution<'_>) -> Res
 }
 
 /// Replays commands from a state on.
-fn replay_from(
-    mut state: State,
-    commands: &[Command],
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
-    commands
-        .iter()
-        .try_for_each(|command| execute(command, &mut state, execution))
+fn replay_from(mut state: State, commands: &[Command], execution: &mut Execution<'_>) -> Result<(), Error> {
+    commands.iter().try_for_each(|command| execute(command, &mut state, execution))
 }
 
-fn execute(
-    command: &Command,
-    state: &mut State,
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
+fn execute(command: &Command, state: &mut State, execution: &mut Execution<'_>) -> Result<(), Error> {
     if state.discards && is_conditional(command) {
         return Ok(());
     }
@@ -158,10 +148,7 @@ fn execute(
                 dispatch(state, [0; 3], count, execution)?;
             }
         }
-        Command::BeginConditional {
-            predicate,
-            is_inverted,
-        } => {
+        Command::BeginConditional { predicate, is_inverted } => {
             let mut word = [0u32];
             // The range was checked when the command was recorded.
             let is_read = predicate.memory.read(predicate.offset, &mut word).is_ok();
@@ -186,16 +173,9 @@ fn execute(
             }
         }
         Command::DrawByteCount(drawn) => draw_byte_count(state, drawn, execution)?,
-        Command::BeginStreamQuery {
-            pool,
-            query,
-            stream,
-        } => {
+        Command::BeginStreamQuery { pool, query, stream } => {
             pool.set_stream(*query, *stream);
-            execution.execute(&Packet::BeginQuery {
-                pool: Arc::clone(&pool.queries),
-                index: *query,
-            })?;
+            execution.execute(&Packet::BeginQuery { pool: Arc::clone(&pool.queries), index: *query })?;
         }
         Command::SetEvent(event, value) => event.set(*value),
         Command::WaitEvents(events) => {
@@ -211,10 +191,7 @@ fn execute(
         }
         Command::Execute(secondaries) => {
             // They inherit the condition, and no bound state, which is undefined after them.
-            let inherited = State {
-                discards: state.discards,
-                ..State::default()
-            };
+            let inherited = State { discards: state.discards, ..State::default() };
             for commands in secondaries {
                 replay_from(inherited.clone(), commands, execution)?;
             }
@@ -248,9 +225,7 @@ fn draw(
         return Ok(());
     }
     match packets(state, parameters, draw_index) {
-        Ok(packets) => packets
-            .iter()
-            .try_for_each(|packet| execution.execute(packet)),
+        Ok(packets) => packets.iter().try_for_each(|packet| execution.execute(packet)),
         Err(reason) => {
             execution.report(&format!("a draw draws nothing: {reason}"));
             Ok(())
@@ -259,18 +234,12 @@ fn draw(
 }
 
 /// The packets of a draw.
-fn packets(
-    state: &mut State,
-    parameters: &DrawParameters,
-    draw_index: u32,
-) -> Result<Vec<Packet>, DrawError> {
+fn packets(state: &mut State, parameters: &DrawParameters, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
     let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
     match &pipeline.kind {
         PipelineKind::Gaussian(gaussian) => {
             let begin = gaussian::begin(state, gaussian)?;
-            let append = gaussian::append(
-                state, &pipeline, gaussian, &begin.set, parameters, draw_index,
-            )?;
+            let append = gaussian::append(state, &pipeline, gaussian, &begin.set, parameters, draw_index)?;
             let Some(set) = &mut state.gaussian_set else {
                 let mut packets = begin.packets();
                 packets.extend([append, Packet::GaussianEnd]);
@@ -283,26 +252,19 @@ fn packets(
                     packets.push(append);
                     Ok(packets)
                 }
-                Some((first, _)) if !Arc::ptr_eq(first, &pipeline) => {
-                    Err(DrawError::OtherPipelineInSet)
-                }
+                Some((first, _)) if !Arc::ptr_eq(first, &pipeline) => Err(DrawError::OtherPipelineInSet),
                 Some((_, first)) if **first != begin.set => Err(DrawError::OtherStateInSet),
                 Some(_) => Ok(vec![append]),
             }
         }
         PipelineKind::Primitive(primitives) => {
-            draw::primitives(state, &pipeline, primitives, parameters, draw_index)
-                .map(|packet| vec![packet])
+            draw::primitives(state, &pipeline, primitives, parameters, draw_index).map(|packet| vec![packet])
         }
     }
 }
 
 /// Draws the vertices that transform feedback has written.
-fn draw_byte_count(
-    state: &mut State,
-    drawn: &DrawByteCount,
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
+fn draw_byte_count(state: &mut State, drawn: &DrawByteCount, execution: &mut Execution<'_>) -> Result<(), Error> {
     let written = draw::read_count(&drawn.counter).unwrap_or(0);
     let parameters = DrawParameters {
         vertex_offset: None,
@@ -314,12 +276,7 @@ fn draw_byte_count(
     draw(state, &parameters, 0, execution)
 }
 
-fn dispatch(
-    state: &State,
-    base: [u32; 3],
-    count: [u32; 3],
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
+fn dispatch(state: &State, base: [u32; 3], count: [u32; 3], execution: &mut Execution<'_>) -> Result<(), Error> {
     match descriptors::dispatch(state, base, count) {
         Ok(packet) => execution.execute(&packet),
         Err(reason) => {
@@ -329,11 +286,7 @@ fn dispatch(
     }
 }
 
-fn draw_indirect(
-    state: &mut State,
-    indirect: &DrawIndirect,
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
+fn draw_indirect(state: &mut State, indirect: &DrawIndirect, execution: &mut Execution<'_>) -> Result<(), Error> {
     let draw_count = match indirect.count.as_ref().map(draw::read_count) {
         None => indirect.draw_count,
         Some(count) => count.unwrap_or(0).min(indirect.draw_count),

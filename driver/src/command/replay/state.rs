@@ -71,16 +71,12 @@ pub(crate) struct SharedSet {
 impl State {
     /// The viewport in effect: the pipeline's, or the dynamic one.
     pub(crate) fn viewport(&self, pipeline: &GaussianPipeline) -> Option<Viewport> {
-        pipeline
-            .viewport
-            .or_else(|| self.viewports.first().copied().flatten())
+        pipeline.viewport.or_else(|| self.viewports.first().copied().flatten())
     }
 
     /// The scissor in effect: the pipeline's, or the dynamic one.
     pub(crate) fn scissor(&self, pipeline: &GaussianPipeline) -> Option<Rect> {
-        pipeline
-            .scissor
-            .or_else(|| self.scissors.first().copied().flatten())
+        pipeline.scissor.or_else(|| self.scissors.first().copied().flatten())
     }
 
     /// The descriptor sets of a bind point.
@@ -145,17 +141,12 @@ impl BoundSets {
         layout: &Arc<DescriptorSetLayout>,
         writes: &[Write],
     ) -> Result<(), Error> {
-        let same = |bound: &&BoundSet| {
-            bound.set.layout().is_push() && Arc::ptr_eq(bound.set.layout(), layout)
-        };
+        let same = |bound: &&BoundSet| bound.set.layout().is_push() && Arc::ptr_eq(bound.set.layout(), layout);
         let set = match self.get(number).filter(same) {
             Some(bound) => Arc::clone(&bound.set),
             None => {
                 let set = Arc::new(DescriptorSet::new(Arc::clone(layout), 0)?);
-                let bound = BoundSet {
-                    set: Arc::clone(&set),
-                    dynamic_offsets: Vec::new(),
-                };
+                let bound = BoundSet { set: Arc::clone(&set), dynamic_offsets: Vec::new() };
                 self.bind(number, &[Some(bound)]);
                 set
             }

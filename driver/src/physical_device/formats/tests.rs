@@ -4,20 +4,14 @@ use std::collections::HashSet;
 #[test]
 fn every_format_of_the_device_has_a_vulkan_name() {
     // The first block of core formats, and the two formats of four bits that were added later.
-    let later = [
-        vk::Format::A4R4G4B4_UNORM_PACK16,
-        vk::Format::A4B4G4R4_UNORM_PACK16,
-    ];
+    let later = [vk::Format::A4R4G4B4_UNORM_PACK16, vk::Format::A4B4G4R4_UNORM_PACK16];
     let found: HashSet<_> = (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
         .map(vk::Format::from_raw)
         .chain(later)
         .filter_map(device_format)
         .collect();
     assert_eq!(found, Format::ALL.iter().copied().collect());
-    assert_eq!(
-        device_format(vk::Format::A2B10G10R10_UNORM_PACK32),
-        Some(Format::A2B10G10R10UnormPack32)
-    );
+    assert_eq!(device_format(vk::Format::A2B10G10R10_UNORM_PACK32), Some(Format::A2B10G10R10UnormPack32));
     assert_eq!(device_format(vk::Format::UNDEFINED), None);
     assert_eq!(device_format(vk::Format::from_raw(-1)), None);
     assert_eq!(device_format(vk::Format::ETC2_R8G8B8_UNORM_BLOCK), None);
@@ -26,34 +20,14 @@ fn every_format_of_the_device_has_a_vulkan_name() {
 #[test]
 fn formats_can_do_what_they_are_for() {
     let float = properties(vk::Format::R32G32B32A32_SFLOAT);
-    assert!(
-        float
-            .optimal_tiling_features
-            .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
-    );
-    assert!(
-        float
-            .buffer_features
-            .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
-    );
+    assert!(float.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND));
+    assert!(float.buffer_features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
     let depth = properties(vk::Format::D32_SFLOAT);
-    assert!(
-        depth
-            .optimal_tiling_features
-            .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT)
-    );
+    assert!(depth.optimal_tiling_features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT));
     assert!(depth.linear_tiling_features.is_empty());
     let vertex = properties(vk::Format::R32G32B32_SFLOAT);
-    assert!(
-        vertex
-            .buffer_features
-            .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
-    );
-    assert!(
-        !vertex
-            .optimal_tiling_features
-            .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT)
-    );
+    assert!(vertex.buffer_features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    assert!(!vertex.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT));
 }
 
 #[test]
@@ -69,33 +43,17 @@ fn images_that_cannot_be_are_refused() {
     assert_eq!(properties.max_extent.width, 16384);
     assert_eq!(properties.max_mip_levels, 15);
     let refused = [
-        ImageQuery {
-            format: vk::Format::UNDEFINED,
-            ..query
-        },
-        ImageQuery {
-            usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-            ..query
-        },
-        ImageQuery {
-            format: vk::Format::R8G8B8A8_SRGB,
-            usage: vk::ImageUsageFlags::STORAGE,
-            ..query
-        },
-        ImageQuery {
-            format: vk::Format::BC1_RGB_UNORM_BLOCK,
-            ..query
-        },
+        ImageQuery { format: vk::Format::UNDEFINED, ..query },
+        ImageQuery { usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, ..query },
+        ImageQuery { format: vk::Format::R8G8B8A8_SRGB, usage: vk::ImageUsageFlags::STORAGE, ..query },
+        ImageQuery { format: vk::Format::BC1_RGB_UNORM_BLOCK, ..query },
         ImageQuery {
             format: vk::Format::BC1_RGB_UNORM_BLOCK,
             ty: vk::ImageType::TYPE_1D,
             usage: vk::ImageUsageFlags::SAMPLED,
             ..query
         },
-        ImageQuery {
-            flags: vk::ImageCreateFlags::SPARSE_BINDING,
-            ..query
-        },
+        ImageQuery { flags: vk::ImageCreateFlags::SPARSE_BINDING, ..query },
         ImageQuery {
             format: vk::Format::D32_SFLOAT,
             ty: vk::ImageType::TYPE_3D,
@@ -105,11 +63,7 @@ fn images_that_cannot_be_are_refused() {
     ];
     for query in refused {
         let error = image_properties(query).unwrap_err();
-        assert_eq!(
-            error.result(),
-            vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
-            "{query:?}"
-        );
+        assert_eq!(error.result(), vk::Result::ERROR_FORMAT_NOT_SUPPORTED, "{query:?}");
     }
 }
 
@@ -125,10 +79,7 @@ fn attachments_of_two_dimensions_may_have_four_samples() {
     let counts = |query| image_properties(query).unwrap().sample_counts;
     let (one, four) = (vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4);
     assert_eq!(counts(query), one | four);
-    let stored = ImageQuery {
-        usage: vk::ImageUsageFlags::STORAGE,
-        ..query
-    };
+    let stored = ImageQuery { usage: vk::ImageUsageFlags::STORAGE, ..query };
     assert_eq!(counts(stored), one | four);
     let depth = ImageQuery {
         format: vk::Format::D24_UNORM_S8_UINT,
@@ -137,28 +88,11 @@ fn attachments_of_two_dimensions_may_have_four_samples() {
     };
     assert_eq!(counts(depth), one | four);
     let single = [
-        ImageQuery {
-            ty: vk::ImageType::TYPE_3D,
-            ..query
-        },
-        ImageQuery {
-            tiling: vk::ImageTiling::LINEAR,
-            ..query
-        },
-        ImageQuery {
-            flags: vk::ImageCreateFlags::CUBE_COMPATIBLE,
-            ..query
-        },
-        ImageQuery {
-            format: vk::Format::BC7_UNORM_BLOCK,
-            usage: vk::ImageUsageFlags::SAMPLED,
-            ..query
-        },
-        ImageQuery {
-            format: vk::Format::R32G32B32_SFLOAT,
-            usage: vk::ImageUsageFlags::SAMPLED,
-            ..query
-        },
+        ImageQuery { ty: vk::ImageType::TYPE_3D, ..query },
+        ImageQuery { tiling: vk::ImageTiling::LINEAR, ..query },
+        ImageQuery { flags: vk::ImageCreateFlags::CUBE_COMPATIBLE, ..query },
+        ImageQuery { format: vk::Format::BC7_UNORM_BLOCK, usage: vk::ImageUsageFlags::SAMPLED, ..query },
+        ImageQuery { format: vk::Format::R32G32B32_SFLOAT, usage: vk::ImageUsageFlags::SAMPLED, ..query },
     ];
     for query in single {
         assert_eq!(counts(query), one, "{query:?}");

@@ -17,13 +17,13 @@ use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianPrecisionGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianLinearizationGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::Activations;
 use simdevice::state::gaussian::{
-    CameraModel, GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization,
-    GaussianPrecision, GaussianState,
+    CameraModel, GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision,
+    GaussianState,
 };
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -176,11 +176,7 @@ impl GaussianPipeline {
             let is_ignored = vk::DynamicState::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE == state;
             is_taken_by_gaussians(state) && !(is_shaded(gaussian) && is_ignored)
         });
-        let state = GaussianState {
-            approximation,
-            footprint,
-            ..state(gaussian, fragments.draw_state())?
-        };
+        let state = GaussianState { approximation, footprint, ..state(gaussian, fragments.draw_state())? };
         require_modes(features, &state)?;
         fragments.gaussian = Some(Box::new(state.clone()));
         Ok(Self {
@@ -192,15 +188,13 @@ impl GaussianPipeline {
             fixed: fragments,
             viewport: fixed(
                 "viewport",
-                info.is_dynamic(vk::DynamicState::VIEWPORT)
-                    || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
+                info.is_dynamic(vk::DynamicState::VIEWPORT) || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
                 &info.pre_rasterization.viewports,
             )?
             .map(convert::viewport),
             scissor: fixed(
                 "scissor",
-                info.is_dynamic(vk::DynamicState::SCISSOR)
-                    || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
+                info.is_dynamic(vk::DynamicState::SCISSOR) || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
                 &info.pre_rasterization.scissors,
             )?
             .map(convert::rect),
@@ -222,10 +216,9 @@ fn source(
         return Ok(GaussianSource::VertexShader(projection));
     }
     let locations = &gaussian.attribute_locations;
-    for (name, location) in [
-        ("firstModelMatrix", locations.first_model_matrix),
-        ("modelOpacity", locations.model_opacity),
-    ] {
+    for (name, location) in
+        [("firstModelMatrix", locations.first_model_matrix), ("modelOpacity", locations.model_opacity)]
+    {
         if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
             require(device.features(), INSTANCING, &format!("{name} is used"))?;
         }
@@ -287,12 +280,9 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
     }
 }
 
-fn state(
-    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    fragments: DrawState,
-) -> Result<GaussianState, Error> {
-    let opacity_compensated = values::is_compensated(gaussian.antialiasing)
-        .ok_or_else(|| unknown("antialiasing", &gaussian.antialiasing))?;
+fn state(gaussian: &PipelineGaussianStateCreateInfoGAURAST, fragments: DrawState) -> Result<GaussianState, Error> {
+    let opacity_compensated =
+        values::is_compensated(gaussian.antialiasing).ok_or_else(|| unknown("antialiasing", &gaussian.antialiasing))?;
     let order = values::order(gaussian.order).ok_or_else(|| unknown("order", &gaussian.order))?;
     Ok(GaussianState {
         precision: match gaussian.precision {
@@ -301,20 +291,12 @@ fn state(
         },
         // Gaussians that a vertex shader projects have neither.
         geometry: match gaussian.geometry {
-            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => {
-                GaussianGeometry::Surfel
-            }
+            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => GaussianGeometry::Surfel,
             _ => GaussianGeometry::Volume,
         },
-        sh_degree: if is_shaded(gaussian) {
-            0
-        } else {
-            gaussian.spherical_harmonics_degree
-        },
+        sh_degree: if is_shaded(gaussian) { 0 } else { gaussian.spherical_harmonics_degree },
         linearization: match gaussian.linearization {
-            GaussianLinearizationGAURAST::UNSCENTED if !is_shaded(gaussian) => {
-                GaussianLinearization::Unscented
-            }
+            GaussianLinearizationGAURAST::UNSCENTED if !is_shaded(gaussian) => GaussianLinearization::Unscented,
             _ => GaussianLinearization::Jacobian,
         },
         order,
@@ -346,17 +328,11 @@ fn camera_source(
         GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
         other => return Err(unknown("cameraSource", &other)),
     }
-    require(
-        features,
-        UNIFORM_BUFFER_CAMERA,
-        "cameraSource is UNIFORM_BUFFER",
-    )?;
+    require(features, UNIFORM_BUFFER_CAMERA, "cameraSource is UNIFORM_BUFFER")?;
     let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
     let is_there = info.layout.as_ref().is_some_and(|layout| {
         let found = layout.set_layout(set).ok();
-        found
-            .and_then(|set| set.binding(binding))
-            .is_some_and(holds_camera)
+        found.and_then(|set| set.binding(binding)).is_some_and(holds_camera)
     });
     if !is_there {
         return Err(Error::usage(
@@ -379,18 +355,12 @@ fn camera_source(
             ),
         ));
     }
-    Ok(CameraSource::UniformBuffer {
-        set,
-        binding,
-        count,
-    })
+    Ok(CameraSource::UniformBuffer { set, binding, count })
 }
 
 /// Reports whether a binding is a uniform buffer that the vertex stage can access.
 fn holds_camera(binding: &LayoutBinding) -> bool {
-    let is_uniform = matches!(
-        binding.kind,
-        vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
-    );
+    let is_uniform =
+        matches!(binding.kind, vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC);
     is_uniform && binding.count > 0 && binding.stages.contains(vk::ShaderStageFlags::VERTEX)
 }

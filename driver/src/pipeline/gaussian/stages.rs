@@ -6,9 +6,7 @@ use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link;
 use crate::pipeline::parts::GraphicsState;
 use crate::pipeline::stages::{self, ProgramResources};
-use crate::pipeline::state::{
-    AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source,
-};
+use crate::pipeline::state::{AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source};
 use crate::pipeline::varyings::{InterfaceComponent, LiveOutputs, Varyings};
 use crate::shader_module::ShaderStage;
 use ash::vk;
@@ -60,11 +58,7 @@ impl VertexProjection {
         let programs = link::link_projection(vertex, stream, &components)?;
         let programs = DrawPipeline::of_gaussians(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
-        Ok(Self {
-            programs: Arc::new(programs),
-            attributes,
-            resources,
-        })
+        Ok(Self { programs: Arc::new(programs), attributes, resources })
     }
 }
 
@@ -99,8 +93,7 @@ impl ResolveStage {
             let is_needed = draw.alpha_to_coverage || draw.alpha_to_one;
             return is_needed.then(|| Self::passing(device, fixed)).transpose();
         };
-        let fragment =
-            stages::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
+        let fragment = stages::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
         let resources = ProgramResources::new(device, &fragment.interface);
@@ -141,13 +134,7 @@ impl ResolveStage {
                 sampling: Sampling::Center,
             })
         };
-        let output = |component| {
-            Some(FragmentOutput::Color {
-                attachment: 0,
-                component,
-                index: 0,
-            })
-        };
+        let output = |component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 });
         let programs = FragmentPrograms {
             program: builder.finish().map_err(|error| invalid(&error))?,
             inputs: (0..4).map(input).collect(),
@@ -174,37 +161,12 @@ const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-None-9
 fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, Error> {
     let locations = &state.resolve_input_locations;
     let inputs = [
-        (
-            "accumulatedColor",
-            locations.accumulated_color,
-            resolve::ACCUMULATED,
-            4,
-        ),
+        ("accumulatedColor", locations.accumulated_color, resolve::ACCUMULATED, 4),
         ("depth", locations.depth, resolve::EXPECTED_DEPTH, 2),
-        (
-            "linearDepth",
-            locations.linear_depth,
-            resolve::EXPECTED_LINEAR_DEPTH,
-            2,
-        ),
-        (
-            "medianGaussian",
-            locations.median_gaussian,
-            resolve::MEDIAN_GAUSSIAN,
-            2,
-        ),
-        (
-            "nearestGaussian",
-            locations.nearest_gaussian,
-            resolve::NEAREST_GAUSSIAN,
-            2,
-        ),
-        (
-            "firstCamera",
-            locations.first_camera,
-            resolve::CAMERA,
-            4 * resolve::CAMERA_LOCATIONS,
-        ),
+        ("linearDepth", locations.linear_depth, resolve::EXPECTED_LINEAR_DEPTH, 2),
+        ("medianGaussian", locations.median_gaussian, resolve::MEDIAN_GAUSSIAN, 2),
+        ("nearestGaussian", locations.nearest_gaussian, resolve::NEAREST_GAUSSIAN, 2),
+        ("firstCamera", locations.first_camera, resolve::CAMERA, 4 * resolve::CAMERA_LOCATIONS),
     ];
     let mut places = Varyings::new();
     for (name, first, number, count) in inputs {
@@ -216,10 +178,7 @@ fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, 
             if places.insert(place, number + at).is_some() {
                 return Err(Error::usage(
                     RESOLVE_INPUTS,
-                    format!(
-                        "{name} has location {}, as another input of the resolve shader has",
-                        place.0
-                    ),
+                    format!("{name} has location {}, as another input of the resolve shader has", place.0),
                 ));
             }
         }
@@ -230,12 +189,7 @@ fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, 
 /// Refuses inputs and outputs that a resolve shader can't have.
 fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error> {
     for input in &interface.inputs {
-        let InputSource::Location {
-            location,
-            component,
-            ..
-        } = input.source
-        else {
+        let InputSource::Location { location, component, .. } = input.source else {
             continue;
         };
         let wanted = varyings.get(&(location, component)).map(|number| {
@@ -271,12 +225,9 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
 }
 
 fn layout(info: &GraphicsState) -> Result<&Arc<PipelineLayout>, Error> {
-    info.layout.as_ref().ok_or_else(|| {
-        Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
-            "the pipeline has no layout",
-        )
-    })
+    info.layout
+        .as_ref()
+        .ok_or_else(|| Error::usage("VUID-VkGraphicsPipelineCreateInfo-layout-06602", "the pipeline has no layout"))
 }
 
 /// A pipeline's stage of a kind.
@@ -312,15 +263,9 @@ fn components(
             return refuse(format!("{name} is unused, but the pipeline reads it"));
         }
         if components.iter().any(|&(taken, _)| taken == location) {
-            return refuse(format!(
-                "{name} is location {location}, as another output is"
-            ));
+            return refuse(format!("{name} is location {location}, as another output is"));
         }
-        let count = if first == gaussian::OPACITY || is_key {
-            1
-        } else {
-            3
-        };
+        let count = if first == gaussian::OPACITY || is_key { 1 } else { 3 };
         for component in 0..count {
             let place = (location, component);
             if !writes_float(interface, place) {

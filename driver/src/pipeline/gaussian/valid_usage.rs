@@ -9,10 +9,9 @@ use crate::pipeline::state::reads_second_source;
 use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST,
-    GaussianAttributeLocationsGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianAttributeLocationsGAURAST,
+    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::state::gaussian::{
@@ -70,11 +69,8 @@ pub(super) const UNSCENTED_PROJECTION: Feature = (
     "unscentedProjection",
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-90040",
 );
-pub(super) const GAUSSIAN_2D: Feature = (
-    |features| features.gaussian_2d,
-    "gaussian2D",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-90041",
-);
+pub(super) const GAUSSIAN_2D: Feature =
+    (|features| features.gaussian_2d, "gaussian2D", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-90041");
 pub(super) const UNIFORM_BUFFER_CAMERA: Feature = (
     |features| features.uniform_buffer_camera,
     "uniformBufferCamera",
@@ -147,10 +143,7 @@ pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Resu
 }
 
 fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
-    Error::FeatureNotEnabled {
-        vuid,
-        message: format!("{STRUCTURE}: {what}, but the feature {name} is not enabled"),
-    }
+    Error::FeatureNotEnabled { vuid, message: format!("{STRUCTURE}: {what}, but the feature {name} is not enabled") }
 }
 
 pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
@@ -164,10 +157,7 @@ pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
         "cameraSource" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraSource-parameter",
         _ => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-parameter",
     };
-    Error::usage(
-        vuid,
-        format!("{STRUCTURE}: {field} has the unknown value {value:?}"),
-    )
+    Error::usage(vuid, format!("{STRUCTURE}: {field} has the unknown value {value:?}"))
 }
 
 pub(super) fn has_fragment_stage(info: &GraphicsState) -> bool {
@@ -202,10 +192,7 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub(super) fn new(
-        info: &GraphicsState,
-        gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    ) -> Self {
+    pub(super) fn new(info: &GraphicsState, gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Self {
         let is_used = |location: u32| location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
         let (resolves, inputs) = (has_fragment_stage(info), gaussian.resolve_input_locations);
         Self {
@@ -219,14 +206,9 @@ impl Modes {
             is_placed: is_used(gaussian.attribute_locations.first_model_matrix),
             has_key: is_used(gaussian.vertex_output_locations.depth_key),
             is_tracking: resolves
-                && [
-                    inputs.depth,
-                    inputs.linear_depth,
-                    inputs.median_gaussian,
-                    inputs.nearest_gaussian,
-                ]
-                .into_iter()
-                .any(is_used),
+                && [inputs.depth, inputs.linear_depth, inputs.median_gaussian, inputs.nearest_gaussian]
+                    .into_iter()
+                    .any(is_used),
             reads_camera: resolves && is_used(inputs.first_camera),
             is_cut: info
                 .pre_rasterization
@@ -307,11 +289,7 @@ pub(crate) struct DynamicRules {
 
 impl DynamicRules {
     pub(super) fn new(modes: Modes, features: &Features, max_degree: u32) -> Self {
-        Self {
-            modes,
-            features: Box::new(features.clone()),
-            max_degree,
-        }
+        Self { modes, features: Box::new(features.clone()), max_degree }
     }
 
     /// Refuses a state with dynamic values that a pipeline could not have.
@@ -319,11 +297,7 @@ impl DynamicRules {
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that is not enabled.
     pub(crate) fn check(&self, state: &GaussianState) -> Result<(), Error> {
-        let modes = Modes {
-            order: state.order,
-            is_compensated: state.opacity_compensated,
-            ..self.modes
-        };
+        let modes = Modes { order: state.order, is_compensated: state.opacity_compensated, ..self.modes };
         modes.check()?;
         require_modes(&self.features, state)?;
         ceiling_over_floor(state.alpha_floor, state.alpha_ceiling)?;
@@ -385,18 +359,10 @@ pub(super) fn without_dynamic<'a>(
         own.antialiasing = GaussianAntialiasingGAURAST::DILATE;
     }
     for (state, member, value) in [
-        (
-            S::GAUSSIAN_LOW_PASS_VARIANCE,
-            &mut own.low_pass_variance,
-            0.0,
-        ),
+        (S::GAUSSIAN_LOW_PASS_VARIANCE, &mut own.low_pass_variance, 0.0),
         (S::GAUSSIAN_ALPHA_FLOOR, &mut own.alpha_floor, 0.0),
         (S::GAUSSIAN_ALPHA_CEILING, &mut own.alpha_ceiling, 1.0),
-        (
-            S::GAUSSIAN_TRANSMITTANCE_FLOOR,
-            &mut own.transmittance_floor,
-            0.0,
-        ),
+        (S::GAUSSIAN_TRANSMITTANCE_FLOOR, &mut own.transmittance_floor, 0.0),
     ] {
         if info.is_dynamic(state) {
             *member = value;
@@ -431,11 +397,7 @@ pub(super) fn stages(
     let shaded = is_shaded(gaussian);
     let of = |wanted| info.stages().filter(move |(stage, _)| *stage == wanted);
     let known = vk::ShaderStageFlags::FRAGMENT
-        | if shaded {
-            vk::ShaderStageFlags::VERTEX
-        } else {
-            vk::ShaderStageFlags::empty()
-        };
+        | if shaded { vk::ShaderStageFlags::VERTEX } else { vk::ShaderStageFlags::empty() };
     let unwanted = info.stages().find(|(stage, _)| !known.contains(*stage));
     let wrong = if let Some((stage, _)) = unwanted {
         Some(format!("must not have a stage {stage:?}"))
@@ -449,10 +411,7 @@ pub(super) fn stages(
     if let Some(wrong) = wrong {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
-            format!(
-                "projectionMode is {:?}, so the pipeline {wrong}",
-                gaussian.projection_mode
-            ),
+            format!("projectionMode is {:?}, so the pipeline {wrong}", gaussian.projection_mode),
         ));
     }
     if info.vertex_input.primitive_restart {
@@ -465,10 +424,7 @@ pub(super) fn stages(
 }
 
 /// Checks the state that only fixed-function projection uses.
-fn projection(
-    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &Features,
-) -> Result<(), Error> {
+fn projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features: &Features) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
@@ -486,10 +442,7 @@ fn projection(
     Ok(())
 }
 
-pub(super) fn modes(
-    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &Features,
-) -> Result<(), Error> {
+pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features: &Features) -> Result<(), Error> {
     if !is_shaded(gaussian) {
         projection(gaussian, features)?;
     }
@@ -521,11 +474,7 @@ pub(super) fn distinct_locations(
         ("scale", locations.scale, 1),
         ("rotation", locations.rotation, 1),
         ("opacity", locations.opacity, 1),
-        (
-            "firstSphericalHarmonics",
-            locations.first_spherical_harmonics,
-            coefficients,
-        ),
+        ("firstSphericalHarmonics", locations.first_spherical_harmonics, coefficients),
         ("firstModelMatrix", locations.first_model_matrix, 3),
         ("modelOpacity", locations.model_opacity, 1),
     ];
@@ -535,8 +484,7 @@ pub(super) fn distinct_locations(
             continue;
         }
         let own = first..first.saturating_add(count);
-        let shared =
-            |(_, other): &&(&str, Range<u32>)| own.start < other.end && other.start < own.end;
+        let shared = |(_, other): &&(&str, Range<u32>)| own.start < other.end && other.start < own.end;
         if let Some((earlier, _)) = used.iter().find(shared) {
             return Err(Error::usage(
                 "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
@@ -564,23 +512,13 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
             ),
         ));
     }
-    values::LOW_PASS_VARIANCE.check(
-        g.low_pass_variance,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
-    )?;
-    values::ALPHA_FLOOR.check(
-        g.alpha_floor,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
-    )?;
-    values::ALPHA_CEILING.check(
-        g.alpha_ceiling,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
-    )?;
+    values::LOW_PASS_VARIANCE
+        .check(g.low_pass_variance, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011")?;
+    values::ALPHA_FLOOR.check(g.alpha_floor, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012")?;
+    values::ALPHA_CEILING.check(g.alpha_ceiling, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013")?;
     ceiling_over_floor(g.alpha_floor, g.alpha_ceiling)?;
-    values::TRANSMITTANCE_FLOOR.check(
-        g.transmittance_floor,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
-    )
+    values::TRANSMITTANCE_FLOOR
+        .check(g.transmittance_floor, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014")
 }
 
 /// Refuses fixed-function state that a Gaussian pipeline doesn't support.
@@ -589,37 +527,18 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     let depth_stencil = info.depth_stencil().copied().unwrap_or_default();
     let tests = [
         (depth_stencil.depth_test_enable, S::DEPTH_TEST_ENABLE),
-        (
-            depth_stencil.depth_bounds_test_enable,
-            S::DEPTH_BOUNDS_TEST_ENABLE,
-        ),
+        (depth_stencil.depth_bounds_test_enable, S::DEPTH_BOUNDS_TEST_ENABLE),
         (depth_stencil.stencil_test_enable, S::STENCIL_TEST_ENABLE),
     ];
-    if tests
-        .iter()
-        .any(|&(enable, state)| enable != vk::FALSE || info.is_dynamic(state))
-    {
-        require(
-            features,
-            DEPTH_STENCIL,
-            "the pipeline has a depth, depth bounds or stencil test",
-        )?;
+    if tests.iter().any(|&(enable, state)| enable != vk::FALSE || info.is_dynamic(state)) {
+        require(features, DEPTH_STENCIL, "the pipeline has a depth, depth bounds or stencil test")?;
     }
     let multisample = &info.fragment_output.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
-        require(
-            features,
-            MULTISAMPLE,
-            "the pipeline has several samples per pixel",
-        )?;
+        require(features, MULTISAMPLE, "the pipeline has several samples per pixel")?;
     }
-    if info
-        .pre_rasterization
-        .rasterization
-        .rasterizer_discard_enable
-        != vk::FALSE
-    {
+    if info.pre_rasterization.rasterization.rasterizer_discard_enable != vk::FALSE {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
             "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE with Gaussians",
@@ -630,11 +549,7 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
         require(features, DYNAMIC_STATE, what)?;
     }
     let shades = has_fragment_stage(info);
-    if let Some(state) = info
-        .dynamic
-        .iter()
-        .find(|state| !may_gaussians_have(**state))
-    {
+    if let Some(state) = info.dynamic.iter().find(|state| !may_gaussians_have(**state)) {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
             format!("{state:?} must not be dynamic in a Gaussian pipeline"),
@@ -642,8 +557,7 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     }
     if !shades && info.fragment_output.blend.iter().any(reads_second_source) {
         return Err(Error::FeatureNotPresent(
-            "a second source of blending (feature dualSrcBlend) with Gaussians and no fragment stage"
-                .into(),
+            "a second source of blending (feature dualSrcBlend) with Gaussians and no fragment stage".into(),
         ));
     }
     if info.pre_rasterization.viewport_count > 1 {
@@ -656,10 +570,7 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
 }
 
 /// Validates and converts the chain's structure of footprints, if it has one.
-pub(super) fn footprint(
-    info: &GraphicsState,
-    features: &Features,
-) -> Result<GaussianFootprint, Error> {
+pub(super) fn footprint(info: &GraphicsState, features: &Features) -> Result<GaussianFootprint, Error> {
     let Some(given) = info.pre_rasterization.footprint else {
         return Ok(GaussianFootprint::default());
     };
@@ -696,14 +607,12 @@ pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximatio
     let given = info.pre_rasterization.approximation.unwrap_or_default();
     let mut own = GaussianApproximation::default();
     if !info.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
-        let vuid =
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051";
+        let vuid = "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051";
         values::EXPONENTIAL_ERROR.check(given.exponential_error, vuid)?;
         own.exponential_error = given.exponential_error;
     }
     if !info.is_dynamic(S::GAUSSIAN_CONTRIBUTION_BUDGET) {
-        let vuid =
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052";
+        let vuid = "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052";
         values::CONTRIBUTION_BUDGET.check(given.contribution_budget, vuid)?;
         own.contribution_budget = given.contribution_budget;
     }

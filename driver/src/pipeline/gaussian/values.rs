@@ -49,26 +49,17 @@ pub(crate) const LOW_PASS_VARIANCE: Rule = Rule {
     holds: |value| value >= 0.0 && value.is_finite(),
     must_be: "finite and not negative",
 };
-pub(crate) const ALPHA_FLOOR: Rule = Rule {
-    name: "alphaFloor",
-    holds: |value| (0.0..=1.0).contains(&value),
-    must_be: "at least 0 and at most 1",
-};
-pub(crate) const ALPHA_CEILING: Rule = Rule {
-    name: "alphaCeiling",
-    holds: |value| value > 0.0 && value <= 1.0,
-    must_be: "greater than 0 and at most 1",
-};
+pub(crate) const ALPHA_FLOOR: Rule =
+    Rule { name: "alphaFloor", holds: |value| (0.0..=1.0).contains(&value), must_be: "at least 0 and at most 1" };
+pub(crate) const ALPHA_CEILING: Rule =
+    Rule { name: "alphaCeiling", holds: |value| value > 0.0 && value <= 1.0, must_be: "greater than 0 and at most 1" };
 pub(crate) const TRANSMITTANCE_FLOOR: Rule = Rule {
     name: "transmittanceFloor",
     holds: |value| (0.0..1.0).contains(&value),
     must_be: "at least 0 and less than 1",
 };
-pub(crate) const EXPONENTIAL_ERROR: Rule = Rule {
-    name: "exponentialError",
-    holds: |value| (0.0..=1.0).contains(&value),
-    must_be: "at least 0 and at most 1",
-};
+pub(crate) const EXPONENTIAL_ERROR: Rule =
+    Rule { name: "exponentialError", holds: |value| (0.0..=1.0).contains(&value), must_be: "at least 0 and at most 1" };
 pub(crate) const CONTRIBUTION_BUDGET: Rule = Rule {
     name: "contributionBudget",
     holds: |value| (0.0..=1.0).contains(&value),

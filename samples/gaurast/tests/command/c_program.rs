@@ -15,11 +15,7 @@ fn build_folder() -> PathBuf {
 /// Runs a command and checks that it succeeds.
 fn succeed(command: &mut Command) {
     let output = command.output().expect("the command starts");
-    assert!(
-        output.status.success(),
-        "{command:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
 /// Compiles the C sample.

@@ -48,11 +48,7 @@ fn frames_of_any_size_and_order_are_the_same_pictures() {
 #[gaurast_runner::test]
 fn the_degree_drawn_is_the_least_of_those_asked_for() {
     let mut renderer = renderer();
-    let shape = GaussianShape {
-        scale: [0.5; 3],
-        rotation: [1.0, 0.0, 0.0, 0.0],
-        opacity: 0.9,
-    };
+    let shape = GaussianShape { scale: [0.5; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 0.9 };
     let mut sh = vec![[0.0; 3]; 25];
     // The z function of band 1 and the middle function of band 2, which are greatest along +z, where the Gaussian is.
     sh[2] = [1.0, 0.0, 0.0];
@@ -61,9 +57,7 @@ fn the_degree_drawn_is_the_least_of_those_asked_for() {
     scene.push([0., 0., 3.], shape, &sh);
     let mut colour = |degree: Option<u32>| {
         let uploaded = renderer.upload(&scene, degree).expect("uploaded");
-        let frame = renderer
-            .render(&uploaded, &camera([9, 9]))
-            .expect("a frame");
+        let frame = renderer.render(&uploaded, &camera([9, 9])).expect("a frame");
         let [r, g, b, alpha] = frame.picture.pixels[40];
         assert!((alpha - 0.9).abs() < 5e-6, "{alpha}");
         [r, g, b].map(|c| c / alpha)
@@ -78,10 +72,7 @@ fn the_degree_drawn_is_the_least_of_those_asked_for() {
         (None, [0.5 + band_1, 0.5 + band_2, 0.5]),
     ] {
         for (value, expected) in colour(degree).into_iter().zip(expected) {
-            assert!(
-                (value - expected).abs() < 1e-5,
-                "{degree:?}: {value} {expected}"
-            );
+            assert!((value - expected).abs() < 1e-5, "{degree:?}: {value} {expected}");
         }
     }
 }
@@ -89,49 +80,19 @@ fn the_degree_drawn_is_the_least_of_those_asked_for() {
 #[gaurast_runner::test]
 fn skipped_gaussians_are_counted_and_poison_nothing() {
     let mut renderer = renderer();
-    let good = GaussianShape {
-        scale: [0.2; 3],
-        rotation: [1.0, 0.0, 0.0, 0.0],
-        opacity: 0.5,
-    };
+    let good = GaussianShape { scale: [0.2; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 0.5 };
     let mut scene = Scene::with_capacity(0, 0);
     let mut push = |position, shape| scene.push(position, shape, &[[0.5; 3]]);
     let ahead = [0., 0., 4.];
     push(ahead, good);
     push([f32::NAN, 0., 4.], good);
-    push(
-        ahead,
-        GaussianShape {
-            scale: [f32::INFINITY; 3],
-            ..good
-        },
-    );
-    push(
-        ahead,
-        GaussianShape {
-            rotation: [0.0; 4],
-            ..good
-        },
-    );
-    push(
-        ahead,
-        GaussianShape {
-            scale: [-1.0; 3],
-            ..good
-        },
-    );
-    push(
-        ahead,
-        GaussianShape {
-            opacity: 0.001,
-            ..good
-        },
-    );
+    push(ahead, GaussianShape { scale: [f32::INFINITY; 3], ..good });
+    push(ahead, GaussianShape { rotation: [0.0; 4], ..good });
+    push(ahead, GaussianShape { scale: [-1.0; 3], ..good });
+    push(ahead, GaussianShape { opacity: 0.001, ..good });
     push([0., 0., -4.], good);
     let uploaded = renderer.upload(&scene, None).expect("uploaded");
-    let frame = renderer
-        .render(&uploaded, &camera([33, 33]))
-        .expect("a frame");
+    let frame = renderer.render(&uploaded, &camera([33, 33])).expect("a frame");
     assert_eq!(counted(&frame, "gaussians read"), 7.0);
     assert_eq!(counted(&frame, "gaussians drawn"), 1.0);
     let skipped: f64 = frame
@@ -141,14 +102,7 @@ fn skipped_gaussians_are_counted_and_poison_nothing() {
         .map(|counter| counter.value)
         .sum();
     assert_eq!(skipped, 6.0);
-    assert!(
-        frame
-            .picture
-            .pixels
-            .as_flattened()
-            .iter()
-            .all(|c| c.is_finite())
-    );
+    assert!(frame.picture.pixels.as_flattened().iter().all(|c| c.is_finite()));
     let centre = frame.picture.pixels[33 * 16 + 16];
     assert!((centre[3] - 0.5).abs() < 5e-6, "{centre:?}");
 }
@@ -157,9 +111,7 @@ fn skipped_gaussians_are_counted_and_poison_nothing() {
 fn an_empty_scene_is_an_empty_picture() {
     let mut renderer = renderer();
     let uploaded = renderer.upload(&Scene::default(), None).expect("uploaded");
-    let frame = renderer
-        .render(&uploaded, &camera([20, 10]))
-        .expect("a frame");
+    let frame = renderer.render(&uploaded, &camera([20, 10])).expect("a frame");
     assert!(frame.picture.pixels.iter().all(|pixel| *pixel == [0.0; 4]));
 }
 

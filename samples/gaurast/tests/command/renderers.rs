@@ -48,11 +48,7 @@ fn scene() -> Vec<Gaussian> {
     let one = |_| {
         let size = random.between(-5.0, -1.0);
         Gaussian {
-            position: [
-                random.between(-3.0, 3.0),
-                random.between(-2.5, 2.5),
-                random.between(-4.2, 5.0),
-            ],
+            position: [random.between(-3.0, 3.0), random.between(-2.5, 2.5), random.between(-4.2, 5.0)],
             scale: [0; 3].map(|_| size + random.between(-1.5, 0.7)),
             rotation: [0; 4].map(|_| random.between(-1.0, 1.0)),
             opacity: random.between(-5.0, 6.0),
@@ -66,14 +62,9 @@ fn scene() -> Vec<Gaussian> {
 fn ply(scene: &[Gaussian]) -> Vec<u8> {
     let rest = (0..45).map(|number| format!("f_rest_{number}"));
     let names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"].map(str::to_owned);
-    let others = [
-        "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
-    ];
+    let others = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
     let others = others.map(str::to_owned);
-    let mut header = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
-        scene.len()
-    );
+    let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", scene.len());
     for name in names.into_iter().chain(rest).chain(others) {
         header += &format!("property float {name}\n");
     }
@@ -131,34 +122,17 @@ fn project(one: &Gaussian, rules: &Rules) -> Option<Splat> {
         let limit = 1.3 * tangent[axis];
         slope[axis].clamp(-limit, limit) * z
     });
-    let jacobian = [
-        [focal / z, 0.0, -focal * tx / (z * z)],
-        [0.0, focal / z, -focal * ty / (z * z)],
-    ];
+    let jacobian = [[focal / z, 0.0, -focal * tx / (z * z)], [0.0, focal / z, -focal * ty / (z * z)]];
     let [w, qx, qy, qz] = one.rotation.map(f64::from);
     let norm = (w * w + qx * qx + qy * qy + qz * qz).sqrt();
     let [w, qx, qy, qz] = [w, qx, qy, qz].map(|part| part / norm);
     let rotation = [
-        [
-            1.0 - 2.0 * (qy * qy + qz * qz),
-            2.0 * (qx * qy - w * qz),
-            2.0 * (qx * qz + w * qy),
-        ],
-        [
-            2.0 * (qx * qy + w * qz),
-            1.0 - 2.0 * (qx * qx + qz * qz),
-            2.0 * (qy * qz - w * qx),
-        ],
-        [
-            2.0 * (qx * qz - w * qy),
-            2.0 * (qy * qz + w * qx),
-            1.0 - 2.0 * (qx * qx + qy * qy),
-        ],
+        [1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy - w * qz), 2.0 * (qx * qz + w * qy)],
+        [2.0 * (qx * qy + w * qz), 1.0 - 2.0 * (qx * qx + qz * qz), 2.0 * (qy * qz - w * qx)],
+        [2.0 * (qx * qz - w * qy), 2.0 * (qy * qz + w * qx), 1.0 - 2.0 * (qx * qx + qy * qy)],
     ];
     // Files hold binary32, and so are what is made of them.
-    let scale = one
-        .scale
-        .map(|scale| f64::from(f64::from(scale).exp() as f32));
+    let scale = one.scale.map(|scale| f64::from(f64::from(scale).exp() as f32));
     let m: [[f64; 3]; 2] = jacobian.map(|row| {
         [0, 1, 2].map(|column| {
             let turned: f64 = (0..3).map(|axis| row[axis] * rotation[axis][column]).sum();
@@ -166,11 +140,7 @@ fn project(one: &Gaussian, rules: &Rules) -> Option<Splat> {
         })
     });
     let product = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (xx, xy, yy) = (
-        product(m[0], m[0]),
-        product(m[0], m[1]),
-        product(m[1], m[1]),
-    );
+    let (xx, xy, yy) = (product(m[0], m[0]), product(m[0], m[1]), product(m[1], m[1]));
     let before = xx * yy - xy * xy;
     let covariance = [xx + 0.3, xy, yy + 0.3];
     let after = covariance[0] * covariance[2] - xy * xy;
@@ -182,10 +152,7 @@ fn project(one: &Gaussian, rules: &Rules) -> Option<Splat> {
     Some(Splat {
         depth: z,
         distance,
-        mean: [
-            focal * slope[0] + WIDTH as f64 / 2.0,
-            focal * slope[1] + HEIGHT as f64 / 2.0,
-        ],
+        mean: [focal * slope[0] + WIDTH as f64 / 2.0, focal * slope[1] + HEIGHT as f64 / 2.0],
         covariance,
         opacity,
         color: color(&one.harmonics, [x / distance, y / distance, z / distance]),
@@ -214,9 +181,7 @@ fn color(harmonics: &[[f32; 3]; COEFFICIENTS], [x, y, z]: [f64; 3]) -> [f64; 3] 
     ];
     [0, 1, 2].map(|channel| {
         let terms = functions.iter().zip(harmonics);
-        let sum: f64 = terms
-            .map(|(function, triple)| function * f64::from(triple[channel]))
-            .sum();
+        let sum: f64 = terms.map(|(function, triple)| function * f64::from(triple[channel])).sum();
         (sum + 0.5).max(0.0)
     })
 }
@@ -318,9 +283,7 @@ fn composite(splats: &[Splat], rules: &Rules, pixel: [usize; 2]) -> ([f64; 4], b
 fn drawn(folder: &TempDir, arguments: &[&str]) -> Vec<[f32; 4]> {
     let size = format!("{WIDTH}x{HEIGHT}");
     let eye = EYE.map(|c| c.to_string()).join(",");
-    let target = [EYE[0], EYE[1], EYE[2] + 1.0]
-        .map(|c| c.to_string())
-        .join(",");
+    let target = [EYE[0], EYE[1], EYE[2] + 1.0].map(|c| c.to_string()).join(",");
     let (eye, target) = (format!("--eye={eye}"), format!("--target={target}"));
     let fov = FOV.to_string();
     let output = Command::new(env!("CARGO_BIN_EXE_gaurast"))
@@ -343,17 +306,10 @@ fn pixels(path: &Path) -> Vec<[f32; 4]> {
 /// Holds the command's picture against a renderer's; returns how many pixels were too close to call.
 #[track_caller]
 fn check(folder: &TempDir, arguments: &[&str], rules: &Rules) -> usize {
-    let mut splats: Vec<Splat> = scene()
-        .iter()
-        .filter_map(|one| project(one, rules))
-        .collect();
+    let mut splats: Vec<Splat> = scene().iter().filter_map(|one| project(one, rules)).collect();
     splats.sort_by(|a, b| {
         let key = |splat: &Splat| {
-            if rules.by_distance {
-                splat.distance
-            } else {
-                splat.depth
-            }
+            if rules.by_distance { splat.distance } else { splat.depth }
         };
         (key(a) as f32).total_cmp(&(key(b) as f32))
     });
@@ -364,9 +320,7 @@ fn check(folder: &TempDir, arguments: &[&str], rules: &Rules) -> usize {
         let place = [at % WIDTH, at / WIDTH];
         let (expected, is_open) = composite(&splats, rules, place);
         covered += usize::from(expected[3] > 0.5);
-        let apart = (0..4)
-            .map(|channel| (expected[channel] - f64::from(pixel[channel])).abs())
-            .fold(0.0, f64::max);
+        let apart = (0..4).map(|channel| (expected[channel] - f64::from(pixel[channel])).abs()).fold(0.0, f64::max);
         if apart > 1e-5 {
             if is_open {
                 open += 1;
@@ -376,12 +330,7 @@ fn check(folder: &TempDir, arguments: &[&str], rules: &Rules) -> usize {
         }
     }
     assert!(covered > WIDTH * HEIGHT / 2, "{covered} pixels are covered");
-    assert!(
-        different.is_empty(),
-        "{arguments:?}: {} pixels differ, such as {:?}",
-        different.len(),
-        different[0]
-    );
+    assert!(different.is_empty(), "{arguments:?}: {} pixels differ, such as {:?}", different.len(), different[0]);
     open
 }
 
@@ -407,11 +356,7 @@ fn inria_s_pictures_are_drawn() {
     };
     let open = check(&folder, &["--as", "inria"], &rules);
     assert!(open <= FEW, "{open}");
-    let compensated = Rules {
-        compensated: true,
-        ratio_floor: 0.000_025,
-        ..rules
-    };
+    let compensated = Rules { compensated: true, ratio_floor: 0.000_025, ..rules };
     let arguments = ["--as", "inria", "--antialiasing", "compensated"];
     let open = check(&folder, &arguments, &compensated);
     assert!(open <= FEW, "{open}");
@@ -430,10 +375,7 @@ fn gsplat_s_pictures_are_drawn() {
     };
     let open = check(&folder, &["--as", "gsplat"], &rules);
     assert!(open <= FEW, "{open}");
-    let compensated = Rules {
-        compensated: true,
-        ..rules
-    };
+    let compensated = Rules { compensated: true, ..rules };
     let arguments = ["--as", "gsplat", "--antialiasing", "compensated"];
     let open = check(&folder, &arguments, &compensated);
     assert!(open <= FEW, "{open}");
@@ -469,22 +411,12 @@ fn renderers_differ_and_pictures_are_compared_with_them() {
     }
     // The last one is there still.
     let eye = EYE.map(|c| c.to_string()).join(",");
-    let target = [EYE[0], EYE[1], EYE[2] + 1.0]
-        .map(|c| c.to_string())
-        .join(",");
+    let target = [EYE[0], EYE[1], EYE[2] + 1.0].map(|c| c.to_string()).join(",");
     let (eye, target) = (format!("--eye={eye}"), format!("--target={target}"));
     let fov = FOV.to_string();
     let compared = |renderer: &str| {
         let output = Command::new(env!("CARGO_BIN_EXE_gaurast"))
-            .args([
-                "compare",
-                "a.exr",
-                "scene.ply",
-                &eye,
-                &target,
-                "--fov",
-                &fov,
-            ])
+            .args(["compare", "a.exr", "scene.ply", &eye, &target, "--fov", &fov])
             .args(["--as", renderer, "--fail-below", "90"])
             .current_dir(folder.path())
             .output()
@@ -494,15 +426,7 @@ fn renderers_differ_and_pictures_are_compared_with_them() {
     assert_eq!(compared("gltf"), Some(0));
     assert_eq!(compared("inria"), Some(1));
     let refused = Command::new(env!("CARGO_BIN_EXE_gaurast"))
-        .args([
-            "scene.ply",
-            "--as",
-            "inria",
-            "--geometry",
-            "2d",
-            "-o",
-            "b.png",
-        ])
+        .args(["scene.ply", "--as", "inria", "--geometry", "2d", "-o", "b.png"])
         .current_dir(folder.path())
         .output()
         .expect("the command starts");

@@ -41,9 +41,8 @@ fn fails(folder: &TempDir, arguments: &[&str], message: &str) {
 
 fn files(folder: &TempDir) -> Vec<String> {
     let entries = std::fs::read_dir(folder.path()).expect("readable");
-    let name = |entry: std::io::Result<std::fs::DirEntry>| {
-        text(entry.expect("an entry").file_name().as_encoded_bytes())
-    };
+    let name =
+        |entry: std::io::Result<std::fs::DirEntry>| text(entry.expect("an entry").file_name().as_encoded_bytes());
     let mut names: Vec<String> = entries.map(name).collect();
     names.sort();
     names
@@ -51,13 +50,10 @@ fn files(folder: &TempDir) -> Vec<String> {
 
 /// A PLY file of round Gaussians of this size, at these positions, with these colours.
 fn scene(size: f64, gaussians: &[([f64; 3], [f64; 3])]) -> String {
-    let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\n",
-        gaussians.len()
-    );
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", gaussians.len());
     for property in [
-        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
-        "opacity", "f_dc_0", "f_dc_1", "f_dc_2",
+        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
+        "f_dc_1", "f_dc_2",
     ] {
         text += &format!("property float {property}\n");
     }
@@ -83,18 +79,10 @@ fn folder() -> TempDir {
 
 /// The share of the pixels of `name` that are not black, and the mean colour.
 fn covered(folder: &TempDir, name: &str) -> (f64, [f64; 3]) {
-    let picture = image::open(folder.path().join(name))
-        .expect("a picture")
-        .to_rgb8();
+    let picture = image::open(folder.path().join(name)).expect("a picture").to_rgb8();
     let count = f64::from(picture.width() * picture.height());
     let drawn = picture.pixels().filter(|pixel| pixel.0 != [0; 3]).count() as f64;
-    let mean = |channel: usize| {
-        picture
-            .pixels()
-            .map(|p| f64::from(p.0[channel]))
-            .sum::<f64>()
-            / count
-    };
+    let mean = |channel: usize| picture.pixels().map(|p| f64::from(p.0[channel])).sum::<f64>() / count;
     (drawn / count, [mean(0), mean(1), mean(2)])
 }
 
@@ -103,46 +91,29 @@ fn a_tiny_scene_is_seen() {
     let folder = tempfile::tempdir().expect("a folder");
     for size in [0.02, 1e-5] {
         let gaussians = [([-size, 0.0, 0.0], RED), ([size, 0.0, 0.0], GREEN)];
-        std::fs::write(
-            folder.path().join("tiny.ply"),
-            scene(0.3 * size, &gaussians),
-        )
-        .expect("written");
+        std::fs::write(folder.path().join("tiny.ply"), scene(0.3 * size, &gaussians)).expect("written");
         let small = ["tiny.ply", "--size", "64x48", "--force"];
         let stdout = succeeds(&folder, &small);
         assert!(stdout.contains("framed by --azimuth"), "{stdout}");
         let (share, [r, g, _]) = covered(&folder, "tiny.png");
-        assert!(
-            share > 0.05 && r > 3.0 && g > 3.0,
-            "{size}: {share} {r} {g}"
-        );
+        assert!(share > 0.05 && r > 3.0 && g > 3.0, "{size}: {share} {r} {g}");
     }
 }
 
 #[gaurast_runner::test]
 fn a_picture_of_nothing_says_why() {
     let folder = folder();
-    let away = [
-        "two.ply", "--size", "32x24", "--eye", "0,0,-3", "--target", "0,0,-9",
-    ];
+    let away = ["two.ply", "--size", "32x24", "--eye", "0,0,-3", "--target", "0,0,-9"];
     let output = gaurast(folder.path(), &away);
     let stderr = text(&output.stderr);
     assert!(output.status.success(), "{stderr}");
     assert!(
-        stderr.contains(
-            "two.png: there is nothing in the picture: of 2 Gaussians: 2 before near plane (--near "
-        ),
+        stderr.contains("two.png: there is nothing in the picture: of 2 Gaussians: 2 before near plane (--near "),
         "{stderr}"
     );
     let strict = [&away[..], &["--strict", "-o", "b.png"]].concat();
-    fails(
-        &folder,
-        &strict,
-        "gaurast: there is nothing in the picture: of 2 Gaussians",
-    );
-    let far = [
-        "two.ply", "--size", "32x24", "--far", "0.3", "--strict", "-o", "b.png",
-    ];
+    fails(&folder, &strict, "gaurast: there is nothing in the picture: of 2 Gaussians");
+    let far = ["two.ply", "--size", "32x24", "--far", "0.3", "--strict", "-o", "b.png"];
     fails(&folder, &far, "2 beyond far plane (--far 0.3)");
 }
 
@@ -151,57 +122,25 @@ fn what_the_device_does_not_draw_together_is_one_sentence() {
     let folder = folder();
     for (modes, message) in [
         (&["--geometry", "2d", "--precision", "fp16"][..], "binary16"),
-        (
-            &["--geometry", "2d", "--camera", "fisheye"],
-            "pinhole and orthographic",
-        ),
-        (
-            &["--geometry", "2d", "--antialiasing", "compensated"],
-            "compensated opacity",
-        ),
-        (
-            &["--order", "per-pixel", "--precision", "fp16"],
-            "order per-pixel",
-        ),
-        (
-            &["--camera", "equirectangular", "--precision", "fp16"],
-            "panoramas",
-        ),
-        (
-            &["--depth", "--order", "per-pixel", "-o", "a.exr"],
-            "depths",
-        ),
+        (&["--geometry", "2d", "--camera", "fisheye"], "pinhole and orthographic"),
+        (&["--geometry", "2d", "--antialiasing", "compensated"], "compensated opacity"),
+        (&["--order", "per-pixel", "--precision", "fp16"], "order per-pixel"),
+        (&["--camera", "equirectangular", "--precision", "fp16"], "panoramas"),
+        (&["--depth", "--order", "per-pixel", "-o", "a.exr"], "depths"),
         (&["--depth", "-o", "a.png"], "no output is one"),
-        (
-            &["--near", "3", "--far", "2"],
-            "the far plane is not beyond it",
-        ),
+        (&["--near", "3", "--far", "2"], "the far plane is not beyond it"),
         (&["--fov", "1e-300"], "focal length"),
-        (
-            &["--background", "transparent", "-o", "a.jpg"],
-            "cannot be transparent",
-        ),
-        (
-            &["--size", "16384x16384", "--depth", "-o", "a.exr"],
-            "GiB of memory",
-        ),
+        (&["--background", "transparent", "-o", "a.jpg"], "cannot be transparent"),
+        (&["--size", "16384x16384", "--depth", "-o", "a.exr"], "GiB of memory"),
     ] {
         fails(&folder, &[&["two.ply"], modes].concat(), message);
     }
     let mut command = Command::new(env!("CARGO_BIN_EXE_gaurast"));
-    command
-        .args(["two.ply", "-o", "a.png"])
-        .current_dir(&folder);
-    let output = command
-        .env("GAURAST_THREADS", "1000")
-        .output()
-        .expect("it starts");
+    command.args(["two.ply", "-o", "a.png"]).current_dir(&folder);
+    let output = command.env("GAURAST_THREADS", "1000").output().expect("it starts");
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(
-        stderr.starts_with("gaurast: GAURAST_THREADS=1000: "),
-        "{stderr}"
-    );
+    assert!(stderr.starts_with("gaurast: GAURAST_THREADS=1000: "), "{stderr}");
     assert_eq!(files(&folder), ["two.ply"]);
 }
 
@@ -210,14 +149,8 @@ fn the_drivers_errors_are_told_once_and_count() {
     let folder = folder();
     let run = |name: &str, value: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gaurast"));
-        command
-            .args(["two.ply", "-q", "--force", "--size", "32x24"])
-            .current_dir(&folder);
-        let output = command
-            .env(name, value)
-            .env_remove("RUST_LOG")
-            .output()
-            .expect("it starts");
+        command.args(["two.ply", "-q", "--force", "--size", "32x24"]).current_dir(&folder);
+        let output = command.env(name, value).env_remove("RUST_LOG").output().expect("it starts");
         let stderr = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
@@ -225,10 +158,7 @@ fn the_drivers_errors_are_told_once_and_count() {
     };
     // A trace that does not fit on the disk is an error.
     let stderr = run("GAURAST_TRACE", "/dev/full");
-    assert!(
-        stderr.contains("GAURAST_TRACE=/dev/full: No space left"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("GAURAST_TRACE=/dev/full: No space left"), "{stderr}");
     let stderr = run("GAURAST_SIMD", "mmx");
     assert!(stderr.contains("GAURAST_SIMD=mmx is none of"), "{stderr}");
 }
@@ -237,11 +167,7 @@ fn the_drivers_errors_are_told_once_and_count() {
 fn sides_distances_and_models() {
     let folder = folder();
     let mean = |arguments: &[&str]| {
-        let all = [
-            &["two.ply", "-q", "--force", "--size", "64x48", "-o", "a.png"],
-            arguments,
-        ]
-        .concat();
+        let all = [&["two.ply", "-q", "--force", "--size", "64x48", "-o", "a.png"], arguments].concat();
         succeeds(&folder, &all);
         covered(&folder, "a.png")
     };
@@ -250,10 +176,7 @@ fn sides_distances_and_models() {
     let (_, [r, g, _]) = mean(&["--azimuth", "180", "--elevation", "0"]);
     assert!(g > 4.0 * r, "green is behind: {r} {g}");
     let (_, [r, g, _]) = mean(&["--azimuth", "90"]);
-    assert!(
-        (r / g - 1.0).abs() < 0.2,
-        "both are seen from the side: {r} {g}"
-    );
+    assert!((r / g - 1.0).abs() < 0.2, "both are seen from the side: {r} {g}");
     // From the side and near, only the target is in the picture.
     let near = ["--azimuth", "90", "--distance", "1.5", "--target"];
     let (_, [r, g, _]) = mean(&[&near[..], &["0,0,-1"]].concat());
@@ -263,19 +186,13 @@ fn sides_distances_and_models() {
     let (plain, _) = mean(&[]);
     let (zoomed, _) = mean(&["--zoom", "0.5"]);
     let (far, _) = mean(&["--distance", "12"]);
-    assert!(
-        zoomed < 0.5 * plain && far < 0.5 * plain,
-        "{plain} {zoomed} {far}"
-    );
+    assert!(zoomed < 0.5 * plain && far < 0.5 * plain, "{plain} {zoomed} {far}");
     let (parallel, _) = mean(&["--camera", "orthographic"]);
     assert!((parallel / plain - 1.0).abs() < 0.4, "{plain} {parallel}");
     // A panorama is taken from the middle, with red and green on opposite sides.
     let (inside, [r, g, _]) = mean(&["--camera", "equirectangular"]);
     assert!(inside > 0.1 && r > 5.0 && g > 5.0, "{inside} {r} {g}");
-    let printed = succeeds(
-        &folder,
-        &["two.ply", "--frame", "--azimuth", "180", "--size", "64x48"],
-    );
+    let printed = succeeds(&folder, &["two.ply", "--frame", "--azimuth", "180", "--size", "64x48"]);
     std::fs::write(folder.path().join("keys.json"), printed).expect("written");
     let (_, [r, g, _]) = mean(&["--path", "keys.json"]);
     assert!(g > 4.0 * r, "the same as asked for before: {r} {g}");
@@ -286,42 +203,16 @@ fn sides_distances_and_models() {
 fn keyframes_of_all_models_are_their_pictures() {
     let folder = folder();
     // A panorama shows all, so that it has nothing to magnify.
-    for (model, zoom) in [
-        ("pinhole", "1.5"),
-        ("orthographic", "1.5"),
-        ("fisheye", "0.75"),
-        ("panorama", "1"),
-    ] {
-        let view = [
-            "two.ply",
-            "--azimuth",
-            "45",
-            "--camera",
-            model,
-            "--zoom",
-            zoom,
-            "--size",
-            "64x48",
-        ];
+    for (model, zoom) in [("pinhole", "1.5"), ("orthographic", "1.5"), ("fisheye", "0.75"), ("panorama", "1")] {
+        let view = ["two.ply", "--azimuth", "45", "--camera", model, "--zoom", zoom, "--size", "64x48"];
         let printed = succeeds(&folder, &[&view[..], &["--frame"]].concat());
         std::fs::write(folder.path().join("keys.json"), printed).expect("written");
         let drawn = [&view[..], &["-o", "a.png", "--force"]].concat();
         let said = succeeds(&folder, &drawn);
         assert_eq!(said.contains("--zoom 1.5"), zoom == "1.5", "{said}");
-        let path = [
-            "two.ply",
-            "--path",
-            "keys.json",
-            "--size",
-            "64x48",
-            "-o",
-            "b.png",
-        ];
+        let path = ["two.ply", "--path", "keys.json", "--size", "64x48", "-o", "b.png"];
         succeeds(&folder, &[&path[..], &["--force"]].concat());
-        succeeds(
-            &folder,
-            &["compare", "a.png", "b.png", "--fail-below", "45"],
-        );
+        succeeds(&folder, &["compare", "a.png", "b.png", "--fail-below", "45"]);
     }
 }
 
@@ -333,27 +224,14 @@ fn a_fisheye_may_see_what_is_behind_it() {
         let view = ["two.ply", "--camera", "fisheye", option, value, "-o", file];
         succeeds(&folder, &[&view[..], &["--size", "64x48"]].concat());
     }
-    succeeds(
-        &folder,
-        &["compare", "a.png", "b.png", "--fail-below", "45"],
-    );
+    succeeds(&folder, &["compare", "a.png", "b.png", "--fail-below", "45"]);
 }
 
 #[gaurast_runner::test]
 fn an_orbit_is_numbered_shared_and_goes_on() {
     let folder = folder();
     let orbit = |more: &[&'static str]| {
-        let fixed = [
-            "two.ply",
-            "--orbit",
-            "4",
-            "--elevation",
-            "0",
-            "--azimuth",
-            "0",
-            "--size",
-            "32x24",
-        ];
+        let fixed = ["two.ply", "--orbit", "4", "--elevation", "0", "--azimuth", "0", "--size", "32x24"];
         [&fixed[..], &["-o", "v_%03d.png"], more].concat()
     };
     succeeds(&folder, &orbit(&["--shard", "1/2"]));
@@ -361,37 +239,22 @@ fn an_orbit_is_numbered_shared_and_goes_on() {
     let first = std::fs::read(folder.path().join("v_001.png")).expect("readable");
     fails(&folder, &orbit(&[]), "v_001.png: it is there already");
     let stdout = succeeds(&folder, &orbit(&["--resume"]));
-    assert!(
-        stdout.contains("v_000.png to v_002.png") && stdout.contains("2 were there"),
-        "{stdout}"
-    );
+    assert!(stdout.contains("v_000.png to v_002.png") && stdout.contains("2 were there"), "{stdout}");
     assert_eq!(files(&folder).len(), 5);
-    assert_eq!(
-        std::fs::read(folder.path().join("v_001.png")).expect("readable"),
-        first
-    );
+    assert_eq!(std::fs::read(folder.path().join("v_001.png")).expect("readable"), first);
     let (_, [r, g, _]) = covered(&folder, "v_000.png");
     let (_, [back_r, back_g, _]) = covered(&folder, "v_002.png");
     assert!(r > 5.0 * g && back_g > 5.0 * back_r);
     let stdout = succeeds(&folder, &orbit(&["--resume"]));
-    assert!(
-        stdout.starts_with("wrote nothing; 4 were there"),
-        "{stdout}"
-    );
-    fails(
-        &folder,
-        &["two.ply", "--orbit", "2", "-o", "x.png"],
-        "2 views do not go to one file",
-    );
+    assert!(stdout.starts_with("wrote nothing; 4 were there"), "{stdout}");
+    fails(&folder, &["two.ply", "--orbit", "2", "-o", "x.png"], "2 views do not go to one file");
 }
 
 #[gaurast_runner::test]
 fn eight_shares_are_one_run() {
     let folder = folder();
     let run = |place: &str, more: &[&str]| {
-        let orbit = [
-            "two.ply", "-q", "--orbit", "11", "--size", "40x30", "-o", place,
-        ];
+        let orbit = ["two.ply", "-q", "--orbit", "11", "--size", "40x30", "-o", place];
         succeeds(&folder, &[&orbit[..], more].concat());
     };
     run("whole/", &[]);
@@ -402,10 +265,7 @@ fn eight_shares_are_one_run() {
         let entries = std::fs::read_dir(folder.path().join(place)).expect("a folder");
         let file = |entry: std::io::Result<std::fs::DirEntry>| {
             let entry = entry.expect("an entry");
-            (
-                entry.file_name(),
-                std::fs::read(entry.path()).expect("readable"),
-            )
+            (entry.file_name(), std::fs::read(entry.path()).expect("readable"))
         };
         let mut files: Vec<_> = entries.map(file).collect();
         files.sort();
@@ -413,19 +273,14 @@ fn eight_shares_are_one_run() {
     };
     let whole = read("whole");
     assert_eq!(whole.len(), 11);
-    assert!(
-        whole.windows(2).all(|pair| pair[0].1 != pair[1].1),
-        "views differ"
-    );
+    assert!(whole.windows(2).all(|pair| pair[0].1 != pair[1].1), "views differ");
     assert!(read("shared") == whole);
 }
 
 #[gaurast_runner::test]
 fn formats_hold_the_same_picture() {
     let folder = folder();
-    let fixed = [
-        "two.ply", "--size", "64x48", "-o", "a.png", "-o", "a.webp", "-o", "a.jpg", "-o", "a.exr",
-    ];
+    let fixed = ["two.ply", "--size", "64x48", "-o", "a.png", "-o", "a.webp", "-o", "a.jpg", "-o", "a.exr"];
     succeeds(&folder, &[&fixed[..], &["--depth"]].concat());
     for (name, least) in [("a.webp", f64::INFINITY), ("a.exr", 50.0), ("a.jpg", 28.0)] {
         let json = succeeds(&folder, &["compare", name, "a.png", "--json"]);
@@ -441,60 +296,23 @@ fn formats_hold_the_same_picture() {
     let keyframe: serde_json::Value = serde_json::from_str(&printed).expect("JSON");
     let vector = |name: &str| -> Vec<f64> {
         let values = keyframe[0][name].as_array().expect("three");
-        values
-            .iter()
-            .map(|value| value.as_f64().expect("a number"))
-            .collect()
+        values.iter().map(|value| value.as_f64().expect("a number")).collect()
     };
-    let distance = (vector("eye").iter().zip(vector("target")))
-        .map(|(a, b)| (a - b).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let distance = (vector("eye").iter().zip(vector("target"))).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     let middle = f64::from(depth(32, 24));
-    assert!(
-        (middle - distance).abs() < 0.7 && middle < distance,
-        "{middle} {distance}"
-    );
+    assert!((middle - distance).abs() < 0.7 && middle < distance, "{middle} {distance}");
     assert_eq!(depth(0, 0), f32::INFINITY);
 
-    succeeds(
-        &folder,
-        &[
-            "two.ply",
-            "--size",
-            "64x48",
-            "-o",
-            "t.png",
-            "--background",
-            "transparent",
-        ],
-    );
+    succeeds(&folder, &["two.ply", "--size", "64x48", "-o", "t.png", "--background", "transparent"]);
     let picture = image::open(folder.path().join("t.png")).expect("a PNG");
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let picture = picture.to_rgba8();
     assert_eq!(picture.get_pixel(0, 0).0, [0, 0, 0, 0]);
     // Straight alpha: faint red pixels have the same red value as opaque ones.
-    let faint = picture
-        .pixels()
-        .filter(|p| (30..60).contains(&p.0[3]) && p.0[0] > p.0[1]);
+    let faint = picture.pixels().filter(|p| (30..60).contains(&p.0[3]) && p.0[0] > p.0[1]);
     assert!(faint.clone().count() > 5 && faint.clone().any(|pixel| pixel.0[0] > 240));
-    succeeds(
-        &folder,
-        &[
-            "two.ply",
-            "--size",
-            "8x8",
-            "-o",
-            "w.png",
-            "--background",
-            "#fff",
-            "--distance",
-            "90",
-        ],
-    );
-    let picture = image::open(folder.path().join("w.png"))
-        .expect("a PNG")
-        .to_rgb8();
+    succeeds(&folder, &["two.ply", "--size", "8x8", "-o", "w.png", "--background", "#fff", "--distance", "90"]);
+    let picture = image::open(folder.path().join("w.png")).expect("a PNG").to_rgb8();
     assert_eq!(picture.get_pixel(0, 0).0, [255; 3]);
 }
 
@@ -504,9 +322,8 @@ fn exr_depth(path: &Path, width: usize) -> impl Fn(usize, usize) -> f32 + use<> 
     let text = text(&bytes);
     assert!(text.contains("expected.Z") && text.contains("sRGB as trained"));
     let file = exr::prelude::read_all_flat_layers_from_file(path).expect("an EXR");
-    let channel = (file.layer_data[0].channel_data.list.iter())
-        .find(|channel| channel.name.to_string() == "Z")
-        .expect("depths");
+    let channel =
+        (file.layer_data[0].channel_data.list.iter()).find(|channel| channel.name.to_string() == "Z").expect("depths");
     let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
     move |x, y| values[y * width + x]
 }
@@ -514,16 +331,11 @@ fn exr_depth(path: &Path, width: usize) -> impl Fn(usize, usize) -> f32 + use<> 
 #[gaurast_runner::test]
 fn standard_output_takes_frames() {
     let folder = folder();
-    let arguments = [
-        "two.ply", "--orbit", "3", "--size", "16x8", "-o", "-", "--raw",
-    ];
+    let arguments = ["two.ply", "--orbit", "3", "--size", "16x8", "-o", "-", "--raw"];
     let output = gaurast(folder.path(), &arguments);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(output.stdout.len(), 3 * 16 * 8 * 3);
-    let png = gaurast(
-        folder.path(),
-        &["two.ply", "--size", "16x8", "-o", "-", "-q"],
-    );
+    let png = gaurast(folder.path(), &["two.ply", "--size", "16x8", "-o", "-", "-q"]);
     assert!(png.stdout.starts_with(b"\x89PNG") && png.stderr.is_empty());
     assert_eq!(files(&folder), ["two.ply"]);
     // The picture of a scene from standard input is not called "-".
@@ -555,16 +367,11 @@ fn a_video_goes_through_ffmpeg() {
             .output()
             .expect("it starts")
     };
-    let video = [
-        "two.ply", "--orbit", "3", "--size", "16x8", "-o", "a.mp4", "--fps", "12",
-    ];
+    let video = ["two.ply", "--orbit", "3", "--size", "16x8", "-o", "a.mp4", "--fps", "12"];
     let output = run(&video);
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(
-        stderr.contains("a.mp4: videos are made by ffmpeg, and there is none"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("a.mp4: videos are made by ffmpeg, and there is none"), "{stderr}");
     // A fake encoder that copies its input and notes its arguments.
     let script = "#!/bin/sh\nfor last; do :; done\necho \"$@\" > told\n/bin/cat > \"$last\"\n";
     let program = tools.path().join("ffmpeg");
@@ -572,27 +379,16 @@ fn a_video_goes_through_ffmpeg() {
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("executable");
     let output = run(&video);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert_eq!(
-        std::fs::read(folder.path().join("a.mp4"))
-            .expect("a video")
-            .len(),
-        3 * 16 * 8 * 3
-    );
+    assert_eq!(std::fs::read(folder.path().join("a.mp4")).expect("a video").len(), 3 * 16 * 8 * 3);
     let told = std::fs::read_to_string(folder.path().join("told")).expect("told");
-    assert!(
-        told.contains("-s 16x8 -r 12") && told.contains("libx264"),
-        "{told}"
-    );
+    assert!(told.contains("-s 16x8 -r 12") && told.contains("libx264"), "{told}");
     assert_eq!(files(&folder), ["a.mp4", "told", "two.ply"]);
     // A fake encoder that fails: its last line is reported, and no file is left.
     std::fs::write(&program, "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 1\n").expect("written");
     let output = run(&[&video[..], &["--force"]].concat());
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(
-        stderr.contains("a.mp4: ffmpeg: Unknown encoder"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("a.mp4: ffmpeg: Unknown encoder"), "{stderr}");
     assert_eq!(files(&folder), ["a.mp4", "told", "two.ply"]);
 }
 
@@ -618,14 +414,9 @@ fn a_training_folder_is_a_scene_with_cameras() {
     let output = gaurast(folder.path(), &["model", "--view", "all", "-o", "out/"]);
     let stderr = text(&output.stderr);
     assert!(output.status.success(), "{stderr}");
-    assert!(
-        stderr.contains("iteration 30000 is drawn") && stderr.contains("white"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("iteration 30000 is drawn") && stderr.contains("white"), "{stderr}");
     let at = |name: &str| {
-        let picture = image::open(folder.path().join(name))
-            .expect("a picture")
-            .to_rgb8();
+        let picture = image::open(folder.path().join(name)).expect("a picture").to_rgb8();
         assert_eq!(picture.dimensions(), (40, 30));
         (picture.get_pixel(20, 15).0, picture.get_pixel(0, 0).0)
     };
@@ -634,38 +425,24 @@ fn a_training_folder_is_a_scene_with_cameras() {
     assert_eq!(corner, [255; 3]);
     at("out/far.png");
     // The same pictures, compared with the scene itself.
-    let compared = succeeds(
-        &folder,
-        &["compare", "out/far.png", "model", "--view", "far", "--json"],
-    );
+    let compared = succeeds(&folder, &["compare", "out/far.png", "model", "--view", "far", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&compared).expect("JSON");
     let largest = json["pictures"][0]["largest"].as_f64().expect("a number");
     assert_eq!(largest, 0.0, "{json}");
     let same = ["compare", "out", "out", "--fail-below", "30"];
     assert!(succeeds(&folder, &same).contains("mean of 2: PSNR inf dB, SSIM 1.0000"));
-    let differ = [
-        "compare",
-        "out/near.png",
-        "out/far.png",
-        "--fail-below",
-        "40",
-        "--difference",
-        "d.png",
-    ];
+    let differ = ["compare", "out/near.png", "out/far.png", "--fail-below", "40", "--difference", "d.png"];
     let output = gaurast(folder.path(), &differ);
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output.stderr).contains("is below 40"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("is below 40"), "{}", text(&output.stderr));
     let (share, _) = covered(&folder, "d.png");
     assert!(share > 0.02, "{share}");
 }
 
 /// A program that draws a picture of 3x1 pixels. Its pictures on the two drivers differ in one channel of one pixel.
 #[cfg(unix)]
-const DRAWS: &str = "case $VK_DRIVER_FILES in *other*) blue=c;; *) blue=b;; esac\nprintf 'P6\\n3 1\\n255\\naaaaa%saaa' $blue";
+const DRAWS: &str =
+    "case $VK_DRIVER_FILES in *other*) blue=c;; *) blue=b;; esac\nprintf 'P6\\n3 1\\n255\\naaaaa%saaa' $blue";
 
 #[cfg(unix)]
 #[gaurast_runner::test]
@@ -699,11 +476,7 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
     assert!((largest - 1.0).abs() < 1e-4, "{largest}");
     let page = folder.path().join("compared-drivers/index.html");
     let page = std::fs::read_to_string(page).expect("a page");
-    for source in [
-        "shown/a-gaurast.png",
-        "shown/a-other_icd.png",
-        "differences/a.png",
-    ] {
+    for source in ["shown/a-gaurast.png", "shown/a-other_icd.png", "differences/a.png"] {
         assert!(page.contains(source), "{page}");
         let picture = folder.path().join("compared-drivers").join(source);
         assert_eq!(image::image_dimensions(picture).expect("a picture"), (3, 1));
@@ -719,35 +492,16 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
     let output = allowed("0.5");
     assert_eq!(output.status.code(), Some(1));
     let said = text(&output.stderr);
-    assert!(
-        said.contains("1.0 steps of 255, and 0.5 are allowed"),
-        "{said}"
-    );
+    assert!(said.contains("1.0 steps of 255, and 0.5 are allowed"), "{said}");
     // A folder that is not empty; a program that fails, or writes nothing; a driver that is missing.
     for (output, sentence) in [
         (compare(&[], "true", &[]), "--force writes into it"),
-        (
-            compare(&["--out", "b"], "exit 3", &[]),
-            "on gaurast it ended with exit status: 3",
-        ),
-        (
-            compare(&["--out", "none"], "true", &[]),
-            "sh: it wrote no picture",
-        ),
+        (compare(&["--out", "b"], "exit 3", &[]), "on gaurast it ended with exit status: 3"),
+        (compare(&["--out", "none"], "true", &[]), "sh: it wrote no picture"),
         (
             gaurast(
                 folder.path(),
-                &[
-                    "compare-drivers",
-                    "--driver",
-                    "other_icd.json",
-                    "--with",
-                    "nothing",
-                    "--out",
-                    "c",
-                    "--",
-                    "true",
-                ],
+                &["compare-drivers", "--driver", "other_icd.json", "--with", "nothing", "--out", "c", "--", "true"],
             ),
             "no manifest of such a driver",
         ),
@@ -763,25 +517,16 @@ fn a_sheet_shows_eight_sides() {
     let folder = folder();
     let stdout = succeeds(&folder, &["views", "two.ply", "--size", "80x60"]);
     assert!(stdout.contains("wrote two-views.png"), "{stdout}");
-    let sheet = image::open(folder.path().join("two-views.png"))
-        .expect("a sheet")
-        .to_rgb8();
+    let sheet = image::open(folder.path().join("two-views.png")).expect("a sheet").to_rgb8();
     assert_eq!(sheet.dimensions(), (320, 120));
     let mean = |column: u32, row: u32, channel: usize| {
         let pixels = (20..60).flat_map(|y| (0..80).map(move |x| (80 * column + x, 60 * row + y)));
-        pixels
-            .map(|(x, y)| u64::from(sheet.get_pixel(x, y).0[channel]))
-            .sum::<u64>()
+        pixels.map(|(x, y)| u64::from(sheet.get_pixel(x, y).0[channel])).sum::<u64>()
     };
     assert!(mean(0, 0, 0) > 2 * mean(0, 0, 1), "red from the front");
     assert!(mean(0, 1, 1) > 2 * mean(0, 1, 0), "green from behind");
     let label = (0..16).flat_map(|y| (0..80).map(move |x| (x, y)));
-    assert!(
-        label
-            .filter(|(x, y)| sheet.get_pixel(*x, *y).0 == [255; 3])
-            .count()
-            > 100
-    );
+    assert!(label.filter(|(x, y)| sheet.get_pixel(*x, *y).0 == [255; 3]).count() > 100);
 }
 
 #[gaurast_runner::test]
@@ -820,8 +565,7 @@ fn the_work_of_tiles_is_drawn() {
 fn scenes_are_put_together() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, colour) in [("red.ply", RED), ("green.ply", GREEN)] {
-        std::fs::write(folder.path().join(name), scene(0.3, &[([0.0; 3], colour)]))
-            .expect("written");
+        std::fs::write(folder.path().join(name), scene(0.3, &[([0.0; 3], colour)])).expect("written");
     }
     let arguments = [
         "red.ply",
@@ -838,42 +582,24 @@ fn scenes_are_put_together() {
         "64x32",
     ];
     succeeds(&folder, &arguments);
-    let picture = image::open(folder.path().join("red.png"))
-        .expect("a picture")
-        .to_rgb8();
+    let picture = image::open(folder.path().join("red.png")).expect("a picture").to_rgb8();
     let area = |channel: usize, left: u32| {
         let pixels = (0..32).flat_map(|y| (left..left + 32).map(move |x| (x, y)));
-        pixels
-            .filter(|(x, y)| picture.get_pixel(*x, *y).0[channel] > 60)
-            .count() as f64
+        pixels.filter(|(x, y)| picture.get_pixel(*x, *y).0[channel] > 60).count() as f64
     };
     let (red, green) = (area(0, 0), area(1, 32));
     assert!(red > 2.5 * green && green > 4.0, "{red} {green}");
     assert_eq!((area(1, 0), area(0, 32)), (0.0, 0.0));
     fails(
         &folder,
-        &[
-            "red.ply",
-            "--transform",
-            "",
-            "--transform",
-            "",
-            "-o",
-            "a.png",
-        ],
+        &["red.ply", "--transform", "", "--transform", "", "-o", "a.png"],
         "--transform is given 2 times, and there are 1 scenes",
     );
     let json = succeeds(&folder, &["info", "red.ply", "green.ply", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-    assert_eq!(
-        (&json["gaussians"], &json["sh_degree"]),
-        (&2.into(), &0.into())
-    );
+    assert_eq!((&json["gaussians"], &json["sh_degree"]), (&2.into(), &0.into()));
     let text = succeeds(&folder, &["info", "red.ply"]);
-    assert!(
-        text.contains("Gaussians   1") && text.contains("from 0.9"),
-        "{text}"
-    );
+    assert!(text.contains("Gaussians   1") && text.contains("from 0.9"), "{text}");
 }
 
 #[gaurast_runner::test]
@@ -886,22 +612,9 @@ fn a_mesh_hides_what_is_behind_it() {
         -3 -3 0 0 0 255\n3 -3 0 0 0 255\n3 3 0 0 0 255\n-3 3 0 0 0 255\n4 0 1 2 3\n";
     std::fs::write(folder.path().join("wall.ply"), wall).expect("written");
     let mean = |more: &[&str]| {
-        let fixed = [
-            "two.ply",
-            "wall.ply",
-            "--elevation",
-            "0",
-            "--size",
-            "64x48",
-            "--force",
-            "-o",
-            "a.png",
-        ];
+        let fixed = ["two.ply", "wall.ply", "--elevation", "0", "--size", "64x48", "--force", "-o", "a.png"];
         let stdout = succeeds(&folder, &[&fixed[..], more].concat());
-        assert!(
-            stdout.contains("2 Gaussians and 2 triangles read"),
-            "{stdout}"
-        );
+        assert!(stdout.contains("2 Gaussians and 2 triangles read"), "{stdout}");
         covered(&folder, "a.png").1
     };
     for camera in [&[][..], &["--camera", "orthographic"], &["--far", "99"]] {
@@ -916,19 +629,9 @@ fn a_mesh_hides_what_is_behind_it() {
     let text = succeeds(&folder, &["info", "two.ply", "wall.ply"]);
     assert!(text.contains("triangles   2\n"), "{text}");
     for (modes, sentence) in [
-        (
-            &["--camera", "fisheye", "-o", "b.png"][..],
-            "pinhole and orthographic",
-        ),
-        (
-            &["--depth", "-o", "b.exr"],
-            "depths are not kept of scenes with meshes",
-        ),
+        (&["--camera", "fisheye", "-o", "b.png"][..], "pinhole and orthographic"),
+        (&["--depth", "-o", "b.exr"], "depths are not kept of scenes with meshes"),
     ] {
-        fails(
-            &folder,
-            &[&["two.ply", "wall.ply"], modes].concat(),
-            sentence,
-        );
+        fails(&folder, &[&["two.ply", "wall.ply"], modes].concat(), sentence);
     }
 }

@@ -30,8 +30,7 @@ impl Products {
     /// Adds a product, by the register that holds it.
     pub fn insert(&mut self, product: Reg, factors: [Reg; 2]) {
         let segment = self.segment;
-        self.by_register
-            .insert(product, Product { factors, segment });
+        self.by_register.insert(product, Product { factors, segment });
     }
 
     /// The operation and operands that fuse a sum or difference with a product among its operands. None if no operand

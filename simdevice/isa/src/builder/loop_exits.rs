@@ -7,11 +7,7 @@ use crate::ir::{Block, Program, Reg, Register, Role, Statement};
 
 /// Rewrites each value that is used outside the innermost loop around its definition into a variable.
 pub fn keep_escaping_values(program: &mut Program) {
-    let mut search = Search {
-        loop_of: vec![None; program.registers.len()],
-        parents: Vec::new(),
-        escaping: Vec::new(),
-    };
+    let mut search = Search { loop_of: vec![None; program.registers.len()], parents: Vec::new(), escaping: Vec::new() };
     search.block(&program.body, None);
     let mut kept: Vec<Option<Reg>> = vec![None; program.registers.len()];
     for value in search.escaping {
@@ -19,22 +15,12 @@ pub fn keep_escaping_values(program: &mut Program) {
         if slot.is_none() && program.registers[value.0 as usize].role == Role::Value {
             let ty = program.registers[value.0 as usize].ty;
             *slot = Some(Reg(program.registers.len() as u32));
-            program.registers.push(Register {
-                ty,
-                role: Role::Variable,
-            });
+            program.registers.push(Register { ty, role: Role::Variable });
         }
     }
     if kept.iter().any(Option::is_some) {
         let mut loops = 0;
-        rewrite(
-            &mut program.body,
-            None,
-            &mut loops,
-            &search.loop_of,
-            &search.parents,
-            &kept,
-        );
+        rewrite(&mut program.body, None, &mut loops, &search.loop_of, &search.parents, &kept);
     }
 }
 

@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use crate::ir::op::Op;
 use crate::ir::validate::{self, InvalidProgram};
 use crate::ir::{
-    Address, AtomicOp, Axis, Binding, Block, Case, Constant, Format, Input, Label, MAX_NESTING,
-    Output, Program, Rate, Reg, Register, Role, Statement, SubgroupOp, Type,
+    Address, AtomicOp, Axis, Binding, Block, Case, Constant, Format, Input, Label, MAX_NESTING, Output, Program, Rate,
+    Reg, Register, Role, Statement, SubgroupOp, Type,
 };
 use contract::Products;
 
@@ -99,19 +99,12 @@ impl Builder {
 
     /// The type of a register of this builder; `B32` for one that isn't.
     pub fn type_of(&self, reg: Reg) -> Type {
-        self.program
-            .registers
-            .get(reg.0 as usize)
-            .map_or(Type::B32, |register| register.ty)
+        self.program.registers.get(reg.0 as usize).map_or(Type::B32, |register| register.ty)
     }
 
     /// The constant that a register holds, if it is one: its bits.
     pub fn constant_bits(&self, reg: Reg) -> Option<u64> {
-        self.program
-            .constants
-            .iter()
-            .find(|constant| constant.reg == reg)
-            .map(|constant| constant.bits)
+        self.program.constants.iter().find(|constant| constant.reg == reg).map(|constant| constant.bits)
     }
 
     /// A constant of any type; see [`Constant::bits`]. Equal constants share a register.
@@ -181,11 +174,7 @@ impl Builder {
 
     /// Reserves private memory of each lane and returns its byte offset, a multiple of 4. 64-bit elements need no more.
     pub fn allocate_private(&mut self, bytes: u32) -> u32 {
-        allocate(
-            &mut self.program.private_bytes,
-            bytes.saturating_add(3) & !3,
-            4,
-        )
+        allocate(&mut self.program.private_bytes, bytes.saturating_add(3) & !3, 4)
     }
 
     /// Appends a statement unchanged.
@@ -199,11 +188,7 @@ impl Builder {
     /// Appends `op(src...)` and returns its value.
     pub fn compute(&mut self, op: Op, src: &[Reg]) -> Reg {
         let dst = self.value(op.signature().result);
-        self.statement(Statement::Compute {
-            op,
-            dst,
-            src: src.to_vec(),
-        });
+        self.statement(Statement::Compute { op, dst, src: src.to_vec() });
         dst
     }
 
@@ -228,15 +213,9 @@ impl Builder {
 
     /// Parallel assignments: every source is read before any destination is written. (Phis of one block.)
     pub fn assign_parallel(&mut self, pairs: &[(Reg, Reg)]) {
-        let mut pairs: Vec<(Reg, Reg)> = pairs
-            .iter()
-            .copied()
-            .filter(|(dst, src)| dst != src)
-            .collect();
+        let mut pairs: Vec<(Reg, Reg)> = pairs.iter().copied().filter(|(dst, src)| dst != src).collect();
         while !pairs.is_empty() {
-            let free = pairs
-                .iter()
-                .position(|(dst, _)| !pairs.iter().any(|(_, src)| src == dst));
+            let free = pairs.iter().position(|(dst, _)| !pairs.iter().any(|(_, src)| src == dst));
             if let Some(free) = free {
                 let (dst, src) = pairs.swap_remove(free);
                 self.assign(dst, src);
@@ -273,24 +252,14 @@ impl Builder {
 
     /// Loads `count` consecutive elements.
     pub fn load(&mut self, address: Address, format: Format, count: usize) -> Vec<Reg> {
-        let dst: Vec<Reg> = (0..count)
-            .map(|_| self.value(format.register_type()))
-            .collect();
-        self.statement(Statement::Load {
-            dst: dst.clone(),
-            address,
-            format,
-        });
+        let dst: Vec<Reg> = (0..count).map(|_| self.value(format.register_type())).collect();
+        self.statement(Statement::Load { dst: dst.clone(), address, format });
         dst
     }
 
     /// Stores consecutive elements.
     pub fn store(&mut self, address: Address, format: Format, src: &[Reg]) {
-        self.statement(Statement::Store {
-            src: src.to_vec(),
-            address,
-            format,
-        });
+        self.statement(Statement::Store { src: src.to_vec(), address, format });
     }
 
     /// A read-modify-write; returns the old value.
@@ -303,14 +272,7 @@ impl Builder {
         comparator: Option<Reg>,
     ) -> Reg {
         let dst = self.value(format.register_type());
-        self.statement(Statement::Atomic {
-            op,
-            dst: Some(dst),
-            address,
-            format,
-            value,
-            comparator,
-        });
+        self.statement(Statement::Atomic { op, dst: Some(dst), address, format, value, comparator });
         dst
     }
 
@@ -324,42 +286,25 @@ impl Builder {
     /// A derivative.
     pub fn derivative(&mut self, src: Reg, axis: Axis, fine: bool) -> Reg {
         let dst = self.value(Type::B32);
-        self.statement(Statement::Derivative {
-            dst,
-            src,
-            axis,
-            fine,
-        });
+        self.statement(Statement::Derivative { dst, src, axis, fine });
         dst
     }
 
     /// A subgroup operation with one result; a ballot is [`Builder::ballot`].
     pub fn subgroup(&mut self, op: SubgroupOp, src: Option<Reg>, index: Option<Reg>) -> Reg {
         let ty = match op {
-            SubgroupOp::Elect | SubgroupOp::All | SubgroupOp::Any | SubgroupOp::AllEqual => {
-                Type::Bool
-            }
+            SubgroupOp::Elect | SubgroupOp::All | SubgroupOp::Any | SubgroupOp::AllEqual => Type::Bool,
             _ => src.map_or(Type::B32, |src| self.type_of(src)),
         };
         let dst = self.value(ty);
-        self.statement(Statement::Subgroup {
-            op,
-            dst: vec![dst],
-            src,
-            index,
-        });
+        self.statement(Statement::Subgroup { op, dst: vec![dst], src, index });
         dst
     }
 
     /// The four words of a ballot.
     pub fn ballot(&mut self, src: Reg) -> [Reg; 4] {
         let dst = std::array::from_fn(|_| self.value(Type::B32));
-        self.statement(Statement::Subgroup {
-            op: SubgroupOp::Ballot,
-            dst: dst.to_vec(),
-            src: Some(src),
-            index: None,
-        });
+        self.statement(Statement::Subgroup { op: SubgroupOp::Ballot, dst: dst.to_vec(), src: Some(src), index: None });
         dst
     }
 
@@ -377,10 +322,7 @@ impl Builder {
     pub fn begin_else(&mut self) {
         match self.pop() {
             Some((before, Construct::Then { condition }, then)) => {
-                self.open.push(Frame {
-                    before,
-                    construct: Construct::Else { condition, then },
-                });
+                self.open.push(Frame { before, construct: Construct::Else { condition, then } });
             }
             other => self.put_back(other, "else without an open if"),
         }
@@ -397,10 +339,7 @@ impl Builder {
     pub fn begin_continuing(&mut self) {
         match self.pop() {
             Some((before, Construct::LoopBody { label }, body)) => {
-                self.open.push(Frame {
-                    before,
-                    construct: Construct::LoopContinuing { label, body },
-                });
+                self.open.push(Frame { before, construct: Construct::LoopContinuing { label, body } });
             }
             other => self.put_back(other, "continuing without an open loop body"),
         }
@@ -409,41 +348,17 @@ impl Builder {
     /// Opens a switch; a [`Builder::begin_case`] must follow.
     pub fn begin_switch(&mut self, selector: Reg) -> Label {
         let label = self.label();
-        self.push(Construct::Switch {
-            label,
-            selector,
-            cases: Vec::new(),
-        });
+        self.push(Construct::Switch { label, selector, cases: Vec::new() });
         label
     }
 
     /// Closes the previous case, if any, and opens one for these values, and for all others if `default`.
     pub fn begin_case(&mut self, values: &[u32], default: bool) {
         match self.pop() {
-            Some((
-                before,
-                Construct::Switch {
-                    label,
-                    selector,
-                    mut cases,
-                },
-                body,
-            )) => {
+            Some((before, Construct::Switch { label, selector, mut cases }, body)) => {
                 close_case(&mut cases, body);
-                cases.push(Case {
-                    values: values.to_vec(),
-                    default,
-                    body: Vec::new(),
-                    fallthrough: false,
-                });
-                self.open.push(Frame {
-                    before,
-                    construct: Construct::Switch {
-                        label,
-                        selector,
-                        cases,
-                    },
-                });
+                cases.push(Case { values: values.to_vec(), default, body: Vec::new(), fallthrough: false });
+                self.open.push(Frame { before, construct: Construct::Switch { label, selector, cases } });
             }
             other => self.put_back(other, "case without an open switch"),
         }
@@ -451,10 +366,7 @@ impl Builder {
 
     /// Lanes at the end of the case being built go on in the next one.
     pub fn fall_through(&mut self) {
-        if let Some(Frame {
-            construct: Construct::Switch { cases, .. },
-            ..
-        }) = self.open.last_mut()
+        if let Some(Frame { construct: Construct::Switch { cases, .. }, .. }) = self.open.last_mut()
             && let Some(case) = cases.last_mut()
         {
             case.fallthrough = true;
@@ -478,37 +390,13 @@ impl Builder {
         };
         self.program.body = before;
         self.statement(match construct {
-            Construct::Then { condition } => Statement::If {
-                condition,
-                then: block,
-                otherwise: Vec::new(),
-            },
-            Construct::Else { condition, then } => Statement::If {
-                condition,
-                then,
-                otherwise: block,
-            },
-            Construct::LoopBody { label } => Statement::Loop {
-                label,
-                body: block,
-                continuing: Vec::new(),
-            },
-            Construct::LoopContinuing { label, body } => Statement::Loop {
-                label,
-                body,
-                continuing: block,
-            },
-            Construct::Switch {
-                label,
-                selector,
-                mut cases,
-            } => {
+            Construct::Then { condition } => Statement::If { condition, then: block, otherwise: Vec::new() },
+            Construct::Else { condition, then } => Statement::If { condition, then, otherwise: block },
+            Construct::LoopBody { label } => Statement::Loop { label, body: block, continuing: Vec::new() },
+            Construct::LoopContinuing { label, body } => Statement::Loop { label, body, continuing: block },
+            Construct::Switch { label, selector, mut cases } => {
                 close_case(&mut cases, block);
-                Statement::Switch {
-                    label,
-                    selector,
-                    cases,
-                }
+                Statement::Switch { label, selector, cases }
             }
             Construct::Scope { label } => Statement::Scope { label, body: block },
         });
@@ -559,9 +447,7 @@ impl Builder {
             return Err(misuse);
         }
         if !self.open.is_empty() {
-            return Err(InvalidProgram::Structure {
-                problem: "a construct is still open at the end",
-            });
+            return Err(InvalidProgram::Structure { problem: "a construct is still open at the end" });
         }
         Ok(self.program)
     }
@@ -578,8 +464,7 @@ impl Builder {
     }
 
     fn misuse(&mut self, problem: &'static str) {
-        self.misuse
-            .get_or_insert(InvalidProgram::Structure { problem });
+        self.misuse.get_or_insert(InvalidProgram::Structure { problem });
     }
 
     fn push(&mut self, construct: Construct) {
@@ -615,9 +500,7 @@ fn close_case(cases: &mut [Case], body: Block) {
 }
 
 fn allocate(used: &mut u32, bytes: u32, align: u32) -> u32 {
-    let offset = used
-        .checked_next_multiple_of(align.max(1))
-        .unwrap_or(u32::MAX);
+    let offset = used.checked_next_multiple_of(align.max(1)).unwrap_or(u32::MAX);
     *used = offset.saturating_add(bytes);
     offset
 }

@@ -25,12 +25,7 @@ struct Interval {
 /// if they are not live at the same time.
 pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation {
     let count = program.registers.len();
-    let mut liveness = Liveness {
-        intervals: vec![None; count],
-        defined_at: vec![0; count],
-        tick: 2,
-        program,
-    };
+    let mut liveness = Liveness { intervals: vec![None; count], defined_at: vec![0; count], tick: 2, program };
     for input in &program.inputs {
         liveness.touch(input.reg, 0);
     }
@@ -40,29 +35,16 @@ pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation
         liveness.intervals[output.reg.0 as usize] = Some(Interval { start: 0, end });
     }
     let mut intervals = liveness.intervals;
-    let mut places = Places {
-        free: Default::default(),
-        next: 2,
-        width,
-    };
+    let mut places = Places { free: Default::default(), next: 2, width };
     let mut slots = vec![RegisterSlot::ZERO; count];
     let pinned = program.constants.iter().map(|constant| constant.reg);
-    let uniform_inputs = program
-        .inputs
-        .iter()
-        .filter(|input| input.rate == Rate::Uniform);
+    let uniform_inputs = program.inputs.iter().filter(|input| input.rate == Rate::Uniform);
     for reg in pinned.chain(uniform_inputs.map(|input| input.reg)) {
-        slots[reg.0 as usize] = places.take(Class {
-            varying: false,
-            wide: is_wide(program, reg),
-        });
+        slots[reg.0 as usize] = places.take(Class { varying: false, wide: is_wide(program, reg) });
         intervals[reg.0 as usize] = None;
     }
     scan(program, varying, &intervals, &mut places, &mut slots);
-    Allocation {
-        slots,
-        vectors: places.next,
-    }
+    Allocation { slots, vectors: places.next }
 }
 
 /// Visits the intervals in order of their start, and reuses the places of those that have ended.
@@ -73,18 +55,11 @@ fn scan(
     places: &mut Places,
     slots: &mut [RegisterSlot],
 ) {
-    let mut order: Vec<(usize, Interval)> = intervals
-        .iter()
-        .enumerate()
-        .filter_map(|(reg, interval)| Some((reg, (*interval)?)))
-        .collect();
+    let mut order: Vec<(usize, Interval)> =
+        intervals.iter().enumerate().filter_map(|(reg, interval)| Some((reg, (*interval)?))).collect();
     order.sort_by_key(|(reg, interval)| (interval.start, *reg));
-    let mut live: std::collections::BinaryHeap<std::cmp::Reverse<(u32, usize)>> =
-        Default::default();
-    let class = |reg: usize| Class {
-        varying: varying[reg],
-        wide: is_wide(program, Reg(reg as u32)),
-    };
+    let mut live: std::collections::BinaryHeap<std::cmp::Reverse<(u32, usize)>> = Default::default();
+    let class = |reg: usize| Class { varying: varying[reg], wide: is_wide(program, Reg(reg as u32)) };
     for (reg, interval) in order {
         while let Some(std::cmp::Reverse((end, done))) = live.peek().copied()
             && end < interval.start
@@ -122,11 +97,7 @@ impl Places {
         let start = self.next;
         let registers = if class.varying { self.width } else { 1 };
         self.next += registers * if class.wide { 2 } else { 1 };
-        if class.varying {
-            RegisterSlot::varying(start)
-        } else {
-            RegisterSlot::uniform(start)
-        }
+        if class.varying { RegisterSlot::varying(start) } else { RegisterSlot::uniform(start) }
     }
 
     fn release(&mut self, class: Class, slot: RegisterSlot) {
@@ -151,10 +122,7 @@ struct Liveness<'a> {
 impl Liveness<'_> {
     fn touch(&mut self, reg: Reg, tick: u32) {
         let entry = &mut self.intervals[reg.0 as usize];
-        let interval = entry.get_or_insert(Interval {
-            start: tick,
-            end: tick,
-        });
+        let interval = entry.get_or_insert(Interval { start: tick, end: tick });
         interval.start = interval.start.min(tick);
         interval.end = interval.end.max(tick);
     }
@@ -168,10 +136,7 @@ impl Liveness<'_> {
         let writes = reads + 1;
         self.tick += 2;
         // Only a statement that works lane by lane may write its result over its operand.
-        let by_lane = matches!(
-            statement,
-            Statement::Compute { .. } | Statement::Assign { .. }
-        );
+        let by_lane = matches!(statement, Statement::Compute { .. } | Statement::Assign { .. });
         for reg in statement.uses() {
             self.touch(reg, if by_lane { reads } else { writes });
         }
@@ -196,10 +161,7 @@ impl Liveness<'_> {
     fn extend_over_loop(&mut self, statement: &Statement, start: u32, end: u32) {
         for block in statement.blocks() {
             for inner in block {
-                let variables = inner
-                    .definitions()
-                    .into_iter()
-                    .filter(|reg| self.role(*reg) == Role::Variable);
+                let variables = inner.definitions().into_iter().filter(|reg| self.role(*reg) == Role::Variable);
                 for reg in variables.collect::<Vec<_>>() {
                     self.touch(reg, start);
                     self.touch(reg, end);

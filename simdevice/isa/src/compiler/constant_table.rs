@@ -14,9 +14,7 @@ pub fn promote_constants(program: &mut Program) -> Option<Vec<u32>> {
     }
     let constants = program.constants.iter();
     let mut search = Search {
-        known: constants
-            .map(|constant| (constant.reg, constant.bits))
-            .collect(),
+        known: constants.map(|constant| (constant.reg, constant.bits)).collect(),
         words: vec![0; program.private_bytes as usize / 4],
         filled: false,
     };
@@ -38,18 +36,12 @@ impl Search {
     /// Reports whether all stores so far are of constants, by all lanes, and before all loads. `always` says whether
     /// every lane runs the block, once.
     fn block(&mut self, block: &Block, always: bool) -> bool {
-        block
-            .iter()
-            .all(|statement| self.statement(statement, always))
+        block.iter().all(|statement| self.statement(statement, always))
     }
 
     fn statement(&mut self, statement: &Statement, always: bool) -> bool {
         match statement {
-            Statement::Store {
-                src,
-                address,
-                format,
-            } if address.space == Space::Private => {
+            Statement::Store { src, address, format } if address.space == Space::Private => {
                 always && !self.filled && self.store(src, address, *format).is_some()
             }
             Statement::Scope { body, .. } => self.block(body, always),

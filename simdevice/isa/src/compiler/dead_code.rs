@@ -10,9 +10,7 @@ pub fn remove_dead(program: &mut Program) {
     }
     while mark(&program.body, &mut live) {}
     sweep(&mut program.body, &live);
-    program
-        .constants
-        .retain(|constant| live[constant.reg.0 as usize]);
+    program.constants.retain(|constant| live[constant.reg.0 as usize]);
     program.inputs.retain(|input| live[input.reg.0 as usize]);
 }
 
@@ -42,12 +40,7 @@ fn mark(block: &Block, live: &mut [bool]) -> bool {
         for inner in statement.blocks().into_iter().rev() {
             found |= mark(inner, live);
         }
-        if has_effect(statement)
-            || statement
-                .definitions()
-                .iter()
-                .any(|reg| live[reg.0 as usize])
-        {
+        if has_effect(statement) || statement.definitions().iter().any(|reg| live[reg.0 as usize]) {
             for reg in statement.uses() {
                 found |= !std::mem::replace(&mut live[reg.0 as usize], true);
             }
@@ -63,9 +56,7 @@ fn sweep(block: &mut Block, live: &[bool]) {
             sweep(inner, live);
         }
         match statement {
-            Statement::If {
-                then, otherwise, ..
-            } => !then.is_empty() || !otherwise.is_empty(),
+            Statement::If { then, otherwise, .. } => !then.is_empty() || !otherwise.is_empty(),
             Statement::Scope { body, .. } => !body.is_empty(),
             Statement::Sample(sample) => keep_live(&mut sample.dst, live),
             Statement::ImageRead(read) => keep_live(&mut read.dst, live),

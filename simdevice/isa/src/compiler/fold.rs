@@ -11,11 +11,7 @@ use crate::kernels::evaluate;
 /// Folds constants, takes branches on constants, and shares equal computations.
 pub fn fold(program: &mut Program, level: Level) {
     let mut folding = Folding {
-        known: program
-            .constants
-            .iter()
-            .map(|constant| (constant.reg, constant.bits))
-            .collect(),
+        known: program.constants.iter().map(|constant| (constant.reg, constant.bits)).collect(),
         constants: HashMap::new(),
         alias: HashMap::new(),
         seen: vec![HashMap::new()],
@@ -25,10 +21,7 @@ pub fn fold(program: &mut Program, level: Level) {
     };
     for constant in &program.constants {
         let ty = folding.registers[constant.reg.0 as usize].ty;
-        folding
-            .constants
-            .entry((ty, constant.bits))
-            .or_insert(constant.reg);
+        folding.constants.entry((ty, constant.bits)).or_insert(constant.reg);
     }
     folding.block(&mut program.body);
     program.registers = folding.registers;
@@ -63,11 +56,7 @@ impl Folding {
                         continue;
                     }
                 }
-                Statement::If {
-                    condition,
-                    then,
-                    otherwise,
-                } => {
+                Statement::If { condition, then, otherwise } => {
                     if let Some(bits) = self.known.get(condition) {
                         let mut taken = std::mem::take(if *bits != 0 { then } else { otherwise });
                         self.block(&mut taken);
@@ -95,19 +84,11 @@ impl Folding {
         if let Some(same) = self.identity(op, src) {
             return Some(same);
         }
-        if src
-            .iter()
-            .any(|reg| self.registers[reg.0 as usize].role == Role::Variable)
-        {
+        if src.iter().any(|reg| self.registers[reg.0 as usize].role == Role::Variable) {
             return None;
         }
         let key = (op, src.to_vec());
-        let found = self
-            .seen
-            .iter()
-            .rev()
-            .find_map(|seen| seen.get(&key))
-            .copied();
+        let found = self.seen.iter().rev().find_map(|seen| seen.get(&key)).copied();
         if found.is_none()
             && let Some(seen) = self.seen.last_mut()
         {
@@ -121,11 +102,7 @@ impl Folding {
         let value = |index: usize| self.known.get(src.get(index)?).copied();
         let same = match op {
             Op::IAdd | Op::Or | Op::Xor if value(0) == Some(0) => src[1],
-            Op::IAdd | Op::ISub | Op::Or | Op::Xor | Op::Shl | Op::UShr | Op::SShr
-                if value(1) == Some(0) =>
-            {
-                src[0]
-            }
+            Op::IAdd | Op::ISub | Op::Or | Op::Xor | Op::Shl | Op::UShr | Op::SShr if value(1) == Some(0) => src[0],
             Op::IMul if value(0) == Some(1) => src[1],
             Op::IMul | Op::UDiv if value(1) == Some(1) => src[0],
             Op::Select | Op::Select64 | Op::BSelect => match value(0) {
@@ -142,10 +119,7 @@ impl Folding {
     fn constant(&mut self, ty: Type, bits: u64) -> Reg {
         *self.constants.entry((ty, bits)).or_insert_with(|| {
             let reg = Reg(self.registers.len() as u32);
-            self.registers.push(Register {
-                ty,
-                role: Role::Value,
-            });
+            self.registers.push(Register { ty, role: Role::Value });
             self.new_constants.push(Constant { reg, bits });
             self.known.insert(reg, bits);
             reg

@@ -10,16 +10,13 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
     let mut copied = vec![false; program.body.len()];
     for output in &mut program.outputs {
         let variable = output.reg;
-        let is_read = program
-            .body
-            .iter()
-            .any(|statement| statement.reads(variable));
+        let is_read = program.body.iter().any(|statement| statement.reads(variable));
         if is_read || assignments(&program.body, variable) != 1 {
             continue;
         }
-        let assigned = program.body[..stay].iter().position(
-            |statement| matches!(statement, Statement::Assign { dst, .. } if *dst == variable),
-        );
+        let assigned = program.body[..stay]
+            .iter()
+            .position(|statement| matches!(statement, Statement::Assign { dst, .. } if *dst == variable));
         let Some(at) = assigned else { continue };
         let Statement::Assign { src, .. } = program.body[at] else {
             continue;
@@ -36,8 +33,7 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
 
 /// Reports whether lanes may return or be killed in a statement.
 fn leaves(statement: &Statement) -> bool {
-    matches!(statement, Statement::Return | Statement::Kill)
-        || statement.blocks().into_iter().flatten().any(leaves)
+    matches!(statement, Statement::Return | Statement::Kill) || statement.blocks().into_iter().flatten().any(leaves)
 }
 
 /// The number of statements that assign to a variable.
@@ -45,9 +41,7 @@ fn assignments(block: &Block, variable: Reg) -> usize {
     let of = |statement: &Statement| {
         let own = usize::from(statement.definitions().contains(&variable));
         let inner = statement.blocks().into_iter();
-        own + inner
-            .map(|block| assignments(block, variable))
-            .sum::<usize>()
+        own + inner.map(|block| assignments(block, variable)).sum::<usize>()
     };
     block.iter().map(of).sum()
 }
@@ -75,10 +69,7 @@ mod tests {
     fn what_every_lane_assigns_once_is_forwarded() {
         let once = |b: &mut Builder, input, output| b.assign(output, input);
         assert!(is_forwarded(Rate::Varying, once));
-        assert!(
-            !is_forwarded(Rate::Uniform, once),
-            "it has one value for all"
-        );
+        assert!(!is_forwarded(Rate::Uniform, once), "it has one value for all");
         let twice = |b: &mut Builder, input, output| {
             b.assign(output, input);
             b.assign(output, input);

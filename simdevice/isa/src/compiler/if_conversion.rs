@@ -10,9 +10,7 @@ const SHORT: usize = 6;
 
 /// Replaces each short branch, which only computes and assigns variables, by selections.
 pub fn convert_branches(program: &mut Program) {
-    let Program {
-        registers, body, ..
-    } = program;
+    let Program { registers, body, .. } = program;
     block(body, registers);
 }
 
@@ -22,11 +20,7 @@ fn block(statements: &mut Block, registers: &mut Vec<Register>) {
             block(inner, registers);
         }
         match statement {
-            Statement::If {
-                condition,
-                then,
-                otherwise,
-            } if is_short(&then, &otherwise, registers) => {
+            Statement::If { condition, then, otherwise } if is_short(&then, &otherwise, registers) => {
                 flatten(statements, condition, then, otherwise, registers);
             }
             other => statements.push(other),
@@ -58,13 +52,7 @@ fn is_short(then: &Block, otherwise: &Block, registers: &[Register]) -> bool {
 }
 
 /// Appends the computations of both sides of a short branch, and selections of their results.
-fn flatten(
-    to: &mut Block,
-    condition: Reg,
-    then: Block,
-    otherwise: Block,
-    registers: &mut Vec<Register>,
-) {
+fn flatten(to: &mut Block, condition: Reg, then: Block, otherwise: Block, registers: &mut Vec<Register>) {
     // In order of their first assignment.
     let mut variables = Vec::new();
     let mut values = [HashMap::new(), HashMap::new()];
@@ -84,10 +72,7 @@ fn flatten(
     for variable in variables {
         let ty = registers[variable.0 as usize].ty;
         let selected = Reg(registers.len() as u32);
-        registers.push(Register {
-            ty,
-            role: Role::Value,
-        });
+        registers.push(Register { ty, role: Role::Value });
         let of = |side: &HashMap<Reg, Reg>| side.get(&variable).copied().unwrap_or(variable);
         to.push(Statement::Compute {
             op: match ty {
@@ -98,10 +83,7 @@ fn flatten(
             dst: selected,
             src: vec![condition, of(&values[0]), of(&values[1])],
         });
-        assignments.push(Statement::Assign {
-            dst: variable,
-            src: selected,
-        });
+        assignments.push(Statement::Assign { dst: variable, src: selected });
     }
     to.append(&mut assignments);
 }

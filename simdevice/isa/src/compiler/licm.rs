@@ -7,10 +7,7 @@ use crate::ir::{Address, Block, Format, Program, Reg, Register, Role, Space, Sta
 /// Moves loop-invariant computations out of loops, and shares repeated loads.
 pub fn move_invariants(program: &mut Program) {
     load_push_constants_first(program);
-    let mut sharing = Sharing {
-        registers: &program.registers,
-        alias: HashMap::new(),
-    };
+    let mut sharing = Sharing { registers: &program.registers, alias: HashMap::new() };
     sharing.block(&mut program.body);
     move_out_of_loops(&mut program.body, &program.registers);
 }
@@ -18,11 +15,7 @@ pub fn move_invariants(program: &mut Program) {
 /// Loads each push constant at a constant offset once, at the beginning: a program can't write them.
 fn load_push_constants_first(program: &mut Program) {
     let mut pushed = Pushed {
-        known: program
-            .constants
-            .iter()
-            .map(|constant| (constant.reg, constant.bits))
-            .collect(),
+        known: program.constants.iter().map(|constant| (constant.reg, constant.bits)).collect(),
         registers: &mut program.registers,
         loaded: HashMap::new(),
         alias: HashMap::new(),
@@ -45,11 +38,7 @@ impl Pushed<'_> {
     fn block(&mut self, block: &mut Block) {
         block.retain_mut(|statement| {
             replace_uses(statement, &self.alias);
-            if let Statement::Load {
-                dst,
-                address,
-                format,
-            } = statement
+            if let Statement::Load { dst, address, format } = statement
                 && let Some(start) = self.start(address)
                 && let Some(end) = start.checked_add(format.bytes() * dst.len() as u32)
             {
@@ -82,17 +71,10 @@ impl Pushed<'_> {
     fn load(&mut self, place: u32, format: Format) -> Reg {
         *self.loaded.entry((place, format)).or_insert_with(|| {
             let reg = Reg(self.registers.len() as u32);
-            self.registers.push(Register {
-                ty: format.register_type(),
-                role: Role::Value,
-            });
+            self.registers.push(Register { ty: format.register_type(), role: Role::Value });
             self.loads.push(Statement::Load {
                 dst: vec![reg],
-                address: Address {
-                    space: Space::PushConstants,
-                    base: None,
-                    offset: place,
-                },
+                address: Address { space: Space::PushConstants, base: None, offset: place },
                 format,
             });
             reg
@@ -123,17 +105,12 @@ impl Sharing<'_> {
                 self.block(inner);
             }
             match statement {
-                Statement::Load {
-                    dst,
-                    address,
-                    format,
-                } => {
-                    let same = loaded.iter().find(|(other, of, regs)| {
-                        other == address && of == format && regs.len() >= dst.len()
-                    });
+                Statement::Load { dst, address, format } => {
+                    let same = loaded
+                        .iter()
+                        .find(|(other, of, regs)| other == address && of == format && regs.len() >= dst.len());
                     if let Some((_, _, regs)) = same {
-                        self.alias
-                            .extend(dst.iter().copied().zip(regs.iter().copied()));
+                        self.alias.extend(dst.iter().copied().zip(regs.iter().copied()));
                         return false;
                     }
                     if self.is_fixed(address) {
@@ -179,17 +156,12 @@ fn move_out_of_loops(block: &mut Block, registers: &[Register]) {
 }
 
 /// Moves statements that read nothing in `defined` from a loop's block to the end of another block.
-fn take_invariant(
-    block: &mut Block,
-    registers: &[Register],
-    defined: &mut HashSet<Reg>,
-    before: &mut Block,
-) {
+fn take_invariant(block: &mut Block, registers: &[Register], defined: &mut HashSet<Reg>, before: &mut Block) {
     for statement in std::mem::take(block) {
         let moves = match &statement {
-            Statement::Compute { src, .. } => src
-                .iter()
-                .all(|reg| registers[reg.0 as usize].role == Role::Value && !defined.contains(reg)),
+            Statement::Compute { src, .. } => {
+                src.iter().all(|reg| registers[reg.0 as usize].role == Role::Value && !defined.contains(reg))
+            }
             _ => false,
         };
         if moves {

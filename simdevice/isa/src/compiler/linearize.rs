@@ -103,11 +103,7 @@ impl Linearizer<'_> {
                 }
             };
             let cost = &mut self.runs[run];
-            let counts = if uniform {
-                &mut cost.uniform
-            } else {
-                &mut cost.varying
-            };
+            let counts = if uniform { &mut cost.uniform } else { &mut cost.varying };
             counts[kind as usize] += 1;
         }
         self.steps.push(step);
@@ -135,11 +131,7 @@ impl Linearizer<'_> {
                 *target = self.marks[*target as usize];
             }
         }
-        Linearized {
-            steps: self.steps,
-            masks: self.masks,
-            runs: self.runs,
-        }
+        Linearized { steps: self.steps, masks: self.masks, runs: self.runs }
     }
 
     /// Linearizes a block. `empty` is the jump target when no lane is active: before, or at, a place where lanes are
@@ -183,32 +175,15 @@ impl Linearizer<'_> {
     }
 
     fn compute_and_assign(&mut self, compute: &Statement, assign: &Statement) {
-        let (
-            Statement::Compute {
-                op,
-                dst: value,
-                src,
-            },
-            Statement::Assign { dst, .. },
-        ) = (compute, assign)
-        else {
+        let (Statement::Compute { op, dst: value, src }, Statement::Assign { dst, .. }) = (compute, assign) else {
             return;
         };
         let (to, temporary) = (self.slot(*dst), self.slot(*value));
         let src = self.operands(src);
         let step = if self.unmasked.contains(dst) || !to.is_varying() {
-            Step::Compute {
-                op: *op,
-                dst: to,
-                src,
-            }
+            Step::Compute { op: *op, dst: to, src }
         } else {
-            Step::ComputeAssign {
-                op: *op,
-                dst: to,
-                temporary,
-                src,
-            }
+            Step::ComputeAssign { op: *op, dst: to, temporary, src }
         };
         self.instruction(step, op.kind(), !to.is_varying());
     }
@@ -227,56 +202,26 @@ impl Linearizer<'_> {
             Statement::Assign { dst, src } => {
                 let (to, from, ty) = (self.slot(*dst), self.slot(*src), self.ty(*dst));
                 let step = if self.unmasked.contains(dst) {
-                    Step::Copy {
-                        dst: to,
-                        src: from,
-                        ty,
-                    }
+                    Step::Copy { dst: to, src: from, ty }
                 } else {
-                    Step::Assign {
-                        dst: to,
-                        src: from,
-                        ty,
-                    }
+                    Step::Assign { dst: to, src: from, ty }
                 };
                 self.instruction(step, Kind::Move, !to.is_varying());
             }
-            Statement::If {
-                condition,
-                then,
-                otherwise,
-            } => self.branch(*condition, then, otherwise, empty),
-            Statement::Switch {
-                label,
-                selector,
-                cases,
-            } => self.switch(*label, *selector, cases, empty),
-            Statement::Loop {
-                label,
-                body,
-                continuing,
-            } => self.repeat(*label, body, continuing, empty),
+            Statement::If { condition, then, otherwise } => self.branch(*condition, then, otherwise, empty),
+            Statement::Switch { label, selector, cases } => self.switch(*label, *selector, cases, empty),
+            Statement::Loop { label, body, continuing } => self.repeat(*label, body, continuing, empty),
             Statement::Scope { label, body } => self.scope(*label, body, empty),
             Statement::Break(_) | Statement::Continue(_) | Statement::Return => {
                 let into = self.exit(statement);
-                self.control(Step::Leave {
-                    into,
-                    target: empty,
-                });
+                self.control(Step::Leave { into, target: empty });
             }
             Statement::Kill => self.control(Step::Kill(empty)),
             Statement::Demote => self.control(Step::Demote),
             Statement::Barrier => {}
             other => {
-                let uniform = other
-                    .definitions()
-                    .first()
-                    .is_some_and(|reg| !self.slot(*reg).is_varying());
-                self.instruction(
-                    Step::Other(Box::new(other.clone())),
-                    kind_of(other),
-                    uniform,
-                );
+                let uniform = other.definitions().first().is_some_and(|reg| !self.slot(*reg).is_varying());
+                self.instruction(Step::Other(Box::new(other.clone())), kind_of(other), uniform);
             }
         }
     }
@@ -289,15 +234,10 @@ impl Linearizer<'_> {
     /// The mask that collects the lanes which leave by this statement.
     fn exit(&self, statement: &Statement) -> MaskId {
         match statement {
-            Statement::Break(label) => self
-                .constructs
-                .get(label)
-                .map_or(MaskId::DONE, |exits| exits.breaks),
-            Statement::Continue(label) => self
-                .constructs
-                .get(label)
-                .and_then(|exits| exits.continues)
-                .unwrap_or(MaskId::DONE),
+            Statement::Break(label) => self.constructs.get(label).map_or(MaskId::DONE, |exits| exits.breaks),
+            Statement::Continue(label) => {
+                self.constructs.get(label).and_then(|exits| exits.continues).unwrap_or(MaskId::DONE)
+            }
             _ => MaskId::DONE,
         }
     }
@@ -306,10 +246,7 @@ impl Linearizer<'_> {
         let condition = self.slot(condition);
         if !condition.is_varying() {
             let (other, end) = (self.mark(), self.mark());
-            self.control(Step::Unless {
-                condition,
-                target: other,
-            });
+            self.control(Step::Unless { condition, target: other });
             self.block(then, empty);
             if !otherwise.is_empty() && !then.last().is_some_and(leaves) {
                 self.control(Step::Jump(end));
@@ -322,43 +259,23 @@ impl Linearizer<'_> {
         match (then.as_slice(), otherwise.as_slice()) {
             ([exit @ (Statement::Break(_) | Statement::Continue(_) | Statement::Return)], _) => {
                 let into = self.exit(exit);
-                self.control(Step::LeaveIf {
-                    condition,
-                    when: true,
-                    into,
-                    target: empty,
-                });
+                self.control(Step::LeaveIf { condition, when: true, into, target: empty });
                 self.block(otherwise, empty);
             }
             (_, [exit @ (Statement::Break(_) | Statement::Continue(_) | Statement::Return)]) => {
                 let into = self.exit(exit);
-                self.control(Step::LeaveIf {
-                    condition,
-                    when: false,
-                    into,
-                    target: empty,
-                });
+                self.control(Step::LeaveIf { condition, when: false, into, target: empty });
                 self.block(then, empty);
             }
             _ => self.divergent_branch(condition, then, otherwise, empty),
         }
     }
 
-    fn divergent_branch(
-        &mut self,
-        condition: RegisterSlot,
-        then: &Block,
-        otherwise: &Block,
-        empty: Mark,
-    ) {
+    fn divergent_branch(&mut self, condition: RegisterSlot, then: &Block, otherwise: &Block, empty: Mark) {
         let saved = self.free_mask;
         let other = self.take_mask();
         let (at_else, end) = (self.mark(), self.mark());
-        self.control(Step::If {
-            condition,
-            other,
-            target: at_else,
-        });
+        self.control(Step::If { condition, other, target: at_else });
         self.block_of_some_lanes(then, at_else);
         self.place(at_else);
         if !otherwise.is_empty() {
@@ -366,10 +283,7 @@ impl Linearizer<'_> {
             self.block_of_some_lanes(otherwise, end);
         }
         self.place(end);
-        self.control(Step::Join {
-            mask: other,
-            target: empty,
-        });
+        self.control(Step::Join { mask: other, target: empty });
         self.free_mask = saved;
     }
 
@@ -385,18 +299,10 @@ impl Linearizer<'_> {
             self.control(Step::Clear(continues));
         }
         // Statements must not run without lanes: they would still set uniform registers.
-        let back = if continues.is_some() {
-            at_continuing
-        } else {
-            end
-        };
+        let back = if continues.is_some() { at_continuing } else { end };
         // Lanes that continue early must keep the values that they have then.
         let private = self.loop_private.remove(&label).unwrap_or_default();
-        let in_body = if continues.is_some() {
-            HashSet::new()
-        } else {
-            private.clone()
-        };
+        let in_body = if continues.is_some() { HashSet::new() } else { private.clone() };
         self.block_of_loop(body, back, in_body);
         self.place(at_continuing);
         if let Some(mask) = continues {
@@ -405,56 +311,30 @@ impl Linearizer<'_> {
         self.block_of_loop(continuing, end, private);
         self.place(end);
         self.control(Step::Repeat(head));
-        self.control(Step::Join {
-            mask: breaks,
-            target: empty,
-        });
+        self.control(Step::Join { mask: breaks, target: empty });
         self.free_mask = saved;
     }
 
     fn scope(&mut self, label: Label, body: &Block, empty: Mark) {
         let saved = self.free_mask;
         let breaks = self.take_mask();
-        self.constructs.insert(
-            label,
-            Exits {
-                breaks,
-                continues: None,
-            },
-        );
+        self.constructs.insert(label, Exits { breaks, continues: None });
         let end = self.mark();
         self.control(Step::Clear(breaks));
         self.block_of_some_lanes(body, end);
         self.place(end);
-        self.control(Step::Join {
-            mask: breaks,
-            target: empty,
-        });
+        self.control(Step::Join { mask: breaks, target: empty });
         self.free_mask = saved;
     }
 
     fn switch(&mut self, label: Label, selector: Reg, cases: &[Case], empty: Mark) {
         let saved = self.free_mask;
         let [entered, unmatched, breaks] = [self.take_mask(), self.take_mask(), self.take_mask()];
-        self.constructs.insert(
-            label,
-            Exits {
-                breaks,
-                continues: None,
-            },
-        );
+        self.constructs.insert(label, Exits { breaks, continues: None });
         let selector = self.slot(selector);
-        let values = cases
-            .iter()
-            .flat_map(|case| case.values.iter().copied())
-            .collect();
+        let values = cases.iter().flat_map(|case| case.values.iter().copied()).collect();
         self.control(Step::Clear(breaks));
-        self.control(Step::Switch {
-            selector,
-            values,
-            entered,
-            unmatched,
-        });
+        self.control(Step::Switch { selector, values, entered, unmatched });
         let end = self.mark();
         for (index, case) in cases.iter().enumerate() {
             let next = self.mark();
@@ -468,48 +348,30 @@ impl Linearizer<'_> {
             self.block_of_some_lanes(&case.body, next);
             let falls = case.fallthrough && index + 1 < cases.len();
             if !falls && !case.body.last().is_some_and(leaves) {
-                self.control(Step::Leave {
-                    into: breaks,
-                    target: next,
-                });
+                self.control(Step::Leave { into: breaks, target: next });
             }
             self.place(next);
         }
         if !cases.iter().any(|case| case.default) {
-            self.control(Step::Join {
-                mask: unmatched,
-                target: end,
-            });
+            self.control(Step::Join { mask: unmatched, target: end });
         }
         self.place(end);
-        self.control(Step::Join {
-            mask: breaks,
-            target: empty,
-        });
+        self.control(Step::Join { mask: breaks, target: empty });
         self.free_mask = saved;
     }
 }
 
 /// Reports whether no lane goes on after a statement.
 fn leaves(statement: &Statement) -> bool {
-    matches!(
-        statement,
-        Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill
-    )
+    matches!(statement, Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill)
 }
 
 /// The number of reads of each register.
 fn count_uses(program: &Program) -> Vec<u32> {
     fn count(block: &Block, uses: &mut [u32]) {
         for statement in block {
-            statement
-                .uses()
-                .into_iter()
-                .for_each(|reg| uses[reg.0 as usize] += 1);
-            statement
-                .blocks()
-                .into_iter()
-                .for_each(|block| count(block, uses));
+            statement.uses().into_iter().for_each(|reg| uses[reg.0 as usize] += 1);
+            statement.blocks().into_iter().for_each(|block| count(block, uses));
         }
     }
     let mut uses = vec![0; program.registers.len()];
@@ -518,13 +380,7 @@ fn count_uses(program: &Program) -> Vec<u32> {
 }
 
 fn contains(block: &Block, wanted: &Statement) -> bool {
-    block.iter().any(|statement| {
-        statement == wanted
-            || statement
-                .blocks()
-                .iter()
-                .any(|block| contains(block, wanted))
-    })
+    block.iter().any(|statement| statement == wanted || statement.blocks().iter().any(|block| contains(block, wanted)))
 }
 
 /// The kind of a statement that isn't arithmetic.
@@ -535,9 +391,7 @@ fn kind_of(statement: &Statement) -> Kind {
         | Statement::LaneIndex { .. }
         | Statement::IsHelper { .. }
         | Statement::Clock { .. } => Kind::Move,
-        Statement::Load { .. } | Statement::Store { .. } | Statement::BufferSize { .. } => {
-            Kind::Memory
-        }
+        Statement::Load { .. } | Statement::Store { .. } | Statement::BufferSize { .. } => Kind::Memory,
         Statement::Atomic { .. } => Kind::Atomic,
         Statement::Sample(_)
         | Statement::ImageRead(_)

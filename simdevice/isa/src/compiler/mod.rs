@@ -18,9 +18,7 @@ use std::sync::atomic::AtomicU32;
 use fearless_simd::Level;
 
 use crate::ir::validate::{InvalidProgram, validate};
-use crate::ir::{
-    Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type, VECTOR_LANES,
-};
+use crate::ir::{Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type, VECTOR_LANES};
 use crate::kernels::registers::RegisterSlot;
 use linearize::Linearized;
 use step::{RunCost, Step};
@@ -45,12 +43,7 @@ pub struct Options {
 impl Options {
     /// Options for batches and subgroups of 64 lanes, without counting.
     pub fn new(level: Level) -> Self {
-        Self {
-            lanes: 64,
-            subgroup_size: 64,
-            count_work: false,
-            level,
-        }
+        Self { lanes: 64, subgroup_size: 64, count_work: false, level }
     }
 }
 
@@ -98,12 +91,7 @@ impl CompiledProgram {
     /// If the program isn't valid, needs too many registers, or the options are out of range.
     pub fn new(mut program: Program, options: &Options) -> Result<Self, InvalidProgram> {
         let structure = |problem| Err(InvalidProgram::Structure { problem });
-        let Options {
-            lanes,
-            subgroup_size,
-            count_work,
-            level,
-        } = *options;
+        let Options { lanes, subgroup_size, count_work, level } = *options;
         if lanes == 0 || !lanes.is_multiple_of(VECTOR_LANES) || lanes > MAX_LANES {
             return structure("the lanes of a batch aren't a multiple of 16 within bounds");
         }

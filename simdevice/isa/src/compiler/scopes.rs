@@ -42,28 +42,15 @@ impl VariableScopes {
 
 /// Finds the scopes of a program's variables.
 pub fn variable_scopes(program: &Program) -> VariableScopes {
-    let mut search = Search {
-        program,
-        variables: HashMap::new(),
-        path: Vec::new(),
-        labels: Vec::new(),
-        statements: 0,
-    };
+    let mut search = Search { program, variables: HashMap::new(), path: Vec::new(), labels: Vec::new(), statements: 0 };
     // The caller sets and reads outputs: their scope is the whole program.
     for output in &program.outputs {
         search.touch(output.reg);
         search.read(output.reg);
     }
     search.block(&program.body);
-    let mut scopes = VariableScopes {
-        variables: search.variables,
-    };
-    let mut first = FirstUse {
-        scopes: &mut scopes,
-        path: Vec::new(),
-        statements: 0,
-        depth: 0,
-    };
+    let mut scopes = VariableScopes { variables: search.variables };
+    let mut first = FirstUse { scopes: &mut scopes, path: Vec::new(), statements: 0, depth: 0 };
     first.block(&program.body);
     scopes
 }
@@ -83,11 +70,8 @@ impl Search<'_> {
 
     fn touch(&mut self, reg: Reg) {
         let path = &self.path;
-        let uses = self.variables.entry(reg).or_insert_with(|| Uses {
-            scope: path.clone(),
-            depth: 0,
-            around_reads: None,
-        });
+        let uses =
+            self.variables.entry(reg).or_insert_with(|| Uses { scope: path.clone(), depth: 0, around_reads: None });
         let common = uses.scope.iter().zip(path).take_while(|(a, b)| a == b);
         let common = common.count();
         uses.scope.truncate(common);
@@ -177,9 +161,9 @@ impl FirstUse<'_> {
 
 fn label_of(statement: &Statement) -> Option<Label> {
     match statement {
-        Statement::Loop { label, .. }
-        | Statement::Scope { label, .. }
-        | Statement::Switch { label, .. } => Some(*label),
+        Statement::Loop { label, .. } | Statement::Scope { label, .. } | Statement::Switch { label, .. } => {
+            Some(*label)
+        }
         _ => None,
     }
 }
@@ -208,10 +192,7 @@ fn count_reads(program: &Program, block: &Block, reads: &mut HashMap<Reg, usize>
                 *reads.entry(reg).or_default() += 1;
             }
         }
-        statement
-            .blocks()
-            .into_iter()
-            .for_each(|block| count_reads(program, block, reads));
+        statement.blocks().into_iter().for_each(|block| count_reads(program, block, reads));
     }
 }
 
@@ -229,20 +210,13 @@ fn search_loops(
             }
             Statement::Loop { label, .. } => {
                 let mut within = HashMap::new();
-                statement
-                    .blocks()
-                    .into_iter()
-                    .for_each(|block| count_reads(program, block, &mut within));
-                let private = within.iter().filter(|(reg, count)| {
-                    assigned.contains(*reg) && reads.get(*reg) == Some(*count)
-                });
+                statement.blocks().into_iter().for_each(|block| count_reads(program, block, &mut within));
+                let private =
+                    within.iter().filter(|(reg, count)| assigned.contains(*reg) && reads.get(*reg) == Some(*count));
                 found.insert(*label, private.map(|(reg, _)| *reg).collect());
             }
             _ => {}
         }
-        statement
-            .blocks()
-            .into_iter()
-            .for_each(|block| search_loops(program, block, reads, found));
+        statement.blocks().into_iter().for_each(|block| search_loops(program, block, reads, found));
     }
 }

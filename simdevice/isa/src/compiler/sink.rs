@@ -13,10 +13,7 @@ pub fn sink(program: &mut Program) {
 
 fn sink_block(block: &mut Block, registers: &[Register]) {
     for statement in block.iter_mut() {
-        statement
-            .blocks_mut()
-            .into_iter()
-            .for_each(|inner| sink_block(inner, registers));
+        statement.blocks_mut().into_iter().for_each(|inner| sink_block(inner, registers));
     }
     for at in 0..block.len() {
         let Statement::Assign { src, .. } = block[at] else {
@@ -24,17 +21,12 @@ fn sink_block(block: &mut Block, registers: &[Register]) {
         };
         let defines = |statement: &Statement| matches!(statement, Statement::Compute { dst, .. } if *dst == src);
         let start = at.saturating_sub(NEARBY);
-        let Some(from) = block[start..at]
-            .iter()
-            .position(defines)
-            .map(|index| start + index)
-        else {
+        let Some(from) = block[start..at].iter().position(defines).map(|index| start + index) else {
             continue;
         };
         let between = &block[from + 1..at];
         let movable = block[from].uses().into_iter().all(|operand| {
-            registers[operand.0 as usize].role == Role::Value
-                || !between.iter().any(|other| other.writes(operand))
+            registers[operand.0 as usize].role == Role::Value || !between.iter().any(|other| other.writes(operand))
         });
         // Lanes that leave in between may need the result at the place where they go.
         let all_stay = between.iter().all(keeps_lanes);
@@ -46,9 +38,7 @@ fn sink_block(block: &mut Block, registers: &[Register]) {
 
 /// Reports whether every lane that runs a statement runs the next one, too.
 fn keeps_lanes(statement: &Statement) -> bool {
-    let leaves = matches!(
-        statement,
-        Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill
-    );
+    let leaves =
+        matches!(statement, Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill);
     !leaves && statement.blocks().into_iter().flatten().all(keeps_lanes)
 }

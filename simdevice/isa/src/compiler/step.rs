@@ -31,30 +31,13 @@ pub type Target = u32;
 #[derive(Clone, Debug)]
 pub enum Step {
     /// `dst = op(src...)` in all lanes.
-    Compute {
-        op: Op,
-        dst: RegisterSlot,
-        src: [RegisterSlot; 4],
-    },
+    Compute { op: Op, dst: RegisterSlot, src: [RegisterSlot; 4] },
     /// `dst = op(src...)` in the active lanes, by way of `temporary` if not all lanes are active.
-    ComputeAssign {
-        op: Op,
-        dst: RegisterSlot,
-        temporary: RegisterSlot,
-        src: [RegisterSlot; 4],
-    },
+    ComputeAssign { op: Op, dst: RegisterSlot, temporary: RegisterSlot, src: [RegisterSlot; 4] },
     /// `dst = src` in all lanes.
-    Copy {
-        dst: RegisterSlot,
-        src: RegisterSlot,
-        ty: Type,
-    },
+    Copy { dst: RegisterSlot, src: RegisterSlot, ty: Type },
     /// `dst = src` in the active lanes (all lanes, if `dst` is uniform).
-    Assign {
-        dst: RegisterSlot,
-        src: RegisterSlot,
-        ty: Type,
-    },
+    Assign { dst: RegisterSlot, src: RegisterSlot, ty: Type },
     /// Any statement that reads other lanes or accesses memory.
     Other(Box<Statement>),
     /// The begin of a counted run: counts an execution and the active lanes.
@@ -63,16 +46,9 @@ pub enum Step {
     /// Jumps to the target.
     Jump(Target),
     /// Jumps to the target if a uniform condition is false.
-    Unless {
-        condition: RegisterSlot,
-        target: Target,
-    },
+    Unless { condition: RegisterSlot, target: Target },
     /// `other = active & !condition; active &= condition`; jumps to the target if no lane is left.
-    If {
-        condition: RegisterSlot,
-        other: MaskId,
-        target: Target,
-    },
+    If { condition: RegisterSlot, other: MaskId, target: Target },
     /// Exchanges `active` and `other`; jumps to the target if no lane is left.
     Else { other: MaskId, target: Target },
     /// `mask = {}`.
@@ -82,30 +58,14 @@ pub enum Step {
     /// `into |= active; active = {}`; jumps to the target.
     Leave { into: MaskId, target: Target },
     /// Moves the active lanes whose condition equals `when` to `into`; jumps to the target if none is left.
-    LeaveIf {
-        condition: RegisterSlot,
-        when: bool,
-        into: MaskId,
-        target: Target,
-    },
+    LeaveIf { condition: RegisterSlot, when: bool, into: MaskId, target: Target },
     /// Jumps to the loop's head if any lane is active; checks the watchdog.
     Repeat(Target),
     /// `entered = active; active = {}; unmatched =` the lanes of `entered` whose selector is none of `values`.
-    Switch {
-        selector: RegisterSlot,
-        values: Box<[u32]>,
-        entered: MaskId,
-        unmatched: MaskId,
-    },
+    Switch { selector: RegisterSlot, values: Box<[u32]>, entered: MaskId, unmatched: MaskId },
     /// Activates also the lanes of `entered` whose selector is one of `values`, and those of `unmatched` if given;
     /// jumps to the target if no lane is active.
-    Case {
-        selector: RegisterSlot,
-        values: Box<[u32]>,
-        entered: MaskId,
-        unmatched: Option<MaskId>,
-        target: Target,
-    },
+    Case { selector: RegisterSlot, values: Box<[u32]>, entered: MaskId, unmatched: Option<MaskId>, target: Target },
     /// Kills the active lanes, which are done; jumps to the target.
     Kill(Target),
     /// Kills the active lanes and makes them helpers.

@@ -21,11 +21,7 @@ pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<boo
         open: Vec::new(),
         changed: true,
     };
-    for input in program
-        .inputs
-        .iter()
-        .filter(|input| input.rate == Rate::Varying)
-    {
+    for input in program.inputs.iter().filter(|input| input.rate == Rate::Varying) {
         search.mark(input.reg);
     }
     for output in &program.outputs {
@@ -137,21 +133,13 @@ impl Search {
                     self.mark(*dst);
                 }
             }
-            Statement::If {
-                condition,
-                then,
-                otherwise,
-            } => {
+            Statement::If { condition, then, otherwise } => {
                 for block in [then, otherwise] {
                     let around = self.branch(*condition);
                     self.within(around, block);
                 }
             }
-            Statement::Switch {
-                label,
-                selector,
-                cases,
-            } => {
+            Statement::Switch { label, selector, cases } => {
                 self.open.push(Around::Labelled(*label));
                 for case in cases {
                     let around = self.branch(*selector);
@@ -159,11 +147,7 @@ impl Search {
                 }
                 self.open.pop();
             }
-            Statement::Loop {
-                label,
-                body,
-                continuing,
-            } => {
+            Statement::Loop { label, body, continuing } => {
                 self.within(Around::Body(*label), body);
                 self.within(Around::Continuing(*label), continuing);
             }
@@ -183,32 +167,22 @@ impl Search {
                 }
             }
             other => {
-                let differs = self.differs_by_itself(other)
-                    || other.uses().into_iter().any(|reg| self.is_varying(reg));
+                let differs = self.differs_by_itself(other) || other.uses().into_iter().any(|reg| self.is_varying(reg));
                 if differs {
-                    other
-                        .definitions()
-                        .into_iter()
-                        .for_each(|reg| self.mark(reg));
+                    other.definitions().into_iter().for_each(|reg| self.mark(reg));
                 }
             }
         }
     }
 
     fn branch(&self, condition: Reg) -> Around {
-        if self.is_varying(condition) {
-            Around::Varying
-        } else {
-            Around::Uniform
-        }
+        if self.is_varying(condition) { Around::Varying } else { Around::Uniform }
     }
 
     /// Reports whether a statement's results may differ between lanes even if its operands don't.
     fn differs_by_itself(&self, statement: &Statement) -> bool {
         match statement {
-            Statement::Load { address, .. } => {
-                address.space == Space::Private && !self.private_is_uniform
-            }
+            Statement::Load { address, .. } => address.space == Space::Private && !self.private_is_uniform,
             Statement::Compute { .. }
             | Statement::Clock { .. }
             | Statement::BufferSize { .. }

@@ -19,11 +19,7 @@ pub struct Binding {
 impl Binding {
     /// A single descriptor.
     pub fn new(slot: u32) -> Self {
-        Self {
-            slot,
-            count: 1,
-            index: None,
-        }
+        Self { slot, count: 1, index: None }
     }
 }
 
@@ -84,11 +80,7 @@ impl Format {
 
     /// The type of the register that holds an element.
     pub fn register_type(self) -> Type {
-        if self == Self::B64 {
-            Type::B64
-        } else {
-            Type::B32
-        }
+        if self == Self::B64 { Type::B64 } else { Type::B32 }
     }
 }
 

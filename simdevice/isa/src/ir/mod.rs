@@ -8,13 +8,10 @@ mod register;
 mod statement;
 pub mod validate;
 
-pub use image::{
-    Dimension, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Sample,
-};
+pub use image::{Dimension, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Sample};
 pub use memory::{Address, AtomicOp, Binding, Format, Space};
 pub use program::{
-    Constant, Input, MAX_LANES, MAX_MEMORY_BYTES, MAX_NESTING, MAX_SUBGROUP_SIZE, Output, Program,
-    Rate,
+    Constant, Input, MAX_LANES, MAX_MEMORY_BYTES, MAX_NESTING, MAX_SUBGROUP_SIZE, Output, Program, Rate,
 };
 pub use register::{Reg, Register, Role, Type, VECTOR_LANES};
 pub use statement::{Axis, Block, Case, Label, Statement, SubgroupOp, is_reducible};

@@ -87,29 +87,16 @@ impl Display for Program {
             writeln!(f, "{} = output {}", output.reg, output.slot)?;
         }
         if self.shared_bytes + self.private_bytes > 0 {
-            writeln!(
-                f,
-                "shared {} bytes, private {} bytes",
-                self.shared_bytes, self.private_bytes
-            )?;
+            writeln!(f, "shared {} bytes, private {} bytes", self.shared_bytes, self.private_bytes)?;
         }
         for constant in &self.constants {
             let bits = constant.bits;
-            match self
-                .registers
-                .get(constant.reg.0 as usize)
-                .map(|register| register.ty)
-            {
+            match self.registers.get(constant.reg.0 as usize).map(|register| register.ty) {
                 Some(Type::Bool) => writeln!(f, "{} = {}", constant.reg, bits != 0)?,
                 Some(Type::B64) => {
                     writeln!(f, "{} = {bits} ({:?})", constant.reg, f64::from_bits(bits))?;
                 }
-                _ => writeln!(
-                    f,
-                    "{} = {bits} ({:?})",
-                    constant.reg,
-                    f32::from_bits(bits as u32)
-                )?,
+                _ => writeln!(f, "{} = {bits} ({:?})", constant.reg, f32::from_bits(bits as u32))?,
             }
         }
         write_block(&self.body, 0, f)

@@ -323,12 +323,7 @@ impl Statement {
                 src.iter_mut().for_each(&mut *visit);
                 use_address(address, visit);
             }
-            Self::Atomic {
-                address,
-                value,
-                comparator,
-                ..
-            } => {
+            Self::Atomic { address, value, comparator, .. } => {
                 use_address(address, visit);
                 visit(value);
                 comparator.iter_mut().for_each(visit);
@@ -376,10 +371,7 @@ impl Statement {
                 match query {
                     ImageQuery::Size { level } => level.iter_mut().for_each(visit),
                     ImageQuery::Levels | ImageQuery::Samples => {}
-                    ImageQuery::Lod {
-                        sampler,
-                        coordinate,
-                    } => {
+                    ImageQuery::Lod { sampler, coordinate } => {
                         use_binding(sampler, visit);
                         coordinate.iter_mut().for_each(visit);
                     }
@@ -408,8 +400,7 @@ impl Statement {
     /// The registers that the statement itself defines or assigns.
     pub fn definitions(&self) -> Vec<Reg> {
         let mut found = Vec::new();
-        self.clone_head()
-            .for_each_definition(&mut |reg| found.push(*reg));
+        self.clone_head().for_each_definition(&mut |reg| found.push(*reg));
         found
     }
 
@@ -423,13 +414,9 @@ impl Statement {
     /// The blocks within, in order of execution.
     pub fn blocks(&self) -> Vec<&Block> {
         match self {
-            Self::If {
-                then, otherwise, ..
-            } => vec![then, otherwise],
+            Self::If { then, otherwise, .. } => vec![then, otherwise],
             Self::Switch { cases, .. } => cases.iter().map(|case| &case.body).collect(),
-            Self::Loop {
-                body, continuing, ..
-            } => vec![body, continuing],
+            Self::Loop { body, continuing, .. } => vec![body, continuing],
             Self::Scope { body, .. } => vec![body],
             _ => Vec::new(),
         }
@@ -438,13 +425,9 @@ impl Statement {
     /// The blocks within, in order of execution.
     pub fn blocks_mut(&mut self) -> Vec<&mut Block> {
         match self {
-            Self::If {
-                then, otherwise, ..
-            } => vec![then, otherwise],
+            Self::If { then, otherwise, .. } => vec![then, otherwise],
             Self::Switch { cases, .. } => cases.iter_mut().map(|case| &mut case.body).collect(),
-            Self::Loop {
-                body, continuing, ..
-            } => vec![body, continuing],
+            Self::Loop { body, continuing, .. } => vec![body, continuing],
             Self::Scope { body, .. } => vec![body],
             _ => Vec::new(),
         }
@@ -452,39 +435,21 @@ impl Statement {
 
     /// Reports whether the statement, or one within, reads a register.
     pub fn reads(&self, reg: Reg) -> bool {
-        self.uses().contains(&reg)
-            || self
-                .blocks()
-                .into_iter()
-                .flatten()
-                .any(|inner| inner.reads(reg))
+        self.uses().contains(&reg) || self.blocks().into_iter().flatten().any(|inner| inner.reads(reg))
     }
 
     /// Reports whether the statement, or one within, defines or assigns a register.
     pub fn writes(&self, reg: Reg) -> bool {
-        self.definitions().contains(&reg)
-            || self
-                .blocks()
-                .into_iter()
-                .flatten()
-                .any(|inner| inner.writes(reg))
+        self.definitions().contains(&reg) || self.blocks().into_iter().flatten().any(|inner| inner.writes(reg))
     }
 
     /// The statement without its blocks.
     fn clone_head(&self) -> Self {
         match self {
-            Self::If { condition, .. } => Self::If {
-                condition: *condition,
-                then: Vec::new(),
-                otherwise: Vec::new(),
-            },
-            Self::Switch {
-                label, selector, ..
-            } => Self::Switch {
-                label: *label,
-                selector: *selector,
-                cases: Vec::new(),
-            },
+            Self::If { condition, .. } => Self::If { condition: *condition, then: Vec::new(), otherwise: Vec::new() },
+            Self::Switch { label, selector, .. } => {
+                Self::Switch { label: *label, selector: *selector, cases: Vec::new() }
+            }
             Self::Loop { .. } | Self::Scope { .. } => Self::Barrier,
             other => other.clone(),
         }
@@ -510,9 +475,7 @@ impl Display for Statement {
 
 /// Writes the statements of a block, each on a line, indented by `depth`.
 pub(super) fn write_block(statements: &Block, depth: usize, f: &mut Formatter<'_>) -> Result {
-    statements
-        .iter()
-        .try_for_each(|inner| write_statement(inner, depth, f))
+    statements.iter().try_for_each(|inner| write_statement(inner, depth, f))
 }
 
 fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Result {
@@ -528,22 +491,9 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
         Statement::LaneIndex { .. } => writeln!(f, "lane_index"),
         Statement::IsHelper { .. } => writeln!(f, "is_helper"),
         Statement::Clock { .. } => writeln!(f, "clock"),
-        Statement::Load {
-            address, format, ..
-        } => writeln!(f, "load {format:?} {address}"),
-        Statement::Store {
-            src,
-            address,
-            format,
-        } => writeln!(f, "store {format:?} {address}, {}", List(src)),
-        Statement::Atomic {
-            op,
-            address,
-            format,
-            value,
-            comparator,
-            ..
-        } => {
+        Statement::Load { address, format, .. } => writeln!(f, "load {format:?} {address}"),
+        Statement::Store { src, address, format } => writeln!(f, "store {format:?} {address}, {}", List(src)),
+        Statement::Atomic { op, address, format, value, comparator, .. } => {
             write!(f, "atomic {op:?} {format:?} {address}, {value}")?;
             match comparator {
                 Some(comparator) => writeln!(f, ", {comparator}"),
@@ -552,14 +502,7 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
         }
         Statement::BufferSize { buffer, .. } => writeln!(f, "buffer_size {buffer}"),
         Statement::Sample(sample) => {
-            write!(
-                f,
-                "sample {:?} {} {}, {}",
-                sample.shape,
-                sample.image,
-                sample.sampler,
-                List(&sample.coordinate)
-            )?;
+            write!(f, "sample {:?} {} {}, {}", sample.shape, sample.image, sample.sampler, List(&sample.coordinate))?;
             writeln!(
                 f,
                 ", {:?}, offset [{}], compare {:?}, gather {:?}",
@@ -570,54 +513,20 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
             )
         }
         Statement::ImageRead(read) => {
-            write!(
-                f,
-                "image_read {:?} {}, {}",
-                read.shape,
-                read.image,
-                List(&read.coordinate)
-            )?;
+            write!(f, "image_read {:?} {}, {}", read.shape, read.image, List(&read.coordinate))?;
             writeln!(f, ", level {:?}, sample {:?}", read.level, read.sample)
         }
         Statement::ImageWrite(write) => {
             let ir = (&write.coordinate, &write.texel);
-            writeln!(
-                f,
-                "image_write {:?} {}, {}: {}",
-                write.shape,
-                write.image,
-                List(ir.0),
-                List(ir.1)
-            )
+            writeln!(f, "image_write {:?} {}, {}: {}", write.shape, write.image, List(ir.0), List(ir.1))
         }
         Statement::ImageAtomic(atomic) => {
-            write!(
-                f,
-                "image_atomic {:?} {:?} {}",
-                atomic.op, atomic.shape, atomic.image
-            )?;
-            writeln!(
-                f,
-                ", {}: {}, {:?}",
-                List(&atomic.coordinate),
-                atomic.value,
-                atomic.comparator
-            )
+            write!(f, "image_atomic {:?} {:?} {}", atomic.op, atomic.shape, atomic.image)?;
+            writeln!(f, ", {}: {}, {:?}", List(&atomic.coordinate), atomic.value, atomic.comparator)
         }
-        Statement::ImageQuery {
-            image,
-            shape,
-            query,
-            ..
-        } => writeln!(f, "image_query {shape:?} {image}, {query:?}"),
-        Statement::Derivative {
-            src, axis, fine, ..
-        } => {
-            writeln!(
-                f,
-                "derivative_{} {axis:?} {src}",
-                if *fine { "fine" } else { "coarse" }
-            )
+        Statement::ImageQuery { image, shape, query, .. } => writeln!(f, "image_query {shape:?} {image}, {query:?}"),
+        Statement::Derivative { src, axis, fine, .. } => {
+            writeln!(f, "derivative_{} {axis:?} {src}", if *fine { "fine" } else { "coarse" })
         }
         Statement::Subgroup { op, src, index, .. } => {
             match op {
@@ -630,11 +539,7 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
             writeln!(f, " {}", List(&operands))
         }
         Statement::Barrier => writeln!(f, "barrier"),
-        Statement::If {
-            condition,
-            then,
-            otherwise,
-        } => {
+        Statement::If { condition, then, otherwise } => {
             writeln!(f, "if {condition} {{")?;
             write_block(then, depth + 1, f)?;
             if !otherwise.is_empty() {
@@ -643,33 +548,17 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
             }
             writeln!(f, "{pad}}}")
         }
-        Statement::Switch {
-            label,
-            selector,
-            cases,
-        } => {
+        Statement::Switch { label, selector, cases } => {
             writeln!(f, "@{} switch {selector} {{", label.0)?;
             for case in cases {
                 let default = if case.default { " default" } else { "" };
                 writeln!(f, "{pad}case {:?}{default} {{", case.values)?;
                 write_block(&case.body, depth + 1, f)?;
-                writeln!(
-                    f,
-                    "{pad}}}{}",
-                    if case.fallthrough {
-                        " fall through"
-                    } else {
-                        ""
-                    }
-                )?;
+                writeln!(f, "{pad}}}{}", if case.fallthrough { " fall through" } else { "" })?;
             }
             writeln!(f, "{pad}}}")
         }
-        Statement::Loop {
-            label,
-            body,
-            continuing,
-        } => {
+        Statement::Loop { label, body, continuing } => {
             writeln!(f, "@{} loop {{", label.0)?;
             write_block(body, depth + 1, f)?;
             if !continuing.is_empty() {

@@ -9,8 +9,7 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
 use super::elementary;
 use super::registers::{
-    Kernel, RegisterFile, RegisterSlot, from_mask, map1, map2, map3, to_mask, vector1, vector2,
-    vector3,
+    Kernel, RegisterFile, RegisterSlot, from_mask, map1, map2, map3, to_mask, vector1, vector2, vector3,
 };
 use crate::ir::op::{Kind, Op};
 
@@ -162,27 +161,13 @@ fn less_common<S: Simd>(op: Op) -> Kernel<S> {
 /// The kernel of a 32-bit operation that SIMD vectors don't have.
 fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
     match op {
-        Op::UDiv => lanes!(map2, |a: u32, b: u32| {
-            a.checked_div(b).unwrap_or(u32::MAX)
-        }),
+        Op::UDiv => lanes!(map2, |a: u32, b: u32| { a.checked_div(b).unwrap_or(u32::MAX) }),
         Op::URem => lanes!(map2, |a: u32, b: u32| { a.checked_rem(b).unwrap_or(a) }),
-        Op::SDiv => lanes!(map2, |a: i32, b: i32| if b == 0 {
-            -1
-        } else {
-            a.wrapping_div(b)
-        },),
-        Op::SRem => lanes!(map2, |a: i32, b: i32| if b == 0 {
-            a
-        } else {
-            a.wrapping_rem(b)
-        },),
+        Op::SDiv => lanes!(map2, |a: i32, b: i32| if b == 0 { -1 } else { a.wrapping_div(b) },),
+        Op::SRem => lanes!(map2, |a: i32, b: i32| if b == 0 { a } else { a.wrapping_rem(b) },),
         Op::SMod => lanes!(map2, floor_mod),
-        Op::UMulHi => lanes!(map2, |a: u32, b: u32| {
-            ((u64::from(a) * u64::from(b)) >> 32) as u32
-        }),
-        Op::SMulHi => lanes!(map2, |a: i32, b: i32| {
-            ((i64::from(a) * i64::from(b)) >> 32) as i32
-        }),
+        Op::UMulHi => lanes!(map2, |a: u32, b: u32| { ((u64::from(a) * u64::from(b)) >> 32) as u32 }),
+        Op::SMulHi => lanes!(map2, |a: i32, b: i32| { ((i64::from(a) * i64::from(b)) >> 32) as i32 }),
         Op::SSign => lanes!(map1, i32::signum),
         Op::BitReverse => lanes!(map1, u32::reverse_bits),
         Op::BitCount => lanes!(map1, |a: u32| a.count_ones()),
@@ -202,18 +187,12 @@ fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
         Op::FRem => lanes!(map2, |a: f32, b: f32| a % b),
         Op::FMod => lanes!(map2, |a: f32, b: f32| {
             let r = a % b;
-            if r != 0.0 && (r < 0.0) != (b < 0.0) {
-                r + b
-            } else {
-                r
-            }
+            if r != 0.0 && (r < 0.0) != (b < 0.0) { r + b } else { r }
         }),
         Op::FLdexp => lanes!(map2, elementary::ldexp),
         Op::FFrexpSignificand => lanes!(map1, |a: f32| elementary::frexp(a).0),
         Op::FFrexpExponent => lanes!(map1, |a: f32| elementary::frexp(a).1),
-        Op::FToF16 => lanes!(map1, |a: f32| {
-            u32::from(half::f16::from_f32(a).to_bits())
-        }),
+        Op::FToF16 => lanes!(map1, |a: f32| { u32::from(half::f16::from_f32(a).to_bits()) }),
         Op::F16ToF => lanes!(map1, |a: u32| { half::f16::from_bits(a as u16).to_f32() }),
         Op::RoundToF16 => lanes!(map1, |a: f32| half::f16::from_f32(a).to_f32()),
         // Every other operation has been taken.
@@ -247,9 +226,7 @@ fn wide<S: Simd>(op: Op) -> Kernel<S> {
         Op::UToU64 => lanes!(map1, |a: u32| u64::from(a)),
         Op::Low32 => lanes!(map1, |a: u64| a as u32),
         Op::High32 => lanes!(map1, |a: u64| (a >> 32) as u32),
-        Op::Join64 => lanes!(map2, |low: u32, high: u32| {
-            u64::from(low) | u64::from(high) << 32
-        }),
+        Op::Join64 => lanes!(map2, |low: u32, high: u32| { u64::from(low) | u64::from(high) << 32 }),
 
         Op::FAdd64 => lanes!(map2, |a: f64, b: f64| a + b),
         Op::FSub64 => lanes!(map2, |a: f64, b: f64| a - b),
@@ -259,17 +236,11 @@ fn wide<S: Simd>(op: Op) -> Kernel<S> {
         Op::FRem64 => lanes!(map2, |a: f64, b: f64| a % b),
         Op::FMod64 => lanes!(map2, |a: f64, b: f64| {
             let r = a % b;
-            if r != 0.0 && (r < 0.0) != (b < 0.0) {
-                r + b
-            } else {
-                r
-            }
+            if r != 0.0 && (r < 0.0) != (b < 0.0) { r + b } else { r }
         }),
         Op::FNeg64 => lanes!(map1, |a: f64| -a),
         Op::FAbs64 => lanes!(map1, f64::abs),
-        Op::FSign64 => lanes!(map1, |a: f64| {
-            f64::from(i8::from(a > 0.0) - i8::from(a < 0.0))
-        }),
+        Op::FSign64 => lanes!(map1, |a: f64| { f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)) }),
         Op::FFloor64 => lanes!(map1, f64::floor),
         Op::FCeil64 => lanes!(map1, f64::ceil),
         Op::FTrunc64 => lanes!(map1, f64::trunc),
@@ -282,9 +253,7 @@ fn wide<S: Simd>(op: Op) -> Kernel<S> {
         Op::FNe64 => lanes!(map2, |a: f64, b: f64| a != b),
         Op::FLt64 => lanes!(map2, |a: f64, b: f64| a < b),
         Op::FLe64 => lanes!(map2, |a: f64, b: f64| a <= b),
-        Op::FLtGt64 => lanes!(map2, |a: f64, b: f64| {
-            a.partial_cmp(&b).is_some_and(Ordering::is_ne)
-        }),
+        Op::FLtGt64 => lanes!(map2, |a: f64, b: f64| { a.partial_cmp(&b).is_some_and(Ordering::is_ne) }),
         Op::FIsNan64 => lanes!(map1, f64::is_nan),
         Op::FIsInf64 => lanes!(map1, f64::is_infinite),
         Op::FLdexp64 => lanes!(map2, ldexp64),
@@ -297,20 +266,10 @@ fn wide<S: Simd>(op: Op) -> Kernel<S> {
         Op::INeg64 => lanes!(map1, u64::wrapping_neg),
         Op::SAbs64 => lanes!(map1, i64::wrapping_abs),
         Op::SSign64 => lanes!(map1, i64::signum),
-        Op::UDiv64 => lanes!(map2, |a: u64, b: u64| {
-            a.checked_div(b).unwrap_or(u64::MAX)
-        }),
+        Op::UDiv64 => lanes!(map2, |a: u64, b: u64| { a.checked_div(b).unwrap_or(u64::MAX) }),
         Op::URem64 => lanes!(map2, |a: u64, b: u64| { a.checked_rem(b).unwrap_or(a) }),
-        Op::SDiv64 => lanes!(map2, |a: i64, b: i64| if b == 0 {
-            -1
-        } else {
-            a.wrapping_div(b)
-        },),
-        Op::SRem64 => lanes!(map2, |a: i64, b: i64| if b == 0 {
-            a
-        } else {
-            a.wrapping_rem(b)
-        },),
+        Op::SDiv64 => lanes!(map2, |a: i64, b: i64| if b == 0 { -1 } else { a.wrapping_div(b) },),
+        Op::SRem64 => lanes!(map2, |a: i64, b: i64| if b == 0 { a } else { a.wrapping_rem(b) },),
         Op::SMod64 => lanes!(map2, floor_mod64),
         Op::And64 => lanes!(map2, |a: u64, b: u64| a & b),
         Op::Or64 => lanes!(map2, |a: u64, b: u64| a | b),
@@ -343,17 +302,10 @@ fn frexp64(a: f64) -> (f64, i32) {
         return (a, 0);
     }
     // Denormals are scaled to normal numbers first.
-    let (scaled, bias) = if a.abs() < f64::MIN_POSITIVE {
-        (a * 2f64.powi(64), -64)
-    } else {
-        (a, 0)
-    };
+    let (scaled, bias) = if a.abs() < f64::MIN_POSITIVE { (a * 2f64.powi(64), -64) } else { (a, 0) };
     let bits = scaled.to_bits();
     let exponent = (bits >> 52 & 0x7ff) as i32 - 1022;
-    (
-        f64::from_bits(bits & !(0x7ff << 52) | 1022 << 52),
-        exponent + bias,
-    )
+    (f64::from_bits(bits & !(0x7ff << 52) | 1022 << 52), exponent + bias)
 }
 
 /// `a * 2^exponent`, rounded once.
@@ -385,11 +337,7 @@ fn floor_mod(a: i32, b: i32) -> i32 {
         return a;
     }
     let remainder = a.wrapping_rem(b);
-    if remainder != 0 && (remainder < 0) != (b < 0) {
-        remainder + b
-    } else {
-        remainder
-    }
+    if remainder != 0 && (remainder < 0) != (b < 0) { remainder + b } else { remainder }
 }
 
 /// [`floor_mod`] of 64 bits.
@@ -399,11 +347,7 @@ fn floor_mod64(a: i64, b: i64) -> i64 {
         return a;
     }
     let remainder = a.wrapping_rem(b);
-    if remainder != 0 && (remainder < 0) != (b < 0) {
-        remainder + b
-    } else {
-        remainder
-    }
+    if remainder != 0 && (remainder < 0) != (b < 0) { remainder + b } else { remainder }
 }
 
 /// Index of the lowest one bit, or -1.
@@ -427,11 +371,7 @@ fn find_signed_msb(a: i32) -> u32 {
 /// `count` ones from bit 0.
 #[inline(always)]
 fn ones(count: u32) -> u32 {
-    if count >= 32 {
-        u32::MAX
-    } else {
-        (1 << count) - 1
-    }
+    if count >= 32 { u32::MAX } else { (1 << count) - 1 }
 }
 
 /// `value` shifted right, also by 32.

@@ -131,17 +131,7 @@ fn exp_biased<S: Simd>(x: F<S>, bias: i32) -> F<S> {
     let n = (clamped * LOG2_E).round_ties_even();
     let r = n.mul_add(splat(x, -0.693_359_4), clamped);
     let r = n.mul_add(splat(x, 2.121_944_4e-4), r);
-    let p = polynomial(
-        r,
-        [
-            1.987_569_1e-4,
-            1.398_2e-3,
-            8.333_452e-3,
-            4.166_579_6e-2,
-            1.666_666_5e-1,
-            5e-1,
-        ],
-    );
+    let p = polynomial(r, [1.987_569_1e-4, 1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5e-1]);
     let y = (r * r).mul_add(p, r) + 1.0;
     let y = scale(y, I::truncate_from(n) + bias);
     x.is_nan().select(x, y)
@@ -159,15 +149,7 @@ fn exp2<S: Simd>(x: F<S>) -> F<S> {
     let r = clamped - n;
     let y = polynomial(
         r,
-        [
-            1.535_336_2e-4,
-            1.339_887_4e-3,
-            9.618_437e-3,
-            5.550_332_5e-2,
-            2.402_264_8e-1,
-            6.931_472e-1,
-            1.0,
-        ],
+        [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1, 6.931_472e-1, 1.0],
     );
     x.is_nan().select(x, scale(y, I::truncate_from(n)))
 }
@@ -206,11 +188,7 @@ fn logarithm<S: Simd>(x: F<S>) -> Logarithm<S> {
         ],
     );
     let p = z.mul_add(splat(x, -0.5), p * f * z);
-    Logarithm {
-        exponent,
-        fraction: f,
-        polynomial: p,
-    }
+    Logarithm { exponent, fraction: f, polynomial: p }
 }
 
 /// The special cases of logarithms: zero, negatives, infinity, NaN.
@@ -224,11 +202,7 @@ fn logarithm_or_special<S: Simd>(x: F<S>, y: F<S>) -> F<S> {
 
 #[inline(always)]
 fn log<S: Simd>(x: F<S>) -> F<S> {
-    let Logarithm {
-        exponent,
-        fraction,
-        polynomial,
-    } = logarithm(x);
+    let Logarithm { exponent, fraction, polynomial } = logarithm(x);
     let low = exponent.mul_add(splat(x, -2.121_944_4e-4), polynomial);
     let y = exponent.mul_add(splat(x, 0.693_359_4), fraction + low);
     logarithm_or_special(x, y)
@@ -236,11 +210,7 @@ fn log<S: Simd>(x: F<S>) -> F<S> {
 
 #[inline(always)]
 fn log2<S: Simd>(x: F<S>) -> F<S> {
-    let Logarithm {
-        exponent,
-        fraction,
-        polynomial,
-    } = logarithm(x);
+    let Logarithm { exponent, fraction, polynomial } = logarithm(x);
     // log2(e) - 1: splitting off 1 keeps the larger part exact.
     let excess = splat(x, LOG2_E - 1.0);
     let low = (polynomial * excess) + fraction * excess;
@@ -316,17 +286,7 @@ fn cos<S: Simd>(x: F<S>) -> F<S> {
 fn tan<S: Simd>(x: F<S>) -> F<S> {
     let (r, n) = reduce(x);
     let z = r * r;
-    let p = polynomial(
-        z,
-        [
-            9.385_402e-3,
-            3.119_922_4e-3,
-            2.443_013_5e-2,
-            5.341_128e-2,
-            1.333_88e-1,
-            3.333_315_7e-1,
-        ],
-    );
+    let p = polynomial(z, [9.385_402e-3, 3.119_922_4e-3, 2.443_013_5e-2, 5.341_128e-2, 1.333_88e-1, 3.333_315_7e-1]);
     let y = (p * z).mul_add(r, r);
     let odd: M<S> = (n & 1).simd_eq(I::splat(x.simd, 1));
     let y = or_exact(x, odd.select(splat(x, -1.0) / y, y), f64::tan);
@@ -336,16 +296,7 @@ fn tan<S: Simd>(x: F<S>) -> F<S> {
 /// Arc sine of up to 1/2.
 #[inline(always)]
 fn asin_polynomial<S: Simd>(x: F<S>, z: F<S>) -> F<S> {
-    let p = polynomial(
-        z,
-        [
-            4.216_32e-2,
-            2.418_131_2e-2,
-            4.547_002_6e-2,
-            7.495_3e-2,
-            1.666_675_2e-1,
-        ],
-    );
+    let p = polynomial(z, [4.216_32e-2, 2.418_131_2e-2, 4.547_002_6e-2, 7.495_3e-2, 1.666_675_2e-1]);
     (p * z).mul_add(x, x)
 }
 
@@ -384,16 +335,10 @@ fn atan_positive<S: Simd>(t: F<S>) -> F<S> {
     let middle = t.simd_gt(splat(t, 0.414_213_57));
     let numerator = large.select(-one, middle.select(t - one, t));
     let denominator = large.select(t, middle.select(t + one, one));
-    let base = large.select(
-        splat(t, FRAC_PI_2),
-        middle.select(splat(t, FRAC_PI_4), splat(t, 0.0)),
-    );
+    let base = large.select(splat(t, FRAC_PI_2), middle.select(splat(t, FRAC_PI_4), splat(t, 0.0)));
     let x = numerator / denominator;
     let z = x * x;
-    let p = polynomial(
-        z,
-        [8.053_744_5e-2, -1.387_768_6e-1, 1.997_771e-1, -3.333_295e-1],
-    );
+    let p = polynomial(z, [8.053_744_5e-2, -1.387_768_6e-1, 1.997_771e-1, -3.333_295e-1]);
     base + (p * z).mul_add(x, x)
 }
 
@@ -445,16 +390,7 @@ fn cosh<S: Simd>(x: F<S>) -> F<S> {
 fn tanh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
-    let p = polynomial(
-        z,
-        [
-            -5.704_988_7e-3,
-            2.063_909e-2,
-            -5.373_971_6e-2,
-            1.333_144_2e-1,
-            -3.333_328e-1,
-        ],
-    );
+    let p = polynomial(z, [-5.704_988_7e-3, 2.063_909e-2, -5.373_971_6e-2, 1.333_144_2e-1, -3.333_328e-1]);
     let near = (p * z).mul_add(a, a);
     let far = splat(x, 1.0) - splat(x, 2.0) / (exp(a + a) + 1.0);
     with_sign(a.simd_lt(splat(x, 0.625)).select(near, far), x)
@@ -464,10 +400,7 @@ fn tanh<S: Simd>(x: F<S>) -> F<S> {
 fn asinh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
-    let p = polynomial(
-        z,
-        [2.012_200_3e-2, -4.269_934e-2, 7.484_759e-2, -1.666_628_8e-1],
-    );
+    let p = polynomial(z, [2.012_200_3e-2, -4.269_934e-2, 7.484_759e-2, -1.666_628_8e-1]);
     let near = (p * z).mul_add(a, a);
     let huge = a.simd_gt(splat(x, 1500.0));
     let sum = huge.select(a, a + (z + 1.0).sqrt());
@@ -478,16 +411,7 @@ fn asinh<S: Simd>(x: F<S>) -> F<S> {
 #[inline(always)]
 fn acosh<S: Simd>(x: F<S>) -> F<S> {
     let t = x - 1.0;
-    let p = polynomial(
-        t,
-        [
-            1.759_688_1e-3,
-            -7.527_288_7e-3,
-            2.645_490_5e-2,
-            -1.178_474_2e-1,
-            SQRT_2,
-        ],
-    );
+    let p = polynomial(t, [1.759_688_1e-3, -7.527_288_7e-3, 2.645_490_5e-2, -1.178_474_2e-1, SQRT_2]);
     let near = p * t.sqrt();
     let huge = x.simd_gt(splat(x, 1500.0));
     let sum = huge.select(x, x + (t * (x + 1.0)).sqrt());
@@ -500,16 +424,7 @@ fn acosh<S: Simd>(x: F<S>) -> F<S> {
 fn atanh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
-    let p = polynomial(
-        z,
-        [
-            1.817_400_8e-1,
-            8.243_703e-2,
-            1.466_914_3e-1,
-            1.997_821_6e-1,
-            3.333_373e-1,
-        ],
-    );
+    let p = polynomial(z, [1.817_400_8e-1, 8.243_703e-2, 1.466_914_3e-1, 1.997_821_6e-1, 3.333_373e-1]);
     let near = (p * z).mul_add(a, a);
     let one = splat(x, 1.0);
     let far = log((one + a) / (one - a)) * 0.5;
@@ -532,8 +447,5 @@ pub fn frexp(a: f32) -> (f32, i32) {
     // Every denormal is a normal f64.
     let bits = f64::from(a).to_bits();
     let exponent = (bits >> 52 & 0x7ff) as i32 - 1022;
-    (
-        f64::from_bits(bits & !(0x7ff << 52) | 1022 << 52) as f32,
-        exponent,
-    )
+    (f64::from_bits(bits & !(0x7ff << 52) | 1022 << 52) as f32, exponent)
 }

@@ -64,15 +64,8 @@ pub struct Span {
 
 impl<'a> RegisterFile<'a> {
     pub fn new(vectors: &'a [Cell<Vector>], width: usize) -> Self {
-        let span = Span {
-            first: 0,
-            count: width,
-        };
-        Self {
-            vectors,
-            width,
-            span,
-        }
+        let span = Span { first: 0, count: width };
+        Self { vectors, width, span }
     }
 
     /// The same register file, with another span of vectors to compute.
@@ -139,11 +132,7 @@ impl<'a> RegisterFile<'a> {
     /// Sets a register in the 16 lanes of a vector of the batch.
     #[inline(always)]
     pub fn set<T: Lane>(self, slot: RegisterSlot, index: usize, value: [T; VECTOR_LANES]) {
-        T::store(
-            T::vectors(self, slot),
-            if slot.is_varying() { index } else { 0 },
-            value,
-        );
+        T::store(T::vectors(self, slot), if slot.is_varying() { index } else { 0 }, value);
     }
 
     /// Sets a uniform register to a constant's bits.
@@ -171,10 +160,7 @@ pub trait Lane: Copy + Default {
 
 /// `f` of each lane. (The standard library's `map` is not always inlined.)
 #[inline(always)]
-pub fn each_lane<A: Copy, B: Copy + Default>(
-    lanes: [A; VECTOR_LANES],
-    f: impl Fn(A) -> B,
-) -> [B; VECTOR_LANES] {
+pub fn each_lane<A: Copy, B: Copy + Default>(lanes: [A; VECTOR_LANES], f: impl Fn(A) -> B) -> [B; VECTOR_LANES] {
     let mut results = [B::default(); VECTOR_LANES];
     for lane in 0..VECTOR_LANES {
         results[lane] = f(lanes[lane]);
@@ -204,14 +190,9 @@ macro_rules! narrow_lane {
 }
 
 narrow_lane!(u32, |bits| bits, |value| value);
-narrow_lane!(i32, |bits: u32| bits.cast_signed(), |value: i32| value
-    .cast_unsigned());
+narrow_lane!(i32, |bits: u32| bits.cast_signed(), |value: i32| value.cast_unsigned());
 narrow_lane!(f32, f32::from_bits, f32::to_bits);
-narrow_lane!(bool, |bits| bits != 0, |value| if value {
-    u32::MAX
-} else {
-    0
-});
+narrow_lane!(bool, |bits| bits != 0, |value| if value { u32::MAX } else { 0 });
 
 macro_rules! wide_lane {
     ($type:ty, $from:expr, $to:expr) => {
@@ -223,10 +204,8 @@ macro_rules! wide_lane {
 
             #[inline(always)]
             fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES] {
-                let halves: [[u64; VECTOR_LANES / 2]; 2] = [
-                    bytemuck::cast(vectors[2 * index].get().0),
-                    bytemuck::cast(vectors[2 * index + 1].get().0),
-                ];
+                let halves: [[u64; VECTOR_LANES / 2]; 2] =
+                    [bytemuck::cast(vectors[2 * index].get().0), bytemuck::cast(vectors[2 * index + 1].get().0)];
                 each_lane(bytemuck::cast::<_, [u64; VECTOR_LANES]>(halves), $from)
             }
 
@@ -241,18 +220,12 @@ macro_rules! wide_lane {
 }
 
 wide_lane!(u64, |bits| bits, |value| value);
-wide_lane!(i64, |bits: u64| bits.cast_signed(), |value: i64| value
-    .cast_unsigned());
+wide_lane!(i64, |bits: u64| bits.cast_signed(), |value: i64| value.cast_unsigned());
 wide_lane!(f64, f64::from_bits, f64::to_bits);
 
 /// Applies a function of one operand lane by lane.
 #[inline(always)]
-pub fn map1<A: Lane, R: Lane>(
-    file: RegisterFile<'_>,
-    dst: RegisterSlot,
-    src: &[RegisterSlot; 4],
-    f: impl Fn(A) -> R,
-) {
+pub fn map1<A: Lane, R: Lane>(file: RegisterFile<'_>, dst: RegisterSlot, src: &[RegisterSlot; 4], f: impl Fn(A) -> R) {
     for index in file.rounds(dst) {
         file.set(dst, index, each_lane(file.lanes(src[0], index), &f));
     }
@@ -310,17 +283,13 @@ pub fn store_vector<S: Simd>(vector: &Cell<Vector>, value: u32x16<S>) {
 /// A bool register's vector as a mask.
 #[inline(always)]
 pub fn to_mask<S: Simd>(value: u32x16<S>) -> mask32x16<S> {
-    value
-        .simd
-        .from_vector_mask32x16(value.bitcast::<i32x16<S>>())
+    value.simd.from_vector_mask32x16(value.bitcast::<i32x16<S>>())
 }
 
 /// A mask as a bool register's vector.
 #[inline(always)]
 pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
-    ExtractToken::token(&mask)
-        .to_vector_mask32x16(mask)
-        .bitcast::<u32x16<S>>()
+    ExtractToken::token(&mask).to_vector_mask32x16(mask).bitcast::<u32x16<S>>()
 }
 
 // The loops below are over indices, because the standard library's adapters are not always inlined into functions of
@@ -368,10 +337,7 @@ pub fn vector2<S: Simd>(
     let n = dst.len();
     if a.len() == n && b.len() == n {
         for i in 0..n {
-            store_vector(
-                &dst[i],
-                f(load_vector(simd, &a[i]), load_vector(simd, &b[i])),
-            );
+            store_vector(&dst[i], f(load_vector(simd, &a[i]), load_vector(simd, &b[i])));
         }
     } else if a.len() == n {
         let b = load_vector(simd, &b[0]);
@@ -412,10 +378,7 @@ pub fn vector3<S: Simd>(
     let step = |operand: &[Cell<Vector>]| if operand.len() == n { usize::MAX } else { 0 };
     let (at_a, at_b, at_c) = (step(a), step(b), step(c));
     for i in 0..n {
-        let (a, b) = (
-            load_vector(simd, &a[i & at_a]),
-            load_vector(simd, &b[i & at_b]),
-        );
+        let (a, b) = (load_vector(simd, &a[i & at_a]), load_vector(simd, &b[i & at_b]));
         store_vector(&dst[i], f(a, b, load_vector(simd, &c[i & at_c])));
     }
 }

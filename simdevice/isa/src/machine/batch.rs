@@ -54,9 +54,7 @@ impl Batch<'_> {
             Type::B32 | Type::Bool => (self.file.narrow(dst), self.file.narrow(src), 1),
         };
         if uniform {
-            dst.iter()
-                .zip(src)
-                .for_each(|(dst, src)| dst.set(src.get()));
+            dst.iter().zip(src).for_each(|(dst, src)| dst.set(src.get()));
             return;
         }
         // A uniform source has one vector (or pair) for all.
@@ -71,8 +69,7 @@ impl Batch<'_> {
                 } else if per_16 == 1 {
                     bits_to_mask(simd, active).select(new, load_vector(simd, to))
                 } else {
-                    bits_to_mask(simd, double(active >> (8 * part)))
-                        .select(new, load_vector(simd, to))
+                    bits_to_mask(simd, double(active >> (8 * part))).select(new, load_vector(simd, to))
                 };
                 store_vector(to, merged);
             }
@@ -92,13 +89,7 @@ impl Batch<'_> {
 
     /// Copies the vectors of a register that are computed; a uniform source has only the first `per_16`.
     #[inline(always)]
-    fn copy_vectors(
-        &self,
-        slot: RegisterSlot,
-        dst: &[Cell<Vector>],
-        src: &[Cell<Vector>],
-        per_16: usize,
-    ) {
+    fn copy_vectors(&self, slot: RegisterSlot, dst: &[Cell<Vector>], src: &[Cell<Vector>], per_16: usize) {
         let step = usize::from(src.len() == dst.len());
         for vector in self.file.rounds(slot) {
             for part in 0..per_16 {

@@ -21,11 +21,7 @@ pub struct Work {
 impl Work {
     /// The share of lanes that were active, from 0 to 1; 1 if nothing ran.
     pub fn occupancy(&self) -> f64 {
-        if self.lanes == 0 {
-            1.0
-        } else {
-            self.active_lanes as f64 / self.lanes as f64
-        }
+        if self.lanes == 0 { 1.0 } else { self.active_lanes as f64 / self.lanes as f64 }
     }
 
     /// Adds another's counts.

@@ -23,38 +23,23 @@ pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool)
     }
 }
 
-pub fn subgroup(
-    batch: &Batch<'_>,
-    op: SubgroupOp,
-    dst: &[Reg],
-    src: Option<Reg>,
-    index: Option<Reg>,
-) {
+pub fn subgroup(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
     let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
     let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);
-    let active: Vec<bool> = (0..lanes)
-        .map(|lane| batch.masks.bits(MaskId::ACTIVE, lane / 16) >> (lane % 16) & 1 != 0)
-        .collect();
-    let values = src.map_or_else(
-        || vec![0; lanes],
-        |reg| gather(batch, batch.slot(reg), wide),
-    );
+    let active: Vec<bool> =
+        (0..lanes).map(|lane| batch.masks.bits(MaskId::ACTIVE, lane / 16) >> (lane % 16) & 1 != 0).collect();
+    let values = src.map_or_else(|| vec![0; lanes], |reg| gather(batch, batch.slot(reg), wide));
     let indices = index.map_or_else(Vec::new, |reg| gather(batch, batch.slot(reg), false));
     for start in (0..lanes).step_by(size) {
         let end = (start + size).min(lanes);
-        let group = Group {
-            active: &active[start..end],
-            values: &values[start..end],
-            size,
-        };
+        let group = Group { active: &active[start..end], values: &values[start..end], size };
         match op {
             SubgroupOp::Ballot => {
                 let words = group.ballot();
                 for (slot, word) in results.iter().zip(words) {
-                    (start..end)
-                        .for_each(|lane| scatter(batch, *slot, false, lane, u64::from(word)));
+                    (start..end).for_each(|lane| scatter(batch, *slot, false, lane, u64::from(word)));
                 }
             }
             _ => {
@@ -72,13 +57,9 @@ pub fn subgroup(
 fn gather(batch: &Batch<'_>, slot: RegisterSlot, wide: bool) -> Vec<u64> {
     let vectors = 0..batch.file.width();
     if wide {
-        vectors
-            .flat_map(|vector| batch.file.lanes::<u64>(slot, vector))
-            .collect()
+        vectors.flat_map(|vector| batch.file.lanes::<u64>(slot, vector)).collect()
     } else {
-        vectors
-            .flat_map(|vector| batch.file.lanes::<u32>(slot, vector).map(u64::from))
-            .collect()
+        vectors.flat_map(|vector| batch.file.lanes::<u32>(slot, vector).map(u64::from)).collect()
     }
 }
 
@@ -128,46 +109,26 @@ impl Group<'_> {
         let lanes = 0..self.active.len();
         let index = |lane: usize| indices.get(lane).copied().unwrap_or(0) as usize;
         let fetch = |lane: usize| {
-            if self.active.get(lane) == Some(&true) {
-                self.values[lane]
-            } else {
-                0
-            }
+            if self.active.get(lane) == Some(&true) { self.values[lane] } else { 0 }
         };
         let all = |value: u64| vec![value; self.active.len()];
         let first = self.active_lanes().next();
         match op {
             SubgroupOp::Elect => lanes.map(|lane| truth(Some(lane) == first)).collect(),
-            SubgroupOp::All => all(truth(
-                self.active_lanes().all(|lane| self.values[lane] != 0),
-            )),
-            SubgroupOp::Any => all(truth(
-                self.active_lanes().any(|lane| self.values[lane] != 0),
-            )),
+            SubgroupOp::All => all(truth(self.active_lanes().all(|lane| self.values[lane] != 0))),
+            SubgroupOp::Any => all(truth(self.active_lanes().any(|lane| self.values[lane] != 0))),
             SubgroupOp::AllEqual => {
                 let value = first.map_or(0, |lane| self.values[lane]);
-                all(truth(
-                    self.active_lanes().all(|lane| self.values[lane] == value),
-                ))
+                all(truth(self.active_lanes().all(|lane| self.values[lane] == value)))
             }
             SubgroupOp::BroadcastFirst => all(first.map_or(0, |lane| self.values[lane])),
             SubgroupOp::Shuffle => lanes.map(|lane| fetch(index(lane))).collect(),
             SubgroupOp::ShuffleXor => lanes.map(|lane| fetch(lane ^ index(lane))).collect(),
-            SubgroupOp::ShuffleUp => lanes
-                .map(|lane| lane.checked_sub(index(lane)).map_or(0, fetch))
-                .collect(),
-            SubgroupOp::ShuffleDown => lanes
-                .map(|lane| fetch(lane.saturating_add(index(lane))))
-                .collect(),
-            SubgroupOp::QuadBroadcast => lanes
-                .map(|lane| self.values[lane & !3 | index(lane) & 3])
-                .collect(),
-            SubgroupOp::QuadSwap => lanes
-                .map(|lane| self.values[lane ^ index(lane) & 3])
-                .collect(),
-            SubgroupOp::Reduce { op, cluster } => {
-                self.reduce(op, (cluster as usize).min(self.size))
-            }
+            SubgroupOp::ShuffleUp => lanes.map(|lane| lane.checked_sub(index(lane)).map_or(0, fetch)).collect(),
+            SubgroupOp::ShuffleDown => lanes.map(|lane| fetch(lane.saturating_add(index(lane)))).collect(),
+            SubgroupOp::QuadBroadcast => lanes.map(|lane| self.values[lane & !3 | index(lane) & 3]).collect(),
+            SubgroupOp::QuadSwap => lanes.map(|lane| self.values[lane ^ index(lane) & 3]).collect(),
+            SubgroupOp::Reduce { op, cluster } => self.reduce(op, (cluster as usize).min(self.size)),
             SubgroupOp::InclusiveScan(op) => self.scan(op, true),
             SubgroupOp::ExclusiveScan(op) => self.scan(op, false),
             // A ballot has four results and is done by itself.
@@ -180,9 +141,7 @@ impl Group<'_> {
         for (number, results) in results.chunks_mut(cluster).enumerate() {
             let start = number * cluster;
             let lanes = (start..start + results.len()).filter(|lane| self.active[*lane]);
-            let total = lanes
-                .map(|lane| self.values[lane])
-                .reduce(|a, b| combine(op, a, b));
+            let total = lanes.map(|lane| self.values[lane]).reduce(|a, b| combine(op, a, b));
             results.fill(total.unwrap_or(identity(op)));
         }
         results
@@ -193,11 +152,7 @@ impl Group<'_> {
         let mut sum = None;
         for lane in self.active_lanes() {
             let next = sum.map_or(self.values[lane], |sum| combine(op, sum, self.values[lane]));
-            results[lane] = if inclusive {
-                next
-            } else {
-                sum.unwrap_or(identity(op))
-            };
+            results[lane] = if inclusive { next } else { sum.unwrap_or(identity(op)) };
             sum = Some(next);
         }
         results

@@ -20,12 +20,7 @@ use crate::kernels::registers::{Kernel, RegisterFile, RegisterSlot};
 /// Runs a batch's steps. There is one implementation, compiled for each SIMD level.
 pub trait Engine: fmt::Debug + Send + Sync {
     /// Runs a batch whose active lanes are set. `runs` are the executions and active lanes of each counted run.
-    fn run(
-        &self,
-        batch: &Batch<'_>,
-        runs: &mut [(u64, u64)],
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Stopped>;
+    fn run(&self, batch: &Batch<'_>, runs: &mut [(u64, u64)], watch: &mut Watch<'_>) -> Result<(), Stopped>;
 }
 
 /// The engine of a SIMD level.
@@ -56,12 +51,7 @@ impl<S: Simd> fmt::Debug for Kernels<S> {
 }
 
 impl<S: Simd> Engine for Kernels<S> {
-    fn run(
-        &self,
-        batch: &Batch<'_>,
-        runs: &mut [(u64, u64)],
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Stopped> {
+    fn run(&self, batch: &Batch<'_>, runs: &mut [(u64, u64)], watch: &mut Watch<'_>) -> Result<(), Stopped> {
         self.simd.vectorize(
             #[inline(always)]
             || run_steps(self, batch, runs, watch),
@@ -89,12 +79,7 @@ fn run_steps<S: Simd>(
             Step::Compute { op, dst, src } => {
                 kernels.by_op[usize::from(*op as u8)](simd, &batch.file, *dst, src);
             }
-            Step::ComputeAssign {
-                op,
-                dst,
-                temporary,
-                src,
-            } => {
+            Step::ComputeAssign { op, dst, temporary, src } => {
                 let kernel = kernels.by_op[usize::from(*op as u8)];
                 if batch.whole {
                     kernel(simd, &batch.file, *dst, src);
@@ -142,11 +127,7 @@ fn run_steps<S: Simd>(
 fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Step) -> Option<u32> {
     let unless_any = |target: u32| (!masks.any(MaskId::ACTIVE)).then_some(target);
     match step {
-        Step::If {
-            condition,
-            other,
-            target,
-        } => {
+        Step::If { condition, other, target } => {
             let other = masks.get(*other);
             masks.split(simd, file, *condition, |active, taken, word| {
                 other[word].set(active.get() & !taken);
@@ -167,12 +148,7 @@ fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Ste
             masks.clear(MaskId::ACTIVE);
             Some(*target)
         }
-        Step::LeaveIf {
-            condition,
-            when,
-            into,
-            target,
-        } => {
+        Step::LeaveIf { condition, when, into, target } => {
             let into = masks.get(*into);
             masks.split(simd, file, *condition, |active, taken, word| {
                 let leaving = if *when { taken } else { active.get() & !taken };
@@ -181,12 +157,7 @@ fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Ste
             });
             unless_any(*target)
         }
-        Step::Switch {
-            selector,
-            values,
-            entered,
-            unmatched,
-        } => {
+        Step::Switch { selector, values, entered, unmatched } => {
             masks.copy(*entered, MaskId::ACTIVE);
             masks.copy(*unmatched, MaskId::ACTIVE);
             select_lanes(file, masks, *selector, values, *entered, |word, bits| {
@@ -196,13 +167,7 @@ fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Ste
             masks.clear(MaskId::ACTIVE);
             None
         }
-        Step::Case {
-            selector,
-            values,
-            entered,
-            unmatched,
-            target,
-        } => {
+        Step::Case { selector, values, entered, unmatched, target } => {
             select_lanes(file, masks, *selector, values, *entered, |word, bits| {
                 let active = &masks.get(MaskId::ACTIVE)[word];
                 active.set(active.get() | bits);
@@ -272,58 +237,19 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
                 batch.file.set(batch.slot(*dst), vector, [time; 16]);
             }
         }
-        Statement::Load {
-            dst,
-            address,
-            format,
-        } => memory::load(batch, simd, dst, address, *format),
-        Statement::Store {
-            src,
-            address,
-            format,
-        } => memory::store(batch, simd, src, address, *format),
-        Statement::Atomic {
-            op,
-            dst,
-            address,
-            format,
-            value,
-            comparator,
-        } => {
-            memory::atomic(
-                batch,
-                simd,
-                *op,
-                *dst,
-                address,
-                *format,
-                *value,
-                *comparator,
-            );
+        Statement::Load { dst, address, format } => memory::load(batch, simd, dst, address, *format),
+        Statement::Store { src, address, format } => memory::store(batch, simd, src, address, *format),
+        Statement::Atomic { op, dst, address, format, value, comparator } => {
+            memory::atomic(batch, simd, *op, *dst, address, *format, *value, *comparator);
         }
         Statement::BufferSize { dst, buffer } => memory::buffer_size(batch, *dst, buffer),
         Statement::Sample(sample) => image::sample(batch, sample),
         Statement::ImageRead(read) => image::read(batch, read),
         Statement::ImageWrite(write) => image::write(batch, write),
         Statement::ImageAtomic(atomic) => image::atomic(batch, atomic),
-        Statement::ImageQuery {
-            dst,
-            image,
-            shape,
-            query,
-        } => image::query(batch, dst, image, *shape, query),
-        Statement::Derivative {
-            dst,
-            src,
-            axis,
-            fine,
-        } => cross_lane::derivative(batch, *dst, *src, *axis, *fine),
-        Statement::Subgroup {
-            op,
-            dst,
-            src,
-            index,
-        } => cross_lane::subgroup(batch, *op, dst, *src, *index),
+        Statement::ImageQuery { dst, image, shape, query } => image::query(batch, dst, image, *shape, query),
+        Statement::Derivative { dst, src, axis, fine } => cross_lane::derivative(batch, *dst, *src, *axis, *fine),
+        Statement::Subgroup { op, dst, src, index } => cross_lane::subgroup(batch, *op, dst, *src, *index),
         // All other statements are arithmetic or control flow, which have steps of their own.
         _ => {}
     }

@@ -20,10 +20,7 @@ impl Executable {
     /// # Errors
     /// If the program isn't valid, needs too many registers, or the options are out of range.
     pub fn new(program: Program, options: &Options) -> Result<Self, InvalidProgram> {
-        Ok(Self {
-            program: CompiledProgram::new(program, options)?,
-            engine: engine(options.level),
-        })
+        Ok(Self { program: CompiledProgram::new(program, options)?, engine: engine(options.level) })
     }
 
     /// Lanes of a batch.

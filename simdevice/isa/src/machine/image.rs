@@ -3,10 +3,7 @@
 use super::batch::Batch;
 use super::masks::lanes_of;
 use crate::compiler::step::MaskId;
-use crate::ir::{
-    Binding, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample,
-    VECTOR_LANES,
-};
+use crate::ir::{Binding, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, VECTOR_LANES};
 use crate::resources::{LaneWords, LodRequest, SampleRequest, TexelRequest};
 
 /// The bind point that means none.
@@ -27,22 +24,11 @@ fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> 
 /// The bind points of 16 lanes.
 fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> LaneWords {
     let indices = words_or_zero(batch, binding.index, vector);
-    indices.map(|index| {
-        if index < binding.count {
-            binding.slot + index
-        } else {
-            UNBOUND
-        }
-    })
+    indices.map(|index| if index < binding.count { binding.slot + index } else { UNBOUND })
 }
 
 /// Calls `ask(image, sampler, lanes)` for each pair of bind points among `lanes`.
-fn for_each_binding(
-    images: &LaneWords,
-    samplers: &LaneWords,
-    mut lanes: u16,
-    mut ask: impl FnMut(u32, u32, u16),
-) {
+fn for_each_binding(images: &LaneWords, samplers: &LaneWords, mut lanes: u16, mut ask: impl FnMut(u32, u32, u16)) {
     while lanes != 0 {
         let first = lanes.trailing_zeros() as usize;
         let (image, sampler) = (images[first], samplers[first]);
@@ -158,22 +144,11 @@ pub fn read(batch: &Batch<'_>, read: &ImageRead) {
     for vector in 0..batch.file.width() {
         let active = batch.masks.bits(MaskId::ACTIVE, vector);
         let images = bind_points(batch, &read.image, vector);
-        let mut request = texel_request(
-            batch,
-            read.shape,
-            &read.coordinate,
-            read.level,
-            read.sample,
-            vector,
-        );
+        let mut request = texel_request(batch, read.shape, &read.coordinate, read.level, read.sample, vector);
         let mut texel = [[0; VECTOR_LANES]; 4];
         for_each_binding(&images, &[0; VECTOR_LANES], active, |image, _, lanes| {
             request.mask = lanes;
-            merge(
-                &mut texel,
-                &batch.resources.images.read(image, &request),
-                lanes,
-            );
+            merge(&mut texel, &batch.resources.images.read(image, &request), lanes);
         });
         put_texel(batch, &read.dst, vector, &texel);
     }
@@ -183,14 +158,7 @@ pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
     for vector in 0..batch.file.width() {
         let lanes = batch.masks.writing(vector);
         let images = bind_points(batch, &write.image, vector);
-        let mut request = texel_request(
-            batch,
-            write.shape,
-            &write.coordinate,
-            None,
-            write.sample,
-            vector,
-        );
+        let mut request = texel_request(batch, write.shape, &write.coordinate, None, write.sample, vector);
         let texel = all_words(batch, &write.texel, vector);
         for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
             request.mask = lanes;
@@ -203,24 +171,13 @@ pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
     for vector in 0..batch.file.width() {
         let lanes = batch.masks.writing(vector);
         let images = bind_points(batch, &atomic.image, vector);
-        let mut request = texel_request(
-            batch,
-            atomic.shape,
-            &atomic.coordinate,
-            None,
-            atomic.sample,
-            vector,
-        );
+        let mut request = texel_request(batch, atomic.shape, &atomic.coordinate, None, atomic.sample, vector);
         let value = words(batch, atomic.value, vector);
         let comparator = words_or_zero(batch, atomic.comparator, vector);
         let mut old = [[0; VECTOR_LANES]];
         for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
             request.mask = lanes;
-            let found =
-                batch
-                    .resources
-                    .images
-                    .atomic(image, &request, atomic.op, &value, &comparator);
+            let found = batch.resources.images.atomic(image, &request, atomic.op, &value, &comparator);
             merge(&mut old, &[found], lanes);
         });
         if let Some(dst) = atomic.dst {
@@ -229,22 +186,13 @@ pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
     }
 }
 
-pub fn query(
-    batch: &Batch<'_>,
-    dst: &[Reg],
-    image: &Binding,
-    shape: ImageShape,
-    query: &ImageQuery,
-) {
+pub fn query(batch: &Batch<'_>, dst: &[Reg], image: &Binding, shape: ImageShape, query: &ImageQuery) {
     let images = batch.resources.images;
     let varying = dst.iter().any(|reg| batch.slot(*reg).is_varying());
     for vector in 0..if varying { batch.file.width() } else { 1 } {
         let bound = bind_points(batch, image, vector);
         let answers: [LaneWords; 4] = match query {
-            ImageQuery::Lod {
-                sampler,
-                coordinate,
-            } => query_lod(batch, &bound, sampler, coordinate, shape, vector),
+            ImageQuery::Lod { sampler, coordinate } => query_lod(batch, &bound, sampler, coordinate, shape, vector),
             ImageQuery::Size { level } => {
                 let levels = words_or_zero(batch, *level, vector);
                 let sizes: [[u32; 4]; VECTOR_LANES] =
@@ -273,10 +221,7 @@ fn query_lod(
         mask: 0,
         shape,
         coordinate: all_words(batch, coordinate, vector),
-        lod: LodRequest::Implicit {
-            bias: [0; VECTOR_LANES],
-            minimum: [0; VECTOR_LANES],
-        },
+        lod: LodRequest::Implicit { bias: [0; VECTOR_LANES], minimum: [0; VECTOR_LANES] },
         offset: [[0; VECTOR_LANES]; 3],
         compare: None,
         gather: None,
@@ -286,11 +231,7 @@ fn query_lod(
     for_each_binding(images, &samplers, active, |image, sampler, lanes| {
         request.mask = lanes;
         let [clamped, unclamped] = batch.resources.images.lod(image, sampler, &request);
-        merge(
-            &mut answers,
-            &[clamped, unclamped, [0; VECTOR_LANES], [0; VECTOR_LANES]],
-            lanes,
-        );
+        merge(&mut answers, &[clamped, unclamped, [0; VECTOR_LANES], [0; VECTOR_LANES]], lanes);
     });
     answers
 }
@@ -302,13 +243,7 @@ fn fixed_point(binding: &Binding) -> Option<u32> {
 
 /// Reports whether the level of detail comes from differences alone.
 fn is_automatic(lod: &Lod) -> bool {
-    matches!(
-        lod,
-        Lod::Implicit {
-            bias: None,
-            minimum: None
-        }
-    )
+    matches!(lod, Lod::Implicit { bias: None, minimum: None })
 }
 
 /// Copies the found values of some lanes into the result.

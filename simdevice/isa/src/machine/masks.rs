@@ -30,9 +30,7 @@ impl LaneMask {
 
     /// Reports whether a lane is in the set.
     pub fn contains(&self, lane: usize) -> bool {
-        self.words
-            .get(lane / 64)
-            .is_some_and(|word| word >> (lane % 64) & 1 != 0)
+        self.words.get(lane / 64).is_some_and(|word| word >> (lane % 64) & 1 != 0)
     }
 
     /// Adds or removes a lane.
@@ -52,17 +50,12 @@ impl LaneMask {
 
     /// A set from its bits, 64 lanes to a word.
     pub(super) fn from_words(words: &[Cell<u64>]) -> Self {
-        Self {
-            words: words.iter().map(Cell::get).collect(),
-        }
+        Self { words: words.iter().map(Cell::get).collect() }
     }
 
     /// The number of lanes in the set.
     pub fn count(&self) -> usize {
-        self.words
-            .iter()
-            .map(|word| word.count_ones() as usize)
-            .sum()
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 }
 
@@ -191,11 +184,7 @@ impl<'a> Masks<'a> {
     ) {
         let active = self.get(MaskId::ACTIVE);
         if !condition.is_varying() {
-            let bits = if file.first::<bool>(condition) {
-                u64::MAX
-            } else {
-                0
-            };
+            let bits = if file.first::<bool>(condition) { u64::MAX } else { 0 };
             for (word, active) in active.iter().enumerate() {
                 split(active, active.get() & bits, word);
             }
@@ -209,8 +198,7 @@ impl<'a> Masks<'a> {
             }
             let mut bits = 0;
             for index in 0..(vectors.len() - 4 * word).min(4) {
-                let lanes =
-                    to_mask(load_vector(simd, &vectors[4 * word + index])).to_bitmask() & 0xffff;
+                let lanes = to_mask(load_vector(simd, &vectors[4 * word + index])).to_bitmask() & 0xffff;
                 bits |= lanes << (16 * index);
             }
             split(active, active.get() & bits, word);

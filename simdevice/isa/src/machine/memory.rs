@@ -23,28 +23,18 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    const EMPTY: Self = Self {
-        words: &[],
-        bytes: 0,
-        range: None,
-    };
+    const EMPTY: Self = Self { words: &[], bytes: 0, range: None };
 
     fn of(range: &'a BufferRange) -> Self {
         let (words, bytes) = range_words(range);
-        Self {
-            words,
-            bytes,
-            range: Some(range),
-        }
+        Self { words, bytes, range: Some(range) }
     }
 
     /// Returns the element's bits. None if it is misaligned or out of range.
     #[inline(always)]
     fn load(self, address: u64, format: Format) -> Option<u64> {
         let size = format.bytes();
-        if address + u64::from(size) > u64::from(self.bytes)
-            || !address.is_multiple_of(u64::from(size.min(4)))
-        {
+        if address + u64::from(size) > u64::from(self.bytes) || !address.is_multiple_of(u64::from(size.min(4))) {
             return None;
         }
         let word = load_word(self.words, (address / 4) as usize)?;
@@ -55,10 +45,7 @@ impl<'a> View<'a> {
             Format::S8 => u64::from(i32::from(narrow as u8 as i8).cast_unsigned()),
             Format::U16 => u64::from(narrow as u16),
             Format::S16 => u64::from(i32::from(narrow as u16 as i16).cast_unsigned()),
-            Format::B64 => {
-                u64::from(word)
-                    | u64::from(load_word(self.words, (address / 4) as usize + 1)?) << 32
-            }
+            Format::B64 => u64::from(word) | u64::from(load_word(self.words, (address / 4) as usize + 1)?) << 32,
         })
     }
 
@@ -66,9 +53,7 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn store(self, address: u64, format: Format, value: u64) {
         let size = format.bytes();
-        if address + u64::from(size) > u64::from(self.bytes)
-            || !address.is_multiple_of(u64::from(size.min(4)))
-        {
+        if address + u64::from(size) > u64::from(self.bytes) || !address.is_multiple_of(u64::from(size.min(4))) {
             return;
         }
         let index = (address / 4) as usize;
@@ -129,10 +114,7 @@ fn places<'a>(batch: &Batch<'a>, address: &Address, vector: usize, lanes: u16) -
         return global_places(batch, address, vector, lanes);
     }
     let addresses = match address.base {
-        Some(base) => batch
-            .file
-            .lanes::<u32>(batch.slot(base), vector)
-            .map(|base| u64::from(base) + offset),
+        Some(base) => batch.file.lanes::<u32>(batch.slot(base), vector).map(|base| u64::from(base) + offset),
         None => [offset; VECTOR_LANES],
     };
     let view = match &address.space {
@@ -153,16 +135,8 @@ fn places<'a>(batch: &Batch<'a>, address: &Address, vector: usize, lanes: u16) -
     Places { view, addresses }
 }
 
-fn global_places<'a>(
-    batch: &Batch<'a>,
-    address: &Address,
-    vector: usize,
-    lanes: u16,
-) -> Places<'a> {
-    let mut places = Places {
-        view: Ok(View::EMPTY),
-        addresses: [0; VECTOR_LANES],
-    };
+fn global_places<'a>(batch: &Batch<'a>, address: &Address, vector: usize, lanes: u16) -> Places<'a> {
+    let mut places = Places { view: Ok(View::EMPTY), addresses: [0; VECTOR_LANES] };
     let Some(base) = address.base else {
         return places;
     };
@@ -180,29 +154,16 @@ fn global_places<'a>(
 }
 
 /// Writes 16 lanes of a loaded register.
-fn put(
-    batch: &Batch<'_>,
-    dst: RegisterSlot,
-    format: Format,
-    vector: usize,
-    values: [u64; VECTOR_LANES],
-) {
+fn put(batch: &Batch<'_>, dst: RegisterSlot, format: Format, vector: usize, values: [u64; VECTOR_LANES]) {
     if format == Format::B64 {
         batch.file.set(dst, vector, values);
     } else {
-        batch
-            .file
-            .set(dst, vector, each_lane(values, |value| value as u32));
+        batch.file.set(dst, vector, each_lane(values, |value| value as u32));
     }
 }
 
 /// Reads 16 lanes of a register that is stored.
-fn take(
-    batch: &Batch<'_>,
-    src: RegisterSlot,
-    format: Format,
-    vector: usize,
-) -> [u64; VECTOR_LANES] {
+fn take(batch: &Batch<'_>, src: RegisterSlot, format: Format, vector: usize) -> [u64; VECTOR_LANES] {
     if format == Format::B64 {
         batch.file.lanes(src, vector)
     } else {
@@ -219,21 +180,11 @@ fn common_view<'a>(batch: &Batch<'a>, space: &Space) -> Option<View<'a>> {
             Some(index) if index.is_varying() => None,
             Some(index) => Some(buffer(batch, binding, batch.file.first(index))),
         },
-        Space::PushConstants => Some(View {
-            words: batch.resources.push_constants,
-            bytes: u32::MAX,
-            range: None,
-        }),
-        Space::Shared => Some(View {
-            words: batch.shared,
-            bytes: batch.program.shared_bytes,
-            range: None,
-        }),
-        Space::Private => batch.program.table.as_deref().map(|words| View {
-            words,
-            bytes: batch.program.private_bytes,
-            range: None,
-        }),
+        Space::PushConstants => Some(View { words: batch.resources.push_constants, bytes: u32::MAX, range: None }),
+        Space::Shared => Some(View { words: batch.shared, bytes: batch.program.shared_bytes, range: None }),
+        Space::Private => {
+            batch.program.table.as_deref().map(|words| View { words, bytes: batch.program.private_bytes, range: None })
+        }
         Space::Global => None,
     }
 }
@@ -247,10 +198,7 @@ pub fn load<S: Simd>(batch: &Batch<'_>, simd: S, dst: &[Reg], address: &Address,
         Some(view) if format == Format::B32 => load_words(batch, simd, view, dst, address),
         None if address.space == Space::Private => load_private(batch, dst, address, format),
         _ if uniform => load_uniform(batch, dst, address, format),
-        _ => batch
-            .file
-            .span()
-            .for_each(|vector| load_lanes(batch, dst, address, format, vector)),
+        _ => batch.file.span().for_each(|vector| load_lanes(batch, dst, address, format, vector)),
     }
 }
 
@@ -265,35 +213,22 @@ fn load_lanes(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Format,
         let step = element as u64 * u64::from(format.bytes());
         let mut values = [0; VECTOR_LANES];
         for lane in lanes_of(lanes) {
-            values[lane] = places
-                .view(lane)
-                .load(places.addresses[lane] + step, format)
-                .unwrap_or(0);
+            values[lane] = places.view(lane).load(places.addresses[lane] + step, format).unwrap_or(0);
         }
         put(batch, batch.slot(*reg), format, vector, values);
     }
 }
 
 /// Loads elements that are the same in all lanes.
-fn load_uniform_from(
-    batch: &Batch<'_>,
-    view: View<'_>,
-    dst: &[Reg],
-    address: &Address,
-    format: Format,
-) {
-    let base = address
-        .base
-        .map_or(0, |base| batch.file.first::<u32>(batch.slot(base)));
+fn load_uniform_from(batch: &Batch<'_>, view: View<'_>, dst: &[Reg], address: &Address, format: Format) {
+    let base = address.base.map_or(0, |base| batch.file.first::<u32>(batch.slot(base)));
     let mut at = u64::from(base) + u64::from(address.offset);
     for reg in dst {
         let value = view.load(at, format).unwrap_or(0);
         if format == Format::B64 {
             batch.file.set(batch.slot(*reg), 0, [value; VECTOR_LANES]);
         } else {
-            batch
-                .file
-                .set(batch.slot(*reg), 0, [value as u32; VECTOR_LANES]);
+            batch.file.set(batch.slot(*reg), 0, [value as u32; VECTOR_LANES]);
         }
         at += u64::from(format.bytes());
     }
@@ -303,10 +238,7 @@ fn load_uniform(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Forma
     let places = places(batch, address, 0, 1);
     for (element, reg) in dst.iter().enumerate() {
         let step = element as u64 * u64::from(format.bytes());
-        let value = places
-            .view(0)
-            .load(places.addresses[0] + step, format)
-            .unwrap_or(0);
+        let value = places.view(0).load(places.addresses[0] + step, format).unwrap_or(0);
         put(batch, batch.slot(*reg), format, 0, [value; VECTOR_LANES]);
     }
 }
@@ -315,10 +247,7 @@ pub fn store<S: Simd>(batch: &Batch<'_>, simd: S, src: &[Reg], address: &Address
     match common_view(batch, &address.space) {
         Some(view) if format == Format::B32 => store_words(batch, simd, view, src, address),
         None if address.space == Space::Private => store_private(batch, src, address, format),
-        _ => batch
-            .file
-            .span()
-            .for_each(|vector| store_lanes(batch, src, address, format, vector)),
+        _ => batch.file.span().for_each(|vector| store_lanes(batch, src, address, format, vector)),
     }
 }
 
@@ -333,9 +262,7 @@ fn store_lanes(batch: &Batch<'_>, src: &[Reg], address: &Address, format: Format
         let step = element as u64 * u64::from(format.bytes());
         let values = take(batch, batch.slot(*reg), format, vector);
         for lane in lanes_of(lanes) {
-            places
-                .view(lane)
-                .store(places.addresses[lane] + step, format, values[lane]);
+            places.view(lane).store(places.addresses[lane] + step, format, values[lane]);
         }
     }
 }
@@ -356,19 +283,15 @@ pub fn atomic<S: Simd>(
         let mut old = [0; VECTOR_LANES];
         if lanes != 0 {
             let values = take(batch, batch.slot(value), format, vector);
-            let comparators = comparator.map_or([0; VECTOR_LANES], |reg| {
-                take(batch, batch.slot(reg), format, vector)
-            });
+            let comparators = comparator.map_or([0; VECTOR_LANES], |reg| take(batch, batch.slot(reg), format, vector));
             let at_once = (format == Format::B32).then(|| {
-                let [values, comparators] =
-                    [values, comparators].map(|lanes| each_lane(lanes, |lane| lane as u32));
+                let [values, comparators] = [values, comparators].map(|lanes| each_lane(lanes, |lane| lane as u32));
                 atomic_words(batch, simd, op, address, vector, &values, &comparators)
             });
             old = match at_once.flatten() {
                 Some(old) => each_lane(old, u64::from),
                 None => {
-                    let change =
-                        |lane, old| combine(op, format, old, values[lane], comparators[lane]);
+                    let change = |lane, old| combine(op, format, old, values[lane], comparators[lane]);
                     atomic_lanes(batch, address, format, vector, lanes, change)
                 }
             };
@@ -402,22 +325,16 @@ pub fn buffer_size(batch: &Batch<'_>, dst: Reg, binding: &Binding) {
     for vector in batch.file.rounds(slot) {
         let sizes = match binding.index {
             None => [buffer(batch, binding, 0).bytes; VECTOR_LANES],
-            Some(index) => batch
-                .file
-                .lanes::<u32>(batch.slot(index), vector)
-                .map(|index| buffer(batch, binding, index).bytes),
+            Some(index) => {
+                batch.file.lanes::<u32>(batch.slot(index), vector).map(|index| buffer(batch, binding, index).bytes)
+            }
         };
         batch.file.set(slot, vector, sizes);
     }
 }
 
 /// Changes an element atomically and returns the old value. Does nothing if it is misaligned or out of range.
-fn update(
-    view: View<'_>,
-    address: u64,
-    format: Format,
-    change: impl Fn(u64) -> u64,
-) -> Option<u64> {
+fn update(view: View<'_>, address: u64, format: Format, change: impl Fn(u64) -> u64) -> Option<u64> {
     let size = u64::from(format.bytes());
     if address + size > u64::from(view.bytes) || !address.is_multiple_of(size) {
         return None;
@@ -452,25 +369,13 @@ impl<'a> Window<'a> {
     fn new(view: View<'a>, offset: u32) -> Self {
         let end = view.words.len().min(view.bytes as usize / 4);
         let start = (offset as usize / 4).min(end);
-        if offset.is_multiple_of(4) {
-            Self {
-                words: &view.words[start..end],
-            }
-        } else {
-            Self { words: &[] }
-        }
+        if offset.is_multiple_of(4) { Self { words: &view.words[start..end] } } else { Self { words: &[] } }
     }
 
     /// The index of each lane's first word from the window's start. None if an element of one of `lanes` is out of
     /// range or misaligned. Other lanes get an index that is in range.
     #[inline(always)]
-    fn starts<S: Simd>(
-        self,
-        simd: S,
-        mut bases: u32x16<S>,
-        lanes: u16,
-        count: usize,
-    ) -> Option<u32x16<S>> {
+    fn starts<S: Simd>(self, simd: S, mut bases: u32x16<S>, lanes: u16, count: usize) -> Option<u32x16<S>> {
         if lanes != u16::MAX {
             let first = bases[lanes.trailing_zeros() as usize % VECTOR_LANES];
             let first = u32x16::splat(simd, first);
@@ -529,13 +434,7 @@ fn slots<const COUNT: usize>(batch: &Batch<'_>, regs: [Reg; COUNT]) -> [Register
 }
 
 /// Loads into varying registers.
-fn load_words<'a, S: Simd>(
-    batch: &Batch<'a>,
-    simd: S,
-    view: View<'a>,
-    dst: &[Reg],
-    address: &Address,
-) {
+fn load_words<'a, S: Simd>(batch: &Batch<'a>, simd: S, view: View<'a>, dst: &[Reg], address: &Address) {
     for (part, dst) in dst.chunks(TOGETHER).enumerate() {
         let address = Address {
             // An offset that overflows is beyond the end of any memory.
@@ -617,18 +516,9 @@ fn gather_words<S: Simd, const COUNT: usize>(
 }
 
 /// Stores words.
-fn store_words<'a, S: Simd>(
-    batch: &Batch<'a>,
-    simd: S,
-    view: View<'a>,
-    src: &[Reg],
-    address: &Address,
-) {
+fn store_words<'a, S: Simd>(batch: &Batch<'a>, simd: S, view: View<'a>, src: &[Reg], address: &Address) {
     for (part, src) in src.chunks(TOGETHER).enumerate() {
-        let address = Address {
-            offset: address.offset.saturating_add((4 * TOGETHER * part) as u32),
-            ..*address
-        };
+        let address = Address { offset: address.offset.saturating_add((4 * TOGETHER * part) as u32), ..*address };
         match src {
             [a] => store_elements(batch, simd, [*a], view, src, &address),
             [a, b] => store_elements(batch, simd, [*a, *b], view, src, &address),
@@ -714,13 +604,7 @@ fn atomic_words<S: Simd>(
     let lanes = batch.masks.writing(vector);
     let window = Window::new(common_view(batch, &address.space)?, address.offset);
     let starts = window.starts(simd, bases(batch, simd, address, vector), lanes, 1)?;
-    let access = Access {
-        lanes,
-        window,
-        starts: starts.into(),
-        values,
-        comparators,
-    };
+    let access = Access { lanes, window, starts: starts.into(), values, comparators };
     let combined = |old: u32, value: u32, comparator: u32| {
         let (old, value) = (u64::from(old), u64::from(value));
         combine(op, Format::B32, old, value, comparator.into()) as u32
@@ -743,8 +627,7 @@ fn atomic_words<S: Simd>(
         AtomicOp::Exchange => access.each(|word, value, _| word.swap(value, Relaxed)),
         _ => access.each(|word, value, comparator| {
             let change = |old| Some(combined(old, value, comparator));
-            word.fetch_update(Relaxed, Relaxed, change)
-                .unwrap_or_else(|old| old)
+            word.fetch_update(Relaxed, Relaxed, change).unwrap_or_else(|old| old)
         }),
     })
 }
@@ -798,27 +681,19 @@ fn private_rows(batch: &Batch<'_>, address: &Address, step: u64, vector: usize) 
     let step = u64::from(address.offset) + step;
     match address.base.map(|base| batch.slot(base)) {
         None => Rows::Same(private_row(batch, step)),
-        Some(base) if !base.is_varying() => Rows::Same(private_row(
-            batch,
-            u64::from(batch.file.first::<u32>(base)) + step,
-        )),
+        Some(base) if !base.is_varying() => {
+            Rows::Same(private_row(batch, u64::from(batch.file.first::<u32>(base)) + step))
+        }
         Some(base) => {
             let bases = batch.file.lanes::<u32>(base, vector);
-            Rows::Each(each_lane(bases, |base| {
-                private_row(batch, u64::from(base) + step)
-            }))
+            Rows::Each(each_lane(bases, |base| private_row(batch, u64::from(base) + step)))
         }
     }
 }
 
 /// Loads one word for 16 lanes; zero where it doesn't exist.
 #[inline(always)]
-fn private_words(
-    batch: &Batch<'_>,
-    address: &Address,
-    step: u64,
-    vector: usize,
-) -> [u32; VECTOR_LANES] {
+fn private_words(batch: &Batch<'_>, address: &Address, step: u64, vector: usize) -> [u32; VECTOR_LANES] {
     let word = |row: usize| batch.private.get(row.wrapping_add(vector));
     match private_rows(batch, address, step, vector) {
         Rows::Same(NOWHERE) => [0; VECTOR_LANES],
@@ -846,25 +721,19 @@ fn load_private(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Forma
             }
             let high = private_words(batch, address, step + 4, vector);
             let exists = second_exists(batch, address, step, vector);
-            let values: [u64; VECTOR_LANES] = std::array::from_fn(|lane| {
-                if exists[lane] {
-                    u64::from(low[lane]) | u64::from(high[lane]) << 32
-                } else {
-                    0
-                }
-            });
+            let values: [u64; VECTOR_LANES] =
+                std::array::from_fn(
+                    |lane| {
+                        if exists[lane] { u64::from(low[lane]) | u64::from(high[lane]) << 32 } else { 0 }
+                    },
+                );
             batch.file.set(batch.slot(*reg), vector, values);
         }
     }
 }
 
 /// The lanes in which the second word of a 64-bit element exists.
-fn second_exists(
-    batch: &Batch<'_>,
-    address: &Address,
-    step: u64,
-    vector: usize,
-) -> [bool; VECTOR_LANES] {
+fn second_exists(batch: &Batch<'_>, address: &Address, step: u64, vector: usize) -> [bool; VECTOR_LANES] {
     match private_rows(batch, address, step + 4, vector) {
         Rows::Same(row) => [row != NOWHERE; VECTOR_LANES],
         Rows::Each(rows) => rows.map(|row| row != NOWHERE),

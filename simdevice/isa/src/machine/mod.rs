@@ -77,21 +77,13 @@ impl Machine {
         let mut machine = Self {
             registers: host::filled(Vector::default(), executable.program.vectors),
             masks: host::zeroed(executable.program.masks * executable.program.lanes.div_ceil(64)),
-            shared: host::collect(
-                (0..executable.program.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0)),
-            ),
-            private: host::filled(
-                Vector::default(),
-                executable.program.private_words() * width,
-            ),
+            shared: host::collect((0..executable.program.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0))),
+            private: host::filled(Vector::default(), executable.program.private_words() * width),
             work: Work::default(),
             runs: vec![(0, 0); executable.program.runs.len()],
             executable,
         };
-        let file = RegisterFile::new(
-            Cell::from_mut(&mut machine.registers[..]).as_slice_of_cells(),
-            width,
-        );
+        let file = RegisterFile::new(Cell::from_mut(&mut machine.registers[..]).as_slice_of_cells(), width);
         for constant in &machine.executable.program.constants {
             let (slot, ty) = (
                 machine.executable.program.slots[constant.reg.0 as usize],
@@ -108,27 +100,14 @@ impl Machine {
     }
 
     fn input_register(&self, slot: u32) -> Option<Reg> {
-        self.executable
-            .program
-            .inputs
-            .iter()
-            .find(|input| input.slot == slot)
-            .map(|input| input.reg)
+        self.executable.program.inputs.iter().find(|input| input.slot == slot).map(|input| input.reg)
     }
 
     /// The vectors of a register.
     fn vectors_of(&self, reg: Reg) -> std::ops::Range<usize> {
         let slot = self.executable.program.slots[reg.0 as usize];
-        let per_16 = if self.executable.program.types[reg.0 as usize] == Type::B64 {
-            2
-        } else {
-            1
-        };
-        let count = if slot.is_varying() {
-            self.executable.program.lanes / 16
-        } else {
-            1
-        };
+        let per_16 = if self.executable.program.types[reg.0 as usize] == Type::B64 { 2 } else { 1 };
+        let count = if slot.is_varying() { self.executable.program.lanes / 16 } else { 1 };
         slot.start()..slot.start() + count * per_16
     }
 
@@ -169,27 +148,20 @@ impl Machine {
 
     /// An output's lanes after a batch: 16 to a vector (8 for `B64`). Empty if the program has no such output.
     pub fn output_vectors(&self, slot: u32) -> &[Vector] {
-        let output = self
-            .executable
-            .program
-            .outputs
-            .iter()
-            .find(|output| output.slot == slot);
+        let output = self.executable.program.outputs.iter().find(|output| output.slot == slot);
         output.map_or(&[], |output| &self.registers[self.vectors_of(output.reg)])
     }
 
     /// One lane of a 32-bit output; zero if the program has no such output.
     pub fn output(&self, slot: u32, lane: usize) -> u32 {
-        self.output_vectors(slot)
-            .get(lane / 16)
-            .map_or(0, |vector| vector.0[lane % 16])
+        self.output_vectors(slot).get(lane / 16).map_or(0, |vector| vector.0[lane % 16])
     }
 
     /// One lane of a 64-bit output.
     pub fn output64(&self, slot: u32, lane: usize) -> u64 {
-        self.output_vectors(slot).get(lane / 8).map_or(0, |vector| {
-            u64::from(vector.0[2 * (lane % 8)]) | u64::from(vector.0[2 * (lane % 8) + 1]) << 32
-        })
+        self.output_vectors(slot)
+            .get(lane / 8)
+            .map_or(0, |vector| u64::from(vector.0[2 * (lane % 8)]) | u64::from(vector.0[2 * (lane % 8) + 1]) << 32)
     }
 
     /// A word of workgroup memory, by its number; zero beyond the end.
@@ -208,19 +180,14 @@ impl Machine {
     /// The lanes that the last batch killed or demoted.
     pub fn killed(&mut self) -> LaneMask {
         let width = self.executable.program.lanes.div_ceil(64);
-        let masks = Masks::new(
-            Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(),
-            width,
-        );
+        let masks = Masks::new(Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(), width);
         LaneMask::from_words(masks.get(MaskId::KILLED))
     }
 
     /// The work counted since it was last taken; nothing, unless the executable counts.
     pub fn take_work(&mut self) -> Work {
-        for ((executions, active), cost) in self.runs.iter_mut().zip(&self.executable.program.runs)
-        {
-            self.work
-                .add_run(cost, *executions, *active, self.executable.program.lanes);
+        for ((executions, active), cost) in self.runs.iter_mut().zip(&self.executable.program.runs) {
+            self.work.add_run(cost, *executions, *active, self.executable.program.lanes);
             (*executions, *active) = (0, 0);
         }
         std::mem::take(&mut self.work)
@@ -244,10 +211,8 @@ impl Machine {
             Cell::from_mut(&mut self.registers[..]).as_slice_of_cells(),
             executable.program.lanes / 16,
         );
-        let masks = Masks::new(
-            Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(),
-            executable.program.lanes.div_ceil(64),
-        );
+        let masks =
+            Masks::new(Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(), executable.program.lanes.div_ceil(64));
         let batch = Batch {
             program: &executable.program,
             resources,
@@ -260,9 +225,7 @@ impl Machine {
         if !masks.any(MaskId::ACTIVE) {
             return Ok(());
         }
-        executable
-            .engine
-            .run(&batch, &mut self.runs, &mut Watch::new(watchdog))
+        executable.engine.run(&batch, &mut self.runs, &mut Watch::new(watchdog))
     }
 
     /// Sets masks, outputs and workgroup memory as they are when a batch begins.

@@ -30,10 +30,7 @@ pub struct Watchdog<'a> {
 
 impl Default for Watchdog<'_> {
     fn default() -> Self {
-        Self {
-            limit: Duration::from_secs(5),
-            cancel: None,
-        }
+        Self { limit: Duration::from_secs(5), cancel: None }
     }
 }
 
@@ -49,11 +46,7 @@ pub(super) struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     pub fn new(watchdog: Watchdog<'a>) -> Self {
-        Self {
-            watchdog,
-            left: PATIENCE,
-            start: None,
-        }
+        Self { watchdog, left: PATIENCE, start: None }
     }
 
     /// Counts a back edge.
@@ -67,18 +60,12 @@ impl<'a> Watch<'a> {
     #[inline(never)]
     fn look(&mut self) -> Result<(), Stopped> {
         self.left = PATIENCE;
-        if self
-            .watchdog
-            .cancel
-            .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
-        {
+        if self.watchdog.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
             return Err(Stopped::Cancelled);
         }
         let start = *self.start.get_or_insert_with(Instant::now);
         if start.elapsed() > self.watchdog.limit {
-            return Err(Stopped::TimedOut {
-                limit: self.watchdog.limit,
-            });
+            return Err(Stopped::TimedOut { limit: self.watchdog.limit });
         }
         Ok(())
     }

@@ -20,11 +20,7 @@ fn buffer(data: &[u32]) -> BufferRange {
     let size = 4 * data.len() as u64;
     let memory = Allocation::new_zeroed(size).expect("memory");
     memory.write(0, data).expect("it fits");
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 fn contents(range: &BufferRange) -> Vec<u32> {
@@ -34,11 +30,7 @@ fn contents(range: &BufferRange) -> Vec<u32> {
 }
 
 fn place(space: Space, base: Reg, offset: u32) -> Address {
-    Address {
-        space,
-        base: Some(base),
-        offset,
-    }
+    Address { space, base: Some(base), offset }
 }
 
 /// Addresses with another pattern in each vector: the same address, consecutive ones, scattered ones; some with a lane
@@ -88,18 +80,13 @@ fn words_are_loaded_alike_in_bulk_and_one_by_one(case: &Case) {
     let (name, level) = level(case);
     let data: Vec<u32> = (0..WORDS).map(|index| index.wrapping_mul(0x9e37)).collect();
     let buffers = [Some(buffer(&data))];
-    let resources = Resources {
-        buffers: &buffers,
-        ..Resources::default()
-    };
+    let resources = Resources { buffers: &buffers, ..Resources::default() };
     let mut random = Random(1);
     for (elements, offset) in [(1, 0), (2, 4), (3, 8), (4, 0), (5, 12), (9, 0), (4, 2)] {
         let mut b = Builder::new();
         let address = b.input(0, Type::B32, Rate::Varying);
         let takes_part = b.input(1, Type::Bool, Rate::Varying);
-        let outputs: Vec<_> = (0..elements)
-            .map(|slot| b.output(slot, Type::B32))
-            .collect();
+        let outputs: Vec<_> = (0..elements).map(|slot| b.output(slot, Type::B32)).collect();
         b.begin_if(takes_part);
         let from = place(Space::Buffer(Binding::new(0)), address, offset);
         let values = b.load(from, Format::B32, elements as usize);
@@ -154,10 +141,7 @@ fn words_are_stored_alike_in_bulk_and_one_by_one(case: &Case) {
         for _ in 0..20 {
             let range = buffer(&vec![0; WORDS as usize]);
             let buffers = [Some(range.clone())];
-            let resources = Resources {
-                buffers: &buffers,
-                ..Resources::default()
-            };
+            let resources = Resources { buffers: &buffers, ..Resources::default() };
             let (at, part) = (addresses(&mut random, elements), participants(&mut random));
             let mut allowed = vec![vec![]; WORDS as usize];
             for lane in 0..LANES {
@@ -187,14 +171,7 @@ fn words_are_stored_alike_in_bulk_and_one_by_one(case: &Case) {
 fn workgroup_and_buffer_atomics_agree(case: &Case) {
     let (name, level) = level(case);
     let mut random = Random(3);
-    for op in [
-        AtomicOp::IAdd,
-        AtomicOp::SMin,
-        AtomicOp::UMax,
-        AtomicOp::Xor,
-        AtomicOp::Exchange,
-        AtomicOp::FAdd,
-    ] {
+    for op in [AtomicOp::IAdd, AtomicOp::SMin, AtomicOp::UMax, AtomicOp::Xor, AtomicOp::Exchange, AtomicOp::FAdd] {
         let mut b = Builder::new();
         let address = b.input(0, Type::B32, Rate::Varying);
         let value = b.input(1, Type::B32, Rate::Varying);
@@ -207,10 +184,7 @@ fn workgroup_and_buffer_atomics_agree(case: &Case) {
         }
         let program = b.finish().expect("a valid program");
         let buffers = [Some(buffer(&[0; 64]))];
-        let resources = Resources {
-            buffers: &buffers,
-            ..Resources::default()
-        };
+        let resources = Resources { buffers: &buffers, ..Resources::default() };
         let mut machine = machine(&program, level, LANES);
         for lane in 0..LANES {
             // Some are out of range, or misaligned.
@@ -230,17 +204,10 @@ fn workgroup_and_buffer_atomics_agree(case: &Case) {
 /// filled under a condition, so that the compiler doesn't recognize it.
 fn table(hidden: bool) -> Program {
     let mut b = Builder::new();
-    let (uniform, varying) = (
-        b.input(0, Type::B32, Rate::Uniform),
-        b.input(1, Type::B32, Rate::Varying),
-    );
+    let (uniform, varying) = (b.input(0, Type::B32, Rate::Uniform), b.input(1, Type::B32, Rate::Varying));
     let start = b.allocate_private(40);
     let values: Vec<_> = (0..10).map(|value| b.u32(100 + value * value)).collect();
-    let to = |offset| Address {
-        space: Space::Private,
-        base: None,
-        offset,
-    };
+    let to = |offset| Address { space: Space::Private, base: None, offset };
     b.store(to(start), Format::B32, &values[..4]);
     if hidden {
         let always = b.compute(Op::ULe, &[varying, varying]);
@@ -277,11 +244,7 @@ fn constant_tables_read_as_private_memory(case: &Case) {
         }
         for lane in 0..ACTIVE {
             for slot in 0..4 {
-                assert_eq!(
-                    plain.output(slot, lane),
-                    twin.output(slot, lane),
-                    "value {slot} of lane {lane} at {name}"
-                );
+                assert_eq!(plain.output(slot, lane), twin.output(slot, lane), "value {slot} of lane {lane} at {name}");
             }
         }
         assert_eq!(plain.output(2, 0), 100);
@@ -295,25 +258,14 @@ fn compare(case: &Case, program: &Program, limit: u32, expected: impl Fn(u32) ->
     let mut random = Random(4);
     let mut machine = machine(program, level, LANES);
     for sparse in [1, 40] {
-        let inputs: Vec<u32> = (0..LANES)
-            .map(|_| {
-                if random.once_in(sparse) {
-                    random.below(limit as usize) as u32
-                } else {
-                    0
-                }
-            })
-            .collect();
+        let inputs: Vec<u32> =
+            (0..LANES).map(|_| if random.once_in(sparse) { random.below(limit as usize) as u32 } else { 0 }).collect();
         for (lane, input) in inputs.iter().enumerate() {
             machine.set_input(0, lane, *input);
         }
         run(&mut machine, ACTIVE, &Resources::default());
         for (lane, input) in inputs.iter().take(ACTIVE).enumerate() {
-            assert_eq!(
-                machine.output(0, lane),
-                expected(*input),
-                "lane {lane} with {input} at {name}"
-            );
+            assert_eq!(machine.output(0, lane), expected(*input), "lane {lane} with {input} at {name}");
         }
     }
 }
@@ -345,9 +297,7 @@ fn lanes_leave_a_loop_with_their_own_count(case: &Case) {
     let both = b.compute(Op::IAdd, &[scaled, sum]);
     b.assign(out, both);
     let program = b.finish().expect("a valid program");
-    compare(case, &program, 30, |wanted| {
-        1000 * wanted + (0..wanted).sum::<u32>()
-    });
+    compare(case, &program, 30, |wanted| 1000 * wanted + (0..wanted).sum::<u32>());
 }
 
 /// A construct that some lanes of a loop skip.
@@ -546,11 +496,7 @@ fn push_constants_are_loaded_once_and_right(case: &Case) {
     let [i, sum] = std::array::from_fn(|_| b.variable(Type::B32));
     b.assign(i, zero);
     b.assign(sum, zero);
-    let push = |offset| Address {
-        space: Space::PushConstants,
-        base: None,
-        offset,
-    };
+    let push = |offset| Address { space: Space::PushConstants, base: None, offset };
     let label = b.begin_loop();
     let limit = b.load(push(4), Format::B32, 1)[0];
     let done = b.compute(Op::ULe, &[limit, i]);
@@ -572,10 +518,7 @@ fn push_constants_are_loaded_once_and_right(case: &Case) {
     b.assign(outputs[1], nothing);
     let program = b.finish().expect("a valid program");
     let pushed = words(bytemuck::cast_slice(&[7u32, 5]));
-    let resources = Resources {
-        push_constants: &pushed,
-        ..Resources::default()
-    };
+    let resources = Resources { push_constants: &pushed, ..Resources::default() };
     let mut machine = machine(&program, level, LANES);
     (0..LANES).for_each(|lane| machine.set_input(0, lane, lane as u32));
     run(&mut machine, ACTIVE, &resources);

@@ -5,14 +5,12 @@ use std::sync::{Arc, Mutex};
 use crate::builder::Builder;
 use crate::clock::host_time;
 use crate::ir::{
-    Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program,
-    Rate, Reg, Space, Statement, Type,
+    Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program, Rate, Reg, Space,
+    Statement, Type,
 };
 use crate::machine::{LaneMask, Watchdog};
 use crate::op::Op;
-use crate::resources::{
-    GlobalMemory, ImageUnit, LaneWords, NoImages, Resources, SampleRequest, TexelRequest, words,
-};
+use crate::resources::{GlobalMemory, ImageUnit, LaneWords, NoImages, Resources, SampleRequest, TexelRequest, words};
 use devmem::Allocation;
 use devmem::BufferRange;
 
@@ -25,11 +23,7 @@ const LANES: usize = 64;
 fn buffer(offset: u64, size: u64, data: &[u32]) -> BufferRange {
     let memory = Allocation::new_zeroed(offset + size + 512).expect("memory");
     memory.write(offset, data).expect("it fits");
-    BufferRange {
-        memory,
-        offset,
-        size,
-    }
+    BufferRange { memory, offset, size }
 }
 
 fn contents(range: &BufferRange, words: usize) -> Vec<u32> {
@@ -39,11 +33,7 @@ fn contents(range: &BufferRange, words: usize) -> Vec<u32> {
 }
 
 fn at(slot: u32, base: Reg, offset: u32) -> Address {
-    Address {
-        space: Space::Buffer(Binding::new(slot)),
-        base: Some(base),
-        offset,
-    }
+    Address { space: Space::Buffer(Binding::new(slot)), base: Some(base), offset }
 }
 
 /// A program that loads elements from an input address into its outputs.
@@ -61,16 +51,11 @@ fn loader(format: Format, count: usize, offset: u32) -> Program {
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
 fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
     let (name, level) = level(case);
-    let data: Vec<u32> = (0..300)
-        .map(|index: u32| index.wrapping_mul(0x0101_0101))
-        .collect();
+    let data: Vec<u32> = (0..300).map(|index: u32| index.wrapping_mul(0x0101_0101)).collect();
     let range = buffer(64, 1000, &data);
     let bytes: Vec<u8> = data.iter().flat_map(|word| word.to_le_bytes()).collect();
     let buffers = [Some(range)];
-    let resources = Resources {
-        buffers: &buffers,
-        ..Resources::default()
-    };
+    let resources = Resources { buffers: &buffers, ..Resources::default() };
     // Consecutive, strided, scattered, out of range, and near overflow.
     let patterns: [fn(usize) -> u32; 6] = [
         |lane| 4 * lane as u32,
@@ -80,14 +65,7 @@ fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
         |lane| u32::MAX - lane as u32,
         |lane| 8 * lane as u32,
     ];
-    for format in [
-        Format::U8,
-        Format::S8,
-        Format::U16,
-        Format::S16,
-        Format::B32,
-        Format::B64,
-    ] {
+    for format in [Format::U8, Format::S8, Format::U16, Format::S16, Format::B32, Format::B64] {
         for (count, offset) in [(1, 0), (2, 4), (3, 0), (1, u32::MAX)] {
             let program = loader(format, count, offset);
             let mut machine = machine(&program, level, LANES);
@@ -97,20 +75,16 @@ fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
                 for lane in 0..LANES {
                     for element in 0..count {
                         let size = u64::from(format.bytes());
-                        let start =
-                            u64::from(pattern(lane)) + u64::from(offset) + element as u64 * size;
+                        let start = u64::from(pattern(lane)) + u64::from(offset) + element as u64 * size;
                         let valid = start + size <= 1000 && start.is_multiple_of(size.min(4));
                         let mut raw = [0; 8];
                         if valid {
                             let from = start as usize;
-                            raw[..size as usize]
-                                .copy_from_slice(&bytes[from..from + size as usize]);
+                            raw[..size as usize].copy_from_slice(&bytes[from..from + size as usize]);
                         }
                         let expected = match format {
                             Format::S8 => u64::from(i32::from(raw[0] as i8).cast_unsigned()),
-                            Format::S16 => u64::from(
-                                i32::from(i16::from_le_bytes([raw[0], raw[1]])).cast_unsigned(),
-                            ),
+                            Format::S16 => u64::from(i32::from(i16::from_le_bytes([raw[0], raw[1]])).cast_unsigned()),
                             _ => u64::from_le_bytes(raw),
                         };
                         let got = if format == Format::B64 {
@@ -118,10 +92,7 @@ fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
                         } else {
                             u64::from(machine.output(element as u32, lane))
                         };
-                        assert_eq!(
-                            got, expected,
-                            "{format:?} at {start} in lane {lane} at {name}"
-                        );
+                        assert_eq!(got, expected, "{format:?} at {start} in lane {lane} at {name}");
                     }
                 }
             }
@@ -140,41 +111,23 @@ fn stores_touch_only_their_bytes_and_vanish_beyond(case: &Case) {
     b.store(at(2, address, 0), Format::B32, &[value]);
     b.store(at(3, address, 0), Format::B32, &[value]);
     let program = b.finish().expect("a valid program");
-    let buffers: Vec<Option<BufferRange>> = (0..3)
-        .map(|_| Some(buffer(16, 40, &[u32::MAX; 20])))
-        .collect();
+    let buffers: Vec<Option<BufferRange>> = (0..3).map(|_| Some(buffer(16, 40, &[u32::MAX; 20]))).collect();
     let mut machine = machine(&program, level, LANES);
     for lane in 0..LANES {
         // The last lanes address bytes beyond the range, and beyond all memory.
-        let target = if lane < 60 {
-            4 * lane as u32
-        } else {
-            u32::MAX - lane as u32
-        };
+        let target = if lane < 60 { 4 * lane as u32 } else { u32::MAX - lane as u32 };
         machine.set_input(0, lane, target);
         machine.set_input(1, lane, 0x0100 + lane as u32);
     }
-    let resources = Resources {
-        buffers: &buffers,
-        ..Resources::default()
-    };
+    let resources = Resources { buffers: &buffers, ..Resources::default() };
     run(&mut machine, 3, &resources);
     run(&mut machine, LANES, &resources);
-    let [narrow, short, word] =
-        [0, 1, 2].map(|slot| contents(buffers[slot].as_ref().expect("bound"), 12));
-    assert_eq!(
-        narrow[..3],
-        [0xffff_ff00, 0xffff_ff01, 0xffff_ff02],
-        "{name}"
-    );
+    let [narrow, short, word] = [0, 1, 2].map(|slot| contents(buffers[slot].as_ref().expect("bound"), 12));
+    assert_eq!(narrow[..3], [0xffff_ff00, 0xffff_ff01, 0xffff_ff02], "{name}");
     assert_eq!(short[1], 0x0101_0101, "{name}");
     assert_eq!(word[..3], [0x100, 0x101, 0x102], "{name}");
     assert_eq!(word[9], 0x109, "{name}");
-    assert_eq!(
-        [narrow[10], short[10], word[10]],
-        [u32::MAX; 3],
-        "beyond the range at {name}"
-    );
+    assert_eq!([narrow[10], short[10], word[10]], [u32::MAX; 3], "beyond the range at {name}");
 }
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
@@ -194,40 +147,18 @@ fn helpers_and_inactive_lanes_write_nothing(case: &Case) {
     b.assign(order, old);
     let program = b.finish().expect("a valid program");
     let buffers = [Some(buffer(0, 256, &[])), Some(buffer(0, 4, &[]))];
-    let resources = Resources {
-        buffers: &buffers,
-        ..Resources::default()
-    };
+    let resources = Resources { buffers: &buffers, ..Resources::default() };
     let mut machine = machine(&program, level, LANES);
     let mut helpers = LaneMask::none();
     helpers.set(3, true);
-    machine
-        .run(
-            &LaneMask::first(20),
-            &helpers,
-            &resources,
-            Watchdog::default(),
-        )
-        .expect("it ends");
+    machine.run(&LaneMask::first(20), &helpers, &resources, Watchdog::default()).expect("it ends");
     let written = contents(buffers[0].as_ref().expect("bound"), LANES);
     for (lane, written) in written.into_iter().enumerate() {
-        assert_eq!(
-            written == 1,
-            lane < 20 && lane != 3,
-            "lane {lane} at {name}"
-        );
-        assert_eq!(
-            machine.output(0, lane) != 0,
-            lane == 3,
-            "lane {lane} at {name}"
-        );
+        assert_eq!(written == 1, lane < 20 && lane != 3, "lane {lane} at {name}");
+        assert_eq!(machine.output(0, lane) != 0, lane == 3, "lane {lane} at {name}");
     }
     assert_eq!(contents(buffers[1].as_ref().expect("bound"), 1), [19]);
-    assert_eq!(
-        [machine.output(1, 2), machine.output(1, 4)],
-        [2, 3],
-        "atomics go in order of lanes"
-    );
+    assert_eq!([machine.output(1, 2), machine.output(1, 4)], [2, 3], "atomics go in order of lanes");
 }
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
@@ -252,11 +183,7 @@ fn atomics_give_the_old_value_and_change_memory(case: &Case) {
             let mut b = Builder::new();
             b.allocate_shared(16, 4);
             let (first, value) = (b.u32(before), b.u32(operand));
-            let address = Address {
-                space,
-                base: None,
-                offset: 4,
-            };
+            let address = Address { space, base: None, offset: 4 };
             b.store(address, Format::B32, &[first]);
             let old = b.atomic(op, address, Format::B32, value, None);
             let new = b.load(address, Format::B32, 1)[0];
@@ -267,19 +194,8 @@ fn atomics_give_the_old_value_and_change_memory(case: &Case) {
             let program = b.finish().expect("a valid program");
             let buffers = [Some(buffer(0, 16, &[]))];
             let mut machine = machine(&program, level, 16);
-            run(
-                &mut machine,
-                1,
-                &Resources {
-                    buffers: &buffers,
-                    ..Resources::default()
-                },
-            );
-            assert_eq!(
-                [machine.output(0, 0), machine.output(1, 0)],
-                [before, after],
-                "{op:?}"
-            );
+            run(&mut machine, 1, &Resources { buffers: &buffers, ..Resources::default() });
+            assert_eq!([machine.output(0, 0), machine.output(1, 0)], [before, after], "{op:?}");
         }
     }
 }
@@ -292,46 +208,22 @@ fn wide_atomics_and_compare_exchange(case: &Case) {
     let wide = b.compute(Op::UToU64, &[lane]);
     let big = b.u64(1 << 40);
     let value = b.compute(Op::IAdd64, &[wide, big]);
-    let address = Address {
-        space: Space::Buffer(Binding::new(0)),
-        base: None,
-        offset: 8,
-    };
+    let address = Address { space: Space::Buffer(Binding::new(0)), base: None, offset: 8 };
     let old = b.atomic(AtomicOp::IAdd, address, Format::B64, value, None);
     let out = b.output(0, Type::B64);
     b.assign(out, old);
     let (one, zero) = (b.u32(1), b.u32(0));
-    let lock = Address {
-        space: Space::Buffer(Binding::new(0)),
-        base: None,
-        offset: 0,
-    };
-    let seen = b.atomic(
-        AtomicOp::CompareExchange,
-        lock,
-        Format::B32,
-        one,
-        Some(zero),
-    );
+    let lock = Address { space: Space::Buffer(Binding::new(0)), base: None, offset: 0 };
+    let seen = b.atomic(AtomicOp::CompareExchange, lock, Format::B32, one, Some(zero));
     let out = b.output(1, Type::B32);
     b.assign(out, seen);
     let program = b.finish().expect("a valid program");
     let buffers = [Some(buffer(0, 16, &[]))];
     let mut machine = machine(&program, level, 16);
-    run(
-        &mut machine,
-        4,
-        &Resources {
-            buffers: &buffers,
-            ..Resources::default()
-        },
-    );
+    run(&mut machine, 4, &Resources { buffers: &buffers, ..Resources::default() });
     assert_eq!(machine.output64(0, 3), 3 * (1 << 40) + 3);
     assert_eq!([0, 1, 2].map(|lane| machine.output(1, lane)), [0, 1, 1]);
-    assert_eq!(
-        contents(buffers[0].as_ref().expect("bound"), 4),
-        [1, 0, 6, 4 << 8]
-    );
+    assert_eq!(contents(buffers[0].as_ref().expect("bound"), 4), [1, 0, 6, 4 << 8]);
 }
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
@@ -344,11 +236,7 @@ fn workgroup_memory_is_shared_between_lanes_and_starts_as_zero(case: &Case) {
     let own = b.compute(Op::Shl, &[lane, two]);
     let mirror = b.compute(Op::ISub, &[last, lane]);
     let other = b.compute(Op::Shl, &[mirror, two]);
-    let shared = |at| Address {
-        space: Space::Shared,
-        base: Some(at),
-        offset: base,
-    };
+    let shared = |at| Address { space: Space::Shared, base: Some(at), offset: base };
     let before = b.load(shared(own), Format::B32, 1)[0];
     b.store(shared(own), Format::B32, &[lane]);
     b.barrier();
@@ -369,61 +257,25 @@ fn push_constants_and_descriptor_arrays(case: &Case) {
     let (_, level) = level(case);
     let mut b = Builder::new();
     let index = b.input(0, Type::B32, Rate::Varying);
-    let array = Binding {
-        slot: 1,
-        count: 3,
-        index: Some(index),
-    };
+    let array = Binding { slot: 1, count: 3, index: Some(index) };
     let zero = b.u32(0);
-    let value = b.load(
-        Address {
-            space: Space::Buffer(array),
-            base: Some(zero),
-            offset: 0,
-        },
-        Format::B32,
-        1,
-    )[0];
+    let value = b.load(Address { space: Space::Buffer(array), base: Some(zero), offset: 0 }, Format::B32, 1)[0];
     let size = b.buffer_size(array);
-    let pushed = b.load(
-        Address {
-            space: Space::PushConstants,
-            base: None,
-            offset: 4,
-        },
-        Format::B32,
-        2,
-    );
+    let pushed = b.load(Address { space: Space::PushConstants, base: None, offset: 4 }, Format::B32, 2);
     for (slot, value) in [value, size, pushed[0], pushed[1]].into_iter().enumerate() {
         let out = b.output(slot as u32, Type::B32);
         b.assign(out, value);
     }
     let program = b.finish().expect("a valid program");
-    let buffers = [
-        None,
-        Some(buffer(0, 4, &[10])),
-        Some(buffer(0, 8, &[20])),
-        None,
-        Some(buffer(0, 12, &[40])),
-    ];
+    let buffers = [None, Some(buffer(0, 4, &[10])), Some(buffer(0, 8, &[20])), None, Some(buffer(0, 12, &[40]))];
     let push = words(&[1, 0, 0, 0, 2, 0, 0, 0, 3]);
-    let resources = Resources {
-        buffers: &buffers,
-        push_constants: &push,
-        ..Resources::default()
-    };
+    let resources = Resources { buffers: &buffers, push_constants: &push, ..Resources::default() };
     let mut machine = machine(&program, level, 16);
     (0..16).for_each(|lane| machine.set_input(0, lane, lane as u32));
     run(&mut machine, 16, &resources);
     // Bind point 3 is empty; those beyond the array are not used.
-    assert_eq!(
-        [0, 1, 2, 3, 15].map(|lane| machine.output(0, lane)),
-        [10, 20, 0, 0, 0]
-    );
-    assert_eq!(
-        [0, 1, 2, 3, 15].map(|lane| machine.output(1, lane)),
-        [4, 8, 0, 0, 0]
-    );
+    assert_eq!([0, 1, 2, 3, 15].map(|lane| machine.output(0, lane)), [10, 20, 0, 0, 0]);
+    assert_eq!([0, 1, 2, 3, 15].map(|lane| machine.output(1, lane)), [4, 8, 0, 0, 0]);
     assert_eq!([machine.output(2, 5), machine.output(3, 5)], [2, 3]);
 }
 
@@ -432,9 +284,7 @@ struct OneRange(BufferRange);
 impl GlobalMemory for OneRange {
     fn find(&self, address: u64) -> Option<(&BufferRange, u64)> {
         let start = 1 << 40;
-        (start..start + self.0.size)
-            .contains(&address)
-            .then_some((&self.0, start))
+        (start..start + self.0.size).contains(&address).then_some((&self.0, start))
     }
 }
 
@@ -443,11 +293,7 @@ fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
     let (_, level) = level(case);
     let mut b = Builder::new();
     let address = b.input(0, Type::B64, Rate::Varying);
-    let global = Address {
-        space: Space::Global,
-        base: Some(address),
-        offset: 4,
-    };
+    let global = Address { space: Space::Global, base: Some(address), offset: 4 };
     let value = b.load(global, Format::B32, 1)[0];
     let out = b.output(0, Type::B32);
     b.assign(out, value);
@@ -456,22 +302,9 @@ fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
     let memory = OneRange(buffer(0, 16, &[1, 2, 3, 4]));
     let mut machine = machine(&program, level, 16);
     let addresses = [1 << 40, (1 << 40) + 8, (1 << 40) + 12, 0, u64::MAX];
-    addresses
-        .iter()
-        .enumerate()
-        .for_each(|(lane, address)| machine.set_input64(0, lane, *address));
-    run(
-        &mut machine,
-        5,
-        &Resources {
-            global: &memory,
-            ..Resources::default()
-        },
-    );
-    assert_eq!(
-        [0, 1, 2, 3, 4].map(|lane| machine.output(0, lane)),
-        [2, 4, 0, 0, 0]
-    );
+    addresses.iter().enumerate().for_each(|(lane, address)| machine.set_input64(0, lane, *address));
+    run(&mut machine, 5, &Resources { global: &memory, ..Resources::default() });
+    assert_eq!([0, 1, 2, 3, 4].map(|lane| machine.output(0, lane)), [2, 4, 0, 0, 0]);
 }
 
 /// An image unit that records which lanes wrote which image, and returns the coordinates from reads.
@@ -483,19 +316,11 @@ impl ImageUnit for Recorder {
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
-        [
-            request.coordinate[0],
-            request.coordinate[1],
-            [image; 16],
-            [u32::from(request.mask); 16],
-        ]
+        [request.coordinate[0], request.coordinate[1], [image; 16], [u32::from(request.mask); 16]]
     }
 
     fn write(&self, image: u32, request: &TexelRequest, _texel: &[LaneWords; 4]) {
-        self.0
-            .lock()
-            .expect("not poisoned")
-            .push((image, request.mask));
+        self.0.lock().expect("not poisoned").push((image, request.mask));
     }
 
     fn atomic(
@@ -532,16 +357,8 @@ fn image_instructions_ask_once_for_each_image(case: &Case) {
     let mut b = Builder::new();
     let index = b.input(0, Type::B32, Rate::Varying);
     let lane = b.lane_index();
-    let shape = ImageShape {
-        dimension: Dimension::D2,
-        arrayed: false,
-        multisampled: false,
-    };
-    let image = Binding {
-        slot: 7,
-        count: 2,
-        index: Some(index),
-    };
+    let shape = ImageShape { dimension: Dimension::D2, arrayed: false, multisampled: false };
+    let image = Binding { slot: 7, count: 2, index: Some(index) };
     let dst: [Reg; 4] = std::array::from_fn(|_| b.value(Type::B32));
     b.statement(Statement::ImageRead(Box::new(ImageRead {
         dst: dst.map(Some),
@@ -551,13 +368,7 @@ fn image_instructions_ask_once_for_each_image(case: &Case) {
         level: None,
         sample: None,
     })));
-    let write = ImageWrite {
-        image,
-        shape,
-        coordinate: vec![lane, index],
-        sample: None,
-        texel: dst,
-    };
+    let write = ImageWrite { image, shape, coordinate: vec![lane, index], sample: None, texel: dst };
     b.statement(Statement::ImageWrite(Box::new(write)));
     for (slot, value) in dst.into_iter().enumerate() {
         let out = b.output(slot as u32, Type::B32);
@@ -567,22 +378,9 @@ fn image_instructions_ask_once_for_each_image(case: &Case) {
     let recorder = Arc::new(Recorder(Mutex::new(Vec::new())));
     let mut machine = machine(&program, level, 16);
     (0..16).for_each(|lane| machine.set_input(0, lane, u32::from(lane % 4 == 3)));
-    run(
-        &mut machine,
-        10,
-        &Resources {
-            images: &*recorder,
-            ..Resources::default()
-        },
-    );
-    assert_eq!(
-        *recorder.0.lock().expect("not poisoned"),
-        [(7, 0b11_0111_0111), (8, 0b00_1000_1000)]
-    );
-    assert_eq!(
-        [0, 1, 2, 3].map(|slot| machine.output(slot, 7)),
-        [7, 1, 8, 0b1000_1000]
-    );
+    run(&mut machine, 10, &Resources { images: &*recorder, ..Resources::default() });
+    assert_eq!(*recorder.0.lock().expect("not poisoned"), [(7, 0b11_0111_0111), (8, 0b00_1000_1000)]);
+    assert_eq!([0, 1, 2, 3].map(|slot| machine.output(slot, 7)), [7, 1, 8, 0b1000_1000]);
 }
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
@@ -605,16 +403,10 @@ fn clocks_are_read_where_they_stand(case: &Case) {
     let mut machine = machine(&program, level, LANES);
     let before = host_time();
     machine
-        .run(
-            &LaneMask::first(LANES),
-            &LaneMask::none(),
-            &Resources::default(),
-            Watchdog::default(),
-        )
+        .run(&LaneMask::first(LANES), &LaneMask::none(), &Resources::default(), Watchdog::default())
         .expect("it ends");
     let after = host_time();
-    let [first, second, third] =
-        [(0, 5), (1, 5), (1, 2)].map(|(slot, lane)| machine.output64(slot, lane));
+    let [first, second, third] = [(0, 5), (1, 5), (1, 2)].map(|(slot, lane)| machine.output64(slot, lane));
     let times = [before, first, second, third, after];
     assert!(times.is_sorted(), "{times:?} at {name}");
     assert!(before < after);

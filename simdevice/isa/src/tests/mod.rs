@@ -34,26 +34,13 @@ fn fuses(name: &str) -> bool {
 
 /// A machine for a program.
 fn machine(program: &Program, level: Level, lanes: usize) -> Machine {
-    let options = Options {
-        lanes,
-        count_work: true,
-        ..Options::new(level)
-    };
-    Machine::new(Arc::new(
-        Executable::new(program.clone(), &options).expect("a valid program"),
-    ))
+    let options = Options { lanes, count_work: true, ..Options::new(level) };
+    Machine::new(Arc::new(Executable::new(program.clone(), &options).expect("a valid program")))
 }
 
 /// Runs the first `active` lanes of a batch.
 fn run(machine: &mut Machine, active: usize, resources: &Resources<'_>) {
-    machine
-        .run(
-            &LaneMask::first(active),
-            &LaneMask::none(),
-            resources,
-            Watchdog::default(),
-        )
-        .expect("it ends");
+    machine.run(&LaneMask::first(active), &LaneMask::none(), resources, Watchdog::default()).expect("it ends");
 }
 
 /// A small generator of random numbers (SplitMix64).

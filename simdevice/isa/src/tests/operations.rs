@@ -47,28 +47,9 @@ fn words() -> Vec<u64> {
         1e10,
         1e38,
     ];
-    let integers = [
-        1,
-        2,
-        3,
-        7,
-        31,
-        32,
-        33,
-        255,
-        0x80,
-        0x8000,
-        0xffff,
-        0x7fff_ffff,
-        0x8000_0000,
-        0xffff_ffff,
-        0xffff_fffe,
-    ];
-    floats
-        .iter()
-        .map(|value| u64::from(value.to_bits()))
-        .chain(integers)
-        .collect()
+    let integers =
+        [1, 2, 3, 7, 31, 32, 33, 255, 0x80, 0x8000, 0xffff, 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, 0xffff_fffe];
+    floats.iter().map(|value| u64::from(value.to_bits())).chain(integers).collect()
 }
 
 fn doubles() -> Vec<u64> {
@@ -99,24 +80,8 @@ fn doubles() -> Vec<u64> {
         3e9,
         5e-46,
     ];
-    let integers = [
-        1,
-        2,
-        3,
-        63,
-        64,
-        0xffff_ffff,
-        0x1_0000_0000,
-        u64::MAX,
-        u64::MAX - 1,
-        i64::MAX as u64,
-        1 << 63,
-    ];
-    floats
-        .iter()
-        .map(|value| value.to_bits())
-        .chain(integers)
-        .collect()
+    let integers = [1, 2, 3, 63, 64, 0xffff_ffff, 0x1_0000_0000, u64::MAX, u64::MAX - 1, i64::MAX as u64, 1 << 63];
+    floats.iter().map(|value| value.to_bits()).chain(integers).collect()
 }
 
 fn table(ty: Type) -> Vec<u64> {
@@ -149,16 +114,7 @@ fn same(op: Op, got: u64, expected: u64) -> bool {
 
 /// Reports whether an operation's results aren't exact. Such operations have tests of their own.
 fn is_approximate(op: Op) -> bool {
-    let exact = [
-        Op::UDiv,
-        Op::URem,
-        Op::SDiv,
-        Op::SRem,
-        Op::SMod,
-        Op::FDiv,
-        Op::FRem,
-        Op::FSqrt,
-    ];
+    let exact = [Op::UDiv, Op::URem, Op::SDiv, Op::SRem, Op::SMod, Op::FDiv, Op::FRem, Op::FSqrt];
     op.kind() == Kind::Special && !exact.contains(&op)
 }
 
@@ -182,11 +138,7 @@ fn check(case: &Case, op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
     let mut machine = machine(&program, level, LANES);
     for batch in cases.chunks(LANES) {
         let operand = |lane: usize, index: usize| {
-            let case = if rates[index] == Rate::Uniform {
-                0
-            } else {
-                lane % batch.len()
-            };
+            let case = if rates[index] == Rate::Uniform { 0 } else { lane % batch.len() };
             batch[case][index]
         };
         for (index, ty) in signature.operands.iter().enumerate() {
@@ -233,13 +185,7 @@ fn exact_operations_equal_the_scalar_interpreter(case: &Case) {
         check(case, op, &vec![Rate::Varying; operands.len()], &pairs);
         for pattern in 1..1 << operands.len() {
             let rates: Vec<Rate> = (0..operands.len())
-                .map(|index| {
-                    if pattern >> index & 1 == 1 {
-                        Rate::Uniform
-                    } else {
-                        Rate::Varying
-                    }
-                })
+                .map(|index| if pattern >> index & 1 == 1 { Rate::Uniform } else { Rate::Varying })
                 .collect();
             check(case, op, &rates, &pairs[..pairs.len().min(2 * LANES)]);
         }
@@ -255,10 +201,7 @@ fn bitfields_take_any_offset_and_count(case: &Case) {
         }
     }
     check(case, Op::BitfieldInsert, &[Rate::Varying; 4], &cases);
-    let cases: Vec<Vec<u64>> = cases
-        .into_iter()
-        .map(|case| vec![case[0], case[2], case[3]])
-        .collect();
+    let cases: Vec<Vec<u64>> = cases.into_iter().map(|case| vec![case[0], case[2], case[3]]).collect();
     check(case, Op::BitfieldUExtract, &[Rate::Varying; 3], &cases);
     check(case, Op::BitfieldSExtract, &[Rate::Varying; 3], &cases);
 }
@@ -268,24 +211,11 @@ fn folding_gives_what_running_gives(case: &Case) {
     let (name, level) = level(case);
     let mut random = Random(2);
     for op in Op::ALL.iter().copied().filter(|op| !is_approximate(*op)) {
-        let operands: Vec<u64> = op
-            .signature()
-            .operands
-            .iter()
-            .map(|ty| random.pick(&table(*ty)))
-            .collect();
+        let operands: Vec<u64> = op.signature().operands.iter().map(|ty| random.pick(&table(*ty))).collect();
         let as_bool = |bits: u64| u64::from(bits != 0);
         let folded = crate::kernels::evaluate(level, op, &operands);
         let expected = apply(op, &operands, fuses(name));
-        let expected = if op.signature().result == Type::Bool {
-            as_bool(expected)
-        } else {
-            expected
-        };
-        assert!(
-            same(op, folded, expected),
-            "{} of {operands:x?} at {name}",
-            op.name()
-        );
+        let expected = if op.signature().result == Type::Bool { as_bool(expected) } else { expected };
+        assert!(same(op, folded, expected), "{} of {operands:x?} at {name}", op.name());
     }
 }

@@ -65,17 +65,7 @@ impl Grower {
         let mut b = Builder::new();
         let random = Random(seed);
         let mut integers: Vec<Reg> = (0..INPUTS as u32)
-            .map(|slot| {
-                b.input(
-                    slot,
-                    Type::B32,
-                    if slot == 0 {
-                        Rate::Uniform
-                    } else {
-                        Rate::Varying
-                    },
-                )
-            })
+            .map(|slot| b.input(slot, Type::B32, if slot == 0 { Rate::Uniform } else { Rate::Varying }))
             .collect();
         integers.extend([0, 1, 3, 0xffff_ffff].map(|value| b.u32(value)));
         let floats: Vec<Reg> = [0.5, -3.0, 1e20].map(|value| b.f32(value)).to_vec();
@@ -97,15 +87,7 @@ impl Grower {
         };
         for word in 0..PRIVATE_WORDS {
             let zero = grower.b.u32(0);
-            grower.b.store(
-                Address {
-                    space: Space::Private,
-                    base: None,
-                    offset: 4 * word,
-                },
-                Format::B32,
-                &[zero],
-            );
+            grower.b.store(Address { space: Space::Private, base: None, offset: 4 * word }, Format::B32, &[zero]);
         }
         for index in 0..4 {
             let value = grower.random.pick(&grower.integers);
@@ -137,11 +119,7 @@ impl Grower {
     }
 
     fn float(&mut self) -> Reg {
-        if self.random.once_in(3) {
-            self.random.pick(&self.float_variables)
-        } else {
-            self.random.pick(&self.floats)
-        }
+        if self.random.once_in(3) { self.random.pick(&self.float_variables) } else { self.random.pick(&self.floats) }
     }
 
     fn condition(&mut self) -> Reg {
@@ -219,11 +197,7 @@ impl Grower {
         let word = self.b.compute(Op::URem, &[index, bound]);
         let two = self.b.u32(2);
         let base = self.b.compute(Op::Shl, &[word, two]);
-        let address = Address {
-            space: Space::Private,
-            base: Some(base),
-            offset: 4 * self.random.below(2) as u32,
-        };
+        let address = Address { space: Space::Private, base: Some(base), offset: 4 * self.random.below(2) as u32 };
         if self.random.once_in(2) {
             let value = self.integer();
             self.b.store(address, Format::B32, &[value]);
@@ -357,10 +331,7 @@ impl Grower {
         self.breakable.push(label);
         let default = self.random.below(5);
         for case in 0..3usize {
-            self.b.begin_case(
-                &[2 * case as u32, 2 * case as u32 + 1][..1 + self.random.below(2)],
-                case == default,
-            );
+            self.b.begin_case(&[2 * case as u32, 2 * case as u32 + 1][..1 + self.random.below(2)], case == default);
             if self.random.once_in(3) {
                 self.b.fall_through();
             }
@@ -374,12 +345,7 @@ impl Grower {
         while self.budget > 0 {
             self.block(0);
         }
-        let values: Vec<Reg> = self
-            .integer_variables
-            .iter()
-            .chain(&self.float_variables)
-            .copied()
-            .collect();
+        let values: Vec<Reg> = self.integer_variables.iter().chain(&self.float_variables).copied().collect();
         for (slot, value) in values.into_iter().enumerate() {
             let out = self.b.output(slot as u32, Type::B32);
             self.b.assign(out, value);
@@ -400,12 +366,7 @@ fn equal(got: u32, expected: u32) -> bool {
 fn inputs(seed: u64, lane: usize) -> [u64; INPUTS] {
     let mut random = Random(seed.wrapping_mul(31).wrapping_add(lane as u64));
     let mut uniform = Random(seed);
-    [
-        uniform.next() & 7,
-        random.next() & 7,
-        random.next() & 0xffff_ffff,
-        (lane / 5) as u64,
-    ]
+    [uniform.next() & 7, random.next() & 7, random.next() & 0xffff_ffff, (lane / 5) as u64]
 }
 
 /// The scalar interpreter's results for each lane: the outputs, and true if it was killed.
@@ -428,14 +389,9 @@ fn set_inputs(machine: &mut Machine, seed: u64) {
 
 fn check(case: &Case, seed: u64, budget: usize) {
     let (name, level) = level(case);
-    let as_written = Grower::new(seed, budget)
-        .finish()
-        .finish_as_written()
-        .expect("well formed");
-    let program = Grower::new(seed, budget)
-        .finish()
-        .finish()
-        .unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
+    let as_written = Grower::new(seed, budget).finish().finish_as_written().expect("well formed");
+    let program =
+        Grower::new(seed, budget).finish().finish().unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
     // Two batches: the second shows whether a result depends on state that the first left.
     let rounds = [seed, seed + 1];
     let wanted = rounds.map(|seed| expected(&as_written, seed, fuses(name)));
@@ -453,11 +409,7 @@ fn check(case: &Case, seed: u64, budget: usize) {
                     output.slot
                 );
             }
-            assert_eq!(
-                killed.contains(lane),
-                *was_killed,
-                "seed {seed}, lane {lane} at {name}"
-            );
+            assert_eq!(killed.contains(lane), *was_killed, "seed {seed}, lane {lane} at {name}");
         }
     }
 }
@@ -489,8 +441,7 @@ fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
             block.insert(other, copy);
         }
         3 => {
-            block[at]
-                .for_each_definition(&mut |reg| *reg = Reg(random.below(registers + 1) as u32));
+            block[at].for_each_definition(&mut |reg| *reg = Reg(random.below(registers + 1) as u32));
         }
         _ => block[at].for_each_use(&mut |reg| *reg = Reg(random.below(registers + 1) as u32)),
     }
@@ -499,41 +450,21 @@ fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
 #[gaurast_runner::test]
 fn broken_programs_are_refused_or_run_without_harm() {
     let (mut refused, mut ended) = (0, 0);
-    let watchdog = Watchdog {
-        limit: Duration::from_millis(2),
-        cancel: None,
-    };
+    let watchdog = Watchdog { limit: Duration::from_millis(2), cancel: None };
     for seed in 0..1500 {
-        let mut program = Grower::new(seed, 30)
-            .finish()
-            .finish()
-            .expect("a valid program");
+        let mut program = Grower::new(seed, 30).finish().finish().expect("a valid program");
         let mut random = Random(seed);
         let registers = program.registers.len();
         (0..1 + random.below(3)).for_each(|_| mutate(&mut program.body, registers, &mut random));
-        match Executable::new(
-            program,
-            &Options {
-                lanes: 32,
-                ..Options::new(Level::new())
-            },
-        ) {
+        match Executable::new(program, &Options { lanes: 32, ..Options::new(Level::new()) }) {
             Err(_) => refused += 1,
             Ok(executable) => {
                 let mut machine = Machine::new(Arc::new(executable));
                 set_inputs(&mut machine, seed);
-                let done = machine.run(
-                    &LaneMask::first(32),
-                    &LaneMask::none(),
-                    &Resources::default(),
-                    watchdog,
-                );
+                let done = machine.run(&LaneMask::first(32), &LaneMask::none(), &Resources::default(), watchdog);
                 ended += u32::from(done.is_ok());
             }
         }
     }
-    assert!(
-        refused > 100 && ended > 100,
-        "{refused} refused, {ended} ended"
-    );
+    assert!(refused > 100 && ended > 100, "{refused} refused, {ended} ended");
 }

@@ -34,14 +34,7 @@ impl<'a> Lane<'a> {
         };
         for constant in &program.constants {
             let is_bool = lane.type_of(constant.reg) == Type::Bool;
-            lane.set(
-                constant.reg,
-                if is_bool {
-                    bool_bits(constant.bits != 0)
-                } else {
-                    constant.bits
-                },
-            );
+            lane.set(constant.reg, if is_bool { bool_bits(constant.bits != 0) } else { constant.bits });
         }
         for input in &program.inputs {
             lane.set(input.reg, inputs[input.slot as usize]);
@@ -53,11 +46,7 @@ impl<'a> Lane<'a> {
     pub fn run(&mut self) -> Vec<u64> {
         let program = self.program;
         self.block(&program.body);
-        program
-            .outputs
-            .iter()
-            .map(|output| self.get(output.reg))
-            .collect()
+        program.outputs.iter().map(|output| self.get(output.reg)).collect()
     }
 
     fn type_of(&self, reg: Reg) -> Type {
@@ -89,21 +78,13 @@ impl<'a> Lane<'a> {
                 self.set(*dst, apply(*op, &operands, self.fused));
             }
             Statement::Assign { dst, src } => self.set(*dst, self.get(*src)),
-            Statement::Load {
-                dst,
-                address,
-                format: Format::B32,
-            } => {
+            Statement::Load { dst, address, format: Format::B32 } => {
                 for (element, reg) in dst.iter().enumerate() {
                     let at = self.address(address) + 4 * element as u64;
                     self.set(*reg, u64::from(self.private.get(&at).copied().unwrap_or(0)));
                 }
             }
-            Statement::Store {
-                src,
-                address,
-                format: Format::B32,
-            } => {
+            Statement::Store { src, address, format: Format::B32 } => {
                 for (element, reg) in src.iter().enumerate() {
                     let at = self.address(address) + 4 * element as u64;
                     if at + 4 <= u64::from(self.program.private_bytes) && at.is_multiple_of(4) {
@@ -111,22 +92,10 @@ impl<'a> Lane<'a> {
                     }
                 }
             }
-            Statement::If {
-                condition,
-                then,
-                otherwise,
-            } => {
-                return self.block(if self.get(*condition) != 0 {
-                    then
-                } else {
-                    otherwise
-                });
+            Statement::If { condition, then, otherwise } => {
+                return self.block(if self.get(*condition) != 0 { then } else { otherwise });
             }
-            Statement::Switch {
-                label,
-                selector,
-                cases,
-            } => {
+            Statement::Switch { label, selector, cases } => {
                 let value = self.get(*selector) as u32;
                 let start = cases
                     .iter()
@@ -141,11 +110,7 @@ impl<'a> Lane<'a> {
                     }
                 }
             }
-            Statement::Loop {
-                label,
-                body,
-                continuing,
-            } => loop {
+            Statement::Loop { label, body, continuing } => loop {
                 match self.block(body) {
                     Flow::Next => {}
                     Flow::Continue(target) if target == *label => {}
@@ -224,16 +189,11 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::BitCount => u(ua.count_ones()),
         Op::FindLsb => s((0..32).find(|bit| ua >> bit & 1 == 1).unwrap_or(-1)),
         Op::FindUMsb => s((0..32).rev().find(|bit| ua >> bit & 1 == 1).unwrap_or(-1)),
-        Op::FindSMsb => s((0..32)
-            .rev()
-            .find(|bit| sa >> bit & 1 != sa >> 31 & 1)
-            .unwrap_or(-1)),
+        Op::FindSMsb => s((0..32).rev().find(|bit| sa >> bit & 1 != sa >> 31 & 1).unwrap_or(-1)),
         Op::BitfieldInsert => {
             let (offset, count) = (uc, at(3) as u32);
             let bits = (0..count.min(32)).filter(|bit| offset.saturating_add(*bit) < 32);
-            u(bits.fold(ua, |out, bit| {
-                out & !(1 << (offset + bit)) | (ub >> bit & 1) << (offset + bit)
-            }))
+            u(bits.fold(ua, |out, bit| out & !(1 << (offset + bit)) | (ub >> bit & 1) << (offset + bit)))
         }
         Op::BitfieldUExtract if ub >= 32 => 0,
         Op::BitfieldUExtract => u(field(ua, ub, uc)),
@@ -241,11 +201,7 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::BitfieldSExtract => {
             let bits = field(ua, ub, uc);
             let sign = bits >> (uc.min(32) - 1) & 1;
-            u(if sign == 1 && uc < 32 {
-                bits | u32::MAX << uc
-            } else {
-                bits
-            })
+            u(if sign == 1 && uc < 32 { bits | u32::MAX << uc } else { bits })
         }
         Op::SExt8 => s(i32::from(ua as i8)),
         Op::SExt16 => s(i32::from(ua as i16)),
@@ -266,8 +222,7 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::SMod => s(if sb == 0 {
             sa
         } else {
-            (i64::from(sa) - i64::from(sb) * (i64::from(sa) as f64 / f64::from(sb)).floor() as i64)
-                as i32
+            (i64::from(sa) - i64::from(sb) * (i64::from(sa) as f64 / f64::from(sb)).floor() as i64) as i32
         }),
         Op::SMin => s(sa.min(sb)),
         Op::SMax => s(sa.max(sb)),
@@ -282,30 +237,14 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::FAdd => f(fa + fb),
         Op::FSub => f(fa - fb),
         Op::FMul => f(fa * fb),
-        Op::FFma => f(if fused {
-            fa.mul_add(fb, fc)
-        } else {
-            fa * fb + fc
-        }),
-        Op::FMulSub => f(if fused {
-            fa.mul_add(fb, -fc)
-        } else {
-            fa * fb - fc
-        }),
-        Op::FNegMulAdd => f(if fused {
-            (-fa).mul_add(fb, fc)
-        } else {
-            -fa * fb + fc
-        }),
+        Op::FFma => f(if fused { fa.mul_add(fb, fc) } else { fa * fb + fc }),
+        Op::FMulSub => f(if fused { fa.mul_add(fb, -fc) } else { fa * fb - fc }),
+        Op::FNegMulAdd => f(if fused { (-fa).mul_add(fb, fc) } else { -fa * fb + fc }),
         Op::FDiv => f(fa / fb),
         Op::FRem => f(fa % fb),
         Op::FMod => {
             let r = f64::from(fa) % f64::from(fb);
-            f(if r != 0.0 && (r < 0.0) != (fb < 0.0) {
-                (r + f64::from(fb)) as f32
-            } else {
-                r as f32
-            })
+            f(if r != 0.0 && (r < 0.0) != (fb < 0.0) { (r + f64::from(fb)) as f32 } else { r as f32 })
         }
         Op::FNeg => f(-fa),
         Op::FAbs => f(fa.abs()),
@@ -397,11 +336,7 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
         Op::FRem64 => f(fa % fb),
         Op::FMod64 => {
             let r = fa % fb;
-            f(if r != 0.0 && (r < 0.0) != (fb < 0.0) {
-                r + fb
-            } else {
-                r
-            })
+            f(if r != 0.0 && (r < 0.0) != (fb < 0.0) { r + fb } else { r })
         }
         Op::FNeg64 => f(-fa),
         Op::FAbs64 => f(fa.abs()),
@@ -448,11 +383,7 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
         Op::SRem64 => s(if sb == 0 { sa } else { sa.wrapping_rem(sb) }),
         Op::SMod64 => {
             let (a, b) = (i128::from(sa), i128::from(sb));
-            if b == 0 {
-                s(sa)
-            } else {
-                (((a % b) + b) % b) as u64
-            }
+            if b == 0 { s(sa) } else { (((a % b) + b) % b) as u64 }
         }
         Op::And64 => a & b,
         Op::Or64 => a | b,

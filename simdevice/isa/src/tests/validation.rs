@@ -71,37 +71,13 @@ fn wrong_operands_are_errors() {
         },
         |b| {
             let x = b.f32(1.0);
-            b.store(
-                Address {
-                    space: Space::PushConstants,
-                    base: None,
-                    offset: 0,
-                },
-                Format::B32,
-                &[x],
-            );
+            b.store(Address { space: Space::PushConstants, base: None, offset: 0 }, Format::B32, &[x]);
         },
         |b| {
-            b.load(
-                Address {
-                    space: Space::Global,
-                    base: None,
-                    offset: 0,
-                },
-                Format::B32,
-                1,
-            );
+            b.load(Address { space: Space::Global, base: None, offset: 0 }, Format::B32, 1);
         },
         |b| {
-            b.load(
-                Address {
-                    space: Space::Shared,
-                    base: None,
-                    offset: 0,
-                },
-                Format::B32,
-                17,
-            );
+            b.load(Address { space: Space::Shared, base: None, offset: 0 }, Format::B32, 17);
         },
         |b| {
             b.input(3, Type::B32, Rate::Varying);
@@ -123,23 +99,9 @@ fn wrong_operands_are_errors() {
 #[gaurast_runner::test]
 fn options_out_of_range_are_errors() {
     let program = Builder::new().finish().expect("an empty program is valid");
-    for (lanes, subgroup_size) in [
-        (0, 32),
-        (17, 32),
-        (1 << 20, 32),
-        (64, 3),
-        (64, 2),
-        (64, 256),
-    ] {
-        let options = Options {
-            lanes,
-            subgroup_size,
-            ..Options::new(Level::new())
-        };
-        assert!(
-            Executable::new(program.clone(), &options).is_err(),
-            "{lanes} lanes, subgroups of {subgroup_size}"
-        );
+    for (lanes, subgroup_size) in [(0, 32), (17, 32), (1 << 20, 32), (64, 3), (64, 2), (64, 256)] {
+        let options = Options { lanes, subgroup_size, ..Options::new(Level::new()) };
+        assert!(Executable::new(program.clone(), &options).is_err(), "{lanes} lanes, subgroups of {subgroup_size}");
     }
 }
 
@@ -148,51 +110,28 @@ fn endless() -> Machine {
     b.begin_loop();
     b.end();
     let program = b.finish().expect("a valid program");
-    Machine::new(Arc::new(
-        Executable::new(program, &Options::new(Level::new())).expect("a valid program"),
-    ))
+    Machine::new(Arc::new(Executable::new(program, &Options::new(Level::new())).expect("a valid program")))
 }
 
 #[gaurast_runner::test]
 fn an_endless_loop_is_stopped() {
     let limit = Duration::from_millis(20);
-    let watchdog = Watchdog {
-        limit,
-        cancel: None,
-    };
-    let stopped = endless().run(
-        &LaneMask::first(64),
-        &LaneMask::none(),
-        &Resources::default(),
-        watchdog,
-    );
+    let watchdog = Watchdog { limit, cancel: None };
+    let stopped = endless().run(&LaneMask::first(64), &LaneMask::none(), &Resources::default(), watchdog);
     assert_eq!(stopped, Err(Stopped::TimedOut { limit }));
 }
 
 #[gaurast_runner::test]
 fn a_cancelled_batch_stops() {
     let cancel = AtomicBool::new(true);
-    let watchdog = Watchdog {
-        cancel: Some(&cancel),
-        ..Watchdog::default()
-    };
-    let stopped = endless().run(
-        &LaneMask::first(64),
-        &LaneMask::none(),
-        &Resources::default(),
-        watchdog,
-    );
+    let watchdog = Watchdog { cancel: Some(&cancel), ..Watchdog::default() };
+    let stopped = endless().run(&LaneMask::first(64), &LaneMask::none(), &Resources::default(), watchdog);
     assert_eq!(stopped, Err(Stopped::Cancelled));
 }
 
 #[gaurast_runner::test]
 fn a_batch_without_lanes_does_nothing() {
-    let done = endless().run(
-        &LaneMask::none(),
-        &LaneMask::none(),
-        &Resources::default(),
-        Watchdog::default(),
-    );
+    let done = endless().run(&LaneMask::none(), &LaneMask::none(), &Resources::default(), Watchdog::default());
     assert_eq!(done, Ok(()));
 }
 
@@ -210,23 +149,15 @@ fn nothing_is_kept_that_nobody_reads() {
     let sum = b.compute(Op::FAdd, &[a, again]);
     let out = b.output(0, Type::B32);
     b.assign(out, sum);
-    let options = Options {
-        count_work: true,
-        ..Options::new(Level::new())
-    };
-    let executable =
-        Executable::new(b.finish().expect("a valid program"), &options).expect("a valid program");
+    let options = Options { count_work: true, ..Options::new(Level::new()) };
+    let executable = Executable::new(b.finish().expect("a valid program"), &options).expect("a valid program");
     assert_eq!(executable.inputs().len(), 1, "the second input is not read");
     let mut machine = Machine::new(Arc::new(executable));
     machine.fill_input(0, 3f32.to_bits());
     super::run(&mut machine, 48, &Resources::default());
     assert_eq!(f32::from_bits(machine.output(0, 5)), 48.0);
     let work = machine.take_work();
-    assert_eq!(
-        work.instructions.iter().sum::<u64>(),
-        2,
-        "a product, and a sum that goes to the output"
-    );
+    assert_eq!(work.instructions.iter().sum::<u64>(), 2, "a product, and a sum that goes to the output");
     assert_eq!(work.occupancy(), 0.75);
 }
 
@@ -241,26 +172,16 @@ fn contraction_fuses_products_unless_their_factors_have_changed() {
         if change {
             b.assign(held, z);
         }
-        let operands = if product_first {
-            [product, z]
-        } else {
-            [z, product]
-        };
+        let operands = if product_first { [product, z] } else { [z, product] };
         let sum = b.compute_contracted(op, &operands);
         let out = b.output(0, Type::B32);
         b.assign(out, sum);
         let program = b.finish().expect("a valid program");
         let mut machine = super::machine(&program, Level::new(), 16);
-        [3f32, 5.0, 7.0]
-            .iter()
-            .enumerate()
-            .for_each(|(slot, value)| machine.fill_input(slot as u32, value.to_bits()));
+        [3f32, 5.0, 7.0].iter().enumerate().for_each(|(slot, value)| machine.fill_input(slot as u32, value.to_bits()));
         super::run(&mut machine, 16, &Resources::default());
         let kinds = ["FFma", "FMulSub", "FNegMulAdd"];
-        (
-            f32::from_bits(machine.output(0, 0)),
-            kinds.iter().any(|kind| program.to_string().contains(kind)),
-        )
+        (f32::from_bits(machine.output(0, 0)), kinds.iter().any(|kind| program.to_string().contains(kind)))
     };
     assert_eq!(fused(false, Op::FAdd, true), (22.0, true));
     assert_eq!(fused(false, Op::FAdd, false), (22.0, true));

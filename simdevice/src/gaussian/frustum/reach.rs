@@ -108,11 +108,7 @@ impl ScreenExtent {
             (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt() * (deviation + filter)
         };
         let (least, most) = (reach_of(0.0), reach_of(greatest));
-        Some(Self {
-            pixels: least,
-            per_deviation: (most - least) / greatest,
-            greatest,
-        })
+        Some(Self { pixels: least, per_deviation: (most - least) / greatest, greatest })
     }
 }
 
@@ -151,13 +147,7 @@ impl Side {
             // A disc is not in the picture if a plane through the eye separates it from the rays.
             (_, GaussianGeometry::Surfel) => (normal(edge), 0.0, length(normal(from_edge))),
         };
-        Self {
-            edge,
-            normal,
-            offset,
-            deviation,
-            focal: focal.abs(),
-        }
+        Self { edge, normal, offset, deviation, focal: focal.abs() }
     }
 
     /// The plane for Gaussians that are linearized, and for discs.
@@ -183,12 +173,7 @@ impl Side {
         let of_points = self.focal * points.reach * points.per_scale * (1.0 + MARGIN);
         let depth = UNSCENTED_SHARE * self.edge.abs();
         Plane {
-            normal: add(
-                straight.normal,
-                1.0 - UNSCENTED_SHARE,
-                row(projection, 2),
-                depth,
-            ),
+            normal: add(straight.normal, 1.0 - UNSCENTED_SHARE, row(projection, 2), depth),
             // Where the projection of some points is undefined, the Jacobian is used.
             per_scale: straight.per_scale.max(of_points),
             offset: 0.0,
@@ -233,16 +218,9 @@ impl Points {
 fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &ScreenExtent) -> Plane {
     let (normal, offset) = match projection.model {
         CameraModel::Orthographic => ([0.0; 3], -reach.greatest),
-        _ => (
-            row(projection, 2).map(|forward| -reach.greatest * forward),
-            0.0,
-        ),
+        _ => (row(projection, 2).map(|forward| -reach.greatest * forward), 0.0),
     };
-    Plane {
-        normal,
-        per_scale: deviation * (1.0 + MARGIN),
-        offset,
-    }
+    Plane { normal, per_scale: deviation * (1.0 + MARGIN), offset }
 }
 
 /// A row of the camera's rotation.

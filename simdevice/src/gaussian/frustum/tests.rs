@@ -9,14 +9,10 @@ use crate::gaussian::preprocess::{Sequence, Source, project};
 use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::ProjectedGroup;
 use crate::gaussian::surfel::Surfel;
-use crate::packet::{
-    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes,
-};
+use crate::packet::{AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes};
 use crate::runtime::SimdLevel;
 use crate::state::Viewport;
-use crate::state::gaussian::{
-    Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
-};
+use crate::state::gaussian::{Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState};
 use crate::stats::optimizations::Optimizations;
 use devmem::{Allocation, dispatch};
 use rand::{Rng, SeedableRng};
@@ -28,11 +24,7 @@ const SIZE: f32 = 400.0;
 fn append() -> GaussianAppend {
     let memory = Allocation::new(64, false).unwrap();
     let stream = || AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size: 64,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size: 64 },
         stride: 0,
         offset: 0,
         format: Format::R32G32B32Sfloat,
@@ -60,8 +52,7 @@ fn append() -> GaussianAppend {
 fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     let mut attributes = Attributes::default();
     for lane in 0..GROUP {
-        let z =
-            rng.random_range(-0.5..4.0f32).exp() * if rng.random_bool(0.05) { -1.0 } else { 1.0 };
+        let z = rng.random_range(-0.5..4.0f32).exp() * if rng.random_bool(0.05) { -1.0 } else { 1.0 };
         let slope = |rng: &mut ChaCha8Rng| rng.random_range(-2.5..2.5f32);
         let at = [slope(rng) * z.abs(), slope(rng) * z.abs(), z];
         let size = z.abs() * rng.random_range(-8.0..0.5f32).exp();
@@ -90,12 +81,7 @@ fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
     Bounds {
         low: position,
         high: position,
-        scale: attributes
-            .scale
-            .each_ref()
-            .map(at)
-            .into_iter()
-            .fold(0.0, f32::max),
+        scale: attributes.scale.each_ref().map(at).into_iter().fold(0.0, f32::max),
         opacity: attributes.opacity[lane],
     }
 }
@@ -103,26 +89,10 @@ fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
 #[gaurast_runner::test]
 fn what_is_outside_is_drawn_nowhere() {
     let modes = [
-        (
-            GaussianGeometry::Volume,
-            GaussianPrecision::Float32,
-            GaussianLinearization::Jacobian,
-        ),
-        (
-            GaussianGeometry::Volume,
-            GaussianPrecision::Float32,
-            GaussianLinearization::Unscented,
-        ),
-        (
-            GaussianGeometry::Volume,
-            GaussianPrecision::Float16,
-            GaussianLinearization::Jacobian,
-        ),
-        (
-            GaussianGeometry::Surfel,
-            GaussianPrecision::Float32,
-            GaussianLinearization::Jacobian,
-        ),
+        (GaussianGeometry::Volume, GaussianPrecision::Float32, GaussianLinearization::Jacobian),
+        (GaussianGeometry::Volume, GaussianPrecision::Float32, GaussianLinearization::Unscented),
+        (GaussianGeometry::Volume, GaussianPrecision::Float16, GaussianLinearization::Jacobian),
+        (GaussianGeometry::Surfel, GaussianPrecision::Float32, GaussianLinearization::Jacobian),
     ];
     let mut rng = ChaCha8Rng::seed_from_u64(41);
     let append = append();
@@ -150,28 +120,9 @@ fn what_is_outside_is_drawn_nowhere() {
                     far_plane: 50.0,
                     depth_coefficients: [0.0; 2],
                 };
-                let viewport = Viewport {
-                    x: 0.0,
-                    y: 0.0,
-                    width: SIZE,
-                    height: SIZE,
-                    min_depth: 0.0,
-                    max_depth: 1.0,
-                };
-                let visible = Visible {
-                    left: 0,
-                    top: 0,
-                    right: 400,
-                    bottom: 400,
-                };
-                let constants = ViewConstants::new(
-                    &state,
-                    &camera,
-                    &viewport,
-                    visible,
-                    None,
-                    Optimizations::NONE,
-                );
+                let viewport = Viewport { x: 0.0, y: 0.0, width: SIZE, height: SIZE, min_depth: 0.0, max_depth: 1.0 };
+                let visible = Visible { left: 0, top: 0, right: 400, bottom: 400 };
+                let constants = ViewConstants::new(&state, &camera, &viewport, visible, None, Optimizations::NONE);
                 let frustum = Frustum::new(&constants, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {
@@ -199,11 +150,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
                 }
                 let all = Bits::first(GROUP);
-                for (of, what) in [
-                    (outside.near, "near"),
-                    (outside.far, "far"),
-                    (outside.beside, "beside"),
-                ] {
+                for (of, what) in [(outside.near, "near"), (outside.far, "far"), (outside.beside, "beside")] {
                     all.and(&of).for_each(|lane| {
                         assert!(!is_drawn[lane], "{state:?} {camera:?} {what} {lane}");
                     });
@@ -211,10 +158,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 for (lane, is_drawn) in is_drawn.into_iter().enumerate() {
                     let reason = frustum.excludes(&bounds(&attributes, lane));
                     beside_chunks += u32::from(reason == Some(Outside::Beside));
-                    assert!(
-                        !(is_drawn && reason.is_some()),
-                        "{state:?} {camera:?} {reason:?} {lane}"
-                    );
+                    assert!(!(is_drawn && reason.is_some()), "{state:?} {camera:?} {reason:?} {lane}");
                 }
             }
             assert!(

@@ -50,11 +50,7 @@ impl Flat {
         let difference = (p - q) * (p + q);
         Self {
             mean,
-            covariance: [
-                (p * cos).hypot(q * sin).powi(2),
-                difference * sin * cos,
-                (p * sin).hypot(q * cos).powi(2),
-            ],
+            covariance: [(p * cos).hypot(q * sin).powi(2), difference * sin * cos, (p * sin).hypot(q * cos).powi(2)],
             determinant: (p * q).powi(2),
             extent,
             depth: 1.0,
@@ -81,9 +77,7 @@ impl Flat {
         let mut others = Vec::new();
         let reach = scratch.flat.ellipse(0).reach(visible, &mut others, None);
         let spans = reach.iter().flat_map(|reach| reach.spans(&others));
-        spans
-            .map(|(row, span)| (row, span.first, span.end))
-            .collect()
+        spans.map(|(row, span)| (row, span.first, span.end)).collect()
     }
 
     /// The ellipse moved outwards by so many times the greatest error that the search in binary32 allows for.
@@ -95,35 +89,15 @@ impl Flat {
         let greatest = 0.5 * (a + c) + (0.5 * (a - c)).hypot(self.covariance[1]);
         let narrow = (self.determinant / greatest).sqrt();
         let by = times * size * f64::from(MARGIN);
-        Self {
-            extent: (self.extent.sqrt() + by / narrow).powi(2),
-            ..*self
-        }
+        Self { extent: (self.extent.sqrt() + by / narrow).powi(2), ..*self }
     }
 }
 
 fn projection(visible: Visible) -> ViewConstants {
-    let camera = Camera {
-        far_plane: 50.0,
-        ..Camera::default()
-    };
-    let viewport = Viewport {
-        x: 0.0,
-        y: 0.0,
-        width: 200.0,
-        height: 150.0,
-        min_depth: 0.0,
-        max_depth: 1.0,
-    };
+    let camera = Camera { far_plane: 50.0, ..Camera::default() };
+    let viewport = Viewport { x: 0.0, y: 0.0, width: 200.0, height: 150.0, min_depth: 0.0, max_depth: 1.0 };
     let state = GaussianState::default();
-    ViewConstants::new(
-        &state,
-        &camera,
-        &viewport,
-        visible,
-        None,
-        Optimizations::ALL,
-    )
+    ViewConstants::new(&state, &camera, &viewport, visible, None, Optimizations::ALL)
 }
 
 /// The tiles of a group's Gaussians, and the counters.
@@ -159,8 +133,7 @@ fn tiles(
 /// True if all of `inner` is in `outer`.
 fn contains(outer: &Spans, inner: &Spans) -> bool {
     inner.iter().all(|&(row, first, end)| {
-        let is_in =
-            |&(other, from, to): &(u32, u16, u16)| row == other && from <= first && end <= to;
+        let is_in = |&(other, from, to): &(u32, u16, u16)| row == other && from <= first && end <= to;
         outer.iter().any(is_in)
     })
 }
@@ -168,9 +141,7 @@ fn contains(outer: &Spans, inner: &Spans) -> bool {
 /// True if an ellipse is known to reach the tiles that the reference finds: it does not test one whose box is in one tile.
 fn is_reached(gaussian: &Flat, view: &ViewConstants, exact: &Spans) -> bool {
     match exact[..] {
-        [(row, first, end)] if end - first == 1 => {
-            gaussian.reaches_a_centre(&view.visible, (row, first))
-        }
+        [(row, first, end)] if end - first == 1 => gaussian.reaches_a_centre(&view.visible, (row, first)),
         _ => true,
     }
 }
@@ -178,18 +149,10 @@ fn is_reached(gaussian: &Flat, view: &ViewConstants, exact: &Spans) -> bool {
 /// Asserts that the search in binary32 finds all tiles that Gaussians reach at a level, and none that they do not reach
 /// if they are moved outwards by eight times its bound. Returns the numbers of tiles that are reached and that are found,
 /// and of Gaussians that were searched in binary64.
-fn assert_bounded(
-    level: Level,
-    view: &ViewConstants,
-    gaussians: &[Flat],
-    scratch: &mut Scratch,
-) -> [u64; 3] {
+fn assert_bounded(level: Level, view: &ViewConstants, gaussians: &[Flat], scratch: &mut Scratch) -> [u64; 3] {
     let (exact, _) = tiles(None, view, gaussians, scratch);
     let (found, counters) = tiles(Some(level), view, gaussians, scratch);
-    let wider: Vec<Flat> = gaussians
-        .iter()
-        .map(|gaussian| gaussian.widened(8.0))
-        .collect();
+    let wider: Vec<Flat> = gaussians.iter().map(|gaussian| gaussian.widened(8.0)).collect();
     let (wide, _) = tiles(None, view, &wider, scratch);
     for (at, gaussian) in gaussians.iter().enumerate() {
         let (exact, found) = (&exact[at], &found[at]);
@@ -199,25 +162,15 @@ fn assert_bounded(
             _ => &wide[at],
         };
         let is_reached = is_reached(gaussian, view, exact);
-        assert!(
-            !is_reached || contains(found, exact),
-            "{gaussian:?} reaches {exact:?}, found {found:?}"
-        );
+        assert!(!is_reached || contains(found, exact), "{gaussian:?} reaches {exact:?}, found {found:?}");
         let is_sane = wider[at].extent.is_finite() && gaussian.extent >= 0.0;
-        assert!(
-            !is_sane || contains(wide, found),
-            "{gaussian:?} found {found:?}, and a wider one reaches {wide:?}"
-        );
+        assert!(!is_sane || contains(wide, found), "{gaussian:?} found {found:?}, and a wider one reaches {wide:?}");
     }
     let count = |of: &[Spans]| {
         let spans = of.iter().flatten();
         spans.map(|&(_, first, end)| u64::from(end - first)).sum()
     };
-    [
-        count(&exact),
-        count(&found),
-        counters.get(Counter::TilesFoundWide),
-    ]
+    [count(&exact), count(&found), counters.get(Counter::TilesFoundWide)]
 }
 
 /// A random Gaussian: of all sizes, from needles to discs, many of them at the limits of what is searched in binary32.
@@ -233,19 +186,13 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
     let long = 2f64.powf(rng.random_range(-12.0..6.0));
     let short = match rng.random_range(0..4) {
         // The least determinant that is searched in binary32, or hardly less or more.
-        0 => {
-            f64::from(LEAST_VARIANCE).sqrt() / long
-                * (1.0 + f64::from(rng.random_range(-2..=2)) * 1e-7)
-        }
+        0 => f64::from(LEAST_VARIANCE).sqrt() / long * (1.0 + f64::from(rng.random_range(-2..=2)) * 1e-7),
         1 => long,
         _ => long * 2f64.powf(rng.random_range(-14.0..0.0)),
     };
     let angle = match rng.random_range(0..3) {
         0 => 0.0,
-        1 => {
-            std::f64::consts::FRAC_PI_2 * f64::from(rng.random_range(0..4))
-                + rng.random_range(-1e-4..1e-4)
-        }
+        1 => std::f64::consts::FRAC_PI_2 * f64::from(rng.random_range(0..4)) + rng.random_range(-1e-4..1e-4),
         _ => rng.random_range(0.0..3.2),
     };
     let extent = match rng.random_range(0..8) {
@@ -267,24 +214,11 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
 
 #[gaurast_runner::test(each = simd_levels())]
 fn binary32_finds_every_tile_that_binary64_finds_and_hardly_more(case: &Case) {
-    let visible = |left, top, right, bottom| Visible {
-        left,
-        top,
-        right,
-        bottom,
-    };
-    let views = [
-        visible(3, 0, 200, 150),
-        visible(0, 0, 1280, 720),
-        visible(0, 7, 16384, 16384),
-        visible(0, 0, 65536, 256),
-    ]
-    .map(projection);
-    let groups = if gaurast_runner::is_long() {
-        400_000
-    } else {
-        400
-    };
+    let visible = |left, top, right, bottom| Visible { left, top, right, bottom };
+    let views =
+        [visible(3, 0, 200, 150), visible(0, 0, 1280, 720), visible(0, 7, 16384, 16384), visible(0, 0, 65536, 256)]
+            .map(projection);
+    let groups = if gaurast_runner::is_long() { 400_000 } else { 400 };
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut scratch = Scratch::new();
     let mut sums = [0; 3];
@@ -369,20 +303,9 @@ proptest! {
 
 #[gaurast_runner::test]
 fn the_last_number_before_infinity_is_known() {
-    for value in [
-        f32::MAX,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MIN,
-        0.0,
-        -0.0,
-        0.2,
-    ] {
+    for value in [f32::MAX, f32::INFINITY, f32::NEG_INFINITY, f32::MIN, 0.0, -0.0, 0.2] {
         let last = last_rounded_to(value);
         assert!(last as f32 <= value, "{value}");
-        assert!(
-            last == f64::INFINITY || last.next_up() as f32 > value,
-            "{value}"
-        );
+        assert!(last == f64::INFINITY || last.next_up() as f32 > value, "{value}");
     }
 }

@@ -46,11 +46,7 @@ fn naive(topology: Topology, run: &[u32]) -> Vec<(Vec<u32>, [u32; 2])> {
                 add(&[i, i + 2, i + 4], i, i + 4);
             }
             TriangleStripWithAdjacency if i % 2 == 0 && i + 5 < n => {
-                let order = if i % 4 == 0 {
-                    [i, i + 2, i + 4]
-                } else {
-                    [i, i + 4, i + 2]
-                };
+                let order = if i % 4 == 0 { [i, i + 2, i + 4] } else { [i, i + 4, i + 2] };
                 add(&order, i, i + 4);
             }
             _ => {}
@@ -72,9 +68,7 @@ fn canonical(mut vertices: Vec<u32>) -> Vec<u32> {
 fn positions(count: usize) -> Vec<[f32; 4]> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut coordinate = || rng.random_range(-0.9..0.9);
-    (0..count)
-        .map(|_| [coordinate(), coordinate(), 0.5, 1.0])
-        .collect()
+    (0..count).map(|_| [coordinate(), coordinate(), 0.5, 1.0]).collect()
 }
 
 /// The primitives of a draw: id, instance, vertices in winding order, and provoking vertex.
@@ -90,12 +84,7 @@ fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
             super::super::PrimitiveKind::Triangle => vec![a, c, b],
         };
         let instance = varying_bits(draw, primitive.provoking, INSTANCE);
-        (
-            primitive.id,
-            instance,
-            canonical(vertices),
-            index(primitive.provoking),
-        )
+        (primitive.id, instance, canonical(vertices), index(primitive.provoking))
     };
     draw.primitives.iter().map(describe).collect()
 }
@@ -134,10 +123,7 @@ fn every_topology_makes_the_primitives_of_the_specification() {
                 let run_of_all = (3..3 + count as u32).collect();
                 let found = primitives(&run(&device, &draw));
                 let expected = expected(topology, &[run_of_all], last);
-                assert_eq!(
-                    found, expected,
-                    "{topology:?}, {count} vertices, last {last}"
-                );
+                assert_eq!(found, expected, "{topology:?}, {count} vertices, last {last}");
             }
         }
     }
@@ -168,11 +154,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
                     2 => buffer(&list.iter().map(|&i| i as u16).collect::<Vec<_>>()),
                     _ => buffer(&list),
                 };
-                draw.indices = Some(IndexStream {
-                    buffer,
-                    index_size,
-                    vertex_offset: 7,
-                });
+                draw.indices = Some(IndexStream { buffer, index_size, vertex_offset: 7 });
                 (draw.first, draw.count) = (2, 85);
                 (draw.first_instance, draw.instance_count) = (5, 2);
                 let runs: Vec<Vec<u32>> = list[2..87]
@@ -180,11 +162,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
                     .map(|run| run.iter().map(|index| index + 7).collect())
                     .collect();
                 let found = primitives(&run(&device, &draw));
-                assert_eq!(
-                    found,
-                    expected(topology, &runs, false),
-                    "{topology:?} {index_size}"
-                );
+                assert_eq!(found, expected(topology, &runs, false), "{topology:?} {index_size}");
             }
         }
     }
@@ -214,10 +192,7 @@ fn draws_of_many_chunks_are_like_one() {
             // Some primitives are too small to cover anything. The others must be in order.
             let mut rest = expected.iter();
             for primitive in &found {
-                assert!(
-                    rest.any(|other| other == primitive),
-                    "{topology:?}: {primitive:?}"
-                );
+                assert!(rest.any(|other| other == primitive), "{topology:?}: {primitive:?}");
             }
             assert!(found.len() * 10 > expected.len() * 9);
         }

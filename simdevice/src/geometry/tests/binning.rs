@@ -30,52 +30,31 @@ fn covers(primitive: &Primitive, [x, y]: [i64; 2]) -> bool {
 #[gaurast_runner::test]
 fn macro_tiles_have_what_touches_them_in_order() {
     let mut rng = ChaCha8Rng::seed_from_u64(51);
-    let area = Rect {
-        x: 13,
-        y: 21,
-        width: 150,
-        height: 110,
-    };
+    let area = Rect { x: 13, y: 21, width: 150, height: 110 };
     for (macro_tile_size, topology) in [
         (16, Topology::TriangleList),
         (64, Topology::TriangleList),
         (32, Topology::LineList),
         (32, Topology::PointList),
     ] {
-        let config = Config {
-            threads: 2,
-            macro_tile_size,
-            ..Config::default()
-        };
+        let config = Config { threads: 2, macro_tile_size, ..Config::default() };
         let device = Device::new(&config).unwrap();
         let mut positions = Vec::new();
         for _ in 0..300 {
             let reach: f32 = rng.random_range(1.0..60.0);
-            let center = [
-                rng.random_range(-20.0..220.0),
-                rng.random_range(-20.0..170.0),
-            ];
+            let center = [rng.random_range(-20.0..220.0), rng.random_range(-20.0..170.0)];
             for _ in 0..3 {
                 let [x, y] = center.map(|c: f32| c + rng.random_range(-reach..reach));
                 positions.push(at_pixel(x, y, 0.5));
             }
         }
-        let layers: Vec<[u32; 4]> = positions
-            .iter()
-            .map(|_| [rng.random_range(0..3), 0, 0, 0])
-            .collect();
+        let layers: Vec<[u32; 4]> = positions.iter().map(|_| [rng.random_range(0..3), 0, 0, 0]).collect();
         let programs = programs(&[VertexOutput::Layer]);
         let mut draw_state = state(topology);
         draw_state.line_width = 3.0;
         let mut draw = draw_with(&device, programs, draw_state, &positions);
-        draw.attributes
-            .push(stream(&layers, crate::Format::R32G32B32A32Uint));
-        let surface = Surface {
-            area,
-            layers: 3,
-            view: None,
-            depth: None,
-        };
+        draw.attributes.push(stream(&layers, crate::Format::R32G32B32A32Uint));
+        let surface = Surface { area, layers: 3, view: None, depth: None };
         let mut counters = Counters::default();
         let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
         let found = Found::new(front.next_segments(&mut counters).unwrap().unwrap());
@@ -98,13 +77,9 @@ fn macro_tiles_have_what_touches_them_in_order() {
                             assert!(!list.contains(&number));
                             continue;
                         }
-                        let mut all =
-                            (0..pixels.height).flat_map(|y| (0..pixels.width).map(move |x| (x, y)));
+                        let mut all = (0..pixels.height).flat_map(|y| (0..pixels.width).map(move |x| (x, y)));
                         let touches = all.any(|(x, y)| {
-                            let at = [
-                                i64::from(pixels.x) + i64::from(x),
-                                i64::from(pixels.y) + i64::from(y),
-                            ];
+                            let at = [i64::from(pixels.x) + i64::from(x), i64::from(pixels.y) + i64::from(y)];
                             covers(primitive, at)
                         });
                         assert!(!touches || list.contains(&number));

@@ -12,21 +12,12 @@ fn amounts(triangle: &[[f32; 4]], at: [f64; 2]) -> Option<[f64; 3]> {
         let [x, y, _, w] = triangle[corner].map(f64::from);
         [x, y, w]
     };
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (a, b, c) = (column(0), column(1), column(2));
     let determinant = dot(a, cross(b, c));
-    let ray = [
-        at[0] / f64::from(WIDTH) * 2.0 - 1.0,
-        at[1] / f64::from(HEIGHT) * 2.0 - 1.0,
-        1.0,
-    ];
+    let ray = [at[0] / f64::from(WIDTH) * 2.0 - 1.0, at[1] / f64::from(HEIGHT) * 2.0 - 1.0, 1.0];
     let amount = |u, v| dot(ray, cross(u, v)) / determinant;
     (determinant.abs() > 1e-9).then(|| [amount(b, c), amount(c, a), amount(a, b)])
 }
@@ -38,10 +29,7 @@ fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], near: Option<f64>, at:
         return false;
     };
     let sum = |values: [f32; 3]| {
-        let parts = amounts
-            .iter()
-            .zip(values)
-            .map(|(amount, value)| amount * f64::from(value));
+        let parts = amounts.iter().zip(values).map(|(amount, value)| amount * f64::from(value));
         parts.sum::<f64>()
     };
     let z = sum([0, 1, 2].map(|corner: usize| triangle[corner][2]));
@@ -62,10 +50,7 @@ fn coverage(draw: &Found, id: Option<u32>, pixel: [i64; 2]) -> usize {
             value > 0 || (value == 0 && (dy < 0 || (dy == 0 && dx > 0)))
         })
     };
-    let all = draw
-        .primitives
-        .iter()
-        .filter(|primitive| id.is_none_or(|id| primitive.id == id));
+    let all = draw.primitives.iter().filter(|primitive| id.is_none_or(|id| primitive.id == id));
     all.filter(|primitive| covers(primitive.corners)).count()
 }
 
@@ -83,61 +68,31 @@ fn what_is_left_is_what_is_visible() {
     let mut rng = ChaCha8Rng::seed_from_u64(21);
     let (mut inside, mut checked, mut cut) = (0, 0, 0);
     for near in [Some(0.0), None, Some(-1.0)] {
-        let mut positions: Vec<_> = (0..3 * 400)
-            .map(|_| random_position(&mut rng, 3000.0))
-            .collect();
+        let mut positions: Vec<_> = (0..3 * 400).map(|_| random_position(&mut rng, 3000.0)).collect();
         if near == Some(-1.0) {
-            positions
-                .iter_mut()
-                .for_each(|[_, _, z, w]| *z = 2.0 * *z - *w);
+            positions.iter_mut().for_each(|[_, _, z, w]| *z = 2.0 * *z - *w);
         }
-        let distances: Vec<[f32; 4]> = positions
-            .iter()
-            .map(|_| {
-                [
-                    rng.random_range(-0.3..1.0),
-                    rng.random_range(-0.3..1.0),
-                    0.0,
-                    0.0,
-                ]
-            })
-            .collect();
+        let distances: Vec<[f32; 4]> =
+            positions.iter().map(|_| [rng.random_range(-0.3..1.0), rng.random_range(-0.3..1.0), 0.0, 0.0]).collect();
         let programs = programs(&[VertexOutput::ClipDistance(0), VertexOutput::ClipDistance(1)]);
         let mut draw_state = state(Topology::TriangleList);
         draw_state.depth_clamp = near.is_none();
         draw_state.negative_one_to_one = near == Some(-1.0);
         let mut draw = draw_with(&device, programs, draw_state, &positions);
-        draw.attributes
-            .push(stream(&distances, crate::Format::R32G32B32A32Sfloat));
+        draw.attributes.push(stream(&distances, crate::Format::R32G32B32A32Sfloat));
         let found = run(&device, &draw);
         for (id, (triangle, distances)) in (0..).zip(positions.chunks(3).zip(distances.chunks(3))) {
             for _ in 0..200 {
-                let pixel = [
-                    rng.random_range(0..i64::from(WIDTH)),
-                    rng.random_range(0..i64::from(HEIGHT)),
-                ];
+                let pixel = [rng.random_range(0..i64::from(WIDTH)), rng.random_range(0..i64::from(HEIGHT))];
                 // Within 1/64 pixel of an edge, snapping may decide either way.
-                let around = [
-                    [0.0, 0.0],
-                    [1.0, 1.0],
-                    [1.0, -1.0],
-                    [-1.0, 1.0],
-                    [-1.0, -1.0],
-                ];
+                let around = [[0.0, 0.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
                 let seen = around.map(|[x, y]| {
-                    let at = [
-                        pixel[0] as f64 + 0.5 + x / 64.0,
-                        pixel[1] as f64 + 0.5 + y / 64.0,
-                    ];
+                    let at = [pixel[0] as f64 + 0.5 + x / 64.0, pixel[1] as f64 + 0.5 + y / 64.0];
                     visible(triangle, distances, near, at)
                 });
                 if seen.iter().all(|&other| other == seen[0]) {
                     let expected = usize::from(seen[0]);
-                    assert_eq!(
-                        coverage(&found, Some(id), pixel),
-                        expected,
-                        "{triangle:?} {pixel:?}"
-                    );
+                    assert_eq!(coverage(&found, Some(id), pixel), expected, "{triangle:?} {pixel:?}");
                     inside += expected;
                     checked += 1;
                 }
@@ -186,10 +141,8 @@ fn meshes_stay_watertight_where_they_are_clipped() {
         draw.count = list.len() as u32;
         draw.indices = Some(indices(&list));
         let found = run(&device, &draw);
-        let triangles: Vec<Vec<[f32; 4]>> = list
-            .chunks(3)
-            .map(|three| three.iter().map(|&i| positions[i as usize]).collect())
-            .collect();
+        let triangles: Vec<Vec<[f32; 4]>> =
+            list.chunks(3).map(|three| three.iter().map(|&i| positions[i as usize]).collect()).collect();
         let mut covered = 0;
         for y in (0..i64::from(HEIGHT)).step_by(3) {
             for x in 0..i64::from(WIDTH) {
@@ -201,17 +154,9 @@ fn meshes_stay_watertight_where_they_are_clipped() {
                     let at = [x as f64 + 0.5, y as f64 + 0.5];
                     let seen = |[dx, dy]: [f64; 2]| {
                         let at = [at[0] + dx, at[1] + dy];
-                        triangles
-                            .iter()
-                            .any(|triangle| visible(triangle, &[[0.0; 4]; 3], Some(0.0), at))
+                        triangles.iter().any(|triangle| visible(triangle, &[[0.0; 4]; 3], Some(0.0), at))
                     };
-                    let around = [
-                        [0.0, 0.0],
-                        [0.1, 0.1],
-                        [-0.1, 0.1],
-                        [0.1, -0.1],
-                        [-0.1, -0.1],
-                    ];
+                    let around = [[0.0, 0.0], [0.1, 0.1], [-0.1, 0.1], [0.1, -0.1], [-0.1, -0.1]];
                     assert!(!around.into_iter().all(seen), "a hole at {x} {y}");
                 }
             }
@@ -236,16 +181,8 @@ fn new_vertices_have_the_varyings_of_their_place() {
         let half = WIDTH as f32 / 2.0;
         let window = |position: &[f32; 4]| half + half * position[0] / position[3];
         for number in [VALUE, LINEAR] {
-            let values: Vec<f32> = positions
-                .iter()
-                .map(|position| {
-                    if number == VALUE {
-                        position[0]
-                    } else {
-                        window(position)
-                    }
-                })
-                .collect();
+            let values: Vec<f32> =
+                positions.iter().map(|position| if number == VALUE { position[0] } else { window(position) }).collect();
             let mut draw = draw(&device, Topology::TriangleList, &positions);
             draw.attributes[1] = stream(&values, crate::Format::R32Sfloat);
             let found = run(&device, &draw);
@@ -253,18 +190,10 @@ fn new_vertices_have_the_varyings_of_their_place() {
                 for corner in 0..3 {
                     let vertex = primitive.vertices[corner];
                     let value = varying(&found, vertex, number);
-                    let x = if number == VALUE {
-                        half + half * value * primitive.inverse_w[corner]
-                    } else {
-                        value
-                    };
+                    let x = if number == VALUE { half + half * value * primitive.inverse_w[corner] } else { value };
                     let off = (x * 256.0 - primitive.corners[corner][0] as f32).abs();
                     // Snapping moves it by half a unit, and binary32 has only 24 bits for distant ones.
-                    assert!(
-                        off < 1.0 + x.abs() / 1000.0,
-                        "{x} {:?}",
-                        primitive.corners[corner]
-                    );
+                    assert!(off < 1.0 + x.abs() / 1000.0, "{x} {:?}", primitive.corners[corner]);
                     made += usize::from(vertex > 0);
                 }
                 assert_eq!(varying_bits(&found, primitive.provoking, INDEX), 0);
@@ -277,24 +206,14 @@ fn new_vertices_have_the_varyings_of_their_place() {
 #[gaurast_runner::test]
 fn far_triangles_inside_the_guard_band_are_not_cut() {
     let device = device(1);
-    let positions = [
-        at_pixel(-30_000.0, -30_000.0, 0.5),
-        at_pixel(30_000.0, 0.0, 0.5),
-        at_pixel(0.0, 30_000.0, 0.5),
-    ];
+    let positions = [at_pixel(-30_000.0, -30_000.0, 0.5), at_pixel(30_000.0, 0.0, 0.5), at_pixel(0.0, 30_000.0, 0.5)];
     let found = run(&device, &draw(&device, Topology::TriangleList, &positions));
     assert_eq!(found.primitives.len(), 1);
     let positions = positions.map(|[x, y, z, w]| [x * 1.5, y * 1.5, z, w]);
     let found = run(&device, &draw(&device, Topology::TriangleList, &positions));
     assert!(found.primitives.len() > 1);
     for primitive in &found.primitives {
-        assert!(
-            primitive
-                .corners
-                .iter()
-                .flatten()
-                .all(|c| c.abs() <= (32_768 + 1) * 256)
-        );
+        assert!(primitive.corners.iter().flatten().all(|c| c.abs() <= (32_768 + 1) * 256));
     }
 }
 

@@ -11,11 +11,7 @@ use rand_chacha::ChaCha8Rng;
 fn facing_is_the_sign_of_the_area_in_the_framebuffer() {
     let device = device(1);
     // Clockwise in a framebuffer whose y points down.
-    let clockwise = [
-        at_pixel(10.0, 10.0, 0.0),
-        at_pixel(90.0, 10.0, 0.0),
-        at_pixel(90.0, 90.0, 0.0),
-    ];
+    let clockwise = [at_pixel(10.0, 10.0, 0.0), at_pixel(90.0, 10.0, 0.0), at_pixel(90.0, 90.0, 0.0)];
     let mut counter_clockwise = clockwise;
     counter_clockwise.swap(1, 2);
     for (positions, is_clockwise) in [(clockwise, true), (counter_clockwise, false)] {
@@ -72,28 +68,15 @@ fn only_what_covers_nothing_is_dropped() {
         let reach = if number % 2 == 0 { 0.9 } else { 2.5 };
         // Many lie on pixel centres and edges.
         let grid = [0.5, 0.25, 1.0 / 256.0][rng.random_range(0..3)];
-        let mut at =
-            |least: f32, greatest: f32| (rng.random_range(least..greatest) / grid).round() * grid;
+        let mut at = |least: f32, greatest: f32| (rng.random_range(least..greatest) / grid).round() * grid;
         let center = [at(-2.0, WIDTH as f32 + 2.0), at(-2.0, HEIGHT as f32 + 2.0)];
         for _ in 0..3 {
-            positions.push(at_pixel(
-                center[0] + at(-reach, reach),
-                center[1] + at(-reach, reach),
-                0.5,
-            ));
+            positions.push(at_pixel(center[0] + at(-reach, reach), center[1] + at(-reach, reach), 0.5));
         }
     }
     let found = run(&device, &draw(&device, Topology::TriangleList, &positions));
-    let kept: Vec<u32> = found
-        .primitives
-        .iter()
-        .map(|primitive| primitive.id)
-        .collect();
-    let transform = super::super::viewport::Transform::new(
-        &state(Topology::TriangleList).viewports[0],
-        false,
-        false,
-    );
+    let kept: Vec<u32> = found.primitives.iter().map(|primitive| primitive.id).collect();
+    let transform = super::super::viewport::Transform::new(&state(Topology::TriangleList).viewports[0], false, false);
     for (id, triangle) in (0..).zip(positions.chunks(3)) {
         let mut corners = [0, 1, 2].map(|i: usize| transform.project(triangle[i]).snapped);
         if area(corners) < 0 {
@@ -104,11 +87,7 @@ fn only_what_covers_nothing_is_dropped() {
         }
     }
     // Small triangles are tested exactly.
-    for primitive in found
-        .primitives
-        .iter()
-        .filter(|primitive| primitive.id % 2 == 0)
-    {
+    for primitive in found.primitives.iter().filter(|primitive| primitive.id % 2 == 0) {
         assert!(covers(primitive.corners), "{:?}", primitive.corners);
     }
 }
@@ -116,25 +95,14 @@ fn only_what_covers_nothing_is_dropped() {
 #[gaurast_runner::test]
 fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
     let device = device(1);
-    let positions = [
-        [-0.5, -0.5, 0.5, 1.0],
-        [0.5, -0.5, 0.5, 1.0],
-        [0.5, 0.5, 0.5, 1.0],
-    ];
+    let positions = [[-0.5, -0.5, 0.5, 1.0], [0.5, -0.5, 0.5, 1.0], [0.5, 0.5, 0.5, 1.0]];
     let programs = programs(&[VertexOutput::Layer, VertexOutput::ViewportIndex]);
     let mut draw_state = state(Topology::TriangleList);
-    draw_state.viewports.push(Viewport {
-        x: 100.0,
-        ..draw_state.viewports[0]
-    });
-    draw_state.scissors.push(Rect {
-        width: 170,
-        ..EVERYTHING
-    });
+    draw_state.viewports.push(Viewport { x: 100.0, ..draw_state.viewports[0] });
+    draw_state.scissors.push(Rect { width: 170, ..EVERYTHING });
     let mut draw = draw_with(&device, programs, draw_state, &positions);
     let targets: [[u32; 4]; 3] = [[2, 1, 0, 0], [0, 0, 0, 0], [9, 77, 0, 0]];
-    draw.attributes
-        .push(stream(&targets, crate::Format::R32G32B32A32Uint));
+    draw.attributes.push(stream(&targets, crate::Format::R32G32B32A32Uint));
     let first = run(&device, &draw);
     let mut last_state = (*draw.state).clone();
     last_state.provoking_last = true;
@@ -153,41 +121,15 @@ fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
 #[gaurast_runner::test]
 fn distances_cull_what_is_negative_everywhere() {
     let device = device(1);
-    let positions = [
-        [-0.5, -0.5, 0.5, 1.0],
-        [0.5, -0.5, 0.5, 1.0],
-        [0.5, 0.5, 0.5, 1.0],
-    ];
+    let positions = [[-0.5, -0.5, 0.5, 1.0], [0.5, -0.5, 0.5, 1.0], [0.5, 0.5, 0.5, 1.0]];
     for (distances, drawn) in [
-        (
-            [
-                [-1.0, 1.0, 0.0, 0.0],
-                [-1.0, 1.0, 0.0, 0.0],
-                [-0.1, 1.0, 0.0, 0.0],
-            ],
-            0,
-        ),
-        (
-            [
-                [-1.0, 1.0, 0.0, 0.0],
-                [-1.0, 1.0, 0.0, 0.0],
-                [0.0, 1.0, 0.0, 0.0],
-            ],
-            1,
-        ),
-        (
-            [
-                [-1.0, 1.0, 0.0, 0.0],
-                [1.0, -1.0, 0.0, 0.0],
-                [1.0, 1.0, 0.0, 0.0],
-            ],
-            1,
-        ),
+        ([[-1.0, 1.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0], [-0.1, 1.0, 0.0, 0.0]], 0),
+        ([[-1.0, 1.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]], 1),
+        ([[-1.0, 1.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]], 1),
     ] {
         let programs = programs(&[VertexOutput::CullDistance(0), VertexOutput::CullDistance(1)]);
         let mut draw = draw_with(&device, programs, state(Topology::TriangleList), &positions);
-        draw.attributes
-            .push(stream(&distances, crate::Format::R32G32B32A32Sfloat));
+        draw.attributes.push(stream(&distances, crate::Format::R32G32B32A32Sfloat));
         assert_eq!(run(&device, &draw).primitives.len(), drawn);
     }
 }
@@ -195,22 +137,10 @@ fn distances_cull_what_is_negative_everywhere() {
 #[gaurast_runner::test]
 fn statistics_count_every_stage() {
     let device = device(1);
-    let mut positions = vec![
-        at_pixel(0.0, 0.0, 0.5),
-        at_pixel(90.0, 0.0, 0.5),
-        at_pixel(90.0, 90.0, 0.5),
-    ];
+    let mut positions = vec![at_pixel(0.0, 0.0, 0.5), at_pixel(90.0, 0.0, 0.5), at_pixel(90.0, 90.0, 0.5)];
     // One triangle is cut in two by the near plane, and one is beyond it.
-    positions.extend([
-        at_pixel(0.0, 0.0, 0.5),
-        at_pixel(90.0, 0.0, 0.5),
-        at_pixel(90.0, 90.0, -0.5),
-    ]);
-    positions.extend([
-        at_pixel(0.0, 0.0, -0.5),
-        at_pixel(90.0, 0.0, -0.5),
-        at_pixel(90.0, 90.0, -0.5),
-    ]);
+    positions.extend([at_pixel(0.0, 0.0, 0.5), at_pixel(90.0, 0.0, 0.5), at_pixel(90.0, 90.0, -0.5)]);
+    positions.extend([at_pixel(0.0, 0.0, -0.5), at_pixel(90.0, 0.0, -0.5), at_pixel(90.0, 90.0, -0.5)]);
     let mut draw = draw(&device, Topology::TriangleList, &positions);
     draw.indices = Some(indices(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 0, 1, 2, 0]));
     draw.count = 13;

@@ -22,19 +22,12 @@ fn pass_through() -> DrawPrograms {
         captured: None,
         tessellation: None,
         geometry: None,
-        fragment: Some(fragment(
-            &[crate::program::interface::Interpolation::Flat; 4],
-        )),
+        fragment: Some(fragment(&[crate::program::interface::Interpolation::Flat; 4])),
     }
 }
 
 /// The values that each of `vertices`, in each instance, reads from a stream.
-fn naive(
-    stream: &AttributeStream,
-    vertices: &[u32],
-    first_instance: u32,
-    instances: u32,
-) -> Vec<[u32; 4]> {
+fn naive(stream: &AttributeStream, vertices: &[u32], first_instance: u32, instances: u32) -> Vec<[u32; 4]> {
     let size = stream.format.texel_size() as u64;
     let mut out = Vec::new();
     for instance in 0..instances {
@@ -58,14 +51,8 @@ fn naive(
 
 fn check(stream: AttributeStream, vertices: &[u32], consecutive: bool) {
     let device = device(1);
-    let positions =
-        vec![[0.0, 0.0, 0.5, 1.0]; 1 + vertices.iter().max().copied().unwrap_or(0) as usize];
-    let mut draw = draw_with(
-        &device,
-        pass_through(),
-        state(Topology::PointList),
-        &positions,
-    );
+    let positions = vec![[0.0, 0.0, 0.5, 1.0]; 1 + vertices.iter().max().copied().unwrap_or(0) as usize];
+    let mut draw = draw_with(&device, pass_through(), state(Topology::PointList), &positions);
     draw.attributes[1] = stream.clone();
     if consecutive {
         (draw.first, draw.count) = (vertices[0], vertices.len() as u32);
@@ -82,10 +69,7 @@ fn check(stream: AttributeStream, vertices: &[u32], consecutive: bool) {
         // The bits of a NaN may change.
         for (found, expected) in found.into_iter().zip(expected) {
             let both_nan = f32::from_bits(found).is_nan() && f32::from_bits(expected).is_nan();
-            assert!(
-                found == expected || both_nan,
-                "{stream:?}: {found:x} {expected:x}"
-            );
+            assert!(found == expected || both_nan, "{stream:?}: {found:x} {expected:x}");
         }
     }
 }
@@ -95,11 +79,7 @@ fn random_stream(rng: &mut ChaCha8Rng, format: Format, bytes: usize) -> Attribut
     let contents: Vec<u8> = (0..bytes + 64).map(|_| rng.random()).collect();
     let BufferRange { memory, .. } = buffer(&contents);
     AttributeStream {
-        buffer: BufferRange {
-            memory,
-            offset: 12,
-            size: bytes as u64,
-        },
+        buffer: BufferRange { memory, offset: 12, size: bytes as u64 },
         stride: rng.random_range(0..40),
         offset: rng.random_range(0..20),
         format,
@@ -122,11 +102,7 @@ fn every_format_is_decoded() {
 #[gaurast_runner::test]
 fn what_lies_outside_the_buffer_is_zero() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for format in [
-        Format::R32G32B32Sfloat,
-        Format::R8G8B8A8Unorm,
-        Format::R16G16Sint,
-    ] {
+    for format in [Format::R32G32B32Sfloat, Format::R8G8B8A8Unorm, Format::R16G16Sint] {
         for bytes in [0, 1, 50, 500] {
             for _ in 0..4 {
                 let stream = random_stream(&mut rng, format, bytes);
@@ -150,12 +126,7 @@ fn built_in_inputs_are_what_vulkan_says() {
     ] {
         programs.vertex_inputs[slot] = Some(input);
     }
-    let mut draw = draw_with(
-        &device,
-        programs,
-        state(Topology::PointList),
-        &[[0.0, 0.0, 0.5, 1.0]; 20],
-    );
+    let mut draw = draw_with(&device, programs, state(Topology::PointList), &[[0.0, 0.0, 0.5, 1.0]; 20]);
     (draw.first, draw.count, draw.first_instance, draw.draw_index) = (3, 4, 11, 6);
     let of = |draw: &crate::packet::Draw| {
         let found = run(&device, draw);

@@ -11,18 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A random float that is often a special value.
 fn wild(rng: &mut ChaCha8Rng) -> f32 {
-    let odd = [
-        0.0,
-        -0.0,
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN_POSITIVE,
-        1e-40,
-        -1.0,
-        1e30,
-    ];
+    let odd = [0.0, -0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, 1e-40, -1.0, 1e30];
     match rng.random_range(0..4) {
         0 => odd[rng.random_range(0..odd.len())],
         1 => f32::from_bits(rng.random()),
@@ -34,42 +23,26 @@ fn wild(rng: &mut ChaCha8Rng) -> f32 {
 fn wild_numbers_are_survived() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(61);
-    let topologies = [
-        Topology::PointList,
-        Topology::LineStrip,
-        Topology::TriangleStrip,
-    ];
+    let topologies = [Topology::PointList, Topology::LineStrip, Topology::TriangleStrip];
     for round in 0..300 {
-        let positions: Vec<[f32; 4]> = (0..60)
-            .map(|_| std::array::from_fn(|_| wild(&mut rng)))
-            .collect();
-        let extra: Vec<[f32; 4]> = (0..60)
-            .map(|_| std::array::from_fn(|_| wild(&mut rng)))
-            .collect();
+        let positions: Vec<[f32; 4]> = (0..60).map(|_| std::array::from_fn(|_| wild(&mut rng))).collect();
+        let extra: Vec<[f32; 4]> = (0..60).map(|_| std::array::from_fn(|_| wild(&mut rng))).collect();
         let programs = programs(&[
             VertexOutput::PointSize,
             VertexOutput::ClipDistance(7),
             VertexOutput::CullDistance(0),
-            if round % 2 == 0 {
-                VertexOutput::ViewportIndex
-            } else {
-                VertexOutput::Layer
-            },
+            if round % 2 == 0 { VertexOutput::ViewportIndex } else { VertexOutput::Layer },
         ]);
         let mut draw_state = state(topologies[round % 3]);
-        draw_state.polygon_mode =
-            [PolygonMode::Fill, PolygonMode::Line, PolygonMode::Point][rng.random_range(0..3)];
+        draw_state.polygon_mode = [PolygonMode::Fill, PolygonMode::Line, PolygonMode::Point][rng.random_range(0..3)];
         draw_state.line_width = wild(&mut rng);
         if draw_state.line_width.is_nan() {
             draw_state.line_width = f32::INFINITY;
         }
         draw_state.depth_clamp = rng.random();
         draw_state.samples = [1, 4][rng.random_range(0..2)];
-        draw_state.depth_bias = Some(DepthBias {
-            constant: wild(&mut rng),
-            clamp: wild(&mut rng),
-            slope: wild(&mut rng),
-        });
+        draw_state.depth_bias =
+            Some(DepthBias { constant: wild(&mut rng), clamp: wild(&mut rng), slope: wild(&mut rng) });
         if rng.random_bool(0.5) {
             draw_state.viewports[0] = Viewport {
                 x: wild(&mut rng),
@@ -81,25 +54,13 @@ fn wild_numbers_are_survived() {
             };
         }
         let mut draw = draw_with(&device, programs, draw_state, &positions);
-        draw.attributes
-            .push(stream(&extra, crate::Format::R32G32B32A32Sfloat));
+        draw.attributes.push(stream(&extra, crate::Format::R32G32B32A32Sfloat));
         let found = run(&device, &draw);
         for primitive in &found.primitives {
             assert!(area(primitive.corners) > 0);
-            assert!(
-                primitive
-                    .corners
-                    .iter()
-                    .flatten()
-                    .all(|c| c.abs() < 1 << 25)
-            );
+            assert!(primitive.corners.iter().flatten().all(|c| c.abs() < 1 << 25));
             let vertices = found.varyings.values.len() / found.varyings.per_vertex;
-            assert!(
-                primitive
-                    .vertices
-                    .iter()
-                    .all(|&vertex| (vertex as usize) < vertices)
-            );
+            assert!(primitive.vertices.iter().all(|&vertex| (vertex as usize) < vertices));
         }
     }
 }
@@ -107,11 +68,7 @@ fn wild_numbers_are_survived() {
 #[gaurast_runner::test]
 fn numbers_at_the_end_of_their_range_are_survived() {
     let device = device(1);
-    let positions = [
-        at_pixel(10.0, 10.0, 0.5),
-        at_pixel(90.0, 10.0, 0.5),
-        at_pixel(90.0, 90.0, 0.5),
-    ];
+    let positions = [at_pixel(10.0, 10.0, 0.5), at_pixel(90.0, 10.0, 0.5), at_pixel(90.0, 90.0, 0.5)];
     let base = draw(&device, Topology::TriangleList, &positions);
     let drawn = |change: &dyn Fn(&mut Draw)| {
         let mut draw = base.clone();
@@ -123,10 +80,7 @@ fn numbers_at_the_end_of_their_range_are_survived() {
     assert_eq!(drawn(&|draw| draw.instance_count = 0), 0);
     assert_eq!(drawn(&|draw| (draw.first, draw.count) = (u32::MAX, 3)), 0);
     assert_eq!(drawn(&|draw| draw.first_instance = u32::MAX), 1);
-    assert_eq!(
-        drawn(&|draw| (draw.first_instance, draw.instance_count) = (u32::MAX - 1, 3)),
-        3
-    );
+    assert_eq!(drawn(&|draw| (draw.first_instance, draw.instance_count) = (u32::MAX - 1, 3)), 3);
     assert_eq!(drawn(&|draw| draw.attributes.clear()), 0);
     let indexed = |draw: &mut Draw, list: &[u32], offset: i32| {
         let mut stream = indices(list);
@@ -161,9 +115,7 @@ fn numbers_at_the_end_of_their_range_are_survived() {
 #[gaurast_runner::test]
 fn the_number_of_workers_changes_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(71);
-    let positions: Vec<[f32; 4]> = (0..4000)
-        .map(|_| [0, 1, 2, 3].map(|_| rng.random_range(-1.0..1.5f32)))
-        .collect();
+    let positions: Vec<[f32; 4]> = (0..4000).map(|_| [0, 1, 2, 3].map(|_| rng.random_range(-1.0..1.5f32))).collect();
     let list: Vec<u32> = (0..30_000).map(|_| rng.random_range(0..4000)).collect();
     let mut seen = None;
     for threads in [1, 2, 5] {
@@ -173,15 +125,8 @@ fn the_number_of_workers_changes_nothing() {
         (draw.count, draw.instance_count) = (30_000, 2);
         let found = run(&device, &draw);
         assert!(found.primitives.len() > 5000);
-        let found = format!(
-            "{:?} {:?} {:?}",
-            found.primitives, found.varyings, found.bins
-        );
-        assert_eq!(
-            *seen.get_or_insert_with(|| found.clone()),
-            found,
-            "{threads} threads"
-        );
+        let found = format!("{:?} {:?} {:?}", found.primitives, found.varyings, found.bins);
+        assert_eq!(*seen.get_or_insert_with(|| found.clone()), found, "{threads} threads");
     }
 }
 
@@ -190,27 +135,14 @@ fn a_vertex_program_without_end_is_stopped() {
     use super::super::{FrontEnd, Surface};
     use crate::{Config, Device};
     use isa::ir::{Label, Program, Statement};
-    let config = Config {
-        threads: 2,
-        shader_timeout: std::time::Duration::from_millis(20),
-        ..Config::default()
-    };
+    let config = Config { threads: 2, shader_timeout: std::time::Duration::from_millis(20), ..Config::default() };
     let device = Device::new(&config).unwrap();
     let mut programs = programs(&[]);
     programs.vertex = Program::default();
-    programs.vertex.body.push(Statement::Loop {
-        label: Label(0),
-        body: Vec::new(),
-        continuing: Vec::new(),
-    });
+    programs.vertex.body.push(Statement::Loop { label: Label(0), body: Vec::new(), continuing: Vec::new() });
     let mut draw = draw_with(&device, programs, state(Topology::PointList), &[[0.0; 4]]);
     draw.count = 10_000;
-    let surface = Surface {
-        area: EVERYTHING,
-        layers: 1,
-        view: None,
-        depth: None,
-    };
+    let surface = Surface { area: EVERYTHING, layers: 1, view: None, depth: None };
     let mut counters = crate::stats::counters::Counters::default();
     let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
     let stopped = front.next_segments(&mut counters).unwrap_err();

@@ -11,8 +11,7 @@ use crate::packet::*;
 use crate::packet::{AttributeStream, BufferRange, IndexStream};
 
 use crate::program::interface::{
-    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
-    VertexOutput,
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,
 };
 
 use crate::state::{DrawState, Rect, Topology};
@@ -28,12 +27,7 @@ pub const WIDTH: u32 = 200;
 pub const HEIGHT: u32 = 150;
 
 /// All pixels.
-pub const EVERYTHING: Rect = Rect {
-    x: 0,
-    y: 0,
-    width: WIDTH,
-    height: HEIGHT,
-};
+pub const EVERYTHING: Rect = Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT };
 
 /// The varying that holds the vertex's index.
 pub const INDEX: usize = 0;
@@ -46,19 +40,14 @@ pub const LINEAR: usize = 3;
 
 /// A device with `threads` workers.
 pub fn device(threads: usize) -> Device {
-    let config = Config {
-        threads,
-        ..Config::default()
-    };
+    let config = Config { threads, ..Config::default() };
     Device::new(&config).unwrap()
 }
 
 /// A program that copies inputs to outputs, each by slot.
 pub fn copies(inputs: u32, copies: &[(u32, u32)]) -> Program {
     let mut b = Builder::new();
-    let inputs: Vec<_> = (0..inputs)
-        .map(|slot| b.input(slot, Type::B32, Rate::Varying))
-        .collect();
+    let inputs: Vec<_> = (0..inputs).map(|slot| b.input(slot, Type::B32, Rate::Varying)).collect();
     for &(from, to) in copies {
         let out = b.output(to, Type::B32);
         b.assign(out, inputs[from as usize]);
@@ -74,11 +63,7 @@ pub fn attribute(stream: usize) -> impl Iterator<Item = Option<VertexInput>> {
 /// A fragment stage that reads varyings with these interpolations.
 pub fn fragment(interpolation: &[Interpolation]) -> FragmentPrograms {
     let inputs = (0..).zip(interpolation).map(|(index, &interpolation)| {
-        Some(FragmentInput::Varying {
-            index,
-            interpolation,
-            sampling: Sampling::Center,
-        })
+        Some(FragmentInput::Varying { index, interpolation, sampling: Sampling::Center })
     });
     FragmentPrograms {
         program: Program::default(),
@@ -95,22 +80,10 @@ pub fn fragment(interpolation: &[Interpolation]) -> FragmentPrograms {
 /// `extra` take the components of attribute 2.
 pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
     use Interpolation::*;
-    let mut pairs = vec![
-        (0, 0),
-        (1, 1),
-        (2, 2),
-        (3, 3),
-        (4, 4),
-        (5, 5),
-        (6, 6),
-        (6, 7),
-    ];
+    let mut pairs = vec![(0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (6, 7)];
     pairs.extend((0..extra.len() as u32).map(|index| (10 + index % 4, 8 + index)));
     let mut inputs: Vec<_> = attribute(0).collect();
-    inputs.extend([
-        Some(VertexInput::VertexIndex),
-        Some(VertexInput::InstanceIndex),
-    ]);
+    inputs.extend([Some(VertexInput::VertexIndex), Some(VertexInput::InstanceIndex)]);
     inputs.extend(attribute(1));
     inputs.extend(attribute(2));
     let mut outputs: Vec<_> = (0..4).map(|c| Some(VertexOutput::Position(c))).collect();
@@ -138,11 +111,7 @@ pub fn buffer<T: bytemuck::NoUninit>(elements: &[T]) -> BufferRange {
     let size = size_of_val(elements) as u64;
     let memory = Allocation::new_zeroed(size.max(4)).unwrap();
     memory.write(0, elements).unwrap();
-    BufferRange {
-        memory,
-        offset: 0,
-        size,
-    }
+    BufferRange { memory, offset: 0, size }
 }
 
 /// A stream of tightly packed elements.
@@ -158,11 +127,7 @@ pub fn stream<T: bytemuck::NoUninit>(elements: &[T], format: Format) -> Attribut
 
 /// An index buffer of 32-bit indices.
 pub fn indices(elements: &[u32]) -> IndexStream {
-    IndexStream {
-        buffer: buffer(elements),
-        index_size: 4,
-        vertex_offset: 0,
-    }
+    IndexStream { buffer: buffer(elements), index_size: 4, vertex_offset: 0 }
 }
 
 /// A draw of these positions with the programs of [`programs`].
@@ -171,20 +136,12 @@ pub fn draw(device: &Device, topology: Topology, positions: &[[f32; 4]]) -> Draw
 }
 
 /// A draw of these positions with other programs and state.
-pub fn draw_with(
-    device: &Device,
-    programs: DrawPrograms,
-    state: DrawState,
-    positions: &[[f32; 4]],
-) -> Draw {
+pub fn draw_with(device: &Device, programs: DrawPrograms, state: DrawState, positions: &[[f32; 4]]) -> Draw {
     let values: Vec<f32> = (0..positions.len()).map(|vertex| vertex as f32).collect();
     Draw {
         pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state: Arc::new(state),
-        attributes: vec![
-            stream(positions, Format::R32G32B32A32Sfloat),
-            stream(&values, Format::R32Sfloat),
-        ],
+        attributes: vec![stream(positions, Format::R32G32B32A32Sfloat), stream(&values, Format::R32Sfloat)],
         vertex_bindings: Bindings::default(),
         primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
@@ -210,23 +167,16 @@ pub struct Found {
 impl Found {
     /// Joins the segments of a part.
     pub fn new(part: PrimitiveDraw) -> Self {
-        let mut found = Self {
-            regions: part.regions,
-            ..Self::default()
-        };
+        let mut found = Self { regions: part.regions, ..Self::default() };
         for segment in part.segments {
             let per_vertex = segment.varyings.per_vertex;
             let vertices = (found.varyings.values.len() / per_vertex.max(1)) as u32;
-            found
-                .bins
-                .push((found.primitives.len() as u32, segment.bins));
-            found
-                .primitives
-                .extend(segment.primitives.iter().map(|primitive| Primitive {
-                    vertices: primitive.vertices.map(|vertex| vertex + vertices),
-                    provoking: primitive.provoking + vertices,
-                    ..*primitive
-                }));
+            found.bins.push((found.primitives.len() as u32, segment.bins));
+            found.primitives.extend(segment.primitives.iter().map(|primitive| Primitive {
+                vertices: primitive.vertices.map(|vertex| vertex + vertices),
+                provoking: primitive.provoking + vertices,
+                ..*primitive
+            }));
             found.varyings.values.extend(segment.varyings.values);
             found.varyings.per_vertex = per_vertex;
         }
@@ -250,12 +200,7 @@ impl Found {
 
 /// The result of a draw, part by part.
 pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
-    let surface = Surface {
-        area: EVERYTHING,
-        layers: 4,
-        view: None,
-        depth: Some(Format::D32Sfloat),
-    };
+    let surface = Surface { area: EVERYTHING, layers: 4, view: None, depth: Some(Format::D32Sfloat) };
     let mut counters = Counters::default();
     let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut counters);
     let mut parts = Vec::new();
@@ -290,10 +235,5 @@ pub fn area(corners: [[i32; 2]; 3]) -> i64 {
 
 /// The clip-space position, with w = 1, of a point given in pixels.
 pub fn at_pixel(x: f32, y: f32, z: f32) -> [f32; 4] {
-    [
-        x / WIDTH as f32 * 2.0 - 1.0,
-        y / HEIGHT as f32 * 2.0 - 1.0,
-        z,
-        1.0,
-    ]
+    [x / WIDTH as f32 * 2.0 - 1.0, y / HEIGHT as f32 * 2.0 - 1.0, z, 1.0]
 }

@@ -19,17 +19,13 @@ fn points_are_squares_of_their_size() {
     let sizes = [[4.0f32], [0.25], [1000.0], [f32::NAN], [2.5]].map(|[size]| [size, 0.0, 0.0, 0.0]);
     let programs = programs(&[VertexOutput::PointSize]);
     let mut draw = draw_with(&device, programs, state(Topology::PointList), &positions);
-    draw.attributes
-        .push(stream(&sizes, crate::Format::R32G32B32A32Sfloat));
+    draw.attributes.push(stream(&sizes, crate::Format::R32G32B32A32Sfloat));
     let found = run(&device, &draw);
     for (number, side) in [1024, 256, 255 * 256, 256, 640].into_iter().enumerate() {
         let primitive = &found.primitives[number];
         assert_eq!(primitive.kind, PrimitiveKind::Point);
         let (x, y) = (50 * 256 - side / 2, 40 * 256 - side / 2);
-        assert_eq!(
-            primitive.corners,
-            [[x, y], [x + side, y], [x + side, y + side]]
-        );
+        assert_eq!(primitive.corners, [[x, y], [x + side, y], [x + side, y + side]]);
         assert_eq!(primitive.vertices, [primitive.provoking; 3]);
     }
 }
@@ -52,22 +48,12 @@ fn points_are_clipped_by_their_centre() {
 #[gaurast_runner::test]
 fn lines_are_rectangles_around_their_segment() {
     let device = device(1);
-    let ends = [
-        [20.0, 30.0],
-        [120.0, 30.0],
-        [60.0, 20.0],
-        [60.0, 100.0],
-        [30.0, 30.0],
-        [60.0, 70.0],
-    ];
+    let ends = [[20.0, 30.0], [120.0, 30.0], [60.0, 20.0], [60.0, 100.0], [30.0, 30.0], [60.0, 70.0]];
     let positions = ends.map(|[x, y]| at_pixel(x, y, 0.5));
     for width in [1.0, 5.0] {
         let mut draw_state = state(Topology::LineList);
         draw_state.line_width = width;
-        let found = run(
-            &device,
-            &draw_with(&device, programs(&[]), draw_state, &positions),
-        );
+        let found = run(&device, &draw_with(&device, programs(&[]), draw_state, &positions));
         assert_eq!(found.primitives.len(), 3);
         for (number, ends) in ends.chunks(2).enumerate() {
             let corners = corners(&found, number);
@@ -86,10 +72,7 @@ fn lines_are_rectangles_around_their_segment() {
                 }
             }
             let index = |vertex| varying_bits(&found, vertex, INDEX) as usize;
-            assert_eq!(
-                primitive.vertices.map(index),
-                [2 * number, 2 * number, 2 * number + 1]
-            );
+            assert_eq!(primitive.vertices.map(index), [2 * number, 2 * number, 2 * number + 1]);
         }
     }
 }
@@ -106,11 +89,7 @@ fn a_line_without_length_is_not_drawn() {
 fn polygons_may_be_drawn_as_their_edges_or_vertices() {
     let device = device(1);
     // The near plane cuts off the third vertex. The cut is not part of the outline.
-    let whole = [
-        at_pixel(20.0, 20.0, 0.5),
-        at_pixel(120.0, 20.0, 0.5),
-        at_pixel(20.0, 120.0, 0.5),
-    ];
+    let whole = [at_pixel(20.0, 20.0, 0.5), at_pixel(120.0, 20.0, 0.5), at_pixel(20.0, 120.0, 0.5)];
     let mut cut = whole;
     cut[2][2] = -0.5;
     for (positions, mode, count) in [
@@ -123,20 +102,12 @@ fn polygons_may_be_drawn_as_their_edges_or_vertices() {
             let mut draw_state = state(Topology::TriangleList);
             draw_state.polygon_mode = mode;
             draw_state.cull_front = cull;
-            let found = run(
-                &device,
-                &draw_with(&device, programs(&[]), draw_state, &positions),
-            );
+            let found = run(&device, &draw_with(&device, programs(&[]), draw_state, &positions));
             assert_eq!(found.primitives.len(), if cull { 0 } else { count });
             for primitive in &found.primitives {
                 assert_eq!(primitive.id, 0);
                 assert_eq!(varying_bits(&found, primitive.provoking, INDEX), 0);
-                let y = primitive
-                    .corners
-                    .map(|corner| corner[1])
-                    .into_iter()
-                    .max()
-                    .unwrap();
+                let y = primitive.corners.map(|corner| corner[1]).into_iter().max().unwrap();
                 assert!(positions == whole || y < 72 * 256);
             }
         }
@@ -147,30 +118,16 @@ fn polygons_may_be_drawn_as_their_edges_or_vertices() {
 fn depth_bias_follows_the_specification() {
     let device = device(1);
     // Depth falls by 0.25 over 100 pixels of x, and by 0.125 over 100 of y.
-    let positions = [
-        at_pixel(20.0, 20.0, 0.75),
-        at_pixel(120.0, 20.0, 0.5),
-        at_pixel(20.0, 120.0, 0.625),
-    ];
+    let positions = [at_pixel(20.0, 20.0, 0.75), at_pixel(120.0, 20.0, 0.5), at_pixel(20.0, 120.0, 0.625)];
     let depth_of = |bias: DepthBias, positions: &[[f32; 4]]| {
         let mut draw_state = state(Topology::TriangleList);
         draw_state.depth_bias = Some(bias);
-        let found = run(
-            &device,
-            &draw_with(&device, programs(&[]), draw_state, positions),
-        );
+        let found = run(&device, &draw_with(&device, programs(&[]), draw_state, positions));
         found.primitives[0].depth[0]
     };
-    let bias = |constant, slope, clamp| DepthBias {
-        constant,
-        clamp,
-        slope,
-    };
+    let bias = |constant, slope, clamp| DepthBias { constant, clamp, slope };
     // The greatest depth has exponent -1: a unit is 2^-24.
-    assert_eq!(
-        depth_of(bias(1000.0, 0.0, 0.0), &positions),
-        0.75 + 1000.0 / 16_777_216.0
-    );
+    assert_eq!(depth_of(bias(1000.0, 0.0, 0.0), &positions), 0.75 + 1000.0 / 16_777_216.0);
     assert!((depth_of(bias(0.0, 2.0, 0.0), &positions) - 0.755).abs() < 1e-6);
     assert!((depth_of(bias(0.0, 2.0, 0.001), &positions) - 0.751).abs() < 1e-6);
     assert!((depth_of(bias(0.0, -2.0, -0.001), &positions) - 0.749).abs() < 1e-6);

@@ -62,12 +62,7 @@ fn corners_lie_where_positions_say() {
     let [primitive] = &drawn.primitives[..] else {
         panic!("one triangle");
     };
-    for (corner, expected) in
-        primitive
-            .corners
-            .iter()
-            .zip([[2560, 5120], [15488, 5184], [2560, 23040]])
-    {
+    for (corner, expected) in primitive.corners.iter().zip([[2560, 5120], [15488, 5184], [2560, 23040]]) {
         let off = [0, 1].map(|axis: usize| (corner[axis] - expected[axis]).abs());
         assert!(off[0] <= 1 && off[1] <= 1, "{corner:?} {expected:?}");
     }
@@ -77,26 +72,9 @@ fn corners_lie_where_positions_say() {
 
 #[gaurast_runner::test]
 fn a_viewport_has_the_pixels_whose_centres_lie_in_it() {
-    let viewport = |x, width| Viewport {
-        x,
-        y: 7.0,
-        width,
-        height: -5.0,
-        min_depth: 0.0,
-        max_depth: 1.0,
-    };
-    for (x, width, first, count) in [
-        (0.0, 10.0, 0, 10),
-        (0.5, 10.0, 0, 10),
-        (0.51, 10.0, 1, 10),
-        (2.25, 0.5, 2, 1),
-    ] {
-        let expected = Rect {
-            x: first,
-            y: 2,
-            width: count,
-            height: 5,
-        };
+    let viewport = |x, width| Viewport { x, y: 7.0, width, height: -5.0, min_depth: 0.0, max_depth: 1.0 };
+    for (x, width, first, count) in [(0.0, 10.0, 0, 10), (0.5, 10.0, 0, 10), (0.51, 10.0, 1, 10), (2.25, 0.5, 2, 1)] {
+        let expected = Rect { x: first, y: 2, width: count, height: 5 };
         assert_eq!(pixels(&viewport(x, width)), expected);
     }
 }
@@ -115,16 +93,11 @@ fn snapping_does_not_move_the_plane_of_depth() {
     let transform = Transform::new(&state(Topology::TriangleList).viewports[0], false, false);
     // The depth at a place, of a plane given at three others.
     let plane = |corners: [[f64; 2]; 3], depth: [f64; 3], at: [f64; 2]| {
-        let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        };
+        let area =
+            |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let [a, b, c] = corners;
         let weights = [area(at, b, c), area(a, at, c), area(a, b, at)];
-        let sum: f64 = weights
-            .iter()
-            .zip(depth)
-            .map(|(weight, depth)| weight * depth)
-            .sum();
+        let sum: f64 = weights.iter().zip(depth).map(|(weight, depth)| weight * depth).sum();
         sum / area(a, b, c)
     };
     let mut checked = 0;

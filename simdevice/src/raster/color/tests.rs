@@ -11,8 +11,7 @@ fn bytes_are_the_nearest_and_read_back_as_their_format_says(case: &Case) {
     let mut values = vec![f32::NAN, f32::INFINITY, -1.0, -0.0, 2.0, f32::MIN_POSITIVE];
     for half in 0..=510 {
         let at = (f64::from(half) / 510.0) as f32;
-        values
-            .extend((-4..=4).map(|step| f32::from_bits(at.to_bits().saturating_add_signed(step))));
+        values.extend((-4..=4).map(|step| f32::from_bits(at.to_bits().saturating_add_signed(step))));
     }
     while !values.len().is_multiple_of(16) {
         values.push(0.3);
@@ -37,23 +36,12 @@ fn bytes_are_the_nearest_and_read_back_as_their_format_says(case: &Case) {
 #[gaurast_runner::test]
 fn stores_touch_only_their_lanes() {
     let values = std::array::from_fn(|lane| 100 + lane as u32);
-    let quads = QuadAddresses {
-        first: [8, 0, 8, 4],
-        consecutive: false,
-    };
+    let quads = QuadAddresses { first: [8, 0, 8, 4], consecutive: false };
     let mut words = [7; 16];
     // Quads 0 and 2 have the same address, each with different lanes.
     quads.store(&mut words, 0b1111_0110_0000_1001, &values);
-    assert_eq!(
-        words,
-        [
-            7, 7, 7, 7, 112, 113, 114, 115, 100, 109, 110, 103, 7, 7, 7, 7
-        ]
-    );
-    let block = QuadAddresses {
-        first: [0, 4, 8, 12],
-        consecutive: true,
-    };
+    assert_eq!(words, [7, 7, 7, 7, 112, 113, 114, 115, 100, 109, 110, 103, 7, 7, 7, 7]);
+    let block = QuadAddresses { first: [0, 4, 8, 12], consecutive: true };
     block.store(&mut words, u16::MAX, &values);
     assert_eq!(words, values);
     assert_eq!(block.load(&words), values);
@@ -64,21 +52,14 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations(case: &Case) {
     let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(19);
     for equation in [PREMULTIPLIED, STRAIGHT] {
-        let state = BlendState {
-            equations: Some((equation, equation)),
-            write_mask: 0xF,
-        };
+        let state = BlendState { equations: Some((equation, equation)), write_mask: 0xF };
         let kernel = ColorOutput::new(&state, None, [0.0; 4], Format::B8G8R8A8Unorm).unwrap();
         assert!(kernel.over.is_some());
-        let general = ColorOutput {
-            over: None,
-            ..kernel.clone()
-        };
+        let general = ColorOutput { over: None, ..kernel.clone() };
         let other = ColorOutput::new(&state, None, [0.0; 4], Format::R16G16B16A16Sfloat).unwrap();
         assert_eq!(other.codec, Codec::Other);
         for _ in 0..200 {
-            let source: [[f32; 16]; 4] =
-                std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+            let source: [[f32; 16]; 4] = std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
             let stored: [u32; 16] = rng.random();
             let write = |output: &ColorOutput| {
                 let mut words = stored;
@@ -101,15 +82,11 @@ fn whole_blocks_of_wide_texels_are_what_their_lanes_are(case: &Case) {
     let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     for equations in [None, Some((PREMULTIPLIED, STRAIGHT))] {
-        let state = BlendState {
-            equations,
-            write_mask: 0xF,
-        };
+        let state = BlendState { equations, write_mask: 0xF };
         let format = Format::R32G32B32A32Sfloat;
         let output = ColorOutput::new(&state, None, [0.0; 4], format).unwrap();
         assert_eq!(output.codec, Codec::Words);
-        let source: [[f32; 16]; 4] =
-            std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+        let source: [[f32; 16]; 4] = std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
         // One texel before the block and one after it must not change.
         let stored: [u32; 72] = std::array::from_fn(|_| rng.random::<f32>().to_bits());
         let write = |lanes: &[u16], consecutive| {
@@ -126,11 +103,7 @@ fn whole_blocks_of_wide_texels_are_what_their_lanes_are(case: &Case) {
             words
         };
         let lanes: Vec<u16> = (0..16).map(|lane| 1 << lane).collect();
-        assert_eq!(
-            write(&[u16::MAX], true),
-            write(&lanes, false),
-            "{equations:?}"
-        );
+        assert_eq!(write(&[u16::MAX], true), write(&lanes, false), "{equations:?}");
         assert_ne!(write(&[u16::MAX], true), stored);
     }
 }

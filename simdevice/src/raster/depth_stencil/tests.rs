@@ -30,22 +30,9 @@ fn depths_become_the_nearest_numbers_of_their_format(case: &Case) {
             _ => ((f64::from(rng.random_range(0..1u32 << 24)) + 0.5) / 16_777_215.0) as f32,
         })
         .collect();
-    depths.extend([
-        0.0,
-        1.0,
-        0.5,
-        f32::from_bits(1),
-        0.999_999_94,
-        2.0,
-        -1.0,
-        -0.0,
-    ]);
+    depths.extend([0.0, 1.0, 0.5, f32::from_bits(1), 0.999_999_94, 2.0, -1.0, -0.0]);
     let level = token_of(case);
-    for format in [
-        Format::D16Unorm,
-        Format::X8D24UnormPack32,
-        Format::D32Sfloat,
-    ] {
+    for format in [Format::D16Unorm, Format::X8D24UnormPack32, Format::D32Sfloat] {
         let code = DepthEncoding::of(format);
         for chunk in depths.as_chunks::<16>().0 {
             let codes: [u32; 16] = dispatch!(level, simd => {
@@ -95,8 +82,7 @@ fn codes_of_floats_are_ordered_as_the_depths(case: &Case) {
     ];
     let float = DepthEncoding::Float;
     let all = (f32::NEG_INFINITY, f32::INFINITY);
-    let codes: [u32; 16] =
-        dispatch!(level, simd => float.encode(simd, f32x16::simd_from(simd, depths), all).into());
+    let codes: [u32; 16] = dispatch!(level, simd => float.encode(simd, f32x16::simd_from(simd, depths), all).into());
     assert!(codes.is_sorted_by(|a, b| a < b), "{codes:?}");
     for (depth, code) in depths.into_iter().zip(codes) {
         assert_eq!(float.encode_one(depth), code, "{depth}");

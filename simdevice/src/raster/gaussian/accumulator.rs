@@ -38,11 +38,7 @@ pub(super) const NOT_TERMINATED: TransmittanceBits = TransmittanceBits(-1);
 impl TransmittanceBits {
     /// A transmittance; with none at all, a pixel whose own is zero is not finished yet.
     pub(super) fn of(transmittance: f32) -> Self {
-        if transmittance > 0.0 {
-            Self(transmittance.to_bits() as i32)
-        } else {
-            NOT_TERMINATED
-        }
+        if transmittance > 0.0 { Self(transmittance.to_bits() as i32) } else { NOT_TERMINATED }
     }
 }
 
@@ -72,11 +68,7 @@ impl Accumulator {
                 continue;
             }
             for (lane, t) in block.iter_mut().enumerate() {
-                *t = if lanes >> lane & 1 == 1 {
-                    1.0
-                } else {
-                    UNTOUCHED
-                };
+                *t = if lanes >> lane & 1 == 1 { 1.0 } else { UNTOUCHED };
             }
         }
     }
@@ -110,21 +102,12 @@ impl Accumulator {
         let [r, g, b] = &self.color;
         let load = |lanes: &[f32; BLOCK_PIXELS]| f32x16::from_slice(simd, lanes);
         let rest = load(&self.transmittance[block]).abs();
-        [
-            load(&r[block]),
-            load(&g[block]),
-            load(&b[block]),
-            f32x16::splat(simd, 1.0) - rest,
-        ]
+        [load(&r[block]), load(&g[block]), load(&b[block]), f32x16::splat(simd, 1.0) - rest]
     }
 
     /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks<S: Simd>(
-        &self,
-        simd: S,
-        TransmittanceBits(light): TransmittanceBits,
-    ) -> u64 {
+    pub(super) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
         let light = i32x16::splat(simd, light);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {
@@ -174,16 +157,13 @@ impl Accumulator {
         let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
         let most_fall = f32x16::splat(simd, most_fall);
         let none = f32x16::splat(simd, f32::NEG_INFINITY);
-        open.select(most_fall, none)
-            .store_slice(&mut self.most_fall[block]);
+        open.select(most_fall, none).store_slice(&mut self.most_fall[block]);
     }
 
     /// The pixels of a block that are not finished.
     pub(super) fn open_lanes(&self, block: usize) -> u32 {
         let lanes = self.transmittance[block].iter().enumerate();
-        lanes.fold(0, |open, (lane, t)| {
-            open | u32::from(t.is_sign_positive()) << lane
-        })
+        lanes.fold(0, |open, (lane, t)| open | u32::from(t.is_sign_positive()) << lane)
     }
 }
 

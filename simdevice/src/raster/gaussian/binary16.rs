@@ -58,9 +58,7 @@ pub(super) struct Half {
 impl Half {
     /// For a task with these thresholds.
     pub(super) fn new(thresholds: &Thresholds) -> Self {
-        Self {
-            thresholds: rounded(thresholds),
-        }
+        Self { thresholds: rounded(thresholds) }
     }
 }
 
@@ -84,10 +82,7 @@ impl BlockKernel for Half {
         } else {
             ranges.pixels(simd, block, splat.look.depth)
         };
-        let look = SplatLook {
-            color: rounded.color,
-            depth: splat.look.depth,
-        };
+        let look = SplatLook { color: rounded.color, depth: splat.look.depth };
         accumulate(accumulator, simd, block, alpha, shown, look, thresholds)
     }
 }
@@ -176,11 +171,7 @@ pub(super) mod scalar {
         }
         let bits = x.to_bits();
         let rounded = f32::from_bits((bits + (bits >> 13 & 1) + 0xFFF) & !0x1FFF);
-        if rounded.abs() >= 65536.0 {
-            f32::INFINITY.copysign(x)
-        } else {
-            rounded
-        }
+        if rounded.abs() >= 65536.0 { f32::INFINITY.copysign(x) } else { rounded }
     }
 
     /// The greatest binary16 number.
@@ -200,10 +191,7 @@ pub(super) mod scalar {
                 factor: splat.factor.map(|f| round(f as f32)),
                 log2_opacity: round(splat.log2_opacity),
                 // An infinite colour times a weight that underflows would be no number.
-                color: splat
-                    .look
-                    .color
-                    .map(|c| round(c).clamp(-GREATEST, GREATEST)),
+                color: splat.look.color.map(|c| round(c).clamp(-GREATEST, GREATEST)),
             }
         }
     }
@@ -223,9 +211,7 @@ pub(super) mod scalar {
             let shifted = x + 12_582_912.0;
             let f = x - (shifted - 12_582_912.0);
             let p = POWER_OF_TWO.iter().fold(0.0, |p, c| p * f + c);
-            round(f32::from_bits(
-                p.to_bits().wrapping_add(shifted.to_bits() << 23),
-            ))
+            round(f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23)))
         }
 
         /// The constants of the draw, as an element has them.
@@ -270,12 +256,7 @@ pub(super) mod scalar {
 
         impl Default for Pixel {
             fn default() -> Self {
-                Self {
-                    color: [0.0; 3],
-                    transmittance: 1.0,
-                    covered: false,
-                    finished: false,
-                }
+                Self { color: [0.0; 3], transmittance: 1.0, covered: false, finished: false }
             }
         }
 

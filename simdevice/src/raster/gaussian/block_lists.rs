@@ -59,8 +59,7 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
             }
             for &primitive in round {
                 let at = locate(primitive);
-                work.contributions +=
-                    kernel.composite(simd, task, at, (&mut *accumulator, block), ranges);
+                work.contributions += kernel.composite(simd, task, at, (&mut *accumulator, block), ranges);
             }
         }
         kernel.end(accumulator, block);
@@ -83,10 +82,7 @@ pub(super) fn part<S: Simd>(
     (accumulator, ranges): (&Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
 ) -> TileCounts {
-    let mut work = TileCounts {
-        pairs: task.list.len() as u64,
-        ..TileCounts::default()
-    };
+    let mut work = TileCounts { pairs: task.list.len() as u64, ..TileCounts::default() };
     let all = mask32x16::splat(simd, true);
     let bounded = task.optimizations.has(Optimization::Blocks);
     let tests_depth = task.thresholds.depth_mode > NO_DEPTH;

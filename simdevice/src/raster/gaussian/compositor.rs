@@ -29,8 +29,8 @@ use super::fast;
 use super::fast::FastScratch;
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
-    Approximation, DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, Kernel,
-    NO_DEPTH, Thresholds, TileCounts, TileInputs,
+    Approximation, DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, Kernel, NO_DEPTH, Thresholds,
+    TileCounts, TileInputs,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
 use super::tracking::{Tracked, Tracking};
@@ -134,9 +134,7 @@ impl GaussianTile {
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.sorted.tiles.walk() {
             None => self.composite_list::<DEPTH>(level, &task, accumulator, runs.as_mut()),
-            Some(walk) => {
-                self.composite_walk::<DEPTH>(level, &task, walk, accumulator, runs.as_mut())
-            }
+            Some(walk) => self.composite_walk::<DEPTH>(level, &task, walk, accumulator, runs.as_mut()),
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -145,8 +143,7 @@ impl GaussianTile {
                 listed: work.listed as u32,
                 runs,
                 contributions: work.contributions,
-                terminated: count(&self.accumulators[accumulator].finished())
-                    .saturating_sub(outside),
+                terminated: count(&self.accumulators[accumulator].finished()).saturating_sub(outside),
                 hidden_rest: work.hidden_rest,
                 ..TileWork::default()
             });
@@ -155,10 +152,7 @@ impl GaussianTile {
         counters.add(Counter::GaussianTilesHidden, work.tiles_hidden);
         counters.add(Counter::GaussianBlocksHidden, work.blocks_hidden);
         counters.add(Counter::BlockEvaluations, work.items);
-        counters.add(
-            Counter::BlocksBesideEllipse,
-            work.open - work.items - work.blocks_hidden,
-        );
+        counters.add(Counter::BlocksBesideEllipse, work.open - work.items - work.blocks_hidden);
         counters.add(Counter::BlocksLeftOut, work.blocks_left_out);
         let blocks = (work.listed - work.tiles_hidden) * BLOCKS as u64;
         let saturated = blocks - work.open - work.blocks_left_out;
@@ -194,10 +188,7 @@ impl GaussianTile {
             half_period: draw.half_period,
             corner: [tile_x, tile_y].map(|tile| tile * TILE_SIZE),
             // The first Gaussian that reaches a pixel finishes it.
-            thresholds: Thresholds {
-                transmittance_floor: f32::INFINITY,
-                ..Thresholds::new(draw, FIND_REACHED)
-            },
+            thresholds: Thresholds { transmittance_floor: f32::INFINITY, ..Thresholds::new(draw, FIND_REACHED) },
             way: Approximation::EXACT,
         };
         match draw.sorted.tiles.walk() {
@@ -227,10 +218,7 @@ impl GaussianTile {
             }
             _ => self.composite_by_block(level, task, accumulator, runs),
         };
-        TileCounts {
-            listed: task.list.len() as u64,
-            ..work
-        }
+        TileCounts { listed: task.list.len() as u64, ..work }
     }
 
     /// As the fast kernel, with powers of two of fewer terms. Apart, so that it is there once.
@@ -266,27 +254,19 @@ impl GaussianTile {
                 let kernel = Half::new(&task.thresholds);
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
-            Kernel::Exact {
-                identities: Some(identities),
-                ..
-            } => {
+            Kernel::Exact { identities: Some(identities), .. } => {
                 let Some(tracked) = self.tracked.get_mut(accumulator) else {
                     return TileCounts::default();
                 };
                 let kernel = Tracking::new(identities, tracked);
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
-            Kernel::Exact {
-                depths: Some(depths),
-                ..
-            } => {
+            Kernel::Exact { depths: Some(depths), .. } => {
                 let scratch = &mut self.per_pixel;
                 dispatch!(level, simd =>
                     composite_per_pixel(scratch, simd, task, depths, lists, to, runs))
             }
-            Kernel::Exact {
-                wide_sums: true, ..
-            } => {
+            Kernel::Exact { wide_sums: true, .. } => {
                 let kernel = WideSums::new();
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
@@ -321,8 +301,7 @@ impl GaussianTile {
         let mut piece = std::mem::take(&mut self.piece);
         loop {
             if task.optimizations.has(Optimization::EarlyTermination)
-                && dispatch!(level, simd => self.accumulators[accumulator].open_blocks(simd, task.way.light))
-                    == 0
+                && dispatch!(level, simd => self.accumulators[accumulator].open_blocks(simd, task.way.light)) == 0
             {
                 break;
             }
@@ -330,10 +309,7 @@ impl GaussianTile {
             if piece.is_empty() {
                 break;
             }
-            let task = TileInputs {
-                list: &piece,
-                ..*task
-            };
+            let task = TileInputs { list: &piece, ..*task };
             let more = self.composite_list::<DEPTH>(level, &task, accumulator, runs.as_deref_mut());
             work.add(&more);
         }

@@ -28,10 +28,7 @@ impl CutOff {
 
     /// The lanes of a block, in the tile at `corner`, whose pixels' centres lie within the cut-off of a Gaussian, a bit each.
     pub(super) fn lanes(&self, splat: &Splat, corner: [u32; 2], block: usize) -> u32 {
-        let middle = [
-            f64::from(corner[0]) + BLOCK_X[block],
-            f64::from(corner[1]) + BLOCK_Y[block],
-        ];
+        let middle = [f64::from(corner[0]) + BLOCK_X[block], f64::from(corner[1]) + BLOCK_Y[block]];
         let bits = |is_within: &dyn Fn([f64; 2]) -> bool| {
             (0..BLOCK_PIXELS).fold(0, |bits, lane| {
                 let centre = [middle[0] + LANE_X_64[lane], middle[1] + LANE_Y_64[lane]];

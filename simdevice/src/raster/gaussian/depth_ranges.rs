@@ -63,13 +63,7 @@ impl DepthRanges {
     /// Makes this what passes against the depths stored at `lanes` of a tile, which are in the order of its blocks.
     pub(super) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &PixelMask) {
         self.tile = [NO_DEPTH, 0];
-        for (block, stored) in stored
-            .as_chunks::<BLOCK_PIXELS>()
-            .0
-            .iter()
-            .enumerate()
-            .take(BLOCKS)
-        {
+        for (block, stored) in stored.as_chunks::<BLOCK_PIXELS>().0.iter().enumerate().take(BLOCKS) {
             let (mut least, mut greatest) = (NO_DEPTH, 0);
             for (lane, &stored) in stored.iter().enumerate() {
                 let range = range(op, stored);
@@ -181,8 +175,7 @@ mod tests {
                 ranges.set(op, &stored, &lanes);
                 for depth in 90..160 {
                     let passes = (0..256).any(|at| {
-                        lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1
-                            && op.holds(depth, stored[at])
+                        lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1 && op.holds(depth, stored[at])
                     });
                     assert!(!(passes && ranges.hides(depth)), "{op:?} {depth}");
                     // Bounds of single ranges are exact but for Equal, whose depths have gaps.

@@ -109,15 +109,7 @@ impl BlockKernel for InOrder {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = splat.look;
-        accumulate(
-            accumulator,
-            simd,
-            block,
-            fall,
-            look,
-            ranges,
-            task.thresholds,
-        )
+        accumulate(accumulator, simd, block, fall, look, ranges, task.thresholds)
     }
 }
 
@@ -127,10 +119,7 @@ pub(super) struct WideSums(Sums);
 impl WideSums {
     /// Sums of no block yet.
     pub(super) fn new() -> Self {
-        Self(Sums {
-            color: [[0.0; BLOCK_PIXELS]; 3],
-            transmittance: [0.0; BLOCK_PIXELS],
-        })
+        Self(Sums { color: [[0.0; BLOCK_PIXELS]; 3], transmittance: [0.0; BLOCK_PIXELS] })
     }
 }
 
@@ -229,24 +218,13 @@ pub(super) fn falls<S: Simd>(
 
 /// As [`falls`], of a primitive that is not cut off.
 #[inline(always)]
-fn whole_falls<S: Simd>(
-    simd: S,
-    task: &TileInputs<'_>,
-    (batch, place): (usize, usize),
-    block: usize,
-) -> f32x16<S> {
+fn whole_falls<S: Simd>(simd: S, task: &TileInputs<'_>, (batch, place): (usize, usize), block: usize) -> f32x16<S> {
     let splat = &task.splats[batch][place];
-    let Kernel::Exact {
-        surfels: Some(surfels),
-        inverse_low_pass,
-        ..
-    } = task.mode
-    else {
+    let Kernel::Exact { surfels: Some(surfels), inverse_low_pass, .. } = task.mode else {
         return falls_64(simd, splat, task, block);
     };
     let surfel = &surfels[batch][place];
-    let from_mean =
-        |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
+    let from_mean = |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
     let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
     let fall = |first: usize| {

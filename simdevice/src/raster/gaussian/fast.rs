@@ -81,11 +81,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         let open = Open {
             bits,
             blocks: bits.count_ones() as u8,
-            rows: if runs.is_some() {
-                accumulator.open_rows()
-            } else {
-                0
-            },
+            rows: if runs.is_some() { accumulator.open_rows() } else { 0 },
         };
         if DEPTH > NO_DEPTH && ranges.rejects_rest(splats[0].look.depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
@@ -97,12 +93,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         }
         let next = rest.get(ROUND..).unwrap_or_default();
         let before = work;
-        let round = Round {
-            splats,
-            next,
-            open,
-            is_recorded: runs.is_some(),
-        };
+        let round = Round { splats, next, open, is_recorded: runs.is_some() };
         let outcome = composite_round::<_, DEPTH>(
             scratch,
             simd,
@@ -119,8 +110,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
                 blocks: open.blocks,
                 reached: (work.items - before.items) as u32,
                 hidden: (work.tiles_hidden - before.tiles_hidden) as u32,
-                hidden_blocks: outcome.blocks_of_hidden
-                    + (work.blocks_hidden - before.blocks_hidden) as u32,
+                hidden_blocks: outcome.blocks_of_hidden + (work.blocks_hidden - before.blocks_hidden) as u32,
             };
             recorder::push_run(runs, run);
         }
@@ -146,11 +136,7 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     if DEPTH <= NO_DEPTH && task.way.light != NOT_TERMINATED {
         let left_out = accumulator.open_blocks(simd, NOT_TERMINATED) & !open;
         // If no block is open, none will be.
-        let of = if open == 0 {
-            rest.len()
-        } else {
-            rest.len().min(ROUND)
-        };
+        let of = if open == 0 { rest.len() } else { rest.len().min(ROUND) };
         work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
     }
     open
@@ -175,10 +161,7 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
     work: &mut TileCounts,
 ) -> RoundOutcome {
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
-    let mut outcome = RoundOutcome {
-        blocks_of_hidden: 0,
-        may_have_finished: false,
-    };
+    let mut outcome = RoundOutcome { blocks_of_hidden: 0, may_have_finished: false };
     let mut from = 0;
     loop {
         let placed = scratch.staged.place::<_, DEPTH>(
@@ -209,17 +192,12 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
             break;
         };
         // It is steep; those before it were composited.
-        let shown = if DEPTH <= NO_DEPTH {
-            open
-        } else {
-            open & ranges.blocks(simd, splat.look.depth).to_bitmask()
-        };
+        let shown = if DEPTH <= NO_DEPTH { open } else { open & ranges.blocks(simd, splat.look.depth).to_bitmask() };
         let exact = u64::from(shown.count_ones());
         work.open += blocks;
         work.blocks_hidden += blocks - exact;
         work.items += exact;
-        work.contributions +=
-            evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
+        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
         outcome.may_have_finished = true;
         from = placed.end + 1;
     }

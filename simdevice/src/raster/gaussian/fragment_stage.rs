@@ -125,9 +125,7 @@ impl<'a> FragmentStageDraw<'a> {
             .filter(|group| !group.blocks.is_empty())
             .collect();
         let mut machines = self.stage.machines();
-        let done = groups
-            .iter()
-            .try_for_each(|group| self.shade(tile, group, samples, covered, tools, &mut machines));
+        let done = groups.iter().try_for_each(|group| self.shade(tile, group, samples, covered, tools, &mut machines));
         machines.give_back(tools.counters);
         for (index, output) in self.colors.iter().enumerate() {
             if output.is_some() {
@@ -139,37 +137,20 @@ impl<'a> FragmentStageDraw<'a> {
 
     /// The sample whose invocations are a sample's, too.
     fn leader(&self, samples: &Samples, sample: usize, block: usize) -> usize {
-        if self.per_sample {
-            sample
-        } else {
-            samples.accumulators[sample][block]
-        }
+        if self.per_sample { sample } else { samples.accumulators[sample][block] }
     }
 
     /// The samples of a leader's group in a block.
-    fn members(
-        &self,
-        samples: &Samples,
-        leader: usize,
-        block: usize,
-    ) -> impl Iterator<Item = usize> {
+    fn members(&self, samples: &Samples, leader: usize, block: usize) -> impl Iterator<Item = usize> {
         (leader..self.samples).filter(move |&sample| self.leader(samples, sample, block) == leader)
     }
 
-    fn group(
-        &self,
-        leader: usize,
-        samples: &Samples,
-        covered: &[PixelMask; SAMPLES],
-    ) -> SampleGroup {
+    fn group(&self, leader: usize, samples: &Samples, covered: &[PixelMask; SAMPLES]) -> SampleGroup {
         let is_covered = |&block: &usize| {
             let mut members = self.members(samples, leader, block);
             members.any(|sample| covered[sample][block] != 0)
         };
-        SampleGroup {
-            leader,
-            blocks: (0..BLOCKS).filter(is_covered).collect(),
-        }
+        SampleGroup { leader, blocks: (0..BLOCKS).filter(is_covered).collect() }
     }
 
     fn shade(
@@ -193,29 +174,14 @@ impl<'a> FragmentStageDraw<'a> {
             for lane in (0..BLOCK_PIXELS).filter(|lane| any >> lane & 1 == 0) {
                 helpers.set(BLOCK_PIXELS * number + lane, true);
             }
-            self.set_inputs(
-                tile,
-                group,
-                (number, block),
-                samples,
-                covered,
-                tools,
-                machine,
-            );
+            self.set_inputs(tile, group, (number, block), samples, covered, tools, machine);
         }
-        let watchdog = Watchdog {
-            limit: self.limit,
-            cancel: Some(tools.cancel),
-        };
+        let watchdog = Watchdog { limit: self.limit, cancel: Some(tools.cancel) };
         let resources = self.bindings.resources();
         machine.run(&LaneMask::first(lanes), &helpers, &resources, watchdog)?;
         let shaded = (lanes - helpers.count()) as u64;
         tools.counters.add(Counter::FragmentInvocations, shaded);
-        let killed = if self.stage.interface.discards {
-            machine.killed()
-        } else {
-            LaneMask::none()
-        };
+        let killed = if self.stage.interface.discards { machine.killed() } else { LaneMask::none() };
         dispatch!(self.level, simd =>
             self.write(simd, tile, group, samples, covered, &killed, machine, tools.buffers));
         Ok(())
@@ -234,11 +200,8 @@ impl<'a> FragmentStageDraw<'a> {
         machine: &mut Machine,
     ) {
         let accumulator = &tools.fragments.accumulators[samples.accumulators[group.leader][block]];
-        let depths = if self.reads_depth() {
-            accumulator.depths(block, self.draw.depth_unit)
-        } else {
-            [[0.0; BLOCK_PIXELS]; 2]
-        };
+        let depths =
+            if self.reads_depth() { accumulator.depths(block, self.draw.depth_unit) } else { [[0.0; BLOCK_PIXELS]; 2] };
         let accumulated: [[f32; BLOCK_PIXELS]; 4] = dispatch!(self.level, simd => {
             let [r, g, b, a] = accumulator.fragments(simd, block);
             [r.into(), g.into(), b.into(), a.into()]
@@ -250,11 +213,7 @@ impl<'a> FragmentStageDraw<'a> {
         let bits = |lanes: [f32; BLOCK_PIXELS]| lanes.map(f32::to_bits);
         let of_gaussians = |index: u32| {
             let number = samples.accumulators[group.leader][block];
-            let tracked = tools
-                .fragments
-                .tracked
-                .get(number)
-                .filter(|_| self.is_tracking());
+            let tracked = tools.fragments.tracked.get(number).filter(|_| self.is_tracking());
             tracked.map_or([0; BLOCK_PIXELS], |tracked| {
                 self.tracked_input(tracked, accumulator.covered[block], block, index)
             })
@@ -269,11 +228,7 @@ impl<'a> FragmentStageDraw<'a> {
                     _ => [self.camera_input(index).to_bits(); BLOCK_PIXELS],
                 },
                 FragmentInput::FragCoord(axis @ (0 | 1)) => {
-                    let (middle, lanes) = if axis == 0 {
-                        (BLOCK_X[block], LANE_X)
-                    } else {
-                        (BLOCK_Y[block], LANE_Y)
-                    };
+                    let (middle, lanes) = if axis == 0 { (BLOCK_X[block], LANE_X) } else { (BLOCK_Y[block], LANE_Y) };
                     let offset = (within[axis] - 128) as f32 / 256.0;
                     let middle = (tile.at[axis] * TILE_SIZE) as f32 + middle as f32;
                     bits(lanes.map(|lane| middle + lane + offset))
@@ -282,9 +237,7 @@ impl<'a> FragmentStageDraw<'a> {
                 FragmentInput::FragCoord(_) => [1f32.to_bits(); BLOCK_PIXELS],
                 FragmentInput::FrontFacing => [u32::MAX; BLOCK_PIXELS],
                 FragmentInput::SampleId => [group.leader as u32; BLOCK_PIXELS],
-                FragmentInput::SamplePosition(axis) => {
-                    [(within[axis.min(1)] as f32 / 256.0).to_bits(); BLOCK_PIXELS]
-                }
+                FragmentInput::SamplePosition(axis) => [(within[axis.min(1)] as f32 / 256.0).to_bits(); BLOCK_PIXELS],
                 FragmentInput::SampleMask => {
                     let mut masks = [0; BLOCK_PIXELS];
                     for sample in self.members(samples, group.leader, block) {
@@ -294,9 +247,9 @@ impl<'a> FragmentStageDraw<'a> {
                     }
                     masks
                 }
-                FragmentInput::PointCoord(_)
-                | FragmentInput::PrimitiveId
-                | FragmentInput::ViewportIndex => [0; BLOCK_PIXELS],
+                FragmentInput::PointCoord(_) | FragmentInput::PrimitiveId | FragmentInput::ViewportIndex => {
+                    [0; BLOCK_PIXELS]
+                }
                 FragmentInput::Layer => [self.draw.layer; BLOCK_PIXELS],
             };
             // An input that is the same for all lanes has one chunk.
@@ -307,13 +260,7 @@ impl<'a> FragmentStageDraw<'a> {
     }
 
     /// The inputs that a block's lanes read of the Gaussians that they show; zeros where nothing is covered.
-    fn tracked_input(
-        &self,
-        tracked: &Tracked,
-        covered: u32,
-        block: usize,
-        index: u32,
-    ) -> [u32; BLOCK_PIXELS] {
+    fn tracked_input(&self, tracked: &Tracked, covered: u32, block: usize, index: u32) -> [u32; BLOCK_PIXELS] {
         let located = |sequences: &[u32; BLOCK_PIXELS], lane: usize, part: u32| {
             let origins = self.draw.origins.as_ref();
             let place = origins.map_or([0; 2], |origins| origins.locate(sequences[lane]));
@@ -331,13 +278,7 @@ impl<'a> FragmentStageDraw<'a> {
                 located(&tracked.nearest[block], lane, part)
             }
         };
-        std::array::from_fn(|lane| {
-            if covered >> lane & 1 == 1 {
-                value(lane)
-            } else {
-                0
-            }
-        })
+        std::array::from_fn(|lane| if covered >> lane & 1 == 1 { value(lane) } else { 0 })
     }
 
     /// A number of those that the camera is.
@@ -370,10 +311,7 @@ impl<'a> FragmentStageDraw<'a> {
     }
 
     /// Takes away what is discarded, and writes the rest to the attachments.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "what fragments are and where they go"
-    )]
+    #[expect(clippy::too_many_arguments, reason = "what fragments are and where they go")]
     #[inline(always)]
     fn write<S: Simd>(
         &self,
@@ -387,17 +325,13 @@ impl<'a> FragmentStageDraw<'a> {
         buffers: &mut Buffers,
     ) {
         let interface = &self.stage.interface;
-        let sources: Vec<Sources<'_>> = interface
-            .colors
-            .iter()
-            .map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot))))
-            .collect();
+        let sources: Vec<Sources<'_>> =
+            interface.colors.iter().map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)))).collect();
         let masks = lanes_of(machine, interface.sample_mask);
         let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
         let alpha = lanes_of(machine, alpha.filter(|_| self.shader.alpha_to_coverage));
         for (number, &block) in group.blocks.iter().enumerate() {
-            let killed =
-                killed.words().get(number / 4).copied().unwrap_or(0) >> (16 * (number % 4));
+            let killed = killed.words().get(number / 4).copied().unwrap_or(0) >> (16 * (number % 4));
             let by_alpha = match alpha.get(number) {
                 Some(alpha) => covered_by_alpha(simd, alpha, self.samples),
                 None => [u16::MAX; 4],
@@ -414,14 +348,7 @@ impl<'a> FragmentStageDraw<'a> {
                 }
                 covered[sample][block] = lanes.into();
                 if lanes != 0 {
-                    self.write_colors(
-                        simd,
-                        tile,
-                        &sources,
-                        (number, block),
-                        (sample, lanes),
-                        buffers,
-                    );
+                    self.write_colors(simd, tile, &sources, (number, block), (sample, lanes), buffers);
                 }
             }
         }
@@ -442,11 +369,8 @@ impl<'a> FragmentStageDraw<'a> {
                 continue;
             };
             let mut source = load(simd, &sources[0], number);
-            let mut second = if output.is_dual_source() {
-                load(simd, &sources[1], number)
-            } else {
-                [f32x16::splat(simd, 0.0); 4]
-            };
+            let mut second =
+                if output.is_dual_source() { load(simd, &sources[1], number) } else { [f32x16::splat(simd, 0.0); 4] };
             if self.shader.alpha_to_one {
                 source[3] = f32x16::splat(simd, 1.0);
                 second[3] = f32x16::splat(simd, 1.0);

@@ -42,10 +42,7 @@ impl BlockMiddles {
     pub(super) fn new([x, y]: [u32; 2]) -> Self {
         let [x, y] = [f64::from(x), f64::from(y)];
         let [first, second, third, fourth] = [BLOCK_X[0], BLOCK_X[1], BLOCK_X[2], BLOCK_X[3]];
-        Self {
-            x: [x + first, x + second, x + third, x + fourth],
-            y: [y + first, y + second, y + third, y + fourth],
-        }
+        Self { x: [x + first, x + second, x + third, x + fourth], y: [y + first, y + second, y + third, y + fourth] }
     }
 }
 
@@ -81,11 +78,7 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
     let mut out = [0.0; BLOCKS];
     let mut block = 0;
     while block < BLOCKS {
-        let at = if column {
-            block % BLOCKS_ACROSS
-        } else {
-            block / BLOCKS_ACROSS
-        };
+        let at = if column { block % BLOCKS_ACROSS } else { block / BLOCKS_ACROSS };
         out[block] = (BLOCK * at) as f64 + BLOCK as f64 / 2.0;
         block += 1;
     }
@@ -111,12 +104,7 @@ pub(super) fn count(lanes: &PixelMask) -> u32 {
 
 /// The pixels of `bounds` in the tile at `corner`.
 pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> PixelMask {
-    let tile = Rect {
-        x: corner[0] as i32,
-        y: corner[1] as i32,
-        width: TILE_SIZE,
-        height: TILE_SIZE,
-    };
+    let tile = Rect { x: corner[0] as i32, y: corner[1] as i32, width: TILE_SIZE, height: TILE_SIZE };
     let inside = bounds.intersect(tile);
     if [inside.width, inside.height] == [TILE_SIZE; 2] {
         return [ALL_LANES; BLOCKS];

@@ -115,8 +115,7 @@ impl<'a> Kernel<'a> {
         let is_plain = cut_off.is_none() && identities.is_none();
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half
-        } else if surfels.is_none() && depths.is_none() && is_plain && !needs_f64_sums(&draw.state)
-        {
+        } else if surfels.is_none() && depths.is_none() && is_plain && !needs_f64_sums(&draw.state) {
             Self::Fast
         } else {
             let variance = f64::from(draw.state.low_pass_variance);
@@ -134,20 +133,9 @@ impl<'a> Kernel<'a> {
     /// The same kernel, except that pixels take the list's order and nothing is tracked.
     pub(super) fn in_list_order(self) -> Self {
         match self {
-            Self::Exact {
-                surfels,
-                inverse_low_pass,
-                wide_sums,
-                cut_off,
-                ..
-            } => Self::Exact {
-                surfels,
-                inverse_low_pass,
-                depths: None,
-                wide_sums,
-                cut_off,
-                identities: None,
-            },
+            Self::Exact { surfels, inverse_low_pass, wide_sums, cut_off, .. } => {
+                Self::Exact { surfels, inverse_low_pass, depths: None, wide_sums, cut_off, identities: None }
+            }
             other => other,
         }
     }
@@ -190,20 +178,14 @@ pub(super) struct Approximation {
 
 impl Approximation {
     /// As exactly as it can.
-    pub(super) const EXACT: Self = Self {
-        powers: NO_DEPTH,
-        light: NOT_TERMINATED,
-    };
+    pub(super) const EXACT: Self = Self { powers: NO_DEPTH, light: NOT_TERMINATED };
 
     /// As a state allows it in a mode; all but the plain one are exact.
     pub(super) fn of(state: &GaussianState, mode: &Kernel<'_>, depth: DepthMode) -> Self {
         if depth != NO_DEPTH || !matches!(mode, Kernel::Fast) {
             return Self::EXACT;
         }
-        let GaussianApproximation {
-            exponential_error,
-            contribution_budget,
-        } = state.approximation;
+        let GaussianApproximation { exponential_error, contribution_budget } = state.approximation;
         Self {
             powers: if exponential_error >= QUADRATIC.error {
                 FASTER_POWERS

@@ -28,10 +28,7 @@ pub(super) struct Tally<S: Simd> {
 impl<S: Simd> Tally<S> {
     #[inline(always)]
     pub(super) fn new(simd: S) -> Self {
-        Self {
-            lanes: i32x16::splat(simd, 0),
-            bits: 0,
-        }
+        Self { lanes: i32x16::splat(simd, 0), bits: 0 }
     }
 
     /// Counts the lanes of a mask.
@@ -62,10 +59,7 @@ impl<S: Simd> Tally<S> {
             return self.bits;
         }
         let lanes = self.lanes.to_array();
-        lanes
-            .iter()
-            .map(|&lane| u64::from(lane.unsigned_abs()))
-            .sum()
+        lanes.iter().map(|&lane| u64::from(lane.unsigned_abs())).sum()
     }
 }
 

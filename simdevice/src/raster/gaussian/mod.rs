@@ -61,16 +61,8 @@ pub struct GaussianTileDraw<'a> {
 
 impl<'a> GaussianTileDraw<'a> {
     /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
-    pub fn new(
-        draw: &'a BinnedDraw,
-        targets: Targets<'a>,
-        samples: Option<u32>,
-        runtime: &Runtime,
-    ) -> Self {
-        const REPLACE: BlendState = BlendState {
-            equations: None,
-            write_mask: 0xF,
-        };
+    pub fn new(draw: &'a BinnedDraw, targets: Targets<'a>, samples: Option<u32>, runtime: &Runtime) -> Self {
+        const REPLACE: BlendState = BlendState { equations: None, write_mask: 0xF };
         let state = &*draw.state;
         let format = targets.color.first().and_then(Option::as_ref);
         let color = format
@@ -88,8 +80,7 @@ impl<'a> GaussianTileDraw<'a> {
             draw,
             targets,
             color,
-            resolve: resolve
-                .map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, runtime)),
+            resolve: resolve.map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, runtime)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
             level: runtime.level(),
@@ -119,11 +110,7 @@ impl<'a> GaussianTileDraw<'a> {
         if let Some(target) = self.targets.depth.filter(|_| self.tests.reads_depth()) {
             buffers.depth.load_or_clear(target, self.draw.layer, tile);
         }
-        if let Some(target) = self
-            .targets
-            .stencil
-            .filter(|_| self.tests.stencil.is_some())
-        {
+        if let Some(target) = self.targets.stencil.filter(|_| self.tests.stencil.is_some()) {
             buffers.stencil.load_or_clear(target, self.draw.layer, tile);
         }
         let mut samples = self.test_first(tile, buffers);
@@ -154,12 +141,7 @@ impl<'a> GaussianTileDraw<'a> {
             && covered != [[0; BLOCKS]; SAMPLES]
         {
             let mut done = Counters::default();
-            let mut tools = Tools {
-                buffers,
-                fragments,
-                counters: &mut done,
-                cancel,
-            };
+            let mut tools = Tools { buffers, fragments, counters: &mut done, cancel };
             let ran = resolve.run(tile, &samples, &mut shaded, &mut tools);
             counters.add_all(&done);
             if let Some(record) = &self.draw.record {
@@ -210,18 +192,14 @@ impl<'a> GaussianTileDraw<'a> {
             if let Some([least, greatest]) = self.tests.bounds {
                 let start = buffers.depth.start(tile.index, sample);
                 let stored = &buffers.depth.words_mut()[start..][..AREA];
-                keep(&mut lanes, stored, |depth| {
-                    (least..=greatest).contains(&depth)
-                });
+                keep(&mut lanes, stored, |depth| (least..=greatest).contains(&depth));
             }
             samples.candidates[sample] = lanes;
             if let Some([face, _]) = &self.tests.stencil {
                 let start = buffers.stencil.start(tile.index, sample);
                 let stored = &buffers.stencil.bytes_mut()[start..][..AREA];
                 let reference = face.reference & face.compare_mask;
-                keep(&mut lanes, stored, |stencil| {
-                    face.compare.holds(reference, stencil & face.compare_mask)
-                });
+                keep(&mut lanes, stored, |stencil| face.compare.holds(reference, stencil & face.compare_mask));
             }
             samples.tested[sample] = lanes;
         }
@@ -244,8 +222,7 @@ impl<'a> GaussianTileDraw<'a> {
                     let tested = &samples.tested;
                     tested[*earlier][block] == tested[sample][block]
                         && (self.tests.depth.is_none()
-                            || self.depths(tile, buffers, *earlier, block)
-                                == self.depths(tile, buffers, sample, block))
+                            || self.depths(tile, buffers, *earlier, block) == self.depths(tile, buffers, sample, block))
                 };
                 let accumulator = (0..sample).find(same).unwrap_or(sample);
                 samples.accumulators[sample][block] = samples.accumulators[accumulator][block];
@@ -270,13 +247,7 @@ impl<'a> GaussianTileDraw<'a> {
     }
 
     /// A sample's stored depths in a block.
-    fn depths(
-        &self,
-        tile: &Tile,
-        buffers: &Buffers,
-        sample: usize,
-        block: usize,
-    ) -> [u32; BLOCK_PIXELS] {
+    fn depths(&self, tile: &Tile, buffers: &Buffers, sample: usize, block: usize) -> [u32; BLOCK_PIXELS] {
         let start = buffers.depth.start(tile.index, sample) + block * BLOCK_PIXELS;
         let mut depths = [0; BLOCK_PIXELS];
         depths.copy_from_slice(&buffers.depth.words()[start..][..BLOCK_PIXELS]);
@@ -293,9 +264,7 @@ impl<'a> GaussianTileDraw<'a> {
         fragments: &GaussianTile,
     ) {
         let target = self.targets.color.first().and_then(Option::as_ref);
-        let (Some(output), Some(target), Some(plane)) =
-            (&self.color, target, buffers.color.first_mut())
-        else {
+        let (Some(output), Some(target), Some(plane)) = (&self.color, target, buffers.color.first_mut()) else {
             return;
         };
         plane.load_or_clear(target, self.draw.layer, tile);
@@ -321,12 +290,7 @@ impl<'a> GaussianTileDraw<'a> {
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.depth.start(tile.index, sample);
             let stored = &mut buffers.depth.words_mut()[start..][..AREA];
-            for (block, stored) in stored
-                .as_chunks_mut::<BLOCK_PIXELS>()
-                .0
-                .iter_mut()
-                .enumerate()
-            {
+            for (block, stored) in stored.as_chunks_mut::<BLOCK_PIXELS>().0.iter_mut().enumerate() {
                 let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
                 for (lane, stored) in stored.iter_mut().enumerate() {
                     if covered[block] >> lane & 1 == 1 {
@@ -382,11 +346,7 @@ impl<'a> GaussianTileDraw<'a> {
                 };
                 let value = apply(op, *stored, face.reference);
                 #[cfg(feature = "mistakes")]
-                let value = if Mistake::StencilTwice.is_made() {
-                    apply(op, value, face.reference)
-                } else {
-                    value
-                };
+                let value = if Mistake::StencilTwice.is_made() { apply(op, value, face.reference) } else { value };
                 *stored = *stored & !face.write_mask | value & face.write_mask;
             }
         }

@@ -50,11 +50,7 @@ struct Gathered {
 
 impl Default for Gathered {
     fn default() -> Self {
-        Self {
-            list: Vec::new(),
-            after: START,
-            limit: END,
-        }
+        Self { list: Vec::new(), after: START, limit: END }
     }
 }
 
@@ -106,13 +102,7 @@ struct Sum {
 }
 
 impl Sum {
-    const EMPTY: Self = Self {
-        color: [0.0; 3],
-        transmittance: 1.0,
-        median: 0,
-        covered: false,
-        finished: false,
-    };
+    const EMPTY: Self = Self { color: [0.0; 3], transmittance: 1.0, median: 0, covered: false, finished: false };
 }
 
 /// A worker's scratch for tiles in the per-pixel order.
@@ -137,14 +127,7 @@ pub(super) fn composite_per_pixel<S: Simd>(
         if names.is_empty() {
             continue;
         }
-        work.contributions += scratch.composite_block(
-            simd,
-            task,
-            depths,
-            names,
-            (&mut *accumulator, block),
-            ranges,
-        );
+        work.contributions += scratch.composite_block(simd, task, depths, names, (&mut *accumulator, block), ranges);
     }
     work
 }
@@ -192,10 +175,8 @@ impl PerPixel {
                 });
                 while reached != 0 {
                     let lane = reached.trailing_zeros() as usize % BLOCK_PIXELS;
-                    self.pixels[lane].add(Contribution {
-                        place: (ordered_key(along[lane]), number),
-                        alpha: alpha[lane].to_bits(),
-                    });
+                    self.pixels[lane]
+                        .add(Contribution { place: (ordered_key(along[lane]), number), alpha: alpha[lane].to_bits() });
                     reached &= reached - 1;
                 }
             }
@@ -216,12 +197,7 @@ impl PerPixel {
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel(
-    sum: &mut Sum,
-    pixel: &mut Gathered,
-    names: &[u32],
-    task: &TileInputs<'_>,
-) -> u64 {
+fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &TileInputs<'_>) -> u64 {
     let floor = f64::from(task.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {
@@ -249,14 +225,8 @@ fn composite_pixel(
 
 /// The rays of a block's pixels.
 fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
-    let middle = [
-        BLOCK_X[block] + f64::from(corner[0]),
-        BLOCK_Y[block] + f64::from(corner[1]),
-    ];
-    rays.of(
-        LANE_X_64.map(|x| x + middle[0]),
-        LANE_Y_64.map(|y| y + middle[1]),
-    )
+    let middle = [BLOCK_X[block] + f64::from(corner[0]), BLOCK_Y[block] + f64::from(corner[1])];
+    rays.of(LANE_X_64.map(|x| x + middle[0]), LANE_Y_64.map(|y| y + middle[1]))
 }
 
 /// Takes what the open pixels of a block accumulated.
@@ -285,15 +255,7 @@ mod tests {
     #[gaurast_runner::test]
     fn passes_give_everything_once_and_in_order() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        for count in [
-            0,
-            1,
-            HELD,
-            2 * HELD - 1,
-            2 * HELD,
-            2 * HELD + 1,
-            20 * HELD + 3,
-        ] {
+        for count in [0, 1, HELD, 2 * HELD - 1, 2 * HELD, 2 * HELD + 1, 20 * HELD + 3] {
             // Many are equal.
             let all: Vec<Contribution> = (0..count as u32)
                 .map(|number| Contribution {

@@ -4,9 +4,7 @@
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, ROUND};
-use super::inputs::{
-    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Thresholds, TileInputs, power,
-};
+use super::inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Thresholds, TileInputs, power};
 use super::masks::{Tally, only};
 use super::staging::{Reaching, StagedRound};
 use crate::gaussian::splat::{Splat, SplatLook};
@@ -47,9 +45,7 @@ pub(super) struct Alphas {
 
 impl Default for Alphas {
     fn default() -> Self {
-        Self {
-            alphas: [[0.0; BLOCK_PIXELS]; BLOCKS * ROUND],
-        }
+        Self { alphas: [[0.0; BLOCK_PIXELS]; BLOCKS * ROUND] }
     }
 }
 
@@ -117,23 +113,13 @@ fn reached<S: Simd>(
     most_fall: f32x16<S>,
 ) -> mask32x16<S> {
     let reached = fall.simd_le(most_fall);
-    if mode > NO_DEPTH {
-        reached & ranges.pixels(simd, block, depth)
-    } else {
-        reached
-    }
+    if mode > NO_DEPTH { reached & ranges.pixels(simd, block, depth) } else { reached }
 }
 
 /// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean
 /// nothing.
 #[inline(always)]
-fn alpha<S: Simd>(
-    simd: S,
-    mode: DepthMode,
-    reached: mask32x16<S>,
-    fall: f32x16<S>,
-    ceiling: f32x16<S>,
-) -> f32x16<S> {
+fn alpha<S: Simd>(simd: S, mode: DepthMode, reached: mask32x16<S>, fall: f32x16<S>, ceiling: f32x16<S>) -> f32x16<S> {
     only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
@@ -166,8 +152,7 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     } else {
         alphas.find::<_, DEPTH, false>(simd, reaching, to, ranges, thresholds)
     };
-    let refused =
-        composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
+    let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
     Evaluated {
         items,
         contributions: reached.saturating_sub(refused.unwrap_or(0)),
@@ -204,13 +189,7 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    let more = composite_near_floor::<_, DEPTH>(
-                        accumulator,
-                        simd,
-                        of_block,
-                        round,
-                        thresholds,
-                    );
+                    let more = composite_near_floor::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
                     if let Some(more) = more {
                         refused = Some(refused.unwrap_or(0) + more);
                     }
@@ -276,15 +255,13 @@ fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
             let (mut reaching, mut alphas) = (reaching, alphas);
             if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
                 let of_block = (block, reaching, alphas);
-                (reaching, alphas) =
-                    composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                (reaching, alphas) = composite_until_finished(accumulator, simd, of_block, round, thresholds);
                 if alphas.is_empty() {
                     return None;
                 }
             }
             let of_block = (block, reaching, alphas);
-            let refused =
-                composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+            let refused = composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
             Some(refused)
         },
     )
@@ -334,10 +311,7 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {
-    let thresholds = Thresholds {
-        depth_mode: DEPTH,
-        ..thresholds
-    };
+    let thresholds = Thresholds { depth_mode: DEPTH, ..thresholds };
     let mut pixels = pixels(accumulator, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
@@ -364,10 +338,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     ranges: &DepthRanges,
     task: &TileInputs<'_>,
 ) -> u64 {
-    let thresholds = Thresholds {
-        depth_mode: DEPTH,
-        ..task.thresholds
-    };
+    let thresholds = Thresholds { depth_mode: DEPTH, ..task.thresholds };
     let mut contributions = 0;
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let fall = falls_64(simd, splat, task, block);
@@ -422,9 +393,7 @@ fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels: Pixels<S>)
     pixels.red.store_slice(&mut r[block]);
     pixels.green.store_slice(&mut g[block]);
     pixels.blue.store_slice(&mut b[block]);
-    pixels
-        .transmittance
-        .store_slice(&mut accumulator.transmittance[block]);
+    pixels.transmittance.store_slice(&mut accumulator.transmittance[block]);
 }
 
 /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
@@ -460,11 +429,8 @@ fn composite_one<S: Simd>(
         let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
         #[cfg(feature = "mistakes")]
-        let first_half = if Mistake::MedianOfOtherHalf.is_made() {
-            weight.simd_gt(0.0) & t.simd_lt(0.5)
-        } else {
-            first_half
-        };
+        let first_half =
+            if Mistake::MedianOfOtherHalf.is_made() { weight.simd_gt(0.0) & t.simd_lt(0.5) } else { first_half };
         let median = first_half.select(u32x16::splat(simd, depth), median);
         median.store_slice(&mut accumulator.median[block]);
     }
@@ -488,15 +454,9 @@ impl<S: Simd> Pixels<S> {
         #[cfg(feature = "mistakes")]
         if Mistake::TransmittanceAfter.is_made() {
             let rest = t.mul_add(-alpha, t);
-            return Passed {
-                weight: rest * alpha,
-                rest,
-            };
+            return Passed { weight: rest * alpha, rest };
         }
-        Passed {
-            weight: t * alpha,
-            rest: t.mul_add(-alpha, t),
-        }
+        Passed { weight: t * alpha, rest: t.mul_add(-alpha, t) }
     }
 
     /// Adds so much of a colour.
@@ -513,21 +473,11 @@ impl<S: Simd> Pixels<S> {
 ///
 /// A Gaussian wider than the period of a panorama counts where it is nearer than its copies.
 #[inline(always)]
-pub(super) fn falls_64<S: Simd>(
-    simd: S,
-    splat: &Splat,
-    task: &TileInputs<'_>,
-    block: usize,
-) -> f32x16<S> {
+pub(super) fn falls_64<S: Simd>(simd: S, splat: &Splat, task: &TileInputs<'_>, block: usize) -> f32x16<S> {
     let [a, b, c] = splat.factor;
-    let from_mean =
-        |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
+    let from_mean = |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-    let half_period = if splat.exceeds_period {
-        task.half_period
-    } else {
-        f64::INFINITY
-    };
+    let half_period = if splat.exceeds_period { task.half_period } else { f64::INFINITY };
     let within = f64x8::splat(simd, half_period);
     let nothing = f64x8::splat(simd, 1e3);
     let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];

@@ -1,9 +1,7 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::DepthRanges;
-use super::grid::{
-    BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
-};
+use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Thresholds, TileInputs};
 use crate::gaussian::splat::{Splat, SplatLook};
 use crate::stats::optimizations::Optimization;
@@ -151,8 +149,7 @@ impl StagedRound {
                 let mut reaching = reaching & open.bitcast::<u32x16<S>>() & present;
                 if DEPTH > NO_DEPTH {
                     let mut words = reaching.to_array();
-                    for (block, word) in words.iter_mut().enumerate().filter(|(_, word)| **word > 0)
-                    {
+                    for (block, word) in words.iter_mut().enumerate().filter(|(_, word)| **word > 0) {
                         let shown = ranges.shown(simd, block, &self.gathered.depth);
                         placed.blocks_hidden += u64::from((*word & !shown).count_ones());
                         *word &= shown;
@@ -161,10 +158,7 @@ impl StagedRound {
                 }
                 let (low, high) = reaching.split();
                 let (low, high) = (low | high).split();
-                let mut any = (low | high)
-                    .to_array()
-                    .into_iter()
-                    .fold(0, |any, word| any | word);
+                let mut any = (low | high).to_array().into_iter().fold(0, |any, word| any | word);
                 placed.is_capped = any & capped != 0;
                 while any != 0 {
                     let number = any.trailing_zeros() as usize;
@@ -182,13 +176,7 @@ impl StagedRound {
     /// Makes `splat` the round's Gaussian `number`.
     #[inline(always)]
     fn gather<const DEPTH: DepthMode>(&mut self, number: usize, splat: &Splat) {
-        let Gathered {
-            mean,
-            factor,
-            log2_opacity,
-            depth,
-            ..
-        } = &mut self.gathered;
+        let Gathered { mean, factor, log2_opacity, depth, .. } = &mut self.gathered;
         for (lanes, &part) in mean.iter_mut().zip(&splat.mean) {
             lanes[number] = part;
         }
@@ -241,13 +229,7 @@ impl StagedRound {
                 S::f64s::from_slice(simd, &lanes[middle..middle + S::f64s::LEN]),
             )
         };
-        let Gathered {
-            mean,
-            factor,
-            narrow,
-            log2_opacity,
-            ..
-        } = &mut self.gathered;
+        let Gathered { mean, factor, narrow, log2_opacity, .. } = &mut self.gathered;
         let (x, y) = (wide(&mean[0]), wide(&mean[1]));
         let (a, b, c) = (wide(&factor[0]), wide(&factor[1]), wide(&factor[2]));
         let log2_opacity = S::f32s::from_slice(simd, &log2_opacity[lanes.clone()]);
@@ -298,12 +280,7 @@ impl StagedRound {
 
     /// The fall of a Gaussian's alpha at a block's pixels: minus its base-2 logarithm. `column` is that of the block.
     #[inline(always)]
-    pub(super) fn falls<S: Simd>(
-        &self,
-        simd: S,
-        number: usize,
-        (block, column): (usize, &ColumnSquares),
-    ) -> f32x16<S> {
+    pub(super) fn falls<S: Simd>(&self, simd: S, number: usize, (block, column): (usize, &ColumnSquares)) -> f32x16<S> {
         let from_u = f32x8::from_slice(simd, &column[2 * number]);
         let v = f32x16::from_slice(simd, &self.along[number]) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))
@@ -362,12 +339,7 @@ impl<S: Simd> Wide<S> {
 
 /// The blocks of a tile that a Gaussian may reach, as [`StagedRound::place`] finds them for several at a time.
 #[inline(always)]
-pub(super) fn reached_blocks<S: Simd>(
-    simd: S,
-    splat: &Splat,
-    middles: &BlockMiddles,
-    most_fall: f32,
-) -> mask32x16<S> {
+pub(super) fn reached_blocks<S: Simd>(simd: S, splat: &Splat, middles: &BlockMiddles, most_fall: f32) -> mask32x16<S> {
     let [a, b, c] = splat.factor;
     // In each column of blocks, and each row.
     let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
@@ -390,12 +362,7 @@ pub(super) fn reached_blocks<S: Simd>(
 
 /// The number of `open` blocks of a tile in which a Gaussian would be evaluated if depths did not hide it.
 #[inline(always)]
-pub(super) fn hidden_blocks<S: Simd>(
-    simd: S,
-    splat: &Splat,
-    task: &TileInputs<'_>,
-    open: mask32x16<S>,
-) -> u32 {
+pub(super) fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, task: &TileInputs<'_>, open: mask32x16<S>) -> u32 {
     let bounded = task.optimizations.has(Optimization::Blocks) && !splat.needs_f64;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;

@@ -13,12 +13,8 @@ use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
 use crate::runtime::Config;
-use crate::simd::exp2::{
-    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
-};
-use crate::state::gaussian::{
-    Camera, CameraModel, GaussianOrder, GaussianPrecision, GaussianState,
-};
+use crate::simd::exp2::{CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated};
+use crate::state::gaussian::{Camera, CameraModel, GaussianOrder, GaussianPrecision, GaussianState};
 use crate::state::{Rect, Viewport};
 use crate::stats::optimizations::Optimizations;
 use crate::stats::recorder::TileWork;
@@ -59,12 +55,7 @@ fn powers_of_two_are_within_their_bound(case: &Case) {
 
 /// A device of a test's variant.
 fn device_of(case: &Case) -> Device {
-    Device::new(&Config {
-        threads: 2,
-        simd: level_of(case),
-        ..Config::default()
-    })
-    .unwrap()
+    Device::new(&Config { threads: 2, simd: level_of(case), ..Config::default() }).unwrap()
 }
 
 /// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
@@ -86,16 +77,8 @@ fn draw_with_depth(
     for _ in 0..count {
         let z = rng.random_range(1.0..6.0f32);
         let size = 10.0f32.powf(rng.random_range(-3.0..0.5));
-        floats.extend([
-            rng.random_range(-1.5..1.5) * z,
-            rng.random_range(-1.0..1.0) * z,
-            z,
-        ]);
-        floats.extend([
-            size,
-            size * rng.random_range(0.01..1.0),
-            size * rng.random_range(0.01..1.0),
-        ]);
+        floats.extend([rng.random_range(-1.5..1.5) * z, rng.random_range(-1.0..1.0) * z, z]);
+        floats.extend([size, size * rng.random_range(0.01..1.0), size * rng.random_range(0.01..1.0)]);
         floats.extend([0; 4].map(|_| rng.random_range(-1.0..1.0f32)));
         floats.push(rng.random_range(0.0..1.2));
         floats.extend([0; 3].map(|_| rng.random_range(-1.0..2.0f32)));
@@ -103,18 +86,9 @@ fn draw_with_depth(
     let size = 4 * floats.len() as u64;
     let memory = Allocation::new_zeroed(size).unwrap();
     memory.write(0, &floats).unwrap();
-    let buffer = BufferRange {
-        memory,
-        offset: 0,
-        size,
-    };
-    let stream = |offset, format| AttributeStream {
-        buffer: buffer.clone(),
-        stride: 56,
-        offset,
-        format,
-        instance_divisor: None,
-    };
+    let buffer = BufferRange { memory, offset: 0, size };
+    let stream =
+        |offset, format| AttributeStream { buffer: buffer.clone(), stride: 56, offset, format, instance_divisor: None };
     let append = GaussianAppend {
         attributes: GaussianAttributes {
             position: stream(0, Format::R32G32B32Sfloat),
@@ -144,14 +118,7 @@ fn draw_with_depth(
             far_plane: f32::INFINITY,
             depth_coefficients: depth.map_or([0.0; 2], |(_, coefficients)| coefficients),
         },
-        viewport: Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: 96.0,
-            height: 64.0,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        },
+        viewport: Viewport { x: 0.0, y: 0.0, width: 96.0, height: 64.0, min_depth: 0.0, max_depth: 1.0 },
         scissor: bounds,
     };
     let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
@@ -165,13 +132,7 @@ fn defaults() -> GaussianState {
 }
 
 /// The tile kernel's naive twin: one pixel at a time through the whole list, no blocks, no saturation.
-fn naive_pixel(
-    draw: &BinnedDraw,
-    tile: [u32; 2],
-    x: usize,
-    y: usize,
-    level: Level,
-) -> Option<[f32; 4]> {
+fn naive_pixel(draw: &BinnedDraw, tile: [u32; 2], x: usize, y: usize, level: Level) -> Option<[f32; 4]> {
     naive_sample(draw, tile, [x, y], level, |_| true).fragment
 }
 
@@ -243,13 +204,8 @@ fn naive_sample(
     for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
         let g = &draw.sorted.splats[batch][place];
-        let middle = |at: usize, corner: u32, mean: f64| {
-            ((4 * (at / 4)) as f64 + 2.0 + f64::from(corner)) - mean
-        };
-        let (mx, my) = (
-            middle(x, corner[0], g.mean[0]),
-            middle(y, corner[1], g.mean[1]),
-        );
+        let middle = |at: usize, corner: u32, mean: f64| ((4 * (at / 4)) as f64 + 2.0 + f64::from(corner)) - mean;
+        let (mx, my) = (middle(x, corner[0], g.mean[0]), middle(y, corner[1], g.mean[1]));
         let f = g.factor;
         let (u, v) = ((mx * f[0]) as f32, (mx * f[1] + my * f[2]) as f32);
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
@@ -328,21 +284,10 @@ fn check_changed(
     let mut tile = Box::new(GaussianTile::default());
     let mut covered = 0;
     for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
-        let any = tile.render(
-            &draw,
-            device.level(),
-            at[0],
-            at[1],
-            &mut Counters::default(),
-        );
+        let any = tile.render(&draw, device.level(), at[0], at[1], &mut Counters::default());
         for (x, y) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (x, y))) {
             let pixel = [at[0] as usize * TILE + x, at[1] as usize * TILE + y];
-            let inside = Rect {
-                x: pixel[0] as i32,
-                y: pixel[1] as i32,
-                width: 1,
-                height: 1,
-            };
+            let inside = Rect { x: pixel[0] as i32, y: pixel[1] as i32, width: 1, height: 1 };
             let inside = !inside.intersect(bounds).is_empty();
             let expected = naive_pixel(&draw, at, x, y, device.level()).filter(|_| inside);
             let got = tile.pixel(x, y).filter(|_| any);
@@ -353,12 +298,7 @@ fn check_changed(
     assert!(covered > 0, "seed {seed}: nothing was drawn");
 }
 
-const WHOLE: Rect = Rect {
-    x: 0,
-    y: 0,
-    width: 96,
-    height: 64,
-};
+const WHOLE: Rect = Rect { x: 0, y: 0, width: 96, height: 64 };
 
 #[gaurast_runner::test(each = simd_levels())]
 fn the_kernel_equals_its_naive_twin(case: &Case) {
@@ -376,18 +316,7 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint(case: &Case) {
         low_pass_variance: 0.0,
         ..defaults()
     };
-    check(
-        case,
-        10,
-        150,
-        &state,
-        Rect {
-            x: 5,
-            y: 3,
-            width: 70,
-            height: 51,
-        },
-    );
+    check(case, 10, 150, &state, Rect { x: 5, y: 3, width: 70, height: 51 });
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -404,49 +333,23 @@ fn it_does_so_where_gaussians_are_wider_than_a_period(case: &Case) {
 #[gaurast_runner::test(each = simd_levels())]
 fn it_does_so_where_gaussians_are_steep(case: &Case) {
     // Without a filter dust is thinner than a pixel by far.
-    let state = GaussianState {
-        low_pass_variance: 0.0,
-        ..defaults()
-    };
+    let state = GaussianState { low_pass_variance: 0.0, ..defaults() };
     let device = Device::new(&Config::default()).unwrap();
     let drawn = draw(5, 3000, state.clone(), &device, WHOLE);
-    let steep = drawn
-        .sorted
-        .splats
-        .iter()
-        .flatten()
-        .filter(|splat| splat.needs_f64);
+    let steep = drawn.sorted.splats.iter().flatten().filter(|splat| splat.needs_f64);
     assert!(steep.count() > 10);
     check(case, 5, 3000, &state, WHOLE);
 }
 
 #[gaurast_runner::test(each = simd_levels())]
 fn it_does_so_where_pixels_end_at_once(case: &Case) {
-    let state = GaussianState {
-        transmittance_floor: 0.5,
-        opacity_compensated: true,
-        ..defaults()
-    };
-    check(
-        case,
-        20,
-        400,
-        &state,
-        Rect {
-            x: 17,
-            y: 0,
-            width: 30,
-            height: 64,
-        },
-    );
+    let state = GaussianState { transmittance_floor: 0.5, opacity_compensated: true, ..defaults() };
+    check(case, 20, 400, &state, Rect { x: 17, y: 0, width: 30, height: 64 });
 }
 
 #[gaurast_runner::test(each = simd_levels())]
 fn it_does_so_where_opacities_are_about_the_ceiling(case: &Case) {
-    let state = GaussianState {
-        alpha_ceiling: 0.9,
-        ..defaults()
-    };
+    let state = GaussianState { alpha_ceiling: 0.9, ..defaults() };
     for above in [-3e-4, -1.01e-4, -0.99e-4, 0.0, 1e-6, 1e-3] {
         check_changed(case, 7, 300, &state, WHOLE, |draw| {
             let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
@@ -472,10 +375,7 @@ fn a_saturated_tile_fetches_no_more() {
     };
     let (ends, list) = evaluated(defaults());
     assert!(ends < list / 4, "{ends} of {list}");
-    let (all, list) = evaluated(GaussianState {
-        transmittance_floor: 0.0,
-        ..defaults()
-    });
+    let (all, list) = evaluated(GaussianState { transmittance_floor: 0.0, ..defaults() });
     assert_eq!(all, list);
 }
 
@@ -483,33 +383,14 @@ fn a_saturated_tile_fetches_no_more() {
 fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
     use crate::stats::recorder::{DrawWork, Recorder};
     let quiet = Device::new(&Config::default()).unwrap();
-    for (seed, bounds) in [
-        (40, WHOLE),
-        (
-            41,
-            Rect {
-                x: 5,
-                y: 3,
-                width: 70,
-                height: 50,
-            },
-        ),
-    ] {
+    for (seed, bounds) in [(40, WHOLE), (41, Rect { x: 5, y: 3, width: 70, height: 50 })] {
         let recorder = Arc::new(Recorder::default());
-        let recording = Device::new(&Config {
-            recorder: Some(Arc::clone(&recorder)),
-            ..Config::default()
-        })
-        .unwrap();
+        let recording = Device::new(&Config { recorder: Some(Arc::clone(&recorder)), ..Config::default() }).unwrap();
         recorder.begin_frame(0, bounds);
         let pictures = [&quiet, &recording].map(|device| {
             let draw = draw(seed, 3000, defaults(), device, bounds);
-            assert_eq!(
-                draw.record.is_some(),
-                device.runtime().config().recorder.is_some()
-            );
-            if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref())
-            {
+            assert_eq!(draw.record.is_some(), device.runtime().config().recorder.is_some());
+            if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref()) {
                 recorder.add_draw(0, record);
             }
             let mut tile = Box::new(GaussianTile::default());
@@ -530,21 +411,12 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
         let trace = recorder.trace();
         let work: &DrawWork = &trace.frames[0].draws[0];
         assert_eq!(work.pairs(), pairs);
-        assert_eq!(
-            work.needed_pairs(),
-            counted.get(Counter::TilePairsEvaluated)
-        );
+        assert_eq!(work.needed_pairs(), counted.get(Counter::TilePairsEvaluated));
         let sum = |of: fn(&TileWork) -> u64| work.tiles.iter().map(of).sum::<u64>();
         let reached = sum(|tile| tile.runs.iter().map(|run| u64::from(run.reached)).sum());
         assert_eq!(reached, counted.get(Counter::BlockEvaluations));
-        assert_eq!(
-            sum(|tile| tile.contributions),
-            counted.get(Counter::PixelContributions)
-        );
-        assert!(
-            sum(|tile| u64::from(tile.terminated)) > 0,
-            "some pixels saturate"
-        );
+        assert_eq!(sum(|tile| tile.contributions), counted.get(Counter::PixelContributions));
+        assert!(sum(|tile| u64::from(tile.terminated)) > 0, "some pixels saturate");
         // What finishes stays finished, and a row or block has pixels as long as the tile has.
         for tile in &work.tiles {
             for pair in tile.runs.windows(2) {

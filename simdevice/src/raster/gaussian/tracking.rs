@@ -76,12 +76,7 @@ pub(super) struct Tracking<'a> {
 impl<'a> Tracking<'a> {
     /// Compositing of Gaussians that have these identities, into what was empty.
     pub(super) fn new(identities: &'a [Vec<Identity>], to: &'a mut Tracked) -> Self {
-        Self {
-            identities,
-            to,
-            open: 0,
-            sums: [Sum::new(false); BLOCK_PIXELS],
-        }
+        Self { identities, to, open: 0, sums: [Sum::new(false); BLOCK_PIXELS] }
     }
 }
 
@@ -176,11 +171,7 @@ impl BlockKernel for Tracking<'_> {
             let [mean, median] = &mut self.to.linear;
             median[block][lane] = sum.median.z;
             // An alpha that underflows weighs nothing.
-            mean[block][lane] = if weights > 0.0 {
-                (distances / weights) as f32
-            } else {
-                sum.median.z
-            };
+            mean[block][lane] = if weights > 0.0 { (distances / weights) as f32 } else { sum.median.z };
         }
     }
 }

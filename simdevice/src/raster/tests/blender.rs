@@ -34,12 +34,7 @@ impl Blender {
     }
 
     /// Blends as [`Blender::blend`] does, with the second source of dual-source blending.
-    pub fn blend_dual(
-        &self,
-        source: [f32; 4],
-        second: [f32; 4],
-        destination: [f32; 4],
-    ) -> [f32; 4] {
+    pub fn blend_dual(&self, source: [f32; 4], second: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
         let blended = match self.equations {
             None => source,
             Some((color, alpha)) => {
@@ -50,13 +45,7 @@ impl Blender {
                 [r, g, b, a]
             }
         };
-        std::array::from_fn(|component| {
-            if self.write[component] {
-                blended[component]
-            } else {
-                destination[component]
-            }
-        })
+        std::array::from_fn(|component| if self.write[component] { blended[component] } else { destination[component] })
     }
 }
 
@@ -68,13 +57,7 @@ fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
 }
 
 /// Evaluates a blend equation.
-fn evaluate(
-    equation: BlendEquation,
-    s: [f32; 4],
-    second: [f32; 4],
-    d: [f32; 4],
-    constants: [f32; 4],
-) -> [f32; 4] {
+fn evaluate(equation: BlendEquation, s: [f32; 4], second: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
     let term = |value: [f32; 4], by: BlendFactor| {
         // A factor of zero removes a term whatever its value, infinities and NaNs included.
         if by == BlendFactor::Zero {
@@ -100,13 +83,7 @@ fn evaluate(
 }
 
 /// The factor of each component.
-fn factors(
-    factor: BlendFactor,
-    s: [f32; 4],
-    second: [f32; 4],
-    d: [f32; 4],
-    constants: [f32; 4],
-) -> [f32; 4] {
+fn factors(factor: BlendFactor, s: [f32; 4], second: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
     let inverse = |of: [f32; 4]| of.map(|component| 1.0 - component);
     match factor {
         BlendFactor::Zero => [0.0; 4],
@@ -158,23 +135,11 @@ mod tests {
         BlendFactor::Src1Alpha,
         BlendFactor::OneMinusSrc1Alpha,
     ];
-    const OPS: [BlendOp; 5] = [
-        BlendOp::Add,
-        BlendOp::Subtract,
-        BlendOp::ReverseSubtract,
-        BlendOp::Min,
-        BlendOp::Max,
-    ];
+    const OPS: [BlendOp; 5] = [BlendOp::Add, BlendOp::Subtract, BlendOp::ReverseSubtract, BlendOp::Min, BlendOp::Max];
     const CONSTANTS: [f32; 4] = [0.2, 1.5, -0.25, 0.75];
 
     /// The factors of a blend equation in binary64, as in the specification's table.
-    fn model_factor(
-        f: BlendFactor,
-        s: [f64; 4],
-        s1: [f64; 4],
-        d: [f64; 4],
-        c: [f64; 4],
-    ) -> [f64; 4] {
+    fn model_factor(f: BlendFactor, s: [f64; 4], s1: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
         let all = |x: f64| [x; 4];
         let inverse = |v: [f64; 4]| v.map(|x| 1.0 - x);
         match f {
@@ -216,10 +181,7 @@ mod tests {
     }
 
     fn blender(color: BlendEquation, alpha: BlendEquation, format: Format) -> Blender {
-        let state = BlendState {
-            equations: Some((color, alpha)),
-            write_mask: 0xF,
-        };
+        let state = BlendState { equations: Some((color, alpha)), write_mask: 0xF };
         Blender::new(&state, CONSTANTS, format)
     }
 
@@ -243,13 +205,8 @@ mod tests {
         for s in FACTORS {
             for d in FACTORS {
                 for op in OPS {
-                    let color = BlendEquation {
-                        source: s,
-                        destination: d,
-                        op,
-                    };
-                    let blended =
-                        blender(color, alpha, format).blend_dual(source, second, destination);
+                    let color = BlendEquation { source: s, destination: d, op };
+                    let blended = blender(color, alpha, format).blend_dual(source, second, destination);
                     let (s, d, c) = (wide(source), wide(destination), wide(CONSTANTS));
                     let s1 = wide(second);
                     let (rgb, a) = (model(color, s, s1, d, c), model(alpha, s, s1, d, c));
@@ -273,15 +230,8 @@ mod tests {
 
     #[gaurast_runner::test]
     fn masked_components_and_zero_factors_keep_nothing_they_should_not() {
-        let replace = BlendEquation {
-            source: BlendFactor::One,
-            destination: BlendFactor::Zero,
-            op: BlendOp::Add,
-        };
-        let state = BlendState {
-            equations: Some((replace, replace)),
-            write_mask: 0b0101,
-        };
+        let replace = BlendEquation { source: BlendFactor::One, destination: BlendFactor::Zero, op: BlendOp::Add };
+        let state = BlendState { equations: Some((replace, replace)), write_mask: 0b0101 };
         let blender = Blender::new(&state, CONSTANTS, Format::R32G32B32A32Sfloat);
         let blended = blender.blend([1.0, 2.0, 3.0, 4.0], [f32::INFINITY, 6.0, f32::NAN, 8.0]);
         assert_eq!(blended, [1.0, 6.0, 3.0, 8.0]);

@@ -8,14 +8,7 @@ use gaurast_runner::{Case, simd_levels};
 use std::sync::Arc;
 
 fn view(format: Format, extent: [u32; 3], kind: ImageKind, samples: u32) -> ImageView {
-    let desc = ImageDesc {
-        kind,
-        format,
-        extent,
-        mip_levels: 1,
-        array_layers: 1,
-        samples,
-    };
+    let desc = ImageDesc { kind, format, extent, mip_levels: 1, array_layers: 1, samples };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     ImageView {
         image: Arc::new(Image::new(desc, memory, 0).unwrap()),
@@ -27,20 +20,10 @@ fn view(format: Format, extent: [u32; 3], kind: ImageKind, samples: u32) -> Imag
     }
 }
 
-const AREA_20X17: Rect = Rect {
-    x: 3,
-    y: 0,
-    width: 17,
-    height: 17,
-};
+const AREA_20X17: Rect = Rect { x: 3, y: 0, width: 17, height: 17 };
 
 fn pixel(x: i32, y: i32) -> Rect {
-    Rect {
-        x,
-        y,
-        width: 1,
-        height: 1,
-    }
+    Rect { x, y, width: 1, height: 1 }
 }
 
 #[gaurast_runner::test]
@@ -63,10 +46,7 @@ fn untouched_tiles_keep_their_bytes_and_touched_ones_are_stored() {
     memory.read(0, &mut bytes).unwrap();
     let changed: Vec<_> = (0..bytes.len()).filter(|&at| bytes[at] != 7).collect();
     let pitch = 128;
-    assert_eq!(
-        changed,
-        (0..4).map(|at| pitch + 17 * 4 + at).collect::<Vec<_>>()
-    );
+    assert_eq!(changed, (0..4).map(|at| pitch + 17 * 4 + at).collect::<Vec<_>>());
 }
 
 #[gaurast_runner::test]
@@ -90,9 +70,7 @@ fn texels_of_every_size_survive_a_load_and_a_store() {
                     // The unused bits may have any value.
                     let layout = view.image.subresource(aspect, 0, 0).unwrap();
                     let end = (layout.offset + layout.size) as usize;
-                    (layout.offset as usize + 3..end)
-                        .step_by(4)
-                        .for_each(|at| after[at] = before[at]);
+                    (layout.offset as usize + 3..end).step_by(4).for_each(|at| after[at] = before[at]);
                 }
                 assert_eq!(after, before, "{format:?}");
             }
@@ -107,12 +85,7 @@ fn depth_and_stencil_keep_their_precision() {
     depth.clear = Some(Format::X8D24UnormPack32.encode([0.75, 0.0, 0.0, 0.0]));
     let mut stencil = Target::new(&view, Aspect::Stencil, 1, StoreOp::Store).unwrap();
     stencil.clear = Some([3; MAX_TEXEL_SIZE]);
-    let area = Rect {
-        x: 0,
-        y: 0,
-        width: 16,
-        height: 16,
-    };
+    let area = Rect { x: 0, y: 0, width: 16, height: 16 };
     let [tile] = Tile::of_macro_tile(16, [0, 0], area).collect::<Vec<_>>()[..] else {
         panic!("one tile");
     };
@@ -135,26 +108,11 @@ fn depth_and_stencil_keep_their_precision() {
 fn what_cannot_be_rendered_to_is_refused() {
     let color = view(Format::R8Unorm, [4, 4, 1], ImageKind::D2, 1);
     let new = |view: &ImageView, aspect| Target::new(view, aspect, 1, StoreOp::Store).err();
-    assert_eq!(
-        new(&color, Aspect::Depth),
-        Some(AttachmentError::Format(Format::R8Unorm))
-    );
-    let wider = ImageView {
-        format: Format::R32Sfloat,
-        ..color.clone()
-    };
-    assert_eq!(
-        new(&wider, Aspect::Color),
-        Some(AttachmentError::Format(Format::R32Sfloat))
-    );
-    let missing = ImageView {
-        base_layer: u32::MAX,
-        ..color
-    };
-    assert!(matches!(
-        new(&missing, Aspect::Color),
-        Some(AttachmentError::Subresource { .. })
-    ));
+    assert_eq!(new(&color, Aspect::Depth), Some(AttachmentError::Format(Format::R8Unorm)));
+    let wider = ImageView { format: Format::R32Sfloat, ..color.clone() };
+    assert_eq!(new(&wider, Aspect::Color), Some(AttachmentError::Format(Format::R32Sfloat)));
+    let missing = ImageView { base_layer: u32::MAX, ..color };
+    assert!(matches!(new(&missing, Aspect::Color), Some(AttachmentError::Subresource { .. })));
     let two = view(Format::R8Unorm, [4, 4, 1], ImageKind::D2, 2);
     assert_eq!(new(&two, Aspect::Color), Some(AttachmentError::Samples(2)));
     let solid = view(Format::R8Unorm, [4, 4, 3], ImageKind::D3, 1);
@@ -168,9 +126,7 @@ fn means_of_bytes_are_those_of_the_format(case: &Case) {
     let format = Format::R8G8B8A8Unorm;
     let image = view(format, [20, 17, 1], ImageKind::D2, 4);
     let memory = image.image.memory.clone();
-    let bytes: Vec<u8> = (0..memory.len())
-        .map(|at| (at * at * 31 % 256) as u8)
-        .collect();
+    let bytes: Vec<u8> = (0..memory.len()).map(|at| (at * at * 31 % 256) as u8).collect();
     memory.write(0, &bytes).unwrap();
     let target = Target::new(&image, Aspect::Color, 1, StoreOp::Store).unwrap();
     let resolved = view(format, [20, 17, 1], ImageKind::D2, 1);

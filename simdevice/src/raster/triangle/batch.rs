@@ -157,10 +157,8 @@ impl<S: Simd> BlockValues<S> {
     pub fn find_rest(&mut self, simd: S, setup: &TriangleSetup, bases: [f64; 2], needs: Needs) {
         let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
         if needs.barycentrics {
-            self.barycentrics = [
-                add(bases[0] as f32, setup.lane_barycentrics[0]),
-                add(bases[1] as f32, setup.lane_barycentrics[1]),
-            ];
+            self.barycentrics =
+                [add(bases[0] as f32, setup.lane_barycentrics[0]), add(bases[1] as f32, setup.lane_barycentrics[1])];
         }
         if needs.inverse_w && !setup.affine {
             self.inverse_w = add(setup.inverse_w(bases), setup.lane_w);
@@ -171,12 +169,7 @@ impl<S: Simd> BlockValues<S> {
     #[inline(always)]
     pub fn lanes(self) -> [[f32; 16]; 4] {
         let [b1, b2] = self.barycentrics;
-        [
-            b1.into(),
-            b2.into(),
-            self.depth.into(),
-            self.inverse_w.into(),
-        ]
+        [b1.into(), b2.into(), self.depth.into(), self.inverse_w.into()]
     }
 }
 
@@ -256,9 +249,7 @@ impl Batch {
             values.depth.store_slice(&mut self.depth[at..at + 16]);
         }
         if self.needs.inverse_w {
-            values
-                .inverse_w
-                .store_slice(&mut self.inverse_w[at..at + 16]);
+            values.inverse_w.store_slice(&mut self.inverse_w[at..at + 16]);
         }
         self.tiles |= 1 << quads[0].tile;
         self.quads[self.count..self.count + 4].copy_from_slice(&quads);
@@ -291,10 +282,7 @@ impl Batch {
             *first = tile * crate::raster::tile::AREA + usize::from(quad.place);
         }
         let [a, b, c, d] = first;
-        QuadAddresses {
-            first,
-            consecutive: b == a + 4 && c == a + 8 && d == a + 12,
-        }
+        QuadAddresses { first, consecutive: b == a + 4 && c == a + 8 && d == a + 12 }
     }
 
     /// True if two quads of a chunk cover the same sample, so that their order matters.
@@ -307,9 +295,7 @@ impl Batch {
     fn overlap(&self, chunk: usize) -> bool {
         let quads = self.chunk_quads(chunk);
         quads.iter().enumerate().any(|(index, a)| {
-            quads[index + 1..]
-                .iter()
-                .any(|b| (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0)
+            quads[index + 1..].iter().any(|b| (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0)
         })
     }
 
@@ -357,9 +343,7 @@ pub fn add_attributes(
     };
     let [a, b, c] = three(primitive.vertices, |v| of_vertex(v).unwrap_or_default());
     let provoking = of_vertex(primitive.provoking).unwrap_or_default();
-    let value = |vertex: &[u32], varying: u32| {
-        f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0))
-    };
+    let value = |vertex: &[u32], varying: u32| f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0));
     for &(varying, interpolation) in &interface.varyings {
         attributes.push(match interpolation {
             Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
@@ -384,11 +368,7 @@ pub fn covered_lanes(cover: u16) -> u16 {
 
 /// The values of a block at a sample position, derived from those at the centres.
 #[inline(always)]
-pub fn at_sample<S: Simd>(
-    values: &BlockValues<S>,
-    setup: &TriangleSetup,
-    position: [i32; 2],
-) -> BlockValues<S> {
+pub fn at_sample<S: Simd>(values: &BlockValues<S>, setup: &TriangleSetup, position: [i32; 2]) -> BlockValues<S> {
     let [x, y] = both(position, offset);
     let move_by = |value: f32x16<S>, [dx, dy]: [f32; 2]| value + (dx * x + dy * y);
     BlockValues {
@@ -404,12 +384,7 @@ pub fn at_sample<S: Simd>(
 impl Batch {
     /// A value of each lane's primitive, as a vector.
     #[inline(always)]
-    fn of_records<S: Simd>(
-        &self,
-        simd: S,
-        chunk: usize,
-        value: impl Fn(&Record) -> f32,
-    ) -> f32x16<S> {
+    fn of_records<S: Simd>(&self, simd: S, chunk: usize, value: impl Fn(&Record) -> f32) -> f32x16<S> {
         if let Some(record) = self.common[chunk] {
             return f32x16::splat(simd, value(&self.records[usize::from(record)]));
         }
@@ -422,20 +397,10 @@ impl Batch {
 
     /// A varying's value at corner 0 and differences to the other corners, of each lane's primitive.
     #[inline(always)]
-    fn attribute<S: Simd>(
-        &self,
-        simd: S,
-        chunk: usize,
-        varying: usize,
-        per_record: usize,
-    ) -> [f32x16<S>; 3] {
+    fn attribute<S: Simd>(&self, simd: S, chunk: usize, varying: usize, per_record: usize) -> [f32x16<S>; 3] {
         if let Some(record) = self.common[chunk] {
             let [a, b, c] = self.attributes[usize::from(record) * per_record + varying];
-            return [
-                f32x16::splat(simd, a),
-                f32x16::splat(simd, b),
-                f32x16::splat(simd, c),
-            ];
+            return [f32x16::splat(simd, a), f32x16::splat(simd, b), f32x16::splat(simd, c)];
         }
         let mut of_quads = [[0.0; 4]; 3];
         for (number, quad) in self.chunk_quads(chunk).iter().enumerate() {
@@ -444,11 +409,7 @@ impl Batch {
             of_quads[1][number] = b;
             of_quads[2][number] = c;
         }
-        [
-            spread(simd, of_quads[0]),
-            spread(simd, of_quads[1]),
-            spread(simd, of_quads[2]),
-        ]
+        [spread(simd, of_quads[0]), spread(simd, of_quads[1]), spread(simd, of_quads[2])]
     }
 
     /// Sets a program's inputs. Returns true if perspective-correct varyings needed no division.
@@ -460,10 +421,8 @@ impl Batch {
         samples: Samples,
         machine: &mut Machine,
     ) -> bool {
-        let perspective = interface
-            .varyings
-            .iter()
-            .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
+        let perspective =
+            interface.varyings.iter().any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
         let divided = perspective && !self.affine;
         if divided {
             self.divide(simd);
@@ -474,12 +433,8 @@ impl Batch {
             let count = self.chunks().min(lanes.len());
             let lanes = &mut lanes[..count];
             match kind {
-                FragmentInput::Varying {
-                    interpolation,
-                    sampling,
-                    ..
-                } if interpolation != Interpolation::Flat
-                    && (at_centers || sampling != Sampling::Centroid) =>
+                FragmentInput::Varying { interpolation, sampling, .. }
+                    if interpolation != Interpolation::Flat && (at_centers || sampling != Sampling::Centroid) =>
                 {
                     let barycentrics = match interpolation {
                         Interpolation::Perspective if divided => &self.perspective,
@@ -537,12 +492,7 @@ impl Batch {
     }
 
     #[inline(always)]
-    fn perspective_at<S: Simd>(
-        &self,
-        simd: S,
-        chunk: usize,
-        [b1, b2, inverse_w]: [f32x16<S>; 3],
-    ) -> [f32x16<S>; 2] {
+    fn perspective_at<S: Simd>(&self, simd: S, chunk: usize, [b1, b2, inverse_w]: [f32x16<S>; 3]) -> [f32x16<S>; 2] {
         let w1 = self.of_records(simd, chunk, |record| record.weights[0]);
         let w2 = self.of_records(simd, chunk, |record| record.weights[1]);
         divided(simd, [b1, b2], inverse_w, [w1, w2])
@@ -550,12 +500,7 @@ impl Batch {
 
     /// The barycentrics and 1 / w of each lane at a covered sample, or at the centre if all samples are covered.
     #[inline(always)]
-    fn centroid_at<S: Simd>(
-        &self,
-        simd: S,
-        chunk: usize,
-        positions: &[[i32; 2]],
-    ) -> [f32x16<S>; 3] {
+    fn centroid_at<S: Simd>(&self, simd: S, chunk: usize, positions: &[[i32; 2]]) -> [f32x16<S>; 3] {
         let (mut x, mut y) = ([0.0; 16], [0.0; 16]);
         for lane in 0..16 {
             let cover = self.chunk_quads(chunk)[lane / 4].cover >> (lane % 4) & 0x1111;
@@ -566,9 +511,7 @@ impl Batch {
         }
         let (x, y) = (f32x16::simd_from(simd, x), f32x16::simd_from(simd, y));
         let [b1, b2, inverse_w] = self.linear_at(simd, chunk);
-        let slope = |corner: usize, axis: usize| {
-            self.of_records(simd, chunk, |record| record.slopes[corner][axis])
-        };
+        let slope = |corner: usize, axis: usize| self.of_records(simd, chunk, |record| record.slopes[corner][axis]);
         [
             b1 + slope(0, 0) * x + slope(0, 1) * y,
             b2 + slope(1, 0) * x + slope(1, 1) * y,
@@ -639,11 +582,8 @@ impl Batch {
             let record = &self.records[usize::from(quad.record)];
             let sample = usize::from(quad.sample);
             // In per-sample shading, fragments are at their sample.
-            let within = if samples.each_shaded {
-                samples.positions[sample].map(|at| at as f32 / 256.0)
-            } else {
-                [0.5; 2]
-            };
+            let within =
+                if samples.each_shaded { samples.positions[sample].map(|at| at as f32 / 256.0) } else { [0.5; 2] };
             *lane = match kind {
                 FragmentInput::FragCoord(axis) => {
                     let axis = axis.min(1);

@@ -41,10 +41,7 @@ pub struct Coverage<const N: usize> {
 
 impl<const N: usize> Default for Coverage<N> {
     fn default() -> Self {
-        Self {
-            blocks: 0,
-            lanes: [[0; N]; 16],
-        }
+        Self { blocks: 0, lanes: [[0; N]; 16] }
     }
 }
 
@@ -61,22 +58,14 @@ impl<const N: usize> Coverage<N> {
     #[inline(always)]
     pub fn find<S: Simd>(&mut self, simd: S, setup: &TriangleSetup, x: i32, y: i32) -> bool {
         self.blocks = 0;
-        let part = setup.bounds.intersect(Rect {
-            x,
-            y,
-            width: SIDE as u32,
-            height: SIDE as u32,
-        });
+        let part = setup.bounds.intersect(Rect { x, y, width: SIDE as u32, height: SIDE as u32 });
         if part.is_empty() {
             return false;
         }
         // The coordinates are in pixels from the tile's corner.
         let (left, top) = (part.x - x, part.y - y);
         let (right, bottom) = (left + part.width as i32, top + part.height as i32);
-        let mut crossings = [Crossing {
-            edge: &setup.edges()[0],
-            values: [0; N],
-        }; 4];
+        let mut crossings = [Crossing { edge: &setup.edges()[0], values: [0; N] }; 4];
         let (mut count, mut steep) = (0, false);
         for edge in setup.edges() {
             let at = edge.a * i64::from(x) + edge.b * i64::from(y);
@@ -121,12 +110,7 @@ impl<const N: usize> Coverage<N> {
 
     /// True if every sample of the tile is covered.
     pub fn is_whole(&self) -> bool {
-        self.blocks == 0xFFFF
-            && self
-                .lanes
-                .as_flattened()
-                .iter()
-                .all(|&lanes| lanes == u16::MAX)
+        self.blocks == 0xFFFF && self.lanes.as_flattened().iter().all(|&lanes| lanes == u16::MAX)
     }
 
     /// Removes lanes outside of these columns and rows.
@@ -138,8 +122,7 @@ impl<const N: usize> Coverage<N> {
                 let below = |limit: i32| table[(limit - at).clamp(0, 4) as usize];
                 below(end) & !below(first)
             };
-            let inside =
-                within(&COLUMNS_BELOW, left, right, x) & within(&ROWS_BELOW, top, bottom, y);
+            let inside = within(&COLUMNS_BELOW, left, right, x) & within(&ROWS_BELOW, top, bottom, y);
             for lanes in &mut self.lanes[block] {
                 *lanes &= inside;
             }
@@ -174,8 +157,7 @@ impl<const N: usize> Coverage<N> {
         let (mut whole, mut some) = ([u32::MAX; N], [u32::MAX; N]);
         for (crossing, values) in crossings.iter().zip(&mut values) {
             let (a, b) = (crossing.edge.a as i32, crossing.edge.b as i32);
-            let blocks =
-                i32x16::simd_from(simd, BLOCK_X) * a + i32x16::simd_from(simd, BLOCK_Y) * b;
+            let blocks = i32x16::simd_from(simd, BLOCK_X) * a + i32x16::simd_from(simd, BLOCK_Y) * b;
             blocks.store_slice(values);
             let (low, high) = (3 * (a.min(0) + b.min(0)), 3 * (a.max(0) + b.max(0)));
             for sample in 0..N {
@@ -221,9 +203,9 @@ impl<const N: usize> Coverage<N> {
                 for lane in 0..16 {
                     let x = i64::from(BLOCK_X[block] + LANE_X[lane]);
                     let y = i64::from(BLOCK_Y[block] + LANE_Y[lane]);
-                    let inside = crossings.iter().all(|crossing| {
-                        crossing.values[sample] + crossing.edge.a * x + crossing.edge.b * y >= 0
-                    });
+                    let inside = crossings
+                        .iter()
+                        .all(|crossing| crossing.values[sample] + crossing.edge.a * x + crossing.edge.b * y >= 0);
                     lanes |= u16::from(inside) << lane;
                 }
                 self.lanes[block][sample] = lanes;

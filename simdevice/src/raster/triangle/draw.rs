@@ -37,13 +37,7 @@ pub(super) enum Path {
 impl Path {
     /// True if a tile that a primitive covers completely is a batch of its own.
     pub(super) fn batches_tiles(self) -> bool {
-        matches!(
-            self,
-            Self::WholeTiles
-                | Self::Deferred {
-                    batches_tiles: true
-                }
-        )
+        matches!(self, Self::WholeTiles | Self::Deferred { batches_tiles: true })
     }
 }
 
@@ -87,33 +81,19 @@ impl<'a> TriangleTileDraw<'a> {
     ) -> Self {
         let state = &*draw.state;
         let program = draw.pipeline.fragment.as_ref();
-        let tests = Tests::new(
-            &state.depth_stencil,
-            targets.depth.map(Target::format),
-            targets.stencil.is_some(),
-        );
-        let colors = color_outputs(
-            program,
-            targets.color,
-            &state.blend,
-            state.logic_op,
-            state.blend_constants,
-        );
-        let effects = program.map_or_else(ShadingEffects::default, |program| {
-            ShadingEffects::new(&program.interface, state, &tests)
-        });
+        let tests = Tests::new(&state.depth_stencil, targets.depth.map(Target::format), targets.stencil.is_some());
+        let colors = color_outputs(program, targets.color, &state.blend, state.logic_op, state.blend_constants);
+        let effects = program
+            .map_or_else(ShadingEffects::default, |program| ShadingEffects::new(&program.interface, state, &tests));
         let stage = program.filter(|program| {
-            program.interface.has_side_effects
-                || effects.counts_late
-                || colors.iter().any(Option::is_some)
+            program.interface.has_side_effects || effects.counts_late || colors.iter().any(Option::is_some)
         });
         let interface = stage.map(|stage| &stage.interface);
         let multisampled = samples.unwrap_or(state.samples) > 1;
         let samples = Samples {
             positions: if multisampled { &SAMPLES_4 } else { &CENTER },
             each_shaded: multisampled
-                && (state.sample_shading
-                    || interface.is_some_and(|interface| interface.per_sample)),
+                && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample)),
         };
         let optimizations = runtime.config().optimizations;
         let takes_whole_tiles = !multisampled
@@ -139,19 +119,13 @@ impl<'a> TriangleTileDraw<'a> {
             colors,
             path,
             tests,
-            early: if effects.tests_late {
-                effects.filter
-            } else {
-                Some(tests).filter(Tests::any)
-            },
+            early: if effects.tests_late { effects.filter } else { Some(tests).filter(Tests::any) },
             removes: effects.removes,
             counts_late: effects.counts_late,
             samples,
             area,
             ranges: depth_ranges(state, tests.code),
-            needs: interface.map_or_else(Needs::default, |interface| {
-                needs(interface, path, optimizations)
-            }),
+            needs: interface.map_or_else(Needs::default, |interface| needs(interface, path, optimizations)),
             optimizations,
             level: runtime.level(),
             limit: runtime.config().shader_timeout,
@@ -191,19 +165,14 @@ struct ShadingEffects {
 
 impl ShadingEffects {
     fn new(interface: &Interface, state: &DrawState, tests: &Tests) -> Self {
-        let removes =
-            interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
+        let removes = interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
         let changes_depth = interface.depth.is_some();
         let tests_late = !interface.early_tests
-            && (changes_depth
-                || interface.has_side_effects && tests.any()
-                || removes && tests.writes());
+            && (changes_depth || interface.has_side_effects && tests.any() || removes && tests.writes());
         Self {
             removes,
             tests_late,
-            filter: tests
-                .filter()
-                .filter(|_| !changes_depth && !interface.has_side_effects),
+            filter: tests.filter().filter(|_| !changes_depth && !interface.has_side_effects),
             counts_late: tests_late || removes && !interface.early_tests,
         }
     }
@@ -212,9 +181,8 @@ impl ShadingEffects {
 /// The path of a draw that may process whole tiles at once. Hidden surfaces are left out only if `may_hide`.
 fn whole_tile_path(interface: &Interface, colors: &[Option<ColorOutput>], may_hide: bool) -> Path {
     let batches_tiles = interface.takes_varyings_alone();
-    let removes_hidden_surfaces = may_hide
-        && !interface.has_side_effects
-        && colors.iter().flatten().all(ColorOutput::overwrites);
+    let removes_hidden_surfaces =
+        may_hide && !interface.has_side_effects && colors.iter().flatten().all(ColorOutput::overwrites);
     if removes_hidden_surfaces {
         Path::Deferred { batches_tiles }
     } else if batches_tiles {
@@ -250,21 +218,12 @@ fn needs(interface: &Interface, path: Path, optimizations: Optimizations) -> Nee
         inputs.any(|&(_, input, _)| wanted(input))
     };
     Needs {
-        barycentrics: reads(|input| {
-            matches!(
-                input,
-                FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
-            )
-        }),
-        depth: path == Path::LateTests
-            || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
+        barycentrics: reads(|input| matches!(input, FragmentInput::Varying { .. } | FragmentInput::PointCoord(_))),
+        depth: path == Path::LateTests || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
         inverse_w: reads(|input| {
             matches!(
                 input,
-                FragmentInput::Varying {
-                    interpolation: Interpolation::Perspective,
-                    ..
-                } | FragmentInput::FragCoord(3)
+                FragmentInput::Varying { interpolation: Interpolation::Perspective, .. } | FragmentInput::FragCoord(3)
             )
         }),
         detects_affine: optimizations.has(Optimization::Affine),

@@ -19,9 +19,7 @@ pub(crate) struct MacroTileWork {
 impl Default for MacroTileWork {
     fn default() -> Self {
         let tiles = (MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2);
-        Self {
-            tiles: vec![TileWork::default(); tiles as usize],
-        }
+        Self { tiles: vec![TileWork::default(); tiles as usize] }
     }
 }
 
@@ -31,11 +29,7 @@ impl MacroTileWork {
         let tile = &mut self.tiles[tile];
         tile.listed += 1;
         if tile.runs.is_empty() {
-            tile.runs.push(Run {
-                rows: TILE_GROUPS as u8,
-                blocks: TILE_GROUPS as u8,
-                ..Run::default()
-            });
+            tile.runs.push(Run { rows: TILE_GROUPS as u8, blocks: TILE_GROUPS as u8, ..Run::default() });
         }
         for run in &mut tile.runs {
             run.primitives += 1;
@@ -54,12 +48,7 @@ impl MacroTileWork {
     }
 
     /// Records the early tests of a block: the covered lanes and those that passed, both by sample.
-    pub(crate) fn test<const N: usize>(
-        &mut self,
-        tile: usize,
-        covered: &[u16; N],
-        left: &[u16; N],
-    ) {
+    pub(crate) fn test<const N: usize>(&mut self, tile: usize, covered: &[u16; N], left: &[u16; N]) {
         let any = |lanes: &[u16; N]| lanes.iter().fold(0, |any, lanes| any | lanes);
         let quads = |lanes: u16| {
             let pairs = lanes | lanes >> 1;
@@ -75,29 +64,18 @@ impl MacroTileWork {
 
 /// The record of a draw of primitives before any work.
 pub(crate) fn no_primitives() -> DrawWork {
-    DrawWork {
-        mode: Mode::Triangle,
-        ..DrawWork::default()
-    }
+    DrawWork { mode: Mode::Triangle, ..DrawWork::default() }
 }
 
 /// Adds the work of a part of a draw before its tiles. `counters` are those of the part alone.
-pub(crate) fn add_front_end(
-    record: &DrawRecord,
-    counters: &Counters,
-    draw: &Draw,
-    part: &PrimitiveDraw,
-) {
+pub(crate) fn add_front_end(record: &DrawRecord, counters: &Counters, draw: &Draw, part: &PrimitiveDraw) {
     let shaded = counters.get(Counter::VertexInvocations);
     let drawn = counters.get(Counter::PrimitivesDrawn);
     let attributes = draw.attributes.iter();
     let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
     // A vertex's outputs are a position and the varyings.
     let written = 4 * (4 + part.varyings_per_vertex() as u64);
-    let index = draw
-        .indices
-        .as_ref()
-        .map_or(0, |indices| indices.index_size);
+    let index = draw.indices.as_ref().map_or(0, |indices| indices.index_size);
     let bytes = shaded * (read as u64 + written)
         + counters.get(Counter::InputVertices) * u64::from(index)
         + drawn * 4 * NUMBERS_IN;
@@ -112,10 +90,7 @@ pub(crate) fn add_front_end(
             let at = primitive.corners.map(|corner| corner[axis]);
             f64::from(of(of(at[0], at[1]), at[2])) / 256.0
         };
-        let (low, high) = (
-            [0, 1].map(|k| side(k, i32::min)),
-            [0, 1].map(|k| side(k, i32::max)),
-        );
+        let (low, high) = ([0, 1].map(|k| side(k, i32::min)), [0, 1].map(|k| side(k, i32::max)));
         for (sum, tiles) in sized.iter_mut().zip(sized_tiles(low, high, region)) {
             *sum += tiles;
         }
@@ -133,13 +108,7 @@ pub(crate) fn add_front_end(
 }
 
 /// Adds the work in macro-tile `at` of `size` x `size` pixels. `counters` are those of the macro-tile alone.
-pub(crate) fn add_macro_tile(
-    record: &DrawRecord,
-    at: [u32; 2],
-    size: u32,
-    done: MacroTileWork,
-    counters: &Counters,
-) {
+pub(crate) fn add_macro_tile(record: &DrawRecord, at: [u32; 2], size: u32, done: MacroTileWork, counters: &Counters) {
     let side = size / TILE_SIZE;
     let listed = done.tiles.into_iter().enumerate();
     let listed = listed.filter(|(_, tile)| tile.listed > 0);
@@ -147,10 +116,7 @@ pub(crate) fn add_macro_tile(
     record.update(|work| {
         work.shade = work.shade.plus(&shade);
         work.tiles.extend(listed.map(|(index, tile)| TileWork {
-            at: [
-                at[0] * side + index as u32 % side,
-                at[1] * side + index as u32 / side,
-            ],
+            at: [at[0] * side + index as u32 % side, at[1] * side + index as u32 / side],
             ..tile
         }));
     });

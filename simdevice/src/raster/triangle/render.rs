@@ -55,12 +55,7 @@ pub fn render(
     cancel: &AtomicBool,
 ) -> Result<(), Stopped> {
     let segments = &draw.draw.segments;
-    if segments.iter().all(|segment| {
-        segment
-            .bins
-            .primitives_of(macro_tile.at, macro_tile.layer)
-            .is_empty()
-    }) {
+    if segments.iter().all(|segment| segment.bins.primitives_of(macro_tile.at, macro_tile.layer).is_empty()) {
         return Ok(());
     }
     let record = draw.draw.record.as_ref();
@@ -79,9 +74,7 @@ pub fn render(
         quads_masked: 0,
         work: record.map(|_| MacroTileWork::default()),
     };
-    renderer
-        .batch
-        .begin(draw.needs, macro_tile.at, macro_tile.size);
+    renderer.batch.begin(draw.needs, macro_tile.at, macro_tile.size);
     let level = draw.level;
     let deferred = &mut *scratch.deferred;
     deferred.clear();
@@ -101,13 +94,7 @@ pub fn render(
         machines.give_back(counters);
     }
     if let (Some(record), Some(before), Some(work)) = (record, before, work) {
-        recording::add_macro_tile(
-            record,
-            macro_tile.at,
-            macro_tile.size,
-            work,
-            &counters.since(&before),
-        );
+        recording::add_macro_tile(record, macro_tile.at, macro_tile.size, work, &counters.since(&before));
     }
     done
 }
@@ -155,11 +142,7 @@ struct RasterPrimitive<'p> {
 impl Renderer<'_, '_> {
     /// Rasterizes all primitives of the macro-tile, then shades deferred tiles.
     #[inline(always)]
-    fn run<S: Simd, const N: usize>(
-        &mut self,
-        simd: S,
-        deferred: &mut DeferredTiles,
-    ) -> Result<(), Stopped> {
+    fn run<S: Simd, const N: usize>(&mut self, simd: S, deferred: &mut DeferredTiles) -> Result<(), Stopped> {
         let size = self.macro_tile.size;
         let whole = Rect {
             x: (self.macro_tile.at[0] * size) as i32,
@@ -170,22 +153,15 @@ impl Renderer<'_, '_> {
         let mut coverage = Coverage::<N>::default();
         let mut setup = TriangleSetup::default();
         let draw = self.draw;
-        let needs = Needs {
-            depth: draw.needs.depth || draw.tests.any(),
-            ..draw.needs
-        };
+        let needs = Needs { depth: draw.needs.depth || draw.tests.any(), ..draw.needs };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
         for (number, segment) in draw.draw.segments.iter().enumerate() {
-            for &index in segment
-                .bins
-                .primitives_of(self.macro_tile.at, self.macro_tile.layer)
-            {
+            for &index in segment.bins.primitives_of(self.macro_tile.at, self.macro_tile.layer) {
                 let Some(primitive) = segment.primitives.get(index as usize) else {
                     continue;
                 };
                 if clip.0 != primitive.viewport {
-                    let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport))
-                    else {
+                    let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport)) else {
                         continue;
                     };
                     clip = (primitive.viewport, pixels.intersect(whole));
@@ -232,10 +208,7 @@ impl Renderer<'_, '_> {
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
         let bounds = current.setup.bounds;
-        let first = [
-            (bounds.x - corner[0]) / SIDE as i32,
-            (bounds.y - corner[1]) / SIDE as i32,
-        ];
+        let first = [(bounds.x - corner[0]) / SIDE as i32, (bounds.y - corner[1]) / SIDE as i32];
         let last = [
             (bounds.x + bounds.width as i32 - 1 - corner[0]) / SIDE as i32,
             (bounds.y + bounds.height as i32 - 1 - corner[1]) / SIDE as i32,
@@ -248,18 +221,11 @@ impl Renderer<'_, '_> {
                 let tile = (row as u32 * side + column as u32) as usize;
                 let found = coverage.find(simd, current.setup, x, y);
                 if let Some(work) = &mut self.work {
-                    let blocks = if found {
-                        coverage.blocks.count_ones()
-                    } else {
-                        0
-                    };
+                    let blocks = if found { coverage.blocks.count_ones() } else { 0 };
                     work.list(tile, blocks);
                 }
                 if found {
-                    let tile = PlacedTile {
-                        index: tile,
-                        corner: [x, y],
-                    };
+                    let tile = PlacedTile { index: tile, corner: [x, y] };
                     self.tile(simd, current, coverage, deferred, tile)?;
                 }
             }
@@ -360,11 +326,7 @@ impl Renderer<'_, '_> {
                 self.load_colors(tile.index, coverage);
                 loaded = true;
             }
-            let quad = Quad {
-                tile: tile.index as u8,
-                place: (block * 16) as u8,
-                ..Quad::default()
-            };
+            let quad = Quad { tile: tile.index as u8, place: (block * 16) as u8, ..Quad::default() };
             if draw.samples.each_shaded {
                 self.append_samples(current, quad, &lanes, &values)?;
             } else {
@@ -387,10 +349,7 @@ impl Renderer<'_, '_> {
             if covered != 0 {
                 let mut only = [0; N];
                 only[sample] = covered;
-                let quad = Quad {
-                    sample: sample as u8,
-                    ..quad
-                };
+                let quad = Quad { sample: sample as u8, ..quad };
                 let position = self.draw.samples.positions[sample];
                 let values = at_sample(values, current.setup, position);
                 self.append(current, quad, &only, &values)?;
@@ -414,11 +373,7 @@ impl Renderer<'_, '_> {
                 Some(record) => record,
                 None => self.record(current),
             };
-            let mut quads = [Quad {
-                record,
-                cover: 15,
-                ..quad
-            }; 4];
+            let mut quads = [Quad { record, cover: 15, ..quad }; 4];
             for (number, quad) in quads.iter_mut().enumerate() {
                 quad.place += 4 * number as u8;
             }
@@ -444,12 +399,7 @@ impl Renderer<'_, '_> {
                 Some(record) => record,
                 None => self.record(current),
             };
-            let quad = Quad {
-                place: quad.place + 4 * number as u8,
-                record,
-                cover,
-                ..quad
-            };
+            let quad = Quad { place: quad.place + 4 * number as u8, record, cover, ..quad };
             self.batch.add(quad, number, &values);
         }
         Ok(())
@@ -459,12 +409,7 @@ impl Renderer<'_, '_> {
         let Some(stage) = self.draw.stage else {
             return 0;
         };
-        let record = self.batch.add_primitive(
-            current.primitive,
-            current.setup,
-            &stage.interface,
-            current.varyings,
-        );
+        let record = self.batch.add_primitive(current.primitive, current.setup, &stage.interface, current.varyings);
         current.record = Some(record);
         record
     }
@@ -494,28 +439,14 @@ impl Renderer<'_, '_> {
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
             let quads = QuadAddresses::block(first);
-            *lanes = test(
-                simd,
-                tests,
-                *lanes,
-                current.primitive.front,
-                code,
-                &quads,
-                self.buffers,
-            );
+            *lanes = test(simd, tests, *lanes, current.primitive.front, code, &quads, self.buffers);
         }
     }
 
     /// True if a primitive fails the depth test in all of a tile. False if the mode or the optimizations do not allow
     /// this test.
     #[inline(always)]
-    fn is_hidden<S: Simd>(
-        &mut self,
-        simd: S,
-        tests: &Tests,
-        current: &RasterPrimitive<'_>,
-        tile: PlacedTile,
-    ) -> bool {
+    fn is_hidden<S: Simd>(&mut self, simd: S, tests: &Tests, current: &RasterPrimitive<'_>, tile: PlacedTile) -> bool {
         let looks = tests.stencil.is_none()
             && self.draw.optimizations.has(Optimization::HierarchicalDepth)
             && tests.depth.is_some();
@@ -548,23 +479,11 @@ impl Renderer<'_, '_> {
             simd, &stage.interface, draw.samples, machine
         ));
         self.counters.add(Counter::BatchesAffine, affine.into());
-        let watchdog = Watchdog {
-            limit: draw.limit,
-            cancel: Some(self.cancel),
-        };
-        machine.run(
-            &batch.active,
-            &batch.helpers,
-            &draw.bindings.resources(),
-            watchdog,
-        )?;
+        let watchdog = Watchdog { limit: draw.limit, cancel: Some(self.cancel) };
+        machine.run(&batch.active, &batch.helpers, &draw.bindings.resources(), watchdog)?;
         let lanes = (4 * batch.count - batch.helpers.count()) as u64;
         self.counters.add(Counter::FragmentInvocations, lanes);
-        let killed = if stage.interface.discards {
-            machine.killed()
-        } else {
-            isa::machine::LaneMask::none()
-        };
+        let killed = if stage.interface.discards { machine.killed() } else { isa::machine::LaneMask::none() };
         let buffers = &mut *self.buffers;
         let passed = dispatch!(level, simd => {
             write(simd, draw, &stage.interface, batch, machine, &killed, buffers)
@@ -577,17 +496,11 @@ impl Renderer<'_, '_> {
     /// Loads or clears depth and stencil of a tile if it was not touched yet.
     fn load_tests(&mut self, tile: usize) {
         let (targets, layer) = (self.draw.targets, self.macro_tile.layer);
-        if let Some(target) = targets
-            .depth
-            .filter(|_| !self.buffers.depth.is_touched(tile))
-        {
+        if let Some(target) = targets.depth.filter(|_| !self.buffers.depth.is_touched(tile)) {
             let tile = self.tile_of(tile);
             self.buffers.depth.load_or_clear(target, layer, &tile);
         }
-        if let Some(target) = targets
-            .stencil
-            .filter(|_| !self.buffers.stencil.is_touched(tile))
-        {
+        if let Some(target) = targets.stencil.filter(|_| !self.buffers.stencil.is_touched(tile)) {
             let tile = self.tile_of(tile);
             self.buffers.stencil.load_or_clear(target, layer, &tile);
         }
@@ -623,21 +536,10 @@ impl Renderer<'_, '_> {
     fn tile_of(&self, index: usize) -> Tile {
         let side = self.macro_tile.size / TILE_SIZE;
         let [column, row] = self.macro_tile.at;
-        let at = [
-            column * side + index as u32 % side,
-            row * side + index as u32 / side,
-        ];
-        let whole = Rect {
-            x: (at[0] * TILE_SIZE) as i32,
-            y: (at[1] * TILE_SIZE) as i32,
-            width: TILE_SIZE,
-            height: TILE_SIZE,
-        };
-        Tile {
-            index,
-            at,
-            pixels: whole.intersect(self.draw.area),
-        }
+        let at = [column * side + index as u32 % side, row * side + index as u32 / side];
+        let whole =
+            Rect { x: (at[0] * TILE_SIZE) as i32, y: (at[1] * TILE_SIZE) as i32, width: TILE_SIZE, height: TILE_SIZE };
+        Tile { index, at, pixels: whole.intersect(self.draw.area) }
     }
 
     /// Marks the colours of a tile as overwritten, or loads them if that optimization is disabled.
@@ -710,35 +612,22 @@ impl Renderer<'_, '_> {
 
     /// Defers a tile of a primitive whose samples all pass.
     #[inline(always)]
-    fn defer(
-        &mut self,
-        current: &mut RasterPrimitive<'_>,
-        deferred: &mut DeferredTiles,
-        tile: usize,
-    ) {
+    fn defer(&mut self, current: &mut RasterPrimitive<'_>, deferred: &mut DeferredTiles, tile: usize) {
         self.mark_colors_overwritten(tile);
         let slot = match current.slot {
             Some(slot) => slot,
             None => {
                 let (segment, primitive) = current.place;
-                *current
-                    .slot
-                    .insert(deferred.add(current.setup, segment, primitive))
+                *current.slot.insert(deferred.add(current.setup, segment, primitive))
             }
         };
         if deferred.defer(tile, slot) {
-            self.counters
-                .add(Counter::QuadsOverwritten, AREA as u64 / 4);
+            self.counters.add(Counter::QuadsOverwritten, AREA as u64 / 4);
         }
     }
 
     /// Shades a tile if it is deferred.
-    fn shade_deferred<S: Simd>(
-        &mut self,
-        simd: S,
-        deferred: &mut DeferredTiles,
-        tile: usize,
-    ) -> Result<(), Stopped> {
+    fn shade_deferred<S: Simd>(&mut self, simd: S, deferred: &mut DeferredTiles, tile: usize) -> Result<(), Stopped> {
         let Some(waiting) = deferred.take(tile) else {
             return Ok(());
         };
@@ -756,13 +645,9 @@ impl Renderer<'_, '_> {
         };
         let side = (self.macro_tile.size / TILE_SIZE) as usize;
         let place = [tile % side, tile / side];
-        let corner = [0, 1].map(|axis| {
-            (self.macro_tile.at[axis] * self.macro_tile.size) as i32 + (place[axis] * SIDE) as i32
-        });
-        let tile = PlacedTile {
-            index: tile,
-            corner,
-        };
+        let corner =
+            [0, 1].map(|axis| (self.macro_tile.at[axis] * self.macro_tile.size) as i32 + (place[axis] * SIDE) as i32);
+        let tile = PlacedTile { index: tile, corner };
         simd.vectorize(
             #[inline(always)]
             || self.shade_tile(simd, &mut current, tile, &[u16::MAX; BLOCKS]),
@@ -795,11 +680,7 @@ impl Renderer<'_, '_> {
                 self.load_colors_written(tile.index);
                 loaded = true;
             }
-            let quad = Quad {
-                tile: tile.index as u8,
-                place: (block * 16) as u8,
-                ..Quad::default()
-            };
+            let quad = Quad { tile: tile.index as u8, place: (block * 16) as u8, ..Quad::default() };
             self.append(current, quad, &[lanes], &values)?;
         }
         Ok(())
@@ -829,10 +710,7 @@ impl Renderer<'_, '_> {
         add_attributes(primitive, interface, varyings, &mut full.attributes);
         let divides = draw.needs.inverse_w && !current.setup.affine;
         if draw.needs.barycentrics {
-            let needs = Needs {
-                inverse_w: divides,
-                ..draw.needs
-            };
+            let needs = Needs { inverse_w: divides, ..draw.needs };
             full.find_barycentrics(simd, current.setup, tile.corner, needs);
         }
         let Some(machines) = self.machines.as_mut() else {
@@ -848,10 +726,7 @@ impl Renderer<'_, '_> {
         }
         let undivided = draw.needs.inverse_w && !divides;
         self.counters.add(Counter::BatchesAffine, undivided.into());
-        let watchdog = Watchdog {
-            limit: draw.limit,
-            cancel: Some(self.cancel),
-        };
+        let watchdog = Watchdog { limit: draw.limit, cancel: Some(self.cancel) };
         let resources = draw.bindings.resources();
         machine.run(&full.all, &full.none, &resources, watchdog)?;
         self.counters.add(Counter::FragmentInvocations, AREA as u64);

@@ -77,23 +77,15 @@ struct SnapCorrection {
 impl SnapCorrection {
     /// The correction for vertices at their corners, which enclose half of `area`.
     fn nowhere(area: i64) -> Self {
-        Self {
-            area: area as f64,
-            ..Self::default()
-        }
+        Self { area: area as f64, ..Self::default() }
     }
 
     /// The correction for vertices at `offsets` from the corners. `None` for very thin triangles that snapping has
     /// turned over or made much wider, because their samples may lie far outside of the original triangle.
     #[inline(always)]
     fn new(numerators: [[i64; 2]; 2], area: i64, offsets: [[i16; 2]; 3]) -> Option<Self> {
-        let [o0, o1, o2] = three(offsets, |offset| {
-            both(offset, |offset| f64::from(offset) / OFFSETS_IN_SUB_PIXEL)
-        });
-        let by = [
-            [o2[1] - o0[1], o0[0] - o2[0]],
-            [o0[1] - o1[1], o1[0] - o0[0]],
-        ];
+        let [o0, o1, o2] = three(offsets, |offset| both(offset, |offset| f64::from(offset) / OFFSETS_IN_SUB_PIXEL));
+        let by = [[o2[1] - o0[1], o0[0] - o2[0]], [o0[1] - o1[1], o1[0] - o0[0]]];
         let [[a1, b1], [a2, b2]] = both(numerators, |n| both(n, |n| n as f64));
         let [[c1, d1], [c2, d2]] = by;
         // The large part of the sum is exact.
@@ -101,10 +93,7 @@ impl SnapCorrection {
         let snapped = area as f64;
         (snapped + larger >= 0.25 * snapped).then(|| Self {
             numerators: by,
-            at_origin: [
-                -(a1 + c1) * o0[0] - (b1 + d1) * o0[1],
-                -(a2 + c2) * o0[0] - (b2 + d2) * o0[1],
-            ],
+            at_origin: [-(a1 + c1) * o0[0] - (b1 + d1) * o0[1], -(a2 + c2) * o0[0] - (b2 + d2) * o0[1]],
             area: snapped + larger,
         })
     }
@@ -112,11 +101,7 @@ impl SnapCorrection {
 
 /// The pixels, as `first..end`, that may have samples between two coordinates of 1/256 pixels.
 fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
-    if samples == 1 {
-        ((low + 127) >> 8, ((high - 128) >> 8) + 1)
-    } else {
-        (low >> 8, (high >> 8) + 1)
-    }
+    if samples == 1 { ((low + 127) >> 8, ((high - 128) >> 8) + 1) } else { (low >> 8, (high >> 8) + 1) }
 }
 
 impl TriangleSetup {
@@ -136,9 +121,7 @@ impl TriangleSetup {
         let mut corners = [p0, p1, p2, p2];
         let edge_count = if parallelogram { 4 } else { 3 };
         if parallelogram {
-            corners[3] = both([0, 1], |axis| {
-                p0[axis].saturating_add(p2[axis]).saturating_sub(p1[axis])
-            });
+            corners[3] = both([0, 1], |axis| p0[axis].saturating_add(p2[axis]).saturating_sub(p1[axis]));
         }
         let extent = |axis: usize| {
             let [a, b, c, d] = corners;
@@ -149,17 +132,9 @@ impl TriangleSetup {
         if left.min(top) < -MAX_COORDINATE || right.max(bottom) > MAX_COORDINATE {
             return false;
         }
-        let (columns, rows) = (
-            pixels(left, right, positions.len()),
-            pixels(top, bottom, positions.len()),
-        );
+        let (columns, rows) = (pixels(left, right, positions.len()), pixels(top, bottom, positions.len()));
         let span = |(first, end): (i32, i32)| (end - first).max(0) as u32;
-        let bounds = clip.intersect(Rect {
-            x: columns.0,
-            y: rows.0,
-            width: span(columns),
-            height: span(rows),
-        });
+        let bounds = clip.intersect(Rect { x: columns.0, y: rows.0, width: span(columns), height: span(rows) });
         if bounds.is_empty() {
             return false;
         }
@@ -170,19 +145,12 @@ impl TriangleSetup {
             return false;
         }
         for (index, edge) in self.edges.iter_mut().enumerate().take(edge_count) {
-            let next = if index + 1 == edge_count {
-                0
-            } else {
-                index + 1
-            };
+            let next = if index + 1 == edge_count { 0 } else { index + 1 };
             *edge = Edge::new(simd, wide(corners[index]), wide(corners[next]), positions);
         }
-        let numerators = [
-            [w2[1] - w0[1], w0[0] - w2[0]],
-            [w0[1] - w1[1], w1[0] - w0[0]],
-        ];
-        let correction = SnapCorrection::new(numerators, area, primitive.offsets)
-            .unwrap_or_else(|| SnapCorrection::nowhere(area));
+        let numerators = [[w2[1] - w0[1], w0[0] - w2[0]], [w0[1] - w1[1], w1[0] - w0[0]]];
+        let correction =
+            SnapCorrection::new(numerators, area, primitive.offsets).unwrap_or_else(|| SnapCorrection::nowhere(area));
         let inverse_area = 1.0 / correction.area;
         let sums = both([0, 1], |corner: usize| {
             let ([a, b], [c, d]) = (numerators[corner], correction.numerators[corner]);
@@ -196,11 +164,7 @@ impl TriangleSetup {
         let [iw0, iw1, iw2] = primitive.inverse_w;
         let is_constant = iw0 == iw1 && iw0 == iw2;
         let scale = if is_constant { iw0 } else { 1.0 };
-        let weights = if is_constant {
-            [1.0; 3]
-        } else {
-            [iw0, iw1, iw2]
-        };
+        let weights = if is_constant { [1.0; 3] } else { [iw0, iw1, iw2] };
         let affine = is_constant && needs.detects_affine;
         let inverse_w = three(weights, f64::from);
         let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
@@ -318,12 +282,7 @@ impl Edge {
         }
         let x = i32x16::simd_from(simd, LANE_X) * a as i32;
         let y = i32x16::simd_from(simd, LANE_Y) * b as i32;
-        Self {
-            a,
-            b,
-            c,
-            lanes: (x + y).into(),
-        }
+        Self { a, b, c, lanes: (x + y).into() }
     }
 }
 

@@ -42,13 +42,7 @@ impl Default for FullTile {
 impl FullTile {
     /// Computes the barycentrics of all pixels. If `needs.inverse_w`, it computes perspective-correct ones, too.
     #[inline(always)]
-    pub(super) fn find_barycentrics<S: Simd>(
-        &mut self,
-        simd: S,
-        setup: &TriangleSetup,
-        at: [i32; 2],
-        needs: Needs,
-    ) {
+    pub(super) fn find_barycentrics<S: Simd>(&mut self, simd: S, setup: &TriangleSetup, at: [i32; 2], needs: Needs) {
         for block in 0..BLOCKS {
             let pixels = 16 * block..16 * (block + 1);
             let values = BlockValues::new(simd, setup, block_corner(at, block), needs);
@@ -114,10 +108,7 @@ pub struct DeferredTiles {
 
 impl Default for DeferredTiles {
     fn default() -> Self {
-        Self {
-            tiles: [None; MAX_TILES],
-            primitives: Vec::new(),
-        }
+        Self { tiles: [None; MAX_TILES], primitives: Vec::new() }
     }
 }
 
@@ -131,17 +122,8 @@ impl DeferredTiles {
     /// Adds a primitive and returns its slot. [`DeferredTiles::defer`] must be called for it next.
     #[cold]
     pub fn add(&mut self, setup: &TriangleSetup, segment: usize, primitive: u32) -> u8 {
-        let deferred = DeferredPrimitive {
-            setup: setup.clone(),
-            segment,
-            primitive,
-            tiles: 0,
-        };
-        let slot = match self
-            .primitives
-            .iter()
-            .position(|deferred| deferred.tiles == 0)
-        {
+        let deferred = DeferredPrimitive { setup: setup.clone(), segment, primitive, tiles: 0 };
+        let slot = match self.primitives.iter().position(|deferred| deferred.tiles == 0) {
             Some(slot) => {
                 self.primitives[slot] = deferred;
                 slot
@@ -202,17 +184,9 @@ mod tests {
         }
         for (tile, newest) in newest.into_iter().enumerate() {
             assert_eq!(deferred.is_deferred(tile), newest.is_some());
-            assert_eq!(
-                deferred.take(tile).map(|deferred| deferred.primitive),
-                newest
-            );
+            assert_eq!(deferred.take(tile).map(|deferred| deferred.primitive), newest);
             assert!(deferred.take(tile).is_none());
         }
-        assert!(
-            deferred
-                .primitives
-                .iter()
-                .all(|deferred| deferred.tiles == 0)
-        );
+        assert!(deferred.primitives.iter().all(|deferred| deferred.tiles == 0));
     }
 }

@@ -68,11 +68,8 @@ pub fn write<S: Simd>(
         return 0;
     }
     let late = draw.path == Path::LateTests && draw.tests.any();
-    let sources: Vec<Sources<'_>> = interface
-        .colors
-        .iter()
-        .map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot))))
-        .collect();
+    let sources: Vec<Sources<'_>> =
+        interface.colors.iter().map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)))).collect();
     let mut passed = 0;
     for chunk in 0..batch.chunks() {
         let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
@@ -80,19 +77,11 @@ pub fn write<S: Simd>(
         // Quads that cover the same sample are processed one after another, and so are quads that may have different
         // faces in a stencil test.
         let in_turn = batch.overlaps(chunk) || late && draw.tests.stencil.is_some();
-        let turns: &[u16] = if in_turn {
-            &[0xF, 0xF0, 0xF00, 0xF000]
-        } else {
-            &[0xFFFF]
-        };
+        let turns: &[u16] = if in_turn { &[0xF, 0xF0, 0xF00, 0xF000] } else { &[0xFFFF] };
         for &turn in turns {
             let mut samples = sample_lanes(batch, chunk, alive & turn);
             remove(simd, draw, interface, machine, chunk, &mut samples);
-            for (sample, lanes) in samples
-                .iter_mut()
-                .enumerate()
-                .take(draw.samples.positions.len())
-            {
+            for (sample, lanes) in samples.iter_mut().enumerate().take(draw.samples.positions.len()) {
                 if *lanes == 0 {
                     continue;
                 }
@@ -146,11 +135,7 @@ fn write_directly<S: Simd>(
             if dual {
                 second = load(simd, &sources[1], chunk);
             }
-            let turns: &[u16] = if batch.overlaps(chunk) {
-                &[0xF, 0xF0, 0xF00, 0xF000]
-            } else {
-                &[0xFFFF]
-            };
+            let turns: &[u16] = if batch.overlaps(chunk) { &[0xF, 0xF0, 0xF00, 0xF000] } else { &[0xFFFF] };
             for &turn in turns {
                 for sample in 0..count {
                     let lanes = covered.lanes(sample) & turn;
@@ -204,10 +189,7 @@ fn remove<S: Simd>(
     chunk: usize,
     samples: &mut [u16; 4],
 ) {
-    if let Some(masks) = interface
-        .sample_mask
-        .and_then(|slot| machine.output_vectors(slot).get(chunk))
-    {
+    if let Some(masks) = interface.sample_mask.and_then(|slot| machine.output_vectors(slot).get(chunk)) {
         for (lane, mask) in masks.0.iter().enumerate() {
             for (sample, lanes) in samples.iter_mut().enumerate() {
                 if mask >> sample & 1 == 0 {
@@ -238,9 +220,7 @@ fn late_depth<S: Simd>(
     chunk: usize,
     sample: usize,
 ) -> u32x16<S> {
-    let written = interface
-        .depth
-        .and_then(|slot| machine.output_vectors(slot).get(chunk));
+    let written = interface.depth.and_then(|slot| machine.output_vectors(slot).get(chunk));
     let depth = match written {
         Some(depth) => as_floats(simd, depth),
         None => {
@@ -288,11 +268,8 @@ fn write_colors<S: Simd>(
             continue;
         };
         let mut source = load(simd, &sources[0], chunk);
-        let mut second = if output.is_dual_source() {
-            load(simd, &sources[1], chunk)
-        } else {
-            [f32x16::splat(simd, 0.0); 4]
-        };
+        let mut second =
+            if output.is_dual_source() { load(simd, &sources[1], chunk) } else { [f32x16::splat(simd, 0.0); 4] };
         if draw.draw.state.alpha_to_one {
             source[3] = f32x16::splat(simd, 1.0);
             second[3] = f32x16::splat(simd, 1.0);

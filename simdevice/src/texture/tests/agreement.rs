@@ -11,21 +11,9 @@ use rand_chacha::ChaCha8Rng;
 fn coordinate(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..10) {
         0 => rng.random_range(-4i32..5) as f32 / 4.0,
-        1 => *[0.0, -0.0, 1.0, -1.0, 0.5, f32::EPSILON, -1e-10]
-            .choose(rng)
-            .unwrap(),
+        1 => *[0.0, -0.0, 1.0, -1.0, 0.5, f32::EPSILON, -1e-10].choose(rng).unwrap(),
         2 => f32::from_bits(rng.random()),
-        3 => *[
-            f32::NAN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            f32::MAX,
-            f32::MIN,
-            8_388_607.5,
-            -3e9,
-        ]
-        .choose(rng)
-        .unwrap(),
+        3 => *[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 8_388_607.5, -3e9].choose(rng).unwrap(),
         4 => rng.random_range(-1000.0..1000.0),
         _ => rng.random_range(-1.5..2.5),
     }
@@ -44,10 +32,7 @@ fn random_lod(rng: &mut ChaCha8Rng) -> LodRequest {
             dy: [(); 3].map(|()| lanes(|| rng.random_range(-0.5f32..0.5).to_bits())),
             minimum: lanes(|| rng.random_range(0f32..2.0).to_bits()),
         },
-        2 => LodRequest::Implicit {
-            bias: lanes(|| coordinate(rng).to_bits()),
-            minimum: [0; 16],
-        },
+        2 => LodRequest::Implicit { bias: lanes(|| coordinate(rng).to_bits()), minimum: [0; 16] },
         _ => LodRequest::Explicit([0; 16]),
     }
 }
@@ -58,9 +43,7 @@ fn random_sampler(rng: &mut ChaCha8Rng) -> Sampler {
     Sampler {
         mag_filter: *filters.choose(rng).unwrap(),
         min_filter: *filters.choose(rng).unwrap(),
-        mipmap_mode: *[MipmapMode::Nearest, MipmapMode::Linear]
-            .choose(rng)
-            .unwrap(),
+        mipmap_mode: *[MipmapMode::Nearest, MipmapMode::Linear].choose(rng).unwrap(),
         address_modes: [(); 3].map(|()| *MODES.choose(rng).unwrap()),
         mip_lod_bias: *[0.0, -0.5, 1.25].choose(rng).unwrap(),
         min_lod: *[0.0, 0.75].choose(rng).unwrap(),
@@ -82,15 +65,8 @@ fn assert_agree(case: &Case, image: &SampledImage, sampler: Sampler, request: &S
     let one_by_one = table.lane_by_lane().sample(0, 0, request);
     for lane in (0..16).filter(|lane| request.mask >> lane & 1 != 0) {
         let (a, b) = (floats(&batched, lane), floats(&one_by_one, lane));
-        let same = a
-            .iter()
-            .zip(b)
-            .all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
-        assert!(
-            same,
-            "lane {lane}: {a:?}, {b:?}\n{:?}\n{sampler:?}\n{request:?}",
-            image.view.image.desc
-        );
+        let same = a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
+        assert!(same, "lane {lane}: {a:?}, {b:?}\n{:?}\n{sampler:?}\n{request:?}", image.view.image.desc);
     }
 }
 
@@ -136,12 +112,8 @@ fn at_once_or_one_by_one_is_the_same(case: &Case) {
             texels[(7 * level + 31 * layer + x + 14 * y + 5 * z) as usize % texels.len()]
         });
         if round % 3 == 0 {
-            image.swizzle = [
-                ComponentSwizzle::Blue,
-                ComponentSwizzle::One,
-                ComponentSwizzle::Red,
-                ComponentSwizzle::Zero,
-            ];
+            image.swizzle =
+                [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Red, ComponentSwizzle::Zero];
         }
         let mut sampler = random_sampler(&mut rng);
         let coordinates: Vec<[f32; 4]> = (0..16)
@@ -156,11 +128,7 @@ fn at_once_or_one_by_one_is_the_same(case: &Case) {
         let mut request = request(dimension, &coordinates);
         request.shape.arrayed = arrayed;
         request.lod = random_lod(&mut rng);
-        request.mask = if round % 2 == 0 {
-            u16::MAX
-        } else {
-            rng.random()
-        };
+        request.mask = if round % 2 == 0 { u16::MAX } else { rng.random() };
         if round % 5 == 0 {
             request.offset = [(); 3].map(|()| lanes(|| rng.random_range(-9i32..10) as u32));
         }
@@ -196,11 +164,7 @@ fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
         for lane in 0..4 {
             let (x, y) = ((lane & 1) as f32, (lane >> 1) as f32);
             let [s, t] = [0, 1].map(|axis| first[axis] + x * right[axis] + y * below[axis]);
-            at.push(if odd {
-                [(); 4].map(|()| coordinate(rng))
-            } else {
-                [s, t, 0.0, 0.0]
-            });
+            at.push(if odd { [(); 4].map(|()| coordinate(rng)) } else { [s, t, 0.0, 0.0] });
         }
     }
     at
@@ -209,33 +173,18 @@ fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
 #[gaurast_runner::test(each = simd_levels())]
 fn plain_samples_are_the_same_one_by_one(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let formats = [
-        Format::R8G8B8A8Unorm,
-        Format::B8G8R8A8Unorm,
-        Format::R8G8B8A8Srgb,
-        Format::B8G8R8A8Srgb,
-    ];
+    let formats = [Format::R8G8B8A8Unorm, Format::B8G8R8A8Unorm, Format::R8G8B8A8Srgb, Format::B8G8R8A8Srgb];
     for round in 0..1500 {
         let [width, height]: [u32; 2] = [(); 2].map(|()| rng.random_range(1..70));
         let desc = ImageDesc {
             mip_levels: rng.random_range(1..=width.max(height).ilog2() + 1),
-            ..desc(
-                ImageKind::D2,
-                *formats.choose(&mut rng).unwrap(),
-                [width, height, 1],
-            )
+            ..desc(ImageKind::D2, *formats.choose(&mut rng).unwrap(), [width, height, 1])
         };
         let texels: Vec<[f32; 4]> = (0..97).map(|_| rng.random()).collect();
-        let mut image = image(desc, |level, _, [x, y, _]| {
-            texels[(7 * level + x + 14 * y) as usize % texels.len()]
-        });
+        let mut image = image(desc, |level, _, [x, y, _]| texels[(7 * level + x + 14 * y) as usize % texels.len()]);
         if round % 3 == 0 {
-            image.swizzle = [
-                ComponentSwizzle::Blue,
-                ComponentSwizzle::One,
-                ComponentSwizzle::Alpha,
-                ComponentSwizzle::Zero,
-            ];
+            image.swizzle =
+                [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Alpha, ComponentSwizzle::Zero];
         }
         let sampler = Sampler {
             mag_filter: Filter::Linear,
@@ -245,11 +194,7 @@ fn plain_samples_are_the_same_one_by_one(case: &Case) {
         };
         let mut request = request(Dimension::D2, &surface_coordinates(&mut rng));
         request.lod = LodRequest::Automatic;
-        request.mask = if round % 2 == 0 {
-            u16::MAX
-        } else {
-            rng.random()
-        };
+        request.mask = if round % 2 == 0 { u16::MAX } else { rng.random() };
         if round % 10 == 0 {
             request.offset[round / 10 % 2] = [2; 16];
         }
@@ -259,17 +204,9 @@ fn plain_samples_are_the_same_one_by_one(case: &Case) {
 
 #[gaurast_runner::test(each = simd_levels())]
 fn a_level_of_weight_zero_is_not_read(case: &Case) {
-    let desc = ImageDesc {
-        mip_levels: 2,
-        ..desc(ImageKind::D2, Format::R32Sfloat, [4, 4, 1])
-    };
-    let image = image(desc, |level, _, _| {
-        [if level == 0 { 0.5 } else { f32::INFINITY }, 0.0, 0.0, 1.0]
-    });
-    let sampler = Sampler {
-        mipmap_mode: MipmapMode::Linear,
-        ..Sampler::default()
-    };
+    let desc = ImageDesc { mip_levels: 2, ..desc(ImageKind::D2, Format::R32Sfloat, [4, 4, 1]) };
+    let image = image(desc, |level, _, _| [if level == 0 { 0.5 } else { f32::INFINITY }, 0.0, 0.0, 1.0]);
+    let sampler = Sampler { mipmap_mode: MipmapMode::Linear, ..Sampler::default() };
     let mut request = request(Dimension::D2, &[[0.3, 0.3, 0.0, 0.0]]);
     request.lod = LodRequest::Explicit(std::array::from_fn(|lane| (lane as f32 % 2.0).to_bits()));
     assert_agree(case, &image, sampler, &request);

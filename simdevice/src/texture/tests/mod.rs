@@ -18,22 +18,11 @@ use isa::resources::{ImageUnit, LaneWords, LodRequest, SampleRequest, TexelReque
 
 /// A shape that is neither arrayed nor multisampled.
 fn shape(dimension: Dimension) -> ImageShape {
-    ImageShape {
-        dimension,
-        arrayed: false,
-        multisampled: false,
-    }
+    ImageShape { dimension, arrayed: false, multisampled: false }
 }
 
 fn desc(kind: ImageKind, format: Format, extent: [u32; 3]) -> ImageDesc {
-    ImageDesc {
-        kind,
-        format,
-        extent,
-        mip_levels: 1,
-        array_layers: 1,
-        samples: 1,
-    }
+    ImageDesc { kind, format, extent, mip_levels: 1, array_layers: 1, samples: 1 }
 }
 
 /// An image whose texel at `(level, layer, [x, y, z])` has these components.
@@ -45,9 +34,7 @@ fn image(desc: ImageDesc, texel: impl Fn(u32, u32, [u32; 3]) -> [f32; 4]) -> Sam
         for layer in 0..desc.array_layers {
             let layout = image.subresource(aspect, level, layer).unwrap();
             let [width, height, depth] = layout.extent;
-            for at in (0..width * height * depth)
-                .map(|i| [i % width, i / width % height, i / width / height])
-            {
+            for at in (0..width * height * depth).map(|i| [i % width, i / width % height, i / width / height]) {
                 let bytes = layout.format.encode(texel(level, layer, at));
                 let size = layout.format.texel_size();
                 image.write_row(&layout, at, &bytes[..size]).unwrap();
@@ -95,11 +82,7 @@ fn floats(answer: &[LaneWords; 4], lane: usize) -> [f32; 4] {
 
 /// A sampler with this filter within levels.
 fn filtered(filter: Filter) -> Sampler {
-    Sampler {
-        mag_filter: filter,
-        min_filter: filter,
-        ..Sampler::default()
-    }
+    Sampler { mag_filter: filter, min_filter: filter, ..Sampler::default() }
 }
 
 /// All address modes.

@@ -52,26 +52,17 @@ fn filters_are_weighted_means() {
     let border = 0.625;
     for mode in MODES {
         for _ in 0..60 {
-            let extent = [
-                rng.random_range(1..8),
-                rng.random_range(1..8),
-                rng.random_range(1..8),
-            ];
+            let extent = [rng.random_range(1..8), rng.random_range(1..8), rng.random_range(1..8)];
             let texels: Vec<f32> = (0..512).map(|_| rng.random()).collect();
             let value = |[x, y, z]: [u32; 3]| texels[(x + 8 * y + 64 * z) as usize];
-            let image = image(
-                desc(ImageKind::D3, Format::R32Sfloat, extent),
-                |_, _, at| [value(at), 0.0, 0.0, 1.0],
-            );
+            let image = image(desc(ImageKind::D3, Format::R32Sfloat, extent), |_, _, at| [value(at), 0.0, 0.0, 1.0]);
             let sampler = Sampler {
                 address_modes: [mode; 3],
                 border_color: BorderColor::float([border, 0.0, 0.0, 0.0]),
                 ..filtered(Filter::Linear)
             };
             let table = table(image, sampler);
-            let coordinates: Vec<[f32; 4]> = (0..16)
-                .map(|_| [(); 4].map(|()| rng.random_range(-2.5..2.5)))
-                .collect();
+            let coordinates: Vec<[f32; 4]> = (0..16).map(|_| [(); 4].map(|()| rng.random_range(-2.5..2.5))).collect();
             let mut request = request(Dimension::D3, &coordinates);
             let offsets = [(); 3].map(|()| rng.random_range(-8..8));
             request.offset = offsets.map(|offset: i32| [offset as u32; 16]);
@@ -107,10 +98,9 @@ fn filters_are_weighted_means() {
 #[gaurast_runner::test]
 fn nearest_texels_are_those_that_hold_the_point() {
     for mode in MODES {
-        let image = image(
-            desc(ImageKind::D2, Format::R32Sfloat, [5, 3, 1]),
-            |_, _, [x, y, _]| [(x + 10 * y) as f32, 0.0, 0.0, 1.0],
-        );
+        let image = image(desc(ImageKind::D2, Format::R32Sfloat, [5, 3, 1]), |_, _, [x, y, _]| {
+            [(x + 10 * y) as f32, 0.0, 0.0, 1.0]
+        });
         let sampler = Sampler {
             address_modes: [mode; 3],
             border_color: BorderColor::float([-1.0, 0.0, 0.0, 0.0]),
@@ -131,10 +121,7 @@ fn nearest_texels_are_those_that_hold_the_point() {
 #[gaurast_runner::test]
 fn levels_of_detail_follow_the_footprint() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let desc = ImageDesc {
-        mip_levels: 7,
-        ..desc(ImageKind::D2, Format::R8G8B8A8Unorm, [100, 64, 1])
-    };
+    let desc = ImageDesc { mip_levels: 7, ..desc(ImageKind::D2, Format::R8G8B8A8Unorm, [100, 64, 1]) };
     let sampler = Sampler {
         mipmap_mode: MipmapMode::Linear,
         mip_lod_bias: 0.25,
@@ -144,23 +131,15 @@ fn levels_of_detail_follow_the_footprint() {
     };
     let table = table(image(desc, |_, _, _| [0.0; 4]), sampler);
     for _ in 0..200 {
-        let coordinates: Vec<[f32; 4]> = (0..16)
-            .map(|_| [(); 4].map(|()| rng.random_range(-0.3..0.3)))
-            .collect();
+        let coordinates: Vec<[f32; 4]> = (0..16).map(|_| [(); 4].map(|()| rng.random_range(-0.3..0.3))).collect();
         let mut request = request(Dimension::D2, &coordinates);
-        request.lod = LodRequest::Implicit {
-            bias: [0; 16],
-            minimum: [0; 16],
-        };
-        let [clamped, unclamped] = table
-            .lod(0, 0, &request)
-            .map(|lanes| lanes.map(f32::from_bits));
+        request.lod = LodRequest::Implicit { bias: [0; 16], minimum: [0; 16] };
+        let [clamped, unclamped] = table.lod(0, 0, &request).map(|lanes| lanes.map(f32::from_bits));
         for lane in 0..16 {
             let quad = lane & !3;
             let scale = |other: usize| {
-                let change = |axis: usize| {
-                    f64::from(coordinates[quad + other][axis]) - f64::from(coordinates[quad][axis])
-                };
+                let change =
+                    |axis: usize| f64::from(coordinates[quad + other][axis]) - f64::from(coordinates[quad][axis]);
                 (change(0) * 100.0).hypot(change(1) * 64.0)
             };
             let expected = scale(1).max(scale(2)).log2() + 0.25;

@@ -8,25 +8,13 @@ use proptest::prelude::*;
 use std::sync::Arc;
 
 fn image(kind: ImageKind, format: Format, extent: [u32; 3], array_layers: u32) -> Arc<Image> {
-    let desc = ImageDesc {
-        kind,
-        format,
-        extent,
-        mip_levels: 1,
-        array_layers,
-        samples: 1,
-    };
+    let desc = ImageDesc { kind, format, extent, mip_levels: 1, array_layers, samples: 1 };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     Arc::new(Image::new(desc, memory, 0).unwrap())
 }
 
 fn layers(aspect: Aspect, layer_count: u32) -> SubresourceLayers {
-    SubresourceLayers {
-        aspect,
-        mip_level: 0,
-        base_layer: 0,
-        layer_count,
-    }
+    SubresourceLayers { aspect, mip_level: 0, base_layer: 0, layer_count }
 }
 
 /// Sets all bytes to pseudo-random values.
@@ -54,12 +42,7 @@ fn texel(image: &Image, layer: u32, at: [u32; 3]) -> [f32; 4] {
 }
 
 fn blit(source: &Arc<Image>, target: &Arc<Image>, filter: Filter, region: ImageBlitRegion) {
-    blit_image(&BlitImage {
-        source: source.clone(),
-        target: target.clone(),
-        filter,
-        regions: vec![region],
-    });
+    blit_image(&BlitImage { source: source.clone(), target: target.clone(), filter, regions: vec![region] });
 }
 
 /// The position in the source of the centre of the target's texel `i` ("Image Copies With Scaling").
@@ -77,11 +60,7 @@ fn linear(image: &Image, layer: u32, place: [f64; 3]) -> [f64; 4] {
             let shifted = place[axis] - 0.5;
             let second = corner >> axis & 1;
             let fraction = shifted - shifted.floor();
-            weight *= if second == 1 {
-                fraction
-            } else {
-                1.0 - fraction
-            };
+            weight *= if second == 1 { fraction } else { 1.0 - fraction };
             let last = f64::from(image.desc.extent[axis] - 1);
             (shifted.floor() + f64::from(second)).clamp(0.0, last) as u32
         });
@@ -94,13 +73,8 @@ fn linear(image: &Image, layer: u32, place: [f64; 3]) -> [f64; 4] {
 }
 
 fn corners() -> impl Strategy<Value = [i32; 2]> {
-    (-3i32..12, 1i32..9, any::<bool>()).prop_map(|(first, length, mirrored)| {
-        if mirrored {
-            [first + length, first]
-        } else {
-            [first, first + length]
-        }
-    })
+    (-3i32..12, 1i32..9, any::<bool>())
+        .prop_map(|(first, length, mirrored)| if mirrored { [first + length, first] } else { [first, first + length] })
 }
 
 proptest! {
@@ -192,19 +166,13 @@ fn a_centre_on_an_edge_between_texels_lies_in_the_second() {
     // The width is halved: the centres are at 1, 3 and 5 of six texels.
     let source = image(ImageKind::D1, Format::R8Uint, [6, 1, 1], 1);
     let layout = source.subresource(Aspect::Color, 0, 0).unwrap();
-    source
-        .write_row(&layout, [0; 3], &[10, 11, 12, 13, 14, 15])
-        .unwrap();
+    source.write_row(&layout, [0; 3], &[10, 11, 12, 13, 14, 15]).unwrap();
     let target = image(ImageKind::D1, Format::R8Uint, [3, 1, 1], 1);
     let region = |width, mirrored: bool| ImageBlitRegion {
         source: layers(Aspect::Color, 1),
         source_corners: [[0; 3], [6, 1, 1]],
         target: layers(Aspect::Color, 1),
-        target_corners: if mirrored {
-            [[width, 0, 0], [0, 1, 1]]
-        } else {
-            [[0; 3], [width, 1, 1]]
-        },
+        target_corners: if mirrored { [[width, 0, 0], [0, 1, 1]] } else { [[0; 3], [width, 1, 1]] },
     };
     let read = || {
         let layout = target.subresource(Aspect::Color, 0, 0).unwrap();
@@ -251,9 +219,7 @@ fn components_are_converted_clamped_and_filled_in() {
         let source = image(ImageKind::D2, from, [1, 1, 1], 1);
         let target = image(ImageKind::D2, to, [1, 1, 1], 1);
         let layout = source.subresource(Aspect::Color, 0, 0).unwrap();
-        source
-            .write_row(&layout, [0; 3], &from.encode(texel)[..from.texel_size()])
-            .unwrap();
+        source.write_row(&layout, [0; 3], &from.encode(texel)[..from.texel_size()]).unwrap();
         let whole = [[0; 3], [1; 3]];
         let region = ImageBlitRegion {
             source: layers(Aspect::Color, 1),
@@ -267,28 +233,12 @@ fn components_are_converted_clamped_and_filled_in() {
     let (snorm, unorm) = (Format::R8G8B8A8Snorm, Format::R8G8B8A8Unorm);
     let texel = [-1.0, 1.0, 0.5, 0.25];
     assert_eq!(convert(snorm, texel, unorm), [0, 255, 129, 64]);
-    assert_eq!(
-        convert(
-            Format::R32Sfloat,
-            [7.0, 0.0, 0.0, 0.0],
-            Format::B8G8R8A8Unorm
-        ),
-        [0, 0, 255, 255]
-    );
-    assert_eq!(
-        convert(unorm, [0.5, 0.0, 1.0, 0.5], Format::R8G8B8A8Srgb),
-        [188, 0, 255, 128]
-    );
+    assert_eq!(convert(Format::R32Sfloat, [7.0, 0.0, 0.0, 0.0], Format::B8G8R8A8Unorm), [0, 0, 255, 255]);
+    assert_eq!(convert(unorm, [0.5, 0.0, 1.0, 0.5], Format::R8G8B8A8Srgb), [188, 0, 255, 128]);
     let integers = [300u32, 70_000, 5, 6].map(f32::from_bits);
-    assert_eq!(
-        convert(Format::R32G32B32A32Uint, integers, Format::R8G8B8A8Uint),
-        [255, 255, 5, 6]
-    );
+    assert_eq!(convert(Format::R32G32B32A32Uint, integers, Format::R8G8B8A8Uint), [255, 255, 5, 6]);
     let signed = [-300i32, 300, -1, 0].map(|i| f32::from_bits(i.cast_unsigned()));
-    assert_eq!(
-        convert(Format::R32G32B32A32Sint, signed, Format::R8G8B8A8Sint),
-        [0x80, 127, 0xFF, 0]
-    );
+    assert_eq!(convert(Format::R32G32B32A32Sint, signed, Format::R8G8B8A8Sint), [0x80, 127, 0xFF, 0]);
 }
 
 #[gaurast_runner::test]
@@ -301,10 +251,7 @@ fn hostile_regions_touch_nothing_else() {
         for a in extremes {
             for b in extremes {
                 for (layer, count) in [(0, u32::MAX), (u32::MAX, 1), (1, u32::MAX)] {
-                    let subresource = SubresourceLayers {
-                        base_layer: layer,
-                        ..layers(Aspect::Color, count)
-                    };
+                    let subresource = SubresourceLayers { base_layer: layer, ..layers(Aspect::Color, count) };
                     let region = ImageBlitRegion {
                         source: subresource,
                         source_corners: [[a; 3], [b; 3]],

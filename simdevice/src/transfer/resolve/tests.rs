@@ -41,24 +41,12 @@ fn floats_have_a_mean_and_integers_have_not() {
 fn one_sample_is_itself() {
     let mut out = [[0.0; 4]; 2];
     let row = [[0.1, 0.2, 0.3, 0.4], [f32::INFINITY; 4]];
-    resolve_row(
-        Format::R32G32B32A32Sfloat,
-        ResolveMode::Average,
-        [row.as_slice()],
-        &mut out,
-    );
+    resolve_row(Format::R32G32B32A32Sfloat, ResolveMode::Average, [row.as_slice()], &mut out);
     assert_eq!(out, row);
 }
 
 fn image(format: Format, samples: u32) -> Arc<Image> {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [4, 3, 1],
-        mip_levels: 1,
-        array_layers: 2,
-        samples,
-    };
+    let desc = ImageDesc { kind: ImageKind::D2, format, extent: [4, 3, 1], mip_levels: 1, array_layers: 2, samples };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     Arc::new(Image::new(desc, memory, 0).unwrap())
 }
@@ -72,17 +60,11 @@ fn a_region_of_each_layer_is_resolved() {
     for sample in 2..4 {
         let row = [255; 16];
         for y in 0..3 {
-            source
-                .write_row(&layout.sample(sample), [0, y, 0], &row)
-                .unwrap();
+            source.write_row(&layout.sample(sample), [0, y, 0], &row).unwrap();
         }
     }
-    let layers = |base_layer, layer_count| SubresourceLayers {
-        aspect: Aspect::Color,
-        mip_level: 0,
-        base_layer,
-        layer_count,
-    };
+    let layers =
+        |base_layer, layer_count| SubresourceLayers { aspect: Aspect::Color, mip_level: 0, base_layer, layer_count };
     resolve_image(&ResolveImage {
         source,
         target: target.clone(),

@@ -9,20 +9,12 @@ use std::sync::Arc;
 /// Draws Gaussians with coefficients up to degree 2, with each of these degrees in turn. Returns for each picture
 /// whether chunks were made. Every picture must equal that of a device without optimizations.
 fn built(cluster_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
-    let config = Config {
-        cluster_budget_bytes,
-        ..single()
-    };
+    let config = Config { cluster_budget_bytes, ..single() };
     let mut processor = CommandProcessor::new(Arc::new(Device::new(&config).unwrap()));
     let all = with_bands_of_zeros();
     let pictures = degrees.iter().map(|&degree| {
         let mut packets = all.clone();
-        if let [
-            Packet::GaussianBegin(begin),
-            Packet::GaussianAppend(append),
-            ..,
-        ] = &mut packets[..]
-        {
+        if let [Packet::GaussianBegin(begin), Packet::GaussianAppend(append), ..] = &mut packets[..] {
             Arc::make_mut(&mut begin.state).sh_degree = degree;
             let coefficients = (degree as usize + 1).pow(2);
             append.attributes.spherical_harmonics.truncate(coefficients);

@@ -1,25 +1,19 @@
 //! Sets of Gaussians in every mode, drawn with and without optimizations.
 
-use crate::common::{
-    HEIGHT, OVER, WIDTH, attachment, bytes, clear, gaussians, gaussians_in, image, rendering,
-    single,
-};
+use crate::common::{HEIGHT, OVER, WIDTH, attachment, bytes, clear, gaussians, gaussians_in, image, rendering, single};
 use simdevice::format::ClearValue;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::packet::{
-    AttachmentClear, AttributeStream, BufferRange, Draw, GaussianBegin, LoadOp, ModelAttributes,
-    PrimitiveBindings,
+    AttachmentClear, AttributeStream, BufferRange, Draw, GaussianBegin, LoadOp, ModelAttributes, PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{
-    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
-    VertexInput, VertexOutput,
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::gaussian::{
-    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
-    GaussianState,
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
 };
 use simdevice::state::{CompareOp, DepthTest, DrawState, Rect, Topology};
 use simdevice::stats::counters::{Counter, Counters};
@@ -39,24 +33,13 @@ pub fn pass_on(count: u32) -> Program {
 }
 
 pub fn programs() -> DrawPrograms {
-    let attribute =
-        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let attribute = |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
     let varyings = (0..4).map(|index| Some(VertexOutput::Varying(index)));
     let inputs = (0..4).map(|index| {
-        Some(FragmentInput::Varying {
-            index,
-            interpolation: Interpolation::Perspective,
-            sampling: Sampling::Center,
-        })
+        Some(FragmentInput::Varying { index, interpolation: Interpolation::Perspective, sampling: Sampling::Center })
     });
-    let outputs = (0..4).map(|component| {
-        Some(FragmentOutput::Color {
-            attachment: 0,
-            component,
-            index: 0,
-        })
-    });
+    let outputs = (0..4).map(|component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 }));
     DrawPrograms {
         vertex: pass_on(8),
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
@@ -79,29 +62,20 @@ pub fn programs() -> DrawPrograms {
 
 /// A draw of triangles with corners in clip space, with a depth test or without.
 pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet {
-    let vertices: Vec<[f32; 8]> = corners
-        .iter()
-        .map(|&[x, y, z, w]| [x, y, z, w, 0.5 + 0.4 * x, 0.5 + 0.4 * y, z, 0.7])
-        .collect();
+    let vertices: Vec<[f32; 8]> =
+        corners.iter().map(|&[x, y, z, w]| [x, y, z, w, 0.5 + 0.4 * x, 0.5 + 0.4 * y, z, 0.7]).collect();
     let size = size_of_val(&vertices[..]) as u64;
     let memory = Allocation::new_zeroed(size).unwrap();
     memory.write(0, vertices.as_flattened()).unwrap();
     let stream = |offset| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size },
         stride: 32,
         offset,
         format: Format::R32G32B32A32Sfloat,
         instance_divisor: None,
     };
     let mut state = DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT]);
-    state.depth_stencil.depth = tested.then_some(DepthTest {
-        compare: CompareOp::Less,
-        write: true,
-    });
+    state.depth_stencil.depth = tested.then_some(DepthTest { compare: CompareOp::Less, write: true });
     Packet::Draw(Box::new(Draw {
         pipeline: Arc::new(DrawPipeline::new(device.level(), &programs()).unwrap()),
         state: Arc::new(state),
@@ -121,11 +95,7 @@ pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet 
 
 /// A triangle over more than half of the framebuffer, at a depth.
 pub fn large(z: f32) -> [[f32; 4]; 3] {
-    [
-        [-1.0, -1.0, z, 1.0],
-        [1.5, -1.0, z, 1.0],
-        [-1.0, 1.5, z, 1.0],
-    ]
+    [[-1.0, -1.0, z, 1.0], [1.5, -1.0, z, 1.0], [-1.0, 1.5, z, 1.0]]
 }
 
 /// Large triangles, one of them hidden, and small ones, some in perspective.
@@ -134,11 +104,7 @@ pub fn all_triangles(device: &Device) -> Vec<Packet> {
         let at = |by: u32| (number * by % 97) as f32 / 50.0 - 0.95;
         let (x, y, z) = (at(31), at(57), 0.1 + 0.008 * (number % 89) as f32);
         let w = 1.0 + (number % 3) as f32;
-        [
-            [x, y, z, 1.0],
-            [x + 0.1, y, z, 1.0],
-            [x * w, (y + 0.2) * w, z * w, w],
-        ]
+        [[x, y, z, 1.0], [x + 0.1, y, z, 1.0], [x * w, (y + 0.2) * w, z * w, w]]
     };
     let several: Vec<[f32; 4]> = (0..200).flat_map(small).collect();
     // Each overwrites the one before it, as a whole or where it is nearer, with small ones between them.
@@ -151,19 +117,11 @@ pub fn all_triangles(device: &Device) -> Vec<Packet> {
         }
     }
     // Its depth is nearer than the others' at one end, and farther at the other.
-    let slanted = [
-        [-1.0, -1.0, 0.2, 1.0],
-        [1.5, -1.0, 0.99, 1.0],
-        [-1.0, 1.5, 0.99, 1.0],
-    ];
+    let slanted = [[-1.0, -1.0, 0.2, 1.0], [1.5, -1.0, 0.99, 1.0], [-1.0, 1.5, 0.99, 1.0]];
     vec![
         triangles(device, &large(0.9), false),
         triangles(device, &layers, false),
-        triangles(
-            device,
-            &[&layers[..], &slanted[..], &layers[..]].concat(),
-            true,
-        ),
+        triangles(device, &[&layers[..], &slanted[..], &layers[..]].concat(), true),
         triangles(device, &large(0.5), true),
         triangles(device, &several, true),
         triangles(device, &large(0.7), true),
@@ -174,12 +132,7 @@ pub fn all_triangles(device: &Device) -> Vec<Packet> {
 pub fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
     let mut packets = gaussians_in(false, seed, count, OVER);
     if let Packet::GaussianBegin(begin) = &mut packets[0] {
-        begin.scissor = Rect {
-            x: 0,
-            y: 0,
-            width: 35,
-            height: 40,
-        };
+        begin.scissor = Rect { x: 0, y: 0, width: 35, height: 40 };
     }
     packets
 }
@@ -208,15 +161,9 @@ pub fn placed() -> Vec<Packet> {
     let elements = [0.0, 1.0, 2.0].map(matrix);
     let size = size_of_val(&elements) as u64;
     let memory = Allocation::new_zeroed(size).unwrap();
-    memory
-        .write(0, elements.as_flattened().as_flattened())
-        .unwrap();
+    memory.write(0, elements.as_flattened().as_flattened()).unwrap();
     let stream = |row: u32| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size },
         stride: 64,
         offset: 16 * row,
         format: Format::R32G32B32A32Sfloat,
@@ -224,10 +171,8 @@ pub fn placed() -> Vec<Packet> {
     };
     if let Packet::GaussianAppend(append) = &mut packets[1] {
         append.instance_count = 3;
-        append.attributes.model = ModelAttributes {
-            matrix: Some(Box::new([stream(0), stream(1), stream(2)])),
-            opacity: Some(stream(3)),
-        };
+        append.attributes.model =
+            ModelAttributes { matrix: Some(Box::new([stream(0), stream(1), stream(2)])), opacity: Some(stream(3)) };
     }
     packets
 }
@@ -271,12 +216,7 @@ pub fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
     let mut placed = placed();
     shrink(&placed[1]);
     if let Packet::GaussianBegin(begin) = &mut placed[0] {
-        begin.scissor = Rect {
-            x: 0,
-            y: 0,
-            width: 35,
-            height: 40,
-        };
+        begin.scissor = Rect { x: 0, y: 0, width: 35, height: 40 };
     }
     let modes: [(&str, Change); 7] = [
         ("volumes", |_| {}),
@@ -317,29 +257,14 @@ pub type Change = fn(&mut GaussianBegin);
 /// between them.
 pub fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(
-        vec![AttachmentClear::Color {
-            index: 0,
-            value: ClearValue::Float([0.4, 0.1, 0.9, 0.5]),
-        }],
-        &[Rect {
-            x: 30,
-            y: 20,
-            width: 40,
-            height: 40,
-        }],
+        vec![AttachmentClear::Color { index: 0, value: ClearValue::Float([0.4, 0.1, 0.9, 0.5]) }],
+        &[Rect { x: 30, y: 20, width: 40, height: 40 }],
     );
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
-    let several = [
-        gaussians(3, 20, OVER),
-        vec![clear_part],
-        gaussians(4, 300, OVER),
-    ];
+    let several = [gaussians(3, 20, OVER), vec![clear_part], gaussians(4, 300, OVER)];
     let mut ties = gaussians_in(false, 6, 3000, OVER);
     if let Packet::GaussianBegin(begin) = &mut ties[0] {
-        begin.state = Arc::new(GaussianState {
-            order: GaussianOrder::Primitive,
-            ..(*begin.state).clone()
-        });
+        begin.state = Arc::new(GaussianState { order: GaussianOrder::Primitive, ..(*begin.state).clone() });
     }
     let panorama = changed(8, |begin| {
         begin.camera = Camera {
@@ -350,10 +275,8 @@ pub fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
         };
     });
     let unscented = changed(9, |begin| {
-        begin.state = Arc::new(GaussianState {
-            linearization: GaussianLinearization::Unscented,
-            ..(*begin.state).clone()
-        });
+        begin.state =
+            Arc::new(GaussianState { linearization: GaussianLinearization::Unscented, ..(*begin.state).clone() });
     });
     let in_mode = |seed: u64, change: fn(&mut GaussianState)| {
         let mut packets = gaussians(seed, 500, OVER);
@@ -388,19 +311,13 @@ pub fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
 /// Draws a scene twice on a device of its own, over triangles if the attachment is loaded. Returns the bytes of colours
 /// and depths, and the counters.
 pub fn draw(optimizations: Optimizations, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
-    let config = Config {
-        optimizations,
-        ..single()
-    };
+    let config = Config { optimizations, ..single() };
     let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
     let depth = image(Format::D32Sfloat, 1, 0);
     let device = Arc::new(Device::new(&config).unwrap());
     let mut processor = CommandProcessor::new(Arc::clone(&device));
     let mut rendering = rendering(attachment(&target, load));
-    let far = ClearValue::DepthStencil {
-        depth: 1.0,
-        stencil: 0,
-    };
+    let far = ClearValue::DepthStencil { depth: 1.0, stencil: 0 };
     rendering.depth = Some(attachment(&depth, LoadOp::Clear(far)));
     // A pipeline belongs to one device.
     let triangles = match load {
@@ -445,19 +362,14 @@ pub fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<C
     let memory = &append.attributes.position.buffer.memory;
     let target = image(Format::R32G32B32A32Sfloat, 1, 0);
     let clear = LoadOp::Clear(ClearValue::Float([0.0; 4]));
-    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
-        &target, clear,
-    ))))];
+    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(&target, clear))))];
     let mut processor = CommandProcessor::new(Arc::new(Device::new(config).unwrap()));
     let passes = (0..4).map(|pass| {
         let before = processor.counters().clone();
         for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
             processor.execute(packet).unwrap();
         }
-        let plain = Config {
-            optimizations: Optimizations::ALL.without(Optimization::ClusterCulling),
-            ..single()
-        };
+        let plain = Config { optimizations: Optimizations::ALL.without(Optimization::ClusterCulling), ..single() };
         let drawn = bytes(&target);
         let mut other = CommandProcessor::new(Arc::new(Device::new(&plain).unwrap()));
         for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
@@ -529,11 +441,7 @@ pub fn with_bands_of_zeros() -> Vec<Packet> {
     }
     append.attributes.spherical_harmonics = (0..9)
         .map(|k| AttributeStream {
-            buffer: BufferRange {
-                memory: memory.clone(),
-                offset: 0,
-                size,
-            },
+            buffer: BufferRange { memory: memory.clone(), offset: 0, size },
             stride: 4 * FLOATS,
             offset: 12 * k,
             format: Format::R32G32B32Sfloat,

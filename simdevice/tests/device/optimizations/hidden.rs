@@ -41,32 +41,17 @@ fn what_is_hidden_changes_no_bit() {
         (
             "a scissor",
             |begin| {
-                begin.scissor = Rect {
-                    x: 21,
-                    y: 17,
-                    width: 61,
-                    height: 43,
-                };
+                begin.scissor = Rect { x: 21, y: 17, width: 61, height: 43 };
             },
             true,
         ),
-        (
-            "a lower floor",
-            |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 1e-9,
-            true,
-        ),
-        (
-            "no floor",
-            |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 0.0,
-            false,
-        ),
+        ("a lower floor", |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 1e-9, true),
+        ("no floor", |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 0.0, false),
         (
             "tested",
             |begin| {
-                Arc::make_mut(&mut begin.state).depth_stencil.depth = Some(DepthTest {
-                    compare: CompareOp::Less,
-                    write: false,
-                });
+                Arc::make_mut(&mut begin.state).depth_stencil.depth =
+                    Some(DepthTest { compare: CompareOp::Less, write: false });
             },
             false,
         ),
@@ -79,11 +64,8 @@ fn what_is_hidden_changes_no_bit() {
                 change(begin);
             }
             let (image, counters) = draw(Optimizations::ALL, &packets, over_black);
-            let (other, without) = draw(
-                Optimizations::ALL.without(Optimization::OcclusionCulling),
-                &packets,
-                over_black,
-            );
+            let (other, without) =
+                draw(Optimizations::ALL.without(Optimization::OcclusionCulling), &packets, over_black);
             assert!(image == other, "{name}, {right}");
             hidden += counters.get(Counter::HiddenByOthers);
             let read = |counters: &Counters| counters.get(Counter::GaussiansRead);

@@ -41,10 +41,7 @@ fn every_skip_saves_work() {
         saved.add_all(&draw(Optimizations::ALL, &packets, load).1);
     }
     for &optimization in Optimization::ALL {
-        assert!(
-            saved.get(optimization.counter()) > 0,
-            "{optimization:?} saved nothing"
-        );
+        assert!(saved.get(optimization.counter()) > 0, "{optimization:?} saved nothing");
     }
 }
 
@@ -56,22 +53,12 @@ fn no_skip_changes_a_bit(case: &gaurast_runner::Case) {
         let (other, without) = draw(Optimizations::NONE, &packets, load);
         assert!(other == image, "{scene}: without any optimization");
         for &optimization in Optimization::ALL {
-            assert_eq!(
-                without.get(optimization.counter()),
-                0,
-                "{scene}: {optimization:?}"
-            );
-            for optimizations in [
-                Optimizations::ALL.without(optimization),
-                Optimizations::NONE.with(optimization),
-            ] {
+            assert_eq!(without.get(optimization.counter()), 0, "{scene}: {optimization:?}");
+            for optimizations in [Optimizations::ALL.without(optimization), Optimizations::NONE.with(optimization)] {
                 let (other, counters) = draw(optimizations, &packets, load);
                 assert!(other == image, "{scene}: {optimizations:?}");
                 let count = counters.get(optimization.counter());
-                assert!(
-                    count == 0 || optimizations.has(optimization),
-                    "{scene}: {optimization:?}"
-                );
+                assert!(count == 0 || optimizations.has(optimization), "{scene}: {optimization:?}");
             }
         }
     }
@@ -83,11 +70,7 @@ fn without_skips_everything_is_worked_on() {
         let (_, counters) = draw(Optimizations::NONE, &packets, load);
         let pairs = counters.get(Counter::TilePairs);
         assert_eq!(counters.get(Counter::TilePairsEvaluated), pairs, "{scene}");
-        assert_eq!(
-            counters.get(Counter::BlockEvaluations),
-            16 * pairs,
-            "{scene}"
-        );
+        assert_eq!(counters.get(Counter::BlockEvaluations), 16 * pairs, "{scene}");
     }
 }
 
@@ -119,9 +102,6 @@ fn chunks_are_made_anew_when_the_memory_was_written() {
 
 #[gaurast_runner::test]
 fn chunks_stay_within_their_budget() {
-    let config = Config {
-        cluster_budget_bytes: 100_000,
-        ..single()
-    };
+    let config = Config { cluster_budget_bytes: 100_000, ..single() };
     assert_eq!(chunks_built(&draw_again(&config, |_, _| {})), [0; 4]);
 }

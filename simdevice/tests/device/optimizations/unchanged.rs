@@ -3,9 +3,7 @@
 use super::drawing::{draw_as_without_skips, programs};
 use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
 use simdevice::format::ClearValue;
-use simdevice::packet::{
-    AttributeStream, BufferRange, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp,
-};
+use simdevice::packet::{AttributeStream, BufferRange, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp};
 use simdevice::program::bindings::Bindings;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::resolve;
@@ -78,9 +76,7 @@ fn what_the_host_may_write_is_read_again() {
 
 #[gaurast_runner::test]
 fn every_change_is_seen() {
-    let state = |change: fn(&mut GaussianState)| {
-        of_begin(move |begin| change(Arc::make_mut(&mut begin.state)))
-    };
+    let state = |change: fn(&mut GaussianState)| of_begin(move |begin| change(Arc::make_mut(&mut begin.state)));
     let changes = vec![
         of_begin(|begin| begin.camera.eye[0] += 1e-9),
         of_begin(|begin| begin.viewport.width -= 1.0),
@@ -116,10 +112,7 @@ fn what_a_program_resolves_is_a_set_of_its_own() {
             sampling: Sampling::Center,
         })
     };
-    let program = FragmentPrograms {
-        inputs: (0..4).map(input).collect(),
-        ..programs().fragment.unwrap()
-    };
+    let program = FragmentPrograms { inputs: (0..4).map(input).collect(), ..programs().fragment.unwrap() };
     let shader = Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
         program: Arc::new(GaussianFragmentProgram::new(device.level(), &program).unwrap()),
         bindings: Bindings::default(),
@@ -148,20 +141,12 @@ fn what_a_program_resolves_is_a_set_of_its_own() {
 /// Two instances, placed by matrices that only the device writes.
 fn placed_in_the_device() -> Vec<Packet> {
     let mut packets = few();
-    let rows = [
-        [1.0f32, 0.0, 0.0, 0.5],
-        [0.0, 1.0, 0.0, 0.0],
-        [0.0, 0.0, 1.0, 0.3],
-    ];
+    let rows = [[1.0f32, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.3]];
     let memory = Allocation::new(96, false).unwrap();
     memory.write(0, rows.as_flattened()).unwrap();
     memory.write(48, rows.as_flattened()).unwrap();
     let stream = |row: u32| AttributeStream {
-        buffer: BufferRange {
-            memory: memory.clone(),
-            offset: 0,
-            size: 96,
-        },
+        buffer: BufferRange { memory: memory.clone(), offset: 0, size: 96 },
         stride: 48,
         offset: 16 * row,
         format: Format::R32G32B32A32Sfloat,

@@ -10,9 +10,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder.join("sensitivity"))?;
     std::fs::write(folder.join("SENSITIVITY.md"), sensitivity::markdown()?)?;
     for sweep in sensitivity::sweeps(&sensitivity::frame())? {
-        let file = folder
-            .join("sensitivity")
-            .join(format!("{}.svg", sweep.file));
+        let file = folder.join("sensitivity").join(format!("{}.svg", sweep.file));
         std::fs::write(file, sweep.svg())?;
     }
     Ok(())

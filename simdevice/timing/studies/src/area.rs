@@ -36,12 +36,7 @@ struct Units {
 impl Units {
     /// The areas of 32-bit units. If the exponential's area is not given, it is solved from the paper's ratio.
     fn single(table: &AreaConfig) -> Self {
-        let mut units = Self {
-            add: table.add_um2,
-            mul: table.mul_um2,
-            div: table.div_um2,
-            exp: table.exp_um2,
-        };
+        let mut units = Self { add: table.add_um2, mul: table.mul_um2, div: table.div_um2, exp: table.exp_um2 };
         if units.exp == 0.0 {
             units.exp = (table.enhanced_ratio * units.there() - units.added()).max(0.0);
         }
@@ -52,12 +47,7 @@ impl Units {
     fn half(table: &AreaConfig) -> Self {
         let single = Self::single(table);
         let shrink = table.half_mul_um2 / table.mul_um2;
-        Self {
-            add: table.half_add_um2,
-            mul: table.half_mul_um2,
-            div: single.div * shrink,
-            exp: single.exp * shrink,
-        }
+        Self { add: table.half_add_um2, mul: table.half_mul_um2, div: single.div * shrink, exp: single.exp * shrink }
     }
 
     /// The area of a PE for triangles.
@@ -74,11 +64,7 @@ impl Units {
 /// The area of a configuration's components. Units have 16 bits if its numbers have at most two bytes.
 pub fn area(config: &Config) -> Area {
     let table = &config.area;
-    let units = if config.rasterizer.number_bytes <= 2 {
-        Units::half(table)
-    } else {
-        Units::single(table)
-    };
+    let units = if config.rasterizer.number_bytes <= 2 { Units::half(table) } else { Units::single(table) };
     // Areas shrink as the square of the feature size.
     let shrink = (table.technology_nm / table.reference_nm).powi(2) * 1e-6;
     let pes = f64::from(config.rasterizer.pes());

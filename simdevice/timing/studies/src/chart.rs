@@ -68,10 +68,7 @@ pub fn svg(charts: &[Chart]) -> String {
     let mut body = String::new();
     let mut left = 0;
     for chart in charts {
-        body += &format!(
-            "<g transform=\"translate({left},0)\">\n{}</g>\n",
-            chart.body()
-        );
+        body += &format!("<g transform=\"translate({left},0)\">\n{}</g>\n", chart.body());
         left += chart.size[0];
     }
     format!(
@@ -82,18 +79,14 @@ pub fn svg(charts: &[Chart]) -> String {
 
 /// Text with SVG's special characters escaped.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// A round step that divides `top` into a few.
 fn round_step(top: f64) -> f64 {
     let rough = top / 6.0;
     let power = 10f64.powf(rough.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|&factor| factor * power >= rough);
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|&factor| factor * power >= rough);
     factor.unwrap_or(10.0) * power
 }
 
@@ -112,10 +105,7 @@ impl Chart {
         let last = self.steps.len().saturating_sub(1) as f64;
         let across = (step + MARGIN) / (last + 2.0 * MARGIN);
         let up = value / self.top();
-        [
-            left + across * (width - left - right),
-            height - bottom - up * (height - top - bottom),
-        ]
+        [left + across * (width - left - right), height - bottom - up * (height - top - bottom)]
     }
 
     fn body(&self) -> String {
@@ -136,77 +126,39 @@ impl Chart {
         let mut value = 0.0;
         while value <= self.top() {
             let [_, y] = self.place(0.0, value);
-            writeln!(
-                out,
-                "<path d=\"M{left:.1} {y:.1}H{end:.1}\" stroke=\"#ddd\"/>"
-            )?;
+            writeln!(out, "<path d=\"M{left:.1} {y:.1}H{end:.1}\" stroke=\"#ddd\"/>")?;
             let (x, below) = (left - 6.0, y + 4.0);
-            writeln!(
-                out,
-                "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"end\">{value:.decimals$}</text>"
-            )?;
+            writeln!(out, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"end\">{value:.decimals$}</text>")?;
             value += step;
         }
-        writeln!(
-            out,
-            "<path d=\"M{left:.1} {top:.1}V{base:.1}H{end:.1}\" stroke=\"black\" fill=\"none\"/>"
-        )?;
+        writeln!(out, "<path d=\"M{left:.1} {top:.1}V{base:.1}H{end:.1}\" stroke=\"black\" fill=\"none\"/>")?;
         let every = self.steps.len().div_ceil(MAX_NAMES).max(1);
         for (step, name) in self.steps.iter().enumerate().step_by(every) {
             let [x, _] = self.place(step as f64, 0.0);
             let (y, name) = (base + 17.0, escaped(name));
-            writeln!(
-                out,
-                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{name}</text>"
-            )?;
+            writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{name}</text>")?;
         }
         let [across, up] = self.axes.each_ref().map(|axis| escaped(axis));
         let (middle, y) = ((left + end) / 2.0, height - 10.0);
-        writeln!(
-            out,
-            "<text x=\"{middle:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{across}</text>"
-        )?;
+        writeln!(out, "<text x=\"{middle:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{across}</text>")?;
         let y = (top + base) / 2.0;
-        writeln!(
-            out,
-            "<text transform=\"translate(16,{y:.1}) rotate(-90)\" text-anchor=\"middle\">{up}</text>"
-        )
+        writeln!(out, "<text transform=\"translate(16,{y:.1}) rotate(-90)\" text-anchor=\"middle\">{up}</text>")
     }
 
     fn write_curves(&self, out: &mut String) -> std::fmt::Result {
         for mark in &self.marks {
-            let ([x, low], [_, high]) = (
-                self.place(mark.step as f64, 0.0),
-                self.place(mark.step as f64, self.top()),
-            );
+            let ([x, low], [_, high]) = (self.place(mark.step as f64, 0.0), self.place(mark.step as f64, self.top()));
             let color = mark.color;
-            writeln!(
-                out,
-                "<path d=\"M{x:.1} {low:.1}V{high:.1}\" stroke=\"{color}\" stroke-dasharray=\"4\"/>"
-            )?;
+            writeln!(out, "<path d=\"M{x:.1} {low:.1}V{high:.1}\" stroke=\"{color}\" stroke-dasharray=\"4\"/>")?;
         }
         for Curve { color, values, .. } in &self.curves {
-            let finite = values
-                .iter()
-                .enumerate()
-                .filter(|(_, value)| value.is_finite());
-            let places: Vec<_> = finite
-                .map(|(step, &value)| self.place(step as f64, value))
-                .collect();
-            let points: Vec<_> = places
-                .iter()
-                .map(|[x, y]| format!("{x:.1},{y:.1}"))
-                .collect();
+            let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
+            let places: Vec<_> = finite.map(|(step, &value)| self.place(step as f64, value)).collect();
+            let points: Vec<_> = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
             let points = points.join(" ");
-            writeln!(
-                out,
-                "<polyline points=\"{points}\" stroke=\"{color}\" stroke-width=\"2\" fill=\"none\"/>"
-            )?;
+            writeln!(out, "<polyline points=\"{points}\" stroke=\"{color}\" stroke-width=\"2\" fill=\"none\"/>")?;
             for [x, y] in places {
-                writeln!(
-                    out,
-                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>"
-                )?;
+                writeln!(out, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>")?;
             }
         }
         Ok(())
@@ -216,22 +168,14 @@ impl Chart {
         let curves = self.curves.iter().map(|curve| (curve.label, curve.color));
         let marks = self.marks.iter().map(|mark| (mark.label, mark.color));
         let entries: Vec<_> = curves.chain(marks).collect();
-        let longest = entries
-            .iter()
-            .map(|(label, _)| label.len())
-            .max()
-            .unwrap_or(0);
-        let [width, height] = [
-            longest as f64 * LETTER + 40.0,
-            entries.len() as f64 * LINE + 8.0,
-        ];
+        let longest = entries.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
+        let [width, height] = [longest as f64 * LETTER + 40.0, entries.len() as f64 * LINE + 8.0];
         let [left, top, right, bottom] = ROOM;
         let [x, y] = match self.legend {
             Corner::UpperLeft => [left + 8.0, top + 4.0],
-            Corner::LowerRight => [
-                f64::from(self.size[0]) - right - width - 8.0,
-                f64::from(self.size[1]) - bottom - height - 8.0,
-            ],
+            Corner::LowerRight => {
+                [f64::from(self.size[0]) - right - width - 8.0, f64::from(self.size[1]) - bottom - height - 8.0]
+            }
         };
         writeln!(
             out,
@@ -241,16 +185,9 @@ impl Chart {
         for (line, (label, color)) in entries.into_iter().enumerate() {
             let middle = y + 12.0 + line as f64 * LINE;
             let (x, below) = (x + 6.0, middle + 4.0);
-            writeln!(
-                out,
-                "<path d=\"M{x:.1} {middle:.1}h16\" stroke=\"{color}\" stroke-width=\"2\"/>"
-            )?;
+            writeln!(out, "<path d=\"M{x:.1} {middle:.1}h16\" stroke=\"{color}\" stroke-width=\"2\"/>")?;
             let x = x + 22.0;
-            writeln!(
-                out,
-                "<text x=\"{x:.1}\" y=\"{below:.1}\">{}</text>",
-                escaped(label)
-            )?;
+            writeln!(out, "<text x=\"{x:.1}\" y=\"{below:.1}\">{}</text>", escaped(label))?;
         }
         Ok(())
     }
@@ -265,16 +202,8 @@ mod tests {
             size: [400, 300],
             axes: ["modules & more".to_owned(), "speed-up".to_owned()],
             steps: ["1", "2", "4"].map(str::to_owned).into(),
-            curves: vec![Curve {
-                label: "raster",
-                color: "red",
-                values: vec![0.0, 10.0, f64::NAN],
-            }],
-            marks: vec![Mark {
-                label: "paper",
-                color: "gray",
-                step: 1,
-            }],
+            curves: vec![Curve { label: "raster", color: "red", values: vec![0.0, 10.0, f64::NAN] }],
+            marks: vec![Mark { label: "paper", color: "gray", step: 1 }],
             legend: Corner::UpperLeft,
         }
     }

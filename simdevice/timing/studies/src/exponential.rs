@@ -41,14 +41,7 @@ const SINGLE: Widths = Widths {
     slope: 22,
     curvature: 16,
     line: [0.693_139_528_347_847_5, 0.241_531_355_813_391_2],
-    polynomial: &[
-        134_217_728,
-        93_032_692,
-        32_240_064,
-        7_470_163,
-        1_234_721,
-        240_031,
-    ],
+    polynomial: &[134_217_728, 93_032_692, 32_240_064, 7_470_163, 1_234_721, 240_031],
 };
 
 const HALF: Widths = Widths {
@@ -71,11 +64,7 @@ struct Entry {
 
 impl Widths {
     fn of(format: Format) -> &'static Self {
-        if format == Format::SINGLE {
-            &SINGLE
-        } else {
-            &HALF
-        }
+        if format == Format::SINGLE { &SINGLE } else { &HALF }
     }
 
     /// Computes an entry from square roots and products alone, which every processor rounds alike.
@@ -112,19 +101,14 @@ impl Widths {
     fn horner(&self, fraction: u64) -> u64 {
         let mut coefficients = self.polynomial.iter().rev();
         let first = coefficients.next().copied().unwrap_or_default();
-        coefficients.fold(first, |sum, coefficient| {
-            coefficient + ((sum * fraction) >> self.fraction)
-        })
+        coefficients.fold(first, |sum, coefficient| coefficient + ((sum * fraction) >> self.fraction))
     }
 }
 
 /// 2 to the power of a number.
 pub fn exp2(format: Format, design: Exponential, x: u32) -> u32 {
     let widths = Widths::of(format);
-    let (sign, exponent) = (
-        format.is_negative(x),
-        x >> format.mantissa & ((1 << format.exponent) - 1),
-    );
+    let (sign, exponent) = (format.is_negative(x), x >> format.mantissa & ((1 << format.exponent) - 1));
     let unbiased = i64::from(exponent) - format.bias();
     let far = if sign { 0 } else { format.greatest() };
     if unbiased >= format.exponent.into() {
@@ -219,8 +203,7 @@ mod tests {
 
     #[test]
     fn powers_are_within_an_ulp_or_two() {
-        let ulps =
-            |format: Format, design| error(format, design) * (1u64 << format.mantissa) as f64;
+        let ulps = |format: Format, design| error(format, design) * (1u64 << format.mantissa) as f64;
         assert!(ulps(Format::SINGLE, Exponential::Table) < 0.8);
         assert!(ulps(Format::SINGLE, Exponential::Polynomial) < 2.5);
         assert!(ulps(Format::HALF, Exponential::Table) < 0.8);

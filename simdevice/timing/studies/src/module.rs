@@ -125,10 +125,7 @@ impl Module {
         let mut pe = Pe::new(self.format, self.exponential);
         let mut pixels = vec![Pixel::new(self.format); GROUPS * LANES];
         let centres = self.centres();
-        let mut work = TileWork {
-            listed: list.primitives.len() as u32,
-            ..TileWork::default()
-        };
+        let mut work = TileWork { listed: list.primitives.len() as u32, ..TileWork::default() };
         for primitive in &list.primitives {
             let open = open_groups(&pixels);
             if open == 0 {
@@ -152,20 +149,14 @@ impl Module {
             }
         }
         work.terminated = pixels.iter().filter(|pixel| pixel.finished).count() as u32;
-        Drawn {
-            pixels: pixels.iter().map(|pixel| pixel.color).collect(),
-            work,
-        }
+        Drawn { pixels: pixels.iter().map(|pixel| pixel.color).collect(), work }
     }
 
     fn draw_triangles(&self, list: &List) -> Drawn {
         let mut pe = Pe::new(self.format, self.exponential);
         let centres = self.centres();
         let mut pixels = vec![[0, 0, self.format.greatest()]; GROUPS * LANES];
-        let mut work = TileWork {
-            listed: list.primitives.len() as u32,
-            ..TileWork::default()
-        };
+        let mut work = TileWork { listed: list.primitives.len() as u32, ..TileWork::default() };
         for primitive in &list.primitives {
             let groups = primitive.groups();
             push(&mut work.runs, u16::MAX, TILE_SIDE as u8, groups);
@@ -219,19 +210,10 @@ fn open_groups(pixels: &[Pixel]) -> u16 {
 fn push(runs: &mut Vec<Run>, open: u16, rows: u8, reached: u16) {
     let (blocks, reached) = (open.count_ones() as u8, reached.count_ones());
     match runs.last_mut() {
-        Some(run)
-            if (run.rows, run.blocks) == (rows, blocks)
-                && run.reached == reached * run.primitives =>
-        {
+        Some(run) if (run.rows, run.blocks) == (rows, blocks) && run.reached == reached * run.primitives => {
             run.primitives += 1;
             run.reached += reached;
         }
-        _ => runs.push(Run {
-            primitives: 1,
-            rows,
-            blocks,
-            reached,
-            ..Run::default()
-        }),
+        _ => runs.push(Run { primitives: 1, rows, blocks, reached, ..Run::default() }),
     }
 }

@@ -22,15 +22,9 @@ struct Parts {
 
 impl Format {
     /// The layout of IEEE 754's binary32. The greatest exponent has no special meaning.
-    pub const SINGLE: Self = Self {
-        exponent: 8,
-        mantissa: 23,
-    };
+    pub const SINGLE: Self = Self { exponent: 8, mantissa: 23 };
     /// The layout of IEEE 754's binary16. The greatest exponent has no special meaning.
-    pub const HALF: Self = Self {
-        exponent: 5,
-        mantissa: 10,
-    };
+    pub const HALF: Self = Self { exponent: 5, mantissa: 10 };
 
     /// Bits of a number.
     pub const fn bits(self) -> u32 {
@@ -100,11 +94,7 @@ impl Format {
     /// The rounded sum.
     pub fn add(self, a: u32, b: u32) -> u32 {
         let magnitude = |a: u32| a & ((1 << (self.exponent + self.mantissa)) - 1);
-        let (large, small) = if magnitude(a) >= magnitude(b) {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        let (large, small) = if magnitude(a) >= magnitude(b) { (a, b) } else { (b, a) };
         let (large, small) = (self.parts(large), self.parts(small));
         if large.significand == 0 {
             // Both are zero.
@@ -174,12 +164,7 @@ impl Format {
         let shifted = numerator << (self.mantissa + 1);
         let (quotient, rest) = (shifted / b.significand, shifted % b.significand);
         let significand = quotient << 1 | u64::from(rest != 0);
-        self.round(
-            sign >> (self.exponent + self.mantissa),
-            exponent,
-            significand,
-            2,
-        )
+        self.round(sign >> (self.exponent + self.mantissa), exponent, significand, 2)
     }
 
     /// The number nearest to a value.
@@ -200,11 +185,7 @@ impl Format {
         let parts = self.parts(number);
         let power = parts.exponent - self.bias() - i64::from(self.mantissa);
         let magnitude = parts.significand as f64 * 2f64.powi(power as i32);
-        if parts.sign == 1 {
-            -magnitude
-        } else {
-            magnitude
-        }
+        if parts.sign == 1 { -magnitude } else { magnitude }
     }
 }
 
@@ -254,10 +235,9 @@ mod tests {
                 }
                 down
             };
-            for (ours, exact) in [
-                (half.add(a, b), half.value(a) + half.value(b)),
-                (half.mul(a, b), half.value(a) * half.value(b)),
-            ] {
+            for (ours, exact) in
+                [(half.add(a, b), half.value(a) + half.value(b)), (half.mul(a, b), half.value(a) * half.value(b))]
+            {
                 if exact.abs() > 1e-4 && exact.abs() < 6e4 {
                     assert_eq!(ours, nearest(exact), "{a:x} {b:x}");
                 }
@@ -278,10 +258,7 @@ mod tests {
             assert_eq!(format.div(0, one), 0);
             // Subnormals are zero.
             assert_eq!(format.add(least - 1, 0), 0);
-            assert_eq!(
-                format.add(format.negate(0), format.negate(0)),
-                format.negate(0)
-            );
+            assert_eq!(format.add(format.negate(0), format.negate(0)), format.negate(0));
             assert_eq!(format.sub(one, one), 0);
             assert_eq!(format.value(one), 1.0);
             assert_eq!(format.number(1.0), one);

@@ -60,13 +60,7 @@ pub struct Gaussian {
 
 impl Gaussian {
     /// The Gaussian in numbers of a format; its exponent is to the base e, and its opacity a factor.
-    pub fn new(
-        format: Format,
-        mean: [f32; 2],
-        exponent: [f32; 3],
-        opacity: f32,
-        color: [f32; 3],
-    ) -> Self {
+    pub fn new(format: Format, mean: [f32; 2], exponent: [f32; 3], opacity: f32, color: [f32; 3]) -> Self {
         let of = |value| format.number(value);
         Self {
             mean: mean.map(of),
@@ -98,11 +92,7 @@ pub struct Pixel {
 impl Pixel {
     /// A black pixel with full transmittance.
     pub fn new(format: Format) -> Self {
-        Self {
-            color: [0; 3],
-            transmittance: format.one(),
-            finished: false,
-        }
+        Self { color: [0; 3], transmittance: format.one(), finished: false }
     }
 }
 
@@ -153,11 +143,7 @@ pub struct Pe {
 impl Pe {
     /// A processing element with no operations counted.
     pub fn new(format: Format, exponential: Exponential) -> Self {
-        Self {
-            format,
-            exponential,
-            operations: Operations::default(),
-        }
+        Self { format, exponential, operations: Operations::default() }
     }
 
     fn add(&mut self, a: u32, b: u32) -> u32 {
@@ -194,12 +180,7 @@ impl Pe {
 
     /// Evaluates a triangle at a pixel's centre. Returns the fragment; None if the pixel is not covered. Depth is
     /// `depth[0] + depth[1] / w`.
-    pub fn triangle(
-        &mut self,
-        triangle: &Triangle,
-        at: [u32; 2],
-        depth: [u32; 2],
-    ) -> Option<Fragment> {
+    pub fn triangle(&mut self, triangle: &Triangle, at: [u32; 2], depth: [u32; 2]) -> Option<Fragment> {
         let u = self.plane(triangle.u, at);
         let v = self.plane(triangle.v, at);
         let inverse_w = self.plane(triangle.w, at);
@@ -210,20 +191,12 @@ impl Pe {
         let scaled = self.mul(depth[1], inverse_w);
         let depth = self.add(depth[0], scaled);
         // The signs tell whether the pixel is covered.
-        let outside = [u, v, rest]
-            .into_iter()
-            .any(|weight| self.format.is_negative(weight));
+        let outside = [u, v, rest].into_iter().any(|weight| self.format.is_negative(weight));
         (!outside).then_some(Fragment { u, v, depth })
     }
 
     /// Blends a Gaussian into the pixel with this centre. Returns true if it contributed.
-    pub fn gaussian(
-        &mut self,
-        g: &Gaussian,
-        at: [u32; 2],
-        thresholds: &Thresholds,
-        pixel: &mut Pixel,
-    ) -> bool {
+    pub fn gaussian(&mut self, g: &Gaussian, at: [u32; 2], thresholds: &Thresholds, pixel: &mut Pixel) -> bool {
         let dx = self.sub(at[0], g.mean[0]);
         let dy = self.sub(at[1], g.mean[1]);
         let along = self.mul(g.exponent[0], dx);
@@ -322,8 +295,7 @@ mod tests {
                 let mut pixel = Pixel::new(SINGLE);
                 for g in &gaussians {
                     let before = pe.operations;
-                    contributions +=
-                        u32::from(pe.gaussian(g, at, &Thresholds::new(SINGLE), &mut pixel));
+                    contributions += u32::from(pe.gaussian(g, at, &Thresholds::new(SINGLE), &mut pixel));
                     let after = pe.operations;
                     let spent = Operations {
                         add: after.add - before.add,
@@ -335,10 +307,7 @@ mod tests {
                 }
                 let (color, t) = reference(&gaussians, at);
                 for (ours, theirs) in pixel.color.iter().zip(color) {
-                    assert!(
-                        (SINGLE.value(*ours) - theirs).abs() < 2e-6,
-                        "{pixel:?} {color:?}"
-                    );
+                    assert!((SINGLE.value(*ours) - theirs).abs() < 2e-6, "{pixel:?} {color:?}");
                 }
                 assert!((SINGLE.value(pixel.transmittance) - t).abs() < 2e-6);
             }
@@ -359,14 +328,8 @@ mod tests {
             [a, b, values[0] - a * x0 - b * y0].map(|value| value as f32)
         };
         let inverse = vertices.map(|[_, _, w]: [f64; 3]| 1.0 / w);
-        let triangle = Triangle::new(
-            SINGLE,
-            [
-                plane([0.0, inverse[1], 0.0]),
-                plane([0.0, 0.0, inverse[2]]),
-                plane(inverse),
-            ],
-        );
+        let triangle =
+            Triangle::new(SINGLE, [plane([0.0, inverse[1], 0.0]), plane([0.0, 0.0, inverse[2]]), plane(inverse)]);
         let mut pe = pe();
         let mut covered = 0;
         for y in 0..16u8 {
@@ -377,9 +340,7 @@ mod tests {
                 let fragment = pe.triangle(&triangle, at.map(|c| SINGLE.number(c as f32)), depth);
                 assert_eq!(pe.operations, Operations::TRIANGLE);
                 // Weights on the screen, then over w.
-                let weight = |a: [f64; 3], b: [f64; 3]| {
-                    (b[0] - a[0]) * (at[1] - a[1]) - (b[1] - a[1]) * (at[0] - a[0])
-                };
+                let weight = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (at[1] - a[1]) - (b[1] - a[1]) * (at[0] - a[0]);
                 let [p, q, r] = vertices;
                 let screen = [weight(q, r), weight(r, p), weight(p, q)];
                 let inside = screen.iter().all(|&w| w >= 0.0);

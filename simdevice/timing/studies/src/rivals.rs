@@ -36,35 +36,17 @@ const INSTANCE_BYTES: f64 = 36.0;
 const RECTANGLE: f64 = 4.0 / std::f64::consts::PI;
 
 /// The work of a fragment: the quadratic form of two interpolated numbers, its test, an exponential, four outputs.
-const FRAGMENT: ShaderWork = ShaderWork {
-    float: 10.0,
-    integer: 2.0,
-    special: 1.0,
-    wide: 0.0,
-    memory: 2.0,
-    image: 0.0,
-    other: 4.0,
-    bytes: 0.0,
-};
+const FRAGMENT: ShaderWork =
+    ShaderWork { float: 10.0, integer: 2.0, special: 1.0, wide: 0.0, memory: 2.0, image: 0.0, other: 4.0, bytes: 0.0 };
 
 /// The work of a vertex, which is a corner of the rectangle.
-const VERTEX: ShaderWork = ShaderWork {
-    float: 12.0,
-    integer: 4.0,
-    special: 0.0,
-    wide: 0.0,
-    memory: 9.0,
-    image: 0.0,
-    other: 4.0,
-    bytes: 0.0,
-};
+const VERTEX: ShaderWork =
+    ShaderWork { float: 12.0, integer: 4.0, special: 0.0, wide: 0.0, memory: 9.0, image: 0.0, other: 4.0, bytes: 0.0 };
 
 impl Quads {
     /// Milliseconds of the whole: the units work in parallel, and the slowest of them decides.
     pub fn milliseconds(&self) -> f64 {
-        [self.shade_ms, self.setup_ms, self.blend_ms, self.memory_ms]
-            .into_iter()
-            .fold(0.0, f64::max)
+        [self.shade_ms, self.setup_ms, self.blend_ms, self.memory_ms].into_iter().fold(0.0, f64::max)
     }
 
     /// The name of the slowest unit.
@@ -85,9 +67,7 @@ impl Quads {
 fn pixels(draw: &DrawWork) -> f64 {
     let tile = |tile: &timing::work::TileWork| {
         let runs = tile.runs.iter();
-        let reached: u64 = runs
-            .map(|run| u64::from(run.reached) + u64::from(run.hidden_blocks))
-            .sum();
+        let reached: u64 = runs.map(|run| u64::from(run.reached) + u64::from(run.hidden_blocks)).sum();
         let listed = f64::from(tile.listed) / f64::from(tile.needed().max(1));
         reached as f64 * listed * f64::from(TILE_PIXELS / TILE_GROUPS)
     };
@@ -96,18 +76,11 @@ fn pixels(draw: &DrawWork) -> f64 {
 
 /// Stage 3 of a frame's Gaussians, drawn as quads on the configuration's GPU without GauRast.
 pub fn quads(frame: &FrameWork, config: &Config) -> Quads {
-    let draws = || {
-        frame
-            .draws
-            .iter()
-            .filter(|draw| draw.mode == Mode::Gaussian)
-    };
+    let draws = || frame.draws.iter().filter(|draw| draw.mode == Mode::Gaussian);
     let fragments = draws().map(pixels).sum::<f64>() * RECTANGLE;
     let gaussians = draws().map(|draw| draw.drawn as f64).sum::<f64>();
     let screen = f64::from(frame.size[0]) * f64::from(frame.size[1]);
-    let mut work = FRAGMENT
-        .times(fragments)
-        .plus(&VERTEX.times(4.0 * gaussians));
+    let mut work = FRAGMENT.times(fragments).plus(&VERTEX.times(4.0 * gaussians));
     work.bytes = INSTANCE_BYTES * gaussians + PIXEL_BYTES * screen;
     let roofline = shader_cores::roofline(&work, &config.shader, &config.memory);
     let cycles_per_ms = config.shader.clock_ghz * 1e6;
@@ -199,14 +172,7 @@ pub const PUBLISHED: [Published; 12] = [
         baseline: "the conventional graphics pipeline: blended quads on a simulated GPU",
         source: "VR-Pipe's abstract, HPCA 2025 (arXiv 2502.17078)",
     },
-    Published {
-        name: "VR-Pipe, mean speed-up",
-        number: "",
-        scenes: "",
-        resolution: "",
-        baseline: "",
-        source: UNREAD,
-    },
+    Published { name: "VR-Pipe, mean speed-up", number: "", scenes: "", resolution: "", baseline: "", source: UNREAD },
     Published {
         name: "Neo, throughput over an edge GPU, at most",
         number: "10.0x",
@@ -231,14 +197,7 @@ pub const PUBLISHED: [Published; 12] = [
         baseline: "an edge GPU",
         source: "the same",
     },
-    Published {
-        name: "Neo, area",
-        number: "",
-        scenes: "",
-        resolution: "",
-        baseline: "",
-        source: UNREAD,
-    },
+    Published { name: "Neo, area", number: "", scenes: "", resolution: "", baseline: "", source: UNREAD },
 ];
 
 #[cfg(test)]
@@ -268,11 +227,7 @@ mod tests {
     fn a_number_has_a_source_and_what_it_is_of_or_says_that_it_was_not_read() {
         for row in PUBLISHED {
             assert_eq!(row.number.is_empty(), row.source == UNREAD, "{}", row.name);
-            assert!(
-                row.number.is_empty() || !row.baseline.is_empty(),
-                "{}",
-                row.name
-            );
+            assert!(row.number.is_empty() || !row.baseline.is_empty(), "{}", row.name);
         }
     }
 }

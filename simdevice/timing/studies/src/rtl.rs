@@ -19,10 +19,7 @@ const HARDWARE: &[(&str, &str)] = &[
     ("fp_exp2.sv", include_str!("../rtl/fp_exp2.sv")),
     ("pe.sv", include_str!("../rtl/pe.sv")),
     ("pixel_buffer.sv", include_str!("../rtl/pixel_buffer.sv")),
-    (
-        "primitive_buffer.sv",
-        include_str!("../rtl/primitive_buffer.sv"),
-    ),
+    ("primitive_buffer.sv", include_str!("../rtl/primitive_buffer.sv")),
     ("raster_module.sv", include_str!("../rtl/raster_module.sv")),
 ];
 
@@ -49,10 +46,7 @@ pub fn files() -> Vec<(&'static str, String)> {
 /// Names of the modules' files, for a tool's command line.
 pub fn sources() -> Vec<&'static str> {
     let names = HARDWARE.iter().map(|(name, _)| *name);
-    names
-        .filter(|name| name.ends_with(".sv"))
-        .chain([TABLE])
-        .collect()
+    names.filter(|name| name.ends_with(".sv")).chain([TABLE]).collect()
 }
 
 /// Cycles until the bench's memory answers a request that was not made ahead: the presets' 100 ns.
@@ -120,21 +114,8 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     let mut command = Command::new("verilator");
     command
         .current_dir(folder)
-        .args([
-            "--cc",
-            "--exe",
-            "--build",
-            "-O3",
-            "-Wno-WIDTH",
-            "--Mdir",
-            &objects,
-        ])
-        .args([
-            "-CFLAGS",
-            "-O1",
-            "-MAKEFLAGS",
-            "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1",
-        ])
+        .args(["--cc", "--exe", "--build", "-O3", "-Wno-WIDTH", "--Mdir", &objects])
+        .args(["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"])
         .args(["--top-module", top])
         .arg(format!("-GEXPONENT={}", format.exponent))
         .arg(format!("-GMANTISSA={}", format.mantissa))
@@ -168,14 +149,7 @@ fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
         return Err(Error::other(format!("{}: failed", program.display())));
     }
     let words = bytes?;
-    Ok(words
-        .chunks_exact(4)
-        .map(|word| {
-            word.iter()
-                .rev()
-                .fold(0, |all, &byte| all << 8 | u32::from(byte))
-        })
-        .collect())
+    Ok(words.chunks_exact(4).map(|word| word.iter().rev().fold(0, |all, &byte| all << 8 | u32::from(byte))).collect())
 }
 
 /// A program that runs every unit, in every design, under Verilator.
@@ -256,29 +230,20 @@ impl ModuleBench {
         let mut memory = Vec::new();
         for list in lists {
             let count = list.primitives.len() as u32;
-            words.extend([
-                u32::from(list.mode == Mode::Gaussian),
-                memory.len() as u32,
-                count,
-            ]);
+            words.extend([u32::from(list.mode == Mode::Gaussian), memory.len() as u32, count]);
             self.store(list, &mut memory);
         }
         let (memory, _) = memory.as_chunks();
         words.extend(memory.iter().map(|&bytes| u32::from_le_bytes(bytes)));
         let out = run(&self.program, &words)?;
-        let (head, beats) = out
-            .split_first_chunk::<8>()
-            .ok_or_else(|| Error::other("the bench wrote nothing"))?;
+        let (head, beats) = out.split_first_chunk::<8>().ok_or_else(|| Error::other("the bench wrote nothing"))?;
         let &[cycles, a, b, c, d, e, f, latency] = head;
         let per_tile = (TILE_PIXELS * 3 * self.format.bits() / 32) as usize;
         Ok(Rasterized {
             cycles,
             causes: [a, b, c, d, e, f],
             latency,
-            pixels: beats
-                .chunks(per_tile)
-                .map(|tile| self.pixels(tile))
-                .collect(),
+            pixels: beats.chunks(per_tile).map(|tile| self.pixels(tile)).collect(),
         })
     }
 

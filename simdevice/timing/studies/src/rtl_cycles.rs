@@ -28,24 +28,9 @@ pub struct Setting {
 impl Setting {
     /// The paper's configuration, and two that skip groups.
     pub const ALL: [Self; 3] = [
-        Self {
-            name: "whole tiles",
-            groups: Groups::Rows,
-            masked: false,
-            seed: 1,
-        },
-        Self {
-            name: "blocks that are reached and open",
-            groups: Groups::Blocks,
-            masked: true,
-            seed: 2,
-        },
-        Self {
-            name: "rows that are reached and open",
-            groups: Groups::Rows,
-            masked: true,
-            seed: 3,
-        },
+        Self { name: "whole tiles", groups: Groups::Rows, masked: false, seed: 1 },
+        Self { name: "blocks that are reached and open", groups: Groups::Blocks, masked: true, seed: 2 },
+        Self { name: "rows that are reached and open", groups: Groups::Rows, masked: true, seed: 3 },
     ];
 
     /// The model of the module.
@@ -77,12 +62,7 @@ impl Cycles {
     ///
     /// # Errors
     /// Returns an error if the bench can't be run.
-    pub fn of(
-        bench: &ModuleBench,
-        setting: Setting,
-        format: Format,
-        lists: &[List],
-    ) -> Result<Self> {
+    pub fn of(bench: &ModuleBench, setting: Setting, format: Format, lists: &[List]) -> Result<Self> {
         let module = setting.module(format);
         let rasterized = bench.run(lists, &module, LATENCY)?;
         let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
@@ -116,8 +96,7 @@ impl Cycles {
     /// transmittance, for memory, for the controller, changing modes.
     pub fn by_cause(&self) -> [[f64; 2]; 6] {
         let modules = &self.stepped.modules;
-        let [_, busy, dependency, memory, controller, modes] =
-            self.rasterized.causes.map(f64::from);
+        let [_, busy, dependency, memory, controller, modes] = self.rasterized.causes.map(f64::from);
         [
             [f64::from(self.rasterized.cycles), self.stepped.cycles],
             [busy, modules.busy],
@@ -150,12 +129,7 @@ fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
         Format::HALF => "fp16",
         _ => "paper-15x16",
     };
-    let settings = [
-        "modules=1",
-        "bandwidth_gb_s=1000",
-        "saturation=reached",
-        "triangle_traversal=reached",
-    ];
+    let settings = ["modules=1", "bandwidth_gb_s=1000", "saturation=reached", "triangle_traversal=reached"];
     Config::preset(base, &settings.map(str::to_owned))
 }
 
@@ -163,10 +137,7 @@ fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
 fn frame(lists: &[List], drawn: &[Drawn]) -> FrameWork {
     let draw = |(index, (list, drawn)): (usize, (&List, &Drawn))| DrawWork {
         mode: list.mode,
-        tiles: vec![TileWork {
-            at: [index as u32, 0],
-            ..drawn.work.clone()
-        }],
+        tiles: vec![TileWork { at: [index as u32, 0], ..drawn.work.clone() }],
         ..DrawWork::default()
     };
     FrameWork {
@@ -184,37 +155,15 @@ mod tests {
     /// Lists of small Gaussians, for which the module takes the model's cycles with `sharing`.
     fn cycles(sharing: f64, reached: u32) -> Cycles {
         let config = machine(Format::SINGLE).unwrap();
-        let run = Run {
-            primitives: 600,
-            rows: 16,
-            blocks: 16,
-            reached: 600 * reached,
-            ..Run::default()
-        };
-        let tile = TileWork {
-            listed: 600,
-            runs: vec![run],
-            ..TileWork::default()
-        };
-        let draw = DrawWork {
-            tiles: vec![tile],
-            ..DrawWork::default()
-        };
-        let frame = FrameWork {
-            size: [16, 16],
-            draws: vec![draw],
-            ..FrameWork::default()
-        };
+        let run = Run { primitives: 600, rows: 16, blocks: 16, reached: 600 * reached, ..Run::default() };
+        let tile = TileWork { listed: 600, runs: vec![run], ..TileWork::default() };
+        let draw = DrawWork { tiles: vec![tile], ..DrawWork::default() };
+        let frame = FrameWork { size: [16, 16], draws: vec![draw], ..FrameWork::default() };
         let mut of_module = config.clone();
         of_module.rasterizer.neighbour_sharing = sharing;
         let report = stepped::rasterize(&frame, &of_module, 0.0);
         Cycles {
-            rasterized: Rasterized {
-                cycles: report.cycles as u32,
-                causes: [0; 6],
-                latency: 0,
-                pixels: Vec::new(),
-            },
+            rasterized: Rasterized { cycles: report.cycles as u32, causes: [0; 6], latency: 0, pixels: Vec::new() },
             stepped: report,
             different_pixels: 0,
             tiles: 1,

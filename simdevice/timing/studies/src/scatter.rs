@@ -63,19 +63,12 @@ struct Scale {
 impl Axis {
     /// The position of a value, before it is scaled to pixels.
     fn place(&self, value: f64) -> f64 {
-        if self.logarithmic {
-            value.log10()
-        } else {
-            value
-        }
+        if self.logarithmic { value.log10() } else { value }
     }
 
     fn scale(&self, values: impl Iterator<Item = f64>) -> Scale {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for value in values
-            .map(|value| self.place(value))
-            .filter(|value| value.is_finite())
-        {
+        for value in values.map(|value| self.place(value)).filter(|value| value.is_finite()) {
             (low, high) = (low.min(value), high.max(value));
         }
         if low > high {
@@ -85,18 +78,13 @@ impl Axis {
             let range = [low.floor(), high.ceil().max(low.floor() + 1.0)];
             let decades = range[0] as i32..=range[1] as i32;
             let mark = |power: i32| (f64::from(power), decade(power));
-            return Scale {
-                range,
-                marks: decades.map(mark).collect(),
-            };
+            return Scale { range, marks: decades.map(mark).collect() };
         }
         let room = ((high - low) * 0.05).max(high.abs() * 1e-3).max(1e-9);
         let (low, high) = (low - room, high + room);
         let rough = (high - low) / MARKS;
         let power = 10f64.powf(rough.log10().floor());
-        let factor = [1.0, 2.0, 5.0, 10.0]
-            .into_iter()
-            .find(|factor| factor * power >= rough);
+        let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * power >= rough);
         let step = factor.unwrap_or(10.0) * power;
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let first = (low / step).ceil();
@@ -105,10 +93,7 @@ impl Axis {
             let value = (first + index as f64) * step;
             (value, format!("{value:.decimals$}"))
         };
-        Scale {
-            range: [low, high],
-            marks: (0..count).map(mark).collect(),
-        }
+        Scale { range: [low, high], marks: (0..count).map(mark).collect() }
     }
 }
 
@@ -123,9 +108,7 @@ fn decade(power: i32) -> String {
 
 /// Text with SVG's special characters escaped.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// The approximate width of a letter and the height of a line of text, in pixels.
@@ -145,11 +128,7 @@ impl Taken {
     fn is_free(&self, [left, top, right, bottom]: Rectangle) -> bool {
         let [low, high, far, deep] = self.within;
         let apart = |&[a, b, c, d]: &Rectangle| right < a || c < left || bottom < b || d < top;
-        left >= low
-            && top >= high
-            && right <= far
-            && bottom <= deep
-            && self.rectangles.iter().all(apart)
+        left >= low && top >= high && right <= far && bottom <= deep && self.rectangles.iter().all(apart)
     }
 
     /// Takes the places of a line's pieces.
@@ -165,8 +144,7 @@ impl Taken {
 
     /// Takes the places within a distance of a point, across and up.
     fn around(&mut self, [x, y]: [f64; 2], distance: f64) {
-        self.rectangles
-            .push([x - distance, y - distance, x + distance, y + distance]);
+        self.rectangles.push([x - distance, y - distance, x + distance, y + distance]);
     }
 
     /// Takes the nearest free place for a text at a point, and returns its anchor and the begin of its baseline or, if
@@ -176,10 +154,7 @@ impl Taken {
         for line in 0..4 {
             let further = 15.0 * f64::from(line);
             for baseline in [y - 6.0 - further, y + 15.0 + further] {
-                for (anchor, begin, end) in [
-                    ("start", x + 6.0, x + 6.0 + width),
-                    ("end", x - 6.0 - width, x - 6.0),
-                ] {
+                for (anchor, begin, end) in [("start", x + 6.0, x + 6.0 + width), ("end", x - 6.0 - width, x - 6.0)] {
                     let rectangle = [begin, baseline - height + 2.0, end, baseline + 3.0];
                     if self.is_free(rectangle) {
                         self.rectangles.push(rectangle);
@@ -226,53 +201,27 @@ impl Plot {
         let y = |place: f64| base - share(1, place) * (base - top);
         for (place, name) in &scales[0].marks {
             let (x, below) = (x(*place), base + 17.0);
-            writeln!(
-                out,
-                "<path d=\"M{x:.1} {top:.1}V{base:.1}\" stroke=\"#ddd\"/>"
-            )?;
-            writeln!(
-                out,
-                "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{name}</text>"
-            )?;
+            writeln!(out, "<path d=\"M{x:.1} {top:.1}V{base:.1}\" stroke=\"#ddd\"/>")?;
+            writeln!(out, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{name}</text>")?;
         }
         for (place, name) in &scales[1].marks {
             let (y, before) = (y(*place), left - 6.0);
-            writeln!(
-                out,
-                "<path d=\"M{left:.1} {y:.1}H{end:.1}\" stroke=\"#ddd\"/>"
-            )?;
+            writeln!(out, "<path d=\"M{left:.1} {y:.1}H{end:.1}\" stroke=\"#ddd\"/>")?;
             let below = y + 4.0;
-            writeln!(
-                out,
-                "<text x=\"{before:.1}\" y=\"{below:.1}\" text-anchor=\"end\">{name}</text>"
-            )?;
+            writeln!(out, "<text x=\"{before:.1}\" y=\"{below:.1}\" text-anchor=\"end\">{name}</text>")?;
         }
-        writeln!(
-            out,
-            "<path d=\"M{left:.1} {top:.1}V{base:.1}H{end:.1}\" stroke=\"black\" fill=\"none\"/>"
-        )?;
+        writeln!(out, "<path d=\"M{left:.1} {top:.1}V{base:.1}H{end:.1}\" stroke=\"black\" fill=\"none\"/>")?;
         let place = |at: [f64; 2]| {
             let [across, up] = [self.axes[0].place(at[0]), self.axes[1].place(at[1])];
             (across.is_finite() && up.is_finite()).then(|| [x(across), y(up)])
         };
-        let mut taken = Taken {
-            within: [left, 0.0, width, base],
-            rectangles: Vec::new(),
-        };
+        let mut taken = Taken { within: [left, 0.0, width, base], rectangles: Vec::new() };
         for point in self.points.iter().filter_map(|point| place(point.at)) {
             taken.around(point, 4.0);
         }
-        for Line {
-            through,
-            name,
-            color,
-        } in &self.lines
-        {
+        for Line { through, name, color } in &self.lines {
             let places: Vec<_> = through.iter().filter_map(|&at| place(at)).collect();
-            let text: Vec<_> = places
-                .iter()
-                .map(|[x, y]| format!("{x:.1},{y:.1}"))
-                .collect();
+            let text: Vec<_> = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
             writeln!(
                 out,
                 "<polyline points=\"{}\" stroke=\"{color}\" stroke-width=\"2\" fill=\"none\"/>",
@@ -287,10 +236,7 @@ impl Plot {
                 let begin = x - LETTER[0] * letters;
                 taken.rectangles.push([begin, y - LETTER[1], x, y + 3.0]);
                 let name = escaped(name);
-                writeln!(
-                    out,
-                    "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"{color}\">{name}</text>"
-                )?;
+                writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"{color}\">{name}</text>")?;
             }
         }
         for point in &self.points {
@@ -306,18 +252,12 @@ impl Plot {
             if point.labelled
                 && let Some((anchor, [x, y])) = taken.text([x, y], letters)
             {
-                writeln!(
-                    out,
-                    "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{name}</text>"
-                )?;
+                writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{name}</text>")?;
             }
         }
         let (middle, low) = ((left + end) / 2.0, height - 10.0);
         let [across, up] = self.axes.each_ref().map(|axis| escaped(&axis.name));
-        writeln!(
-            out,
-            "<text x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{across}</text>"
-        )?;
+        writeln!(out, "<text x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{across}</text>")?;
         let middle = (top + base) / 2.0;
         writeln!(
             out,
@@ -351,39 +291,20 @@ mod tests {
 
     #[test]
     fn the_front_has_what_nothing_beats() {
-        let places = [
-            [1.0, 5.0],
-            [2.0, 5.0],
-            [2.0, 3.0],
-            [3.0, 4.0],
-            [4.0, 1.0],
-            [1.0, 6.0],
-        ];
+        let places = [[1.0, 5.0], [2.0, 5.0], [2.0, 3.0], [3.0, 4.0], [4.0, 1.0], [1.0, 6.0]];
         assert_eq!(pareto(&places), [0, 2, 4]);
         assert!(pareto(&[]).is_empty());
     }
 
     #[test]
     fn points_and_lines_are_where_the_axes_say() {
-        let axis = |name: &str, logarithmic| Axis {
-            name: name.to_owned(),
-            logarithmic,
-        };
-        let point = |at| Point {
-            at,
-            name: "a < b".to_owned(),
-            labelled: true,
-            color: "red",
-        };
+        let axis = |name: &str, logarithmic| Axis { name: name.to_owned(), logarithmic };
+        let point = |at| Point { at, name: "a < b".to_owned(), labelled: true, color: "red" };
         let plot = Plot {
             size: [400, 300],
             axes: [axis("operations a byte", true), axis("time", false)],
             points: vec![point([1.0, 0.0]), point([100.0, 2.0]), point([0.0, 1.0])],
-            lines: vec![Line {
-                through: vec![[1.0, 0.0], [1000.0, 1.0]],
-                name: "roof".to_owned(),
-                color: "blue",
-            }],
+            lines: vec![Line { through: vec![[1.0, 0.0], [1000.0, 1.0]], name: "roof".to_owned(), color: "blue" }],
         };
         let svg = plot.svg();
         // A point at zero has no position on a logarithmic axis.
@@ -397,22 +318,15 @@ mod tests {
 
     #[test]
     fn names_are_not_written_over_each_other_nor_over_points() {
-        let axis = || Axis {
-            name: String::new(),
-            logarithmic: false,
-        };
+        let axis = || Axis { name: String::new(), logarithmic: false };
         let point = |index: u32| Point {
             at: [f64::from(index / 4), f64::from(index % 4) * 1e-3],
             name: format!("machine {index}"),
             labelled: true,
             color: "red",
         };
-        let plot = Plot {
-            size: [500, 300],
-            axes: [axis(), axis()],
-            points: (0..40).map(point).collect(),
-            lines: Vec::new(),
-        };
+        let plot =
+            Plot { size: [500, 300], axes: [axis(), axis()], points: (0..40).map(point).collect(), lines: Vec::new() };
         let svg = plot.svg();
         let numbers = |line: &str, names: [&str; 2]| {
             names.map(|name| -> f64 {
@@ -421,11 +335,8 @@ mod tests {
                 number.parse().expect("a number")
             })
         };
-        let circles: Vec<_> = svg
-            .lines()
-            .filter(|line| line.starts_with("<circle"))
-            .map(|line| numbers(line, ["cx", "cy"]))
-            .collect();
+        let circles: Vec<_> =
+            svg.lines().filter(|line| line.starts_with("<circle")).map(|line| numbers(line, ["cx", "cy"])).collect();
         assert_eq!(circles.len(), 40);
         let texts: Vec<_> = svg
             .lines()
@@ -434,18 +345,13 @@ mod tests {
                 let [x, y] = numbers(line, ["x", "y"]);
                 let letters = line.split(['<', '>']).nth(2).map_or(0, str::len);
                 let width = LETTER[0] * letters as f64;
-                let left = if line.contains("\"end\"") {
-                    x - width
-                } else {
-                    x
-                };
+                let left = if line.contains("\"end\"") { x - width } else { x };
                 [left, y - 9.0, left + width, y]
             })
             .collect();
         // There is room for some, and not for all.
         assert!((5..40).contains(&texts.len()), "{}", texts.len());
-        let meet =
-            |a: &[f64; 4], b: &[f64; 4]| a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+        let meet = |a: &[f64; 4], b: &[f64; 4]| a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
         for (index, text) in texts.iter().enumerate() {
             assert!(!texts[..index].iter().any(|other| meet(text, other)));
             let on = |&[x, y]: &[f64; 2]| meet(text, &[x - 3.0, y - 3.0, x + 3.0, y + 3.0]);

@@ -27,10 +27,7 @@ struct Chance(u64);
 impl Chance {
     /// A number from 0 to below 1.
     fn number(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -51,10 +48,7 @@ pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
             let sigma = (1.1 + 0.8 * chance.normal()).exp().clamp(0.55, 60.0);
             let dense = chance.number() < 0.6;
             let mean = if dense {
-                [
-                    width * (0.5 + 0.16 * chance.normal()),
-                    height * (0.55 + 0.16 * chance.normal()),
-                ]
+                [width * (0.5 + 0.16 * chance.normal()), height * (0.55 + 0.16 * chance.normal())]
             } else {
                 [width * chance.number(), height * chance.number()]
             };
@@ -84,9 +78,7 @@ pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
     };
     let [preprocess, sort] = stages::gaussian(&counts);
     let boxes = |side: u32, reach: fn(&Round) -> f64| {
-        all.iter()
-            .map(|g| boxed(g, reach(g), f64::from(side), [width, height]))
-            .sum()
+        all.iter().map(|g| boxed(g, reach(g), f64::from(side), [width, height])).sum()
     };
     let draw = DrawWork {
         primitives: count as u64,
@@ -98,11 +90,7 @@ pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
         tiles,
         ..DrawWork::default()
     };
-    FrameWork {
-        size,
-        draws: vec![draw],
-        ..FrameWork::default()
-    }
+    FrameWork { size, draws: vec![draw], ..FrameWork::default() }
 }
 
 /// The number of tiles, `side` pixels wide, that the square around a Gaussian touches.
@@ -110,11 +98,7 @@ fn boxed(g: &Round, reach: f64, side: f64, size: [f64; 2]) -> u64 {
     let along = |axis: usize| {
         let low = (g.mean[axis] - reach).max(0.0);
         let high = (g.mean[axis] + reach).min(size[axis]);
-        if low < high {
-            ((high / side).ceil() - (low / side).floor()) as u64
-        } else {
-            0
-        }
+        if low < high { ((high / side).ceil() - (low / side).floor()) as u64 } else { 0 }
     };
     along(0) * along(1)
 }
@@ -136,37 +120,23 @@ fn reaches(g: &Round, corner: [f64; 2], side: f64) -> bool {
 fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
     const BLOCKS: usize = TILE_GROUPS as usize;
     let corner = at.map(|at| f64::from(at * TILE_SIDE));
-    let list: Vec<_> = all
-        .iter()
-        .filter(|g| reaches(g, corner, f64::from(TILE_SIDE)))
-        .collect();
+    let list: Vec<_> = all.iter().filter(|g| reaches(g, corner, f64::from(TILE_SIDE))).collect();
     // Transmittance of each block's pixels; negative if a pixel is finished.
     let mut transmittance = [[1.0f64; 16]; BLOCKS];
-    let mut work = TileWork {
-        at,
-        listed: list.len() as u32,
-        ..TileWork::default()
-    };
+    let mut work = TileWork { at, listed: list.len() as u32, ..TileWork::default() };
     for chunk in list.chunks(CHUNK) {
-        let open: Vec<_> = (0..BLOCKS)
-            .filter(|&block| transmittance[block].iter().any(|&t| t > 0.0))
-            .collect();
+        let open: Vec<_> = (0..BLOCKS).filter(|&block| transmittance[block].iter().any(|&t| t > 0.0)).collect();
         if open.is_empty() {
             break;
         }
         let open_row = |row: &usize| {
-            (0..4).any(|column| {
-                (0..4).any(|x| transmittance[row / 4 * 4 + column][row % 4 * 4 + x] > 0.0)
-            })
+            (0..4).any(|column| (0..4).any(|x| transmittance[row / 4 * 4 + column][row % 4 * 4 + x] > 0.0))
         };
         let rows = (0..16).filter(open_row).count() as u8;
         let mut reached = 0;
         for g in chunk {
             for &block in &open {
-                let place = [
-                    corner[0] + (block % 4 * 4) as f64,
-                    corner[1] + (block / 4 * 4) as f64,
-                ];
+                let place = [corner[0] + (block % 4 * 4) as f64, corner[1] + (block / 4 * 4) as f64];
                 if reaches(g, place, 4.0) {
                     reached += 1;
                     work.contributions += blend(g, place, &mut transmittance[block]);

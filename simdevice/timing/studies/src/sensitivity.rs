@@ -67,21 +67,14 @@ impl Sweep {
         let curve = |label, color, of: fn(&Simulation) -> f64| Curve {
             label,
             color,
-            values: self
-                .points
-                .iter()
-                .map(|point| of(&point.simulation))
-                .collect(),
+            values: self.points.iter().map(|point| of(&point.simulation)).collect(),
         };
         let knee = self.knee().filter(|_| self.file != "precision");
         let mark = |label, color, x: Option<f64>| {
             let step = self.points.iter().position(|point| Some(point.x) == x)?;
             Some(Mark { label, color, step })
         };
-        let marks = [
-            mark("knee", "black", knee.map(|point| point.x)),
-            mark("paper", "#787878", Some(self.paper)),
-        ];
+        let marks = [mark("knee", "black", knee.map(|point| point.x)), mark("paper", "#787878", Some(self.paper))];
         chart::svg(&[Chart {
             size: [640, 360],
             axes: [self.axis, "speed-up over the shader cores"].map(str::to_owned),
@@ -104,11 +97,7 @@ fn machine(settings: &[String]) -> Result<Config, ConfigError> {
 fn points(frame: &FrameWork, field: &str, values: &[f64]) -> Result<Vec<Point>, ConfigError> {
     let point = |&x: &f64| {
         let config = machine(&[format!("{field}={x}")])?;
-        Ok(Point {
-            x,
-            name: format!("{x}"),
-            simulation: simulate(frame, &config),
-        })
+        Ok(Point { x, name: format!("{x}"), simulation: simulate(frame, &config) })
     };
     values.iter().map(point).collect()
 }
@@ -142,19 +131,13 @@ fn streams(config: &Config) -> f64 {
 }
 
 fn modules(frame: &FrameWork, paper: &Config) -> Result<Sweep, ConfigError> {
-    let mut points = points(
-        frame,
-        "modules",
-        &[1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 120.0],
-    )?;
+    let mut points = points(frame, "modules", &[1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 120.0])?;
     for point in &mut points {
         point.x *= f64::from(paper.rasterizer.pes_per_module);
         point.name = format!("{:.0}", point.x);
     }
     let before = points[0].simulation.stages.preprocess + points[0].simulation.stages.sort;
-    let enough = points
-        .iter()
-        .find(|point| point.simulation.stages.raster < before);
+    let enough = points.iter().find(|point| point.simulation.stages.raster < before);
     let result = simulate(frame, paper);
     let left = (streams(paper) - result.contention_gb_s).max(streams(paper) / 2.0);
     let each = appetite(paper, &result);
@@ -196,26 +179,13 @@ fn tile_side(frame: &FrameWork) -> Result<Sweep, ConfigError> {
         small / known,
         large / known,
     );
-    Ok(Sweep {
-        file: "tile_side",
-        title: "Tile size",
-        axis: "pixels along a tile's side",
-        points,
-        paper: 16.0,
-        why,
-    })
+    Ok(Sweep { file: "tile_side", title: "Tile size", axis: "pixels along a tile's side", points, paper: 16.0, why })
 }
 
 fn batch(frame: &FrameWork, paper: &Config) -> Result<Sweep, ConfigError> {
-    let points = points(
-        frame,
-        "batch",
-        &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0],
-    )?;
+    let points = points(frame, "batch", &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0])?;
     let raster = &paper.rasterizer;
-    let wasted = |point: &Point| {
-        100.0 * point.simulation.raster.bytes_wasted / point.simulation.raster.bytes_in
-    };
+    let wasted = |point: &Point| 100.0 * point.simulation.raster.bytes_wasted / point.simulation.raster.bytes_in;
     let (first, last) = (&points[0], &points[points.len() - 1]);
     let why = format!(
         "Half of the buffer holds so many primitives of {} bytes; the other half is being filled meanwhile. A batch is \
@@ -282,9 +252,7 @@ fn precision(frame: &FrameWork) -> Result<Sweep, ConfigError> {
         });
     }
     let energy = |point: &Point| point.simulation.energy.modules();
-    let speed = |a: usize, b: usize| {
-        points[b].simulation.raster_speedup / points[a].simulation.raster_speedup
-    };
+    let speed = |a: usize, b: usize| points[b].simulation.raster_speedup / points[a].simulation.raster_speedup;
     let waits = &points[0].simulation.raster.modules;
     let why = format!(
         "A PE takes a pixel a cycle whatever its numbers' width, so that half floats buy no speed where PEs limit. They \
@@ -297,14 +265,7 @@ fn precision(frame: &FrameWork) -> Result<Sweep, ConfigError> {
         speed(2, 3),
         100.0 * energy(&points[1]) / energy(&points[0]),
     );
-    Ok(Sweep {
-        file: "precision",
-        title: "Precision",
-        axis: "numbers and bandwidth",
-        points,
-        paper: 0.0,
-        why,
-    })
+    Ok(Sweep { file: "precision", title: "Precision", axis: "numbers and bandwidth", points, paper: 0.0, why })
 }
 
 /// The text of SENSITIVITY.md.
@@ -350,11 +311,7 @@ pub fn markdown() -> Result<String, ConfigError> {
                 result.energy.modules() + result.energy.memory,
             );
         }
-        let _ = write!(
-            out,
-            "\n![{}](sensitivity/{}.svg)\n\n",
-            sweep.title, sweep.file
-        );
+        let _ = write!(out, "\n![{}](sensitivity/{}.svg)\n\n", sweep.title, sweep.file);
         if sweep.file != "precision" {
             match sweep.knee() {
                 Some(knee) => {
@@ -381,14 +338,9 @@ fn baselines(frame: &FrameWork) -> Result<String, ConfigError> {
         ("Gaussian mode, a frame alone", ours),
         ("shader cores, calibrated", result.baseline_raster_ms),
         ("shader cores, SIMT machine", threads.milliseconds()),
-        (
-            "blended quads on the plain rasterizer",
-            quads.milliseconds(),
-        ),
+        ("blended quads on the plain rasterizer", quads.milliseconds()),
     ];
-    let mut out =
-        "\n## Other machines\n\n| stage 3 | ms | over the Gaussian mode |\n|---|---:|---:|\n"
-            .to_owned();
+    let mut out = "\n## Other machines\n\n| stage 3 | ms | over the Gaussian mode |\n|---|---:|---:|\n".to_owned();
     for (name, ms) in rows {
         // Writing to a string cannot fail.
         let _ = writeln!(out, "| {name} | {ms:.3} | {:.1}x |", ms / ours);

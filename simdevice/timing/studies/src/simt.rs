@@ -18,11 +18,7 @@ pub struct Parameter {
 }
 
 const fn parameter(name: &'static str, value: f64, source: &'static str) -> Parameter {
-    Parameter {
-        name,
-        value,
-        source,
-    }
+    Parameter { name, value, source }
 }
 
 const SCHEDULERS: Parameter = parameter(
@@ -31,11 +27,8 @@ const SCHEDULERS: Parameter = parameter(
     "NVIDIA Ampere GA102 white paper: four partitions, each issues a warp's instruction in a cycle",
 );
 const WARP: Parameter = parameter("lanes of a warp", 32.0, "CUDA C++ Programming Guide");
-const BATCH: Parameter = parameter(
-    "Gaussians of a batch",
-    256.0,
-    "the original 3DGS code: a thread fetches one for its block",
-);
+const BATCH: Parameter =
+    parameter("Gaussians of a batch", 256.0, "the original 3DGS code: a thread fetches one for its block");
 const SPECIAL: Parameter = parameter(
     "lanes of special functions of an SM",
     16.0,
@@ -82,16 +75,9 @@ const CACHE: Parameter = parameter(
     4.0 * 1024.0 * 1024.0,
     "NVIDIA Jetson AGX Orin technical brief: 4 MB; that Orin NX has as much is assumed",
 );
-const ENTRY_BYTES: Parameter = parameter(
-    "bytes of a list's entry",
-    4.0,
-    "the original 3DGS code: an index",
-);
-const GAUSSIAN_BYTES: Parameter = parameter(
-    "bytes of a Gaussian that a batch reads",
-    24.0,
-    "the original 3DGS code: centre, conic and opacity",
-);
+const ENTRY_BYTES: Parameter = parameter("bytes of a list's entry", 4.0, "the original 3DGS code: an index");
+const GAUSSIAN_BYTES: Parameter =
+    parameter("bytes of a Gaussian that a batch reads", 24.0, "the original 3DGS code: centre, conic and opacity");
 const COLOR_BYTES: Parameter = parameter(
     "bytes of a colour, in a sector of L2",
     32.0,
@@ -117,11 +103,8 @@ pub const MACHINE: [Parameter; 16] = [
     COLOR_BYTES,
     WARPS_OF_A_BLOCK,
 ];
-const WARPS_OF_A_BLOCK: Parameter = parameter(
-    "warps of a block",
-    8.0,
-    "the original 3DGS code: 16x16 threads, so that a warp is two rows of a tile",
-);
+const WARPS_OF_A_BLOCK: Parameter =
+    parameter("warps of a block", 8.0, "the original 3DGS code: 16x16 threads, so that a warp is two rows of a tile");
 
 /// The time of stage 3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -189,24 +172,15 @@ impl Block {
         let loads = (2.0 * block.warps + 4.0 * block.blended) * WARP.value / LOAD_STORE.value;
         block.cycles = issue.max(special).max(loads);
         // A warp issues at most one instruction in `DEPENDENT` cycles.
-        block.least =
-            instructions / WARPS_OF_A_BLOCK.value * DEPENDENT.value + batches * BATCH_LATENCY.value;
+        block.least = instructions / WARPS_OF_A_BLOCK.value * DEPENDENT.value + batches * BATCH_LATENCY.value;
         block
     }
 }
 
 /// The time of stage 3 of a frame's Gaussians.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simt {
-    let draws = || {
-        frame
-            .draws
-            .iter()
-            .filter(|draw| draw.mode == Mode::Gaussian)
-    };
-    let blocks: Vec<_> = draws()
-        .flat_map(|draw| &draw.tiles)
-        .map(Block::of)
-        .collect();
+    let draws = || frame.draws.iter().filter(|draw| draw.mode == Mode::Gaussian);
+    let blocks: Vec<_> = draws().flat_map(|draw| &draw.tiles).map(Block::of).collect();
     let shader = &config.shader;
     let sms = shader.sms as usize;
     let cycles = schedule(&blocks, sms);
@@ -233,9 +207,7 @@ fn bytes(draw: &DrawWork) -> f64 {
     let misses = again * (1.0 - CACHE.value / set.max(CACHE.value));
     let first = draw.drawn as f64;
     let pixels = draw.tiles.len() as f64 * f64::from(TILE_SIDE * TILE_SIDE);
-    needed * ENTRY_BYTES.value
-        + (first + misses) * (GAUSSIAN_BYTES.value + COLOR_BYTES.value)
-        + pixels * 20.0
+    needed * ENTRY_BYTES.value + (first + misses) * (GAUSSIAN_BYTES.value + COLOR_BYTES.value) + pixels * 20.0
 }
 
 /// Cycles until all blocks have ended. A block goes to the first SM with a free slot; those on an SM share its issue
@@ -247,16 +219,11 @@ fn schedule(blocks: &[Block], sms: usize) -> f64 {
     let mut now = 0.0;
     loop {
         // The SM with the fewest blocks is first.
-        while let Some(place) = (0..sms)
-            .filter(|&sm| resident[sm].len() < RESIDENT.value as usize)
-            .min_by_key(|&sm| resident[sm].len())
+        while let Some(place) =
+            (0..sms).filter(|&sm| resident[sm].len() < RESIDENT.value as usize).min_by_key(|&sm| resident[sm].len())
             && let Some(block) = waiting.next()
         {
-            let pace = if block.cycles > 0.0 {
-                (block.least / block.cycles).max(1.0)
-            } else {
-                1.0
-            };
+            let pace = if block.cycles > 0.0 { (block.least / block.cycles).max(1.0) } else { 1.0 };
             resident[place].push([block.cycles, pace]);
         }
         // The pace of a block is its share of the SM, or its own if that is slower.

@@ -13,9 +13,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
     let mut queue = tasks.iter();
-    let mut modules: Vec<_> = (0..config.rasterizer.modules)
-        .map(|_| Module::default())
-        .collect();
+    let mut modules: Vec<_> = (0..config.rasterizer.modules).map(|_| Module::default()).collect();
     let mut cycles = 0u64;
     while !tasks.is_empty() {
         for module in &mut modules {
@@ -30,10 +28,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
             module.step(config, &mut report.modules);
         }
         // The arbiter gives every requesting port the same share.
-        let asking = modules
-            .iter()
-            .filter(|module| module.wants_memory())
-            .count();
+        let asking = modules.iter().filter(|module| module.wants_memory()).count();
         let share = rates.port.min(rates.memory / asking.max(1) as f64);
         for module in &mut modules {
             module.transfer(share);
@@ -41,10 +36,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
         cycles += 1;
     }
     report.cycles = cycles as f64;
-    report.switches = modules
-        .iter()
-        .map(|module| f64::from(module.switches))
-        .sum();
+    report.switches = modules.iter().map(|module| f64::from(module.switches)).sum();
     report.modules.idle = report.cycles * modules.len() as f64 - report.modules.total();
     report
 }
@@ -120,11 +112,7 @@ impl Module {
         latency: u32,
         report: &mut RasterReport,
     ) {
-        let fetching = self
-            .port
-            .iter()
-            .filter(|request| request.batch.is_some())
-            .count();
+        let fetching = self.port.iter().filter(|request| request.batch.is_some()).count();
         let held = self.ready.len() + usize::from(self.computing.is_some());
         // One fetch at a time: the second begins when the first has ended.
         if fetching > 0 || held >= 2 {
@@ -156,9 +144,7 @@ impl Module {
     }
 
     fn wants_memory(&self) -> bool {
-        self.port
-            .front()
-            .is_some_and(|request| request.latency == 0)
+        self.port.front().is_some_and(|request| request.latency == 0)
     }
 
     /// Moves up to `share` bytes.
@@ -200,22 +186,14 @@ impl Module {
                 let latency = config.rasterizer.latency(batch.mode);
                 let bytes = f64::from(config.rasterizer.tile_bytes());
                 // The last pixels must leave the pipeline before they are written.
-                self.ended = Some(Request {
-                    latency,
-                    bytes,
-                    batch: None,
-                });
+                self.ended = Some(Request { latency, bytes, batch: None });
             }
             self.computing = None;
         }
     }
 
     fn begin(&mut self, config: &Config) {
-        let held = self
-            .port
-            .iter()
-            .filter(|request| request.batch.is_none())
-            .count();
+        let held = self.port.iter().filter(|request| request.batch.is_none()).count();
         while let Some(batch) = self.ready.pop_front() {
             // Two halves hold pixels: one is free once the tile before the last is written.
             if batch.first_of_tile && held > 1 {
@@ -235,11 +213,7 @@ impl Module {
             self.mode = Some(batch.mode);
             let mut work = Computation {
                 switch,
-                controller: if batch.first_of_part {
-                    raster.tile_overhead
-                } else {
-                    0
-                },
+                controller: if batch.first_of_part { raster.tile_overhead } else { 0 },
                 next: 0,
                 busy: 0,
                 dependency: 0,
@@ -302,12 +276,7 @@ impl Computation {
 }
 
 /// Divides a tile's lists into batches.
-fn batches(
-    task: &Task,
-    config: &Config,
-    after_waste: &mut bool,
-    report: &mut RasterReport,
-) -> VecDeque<Batch> {
+fn batches(task: &Task, config: &Config, after_waste: &mut bool, report: &mut RasterReport) -> VecDeque<Batch> {
     let raster = &config.rasterizer;
     let mut out = VecDeque::new();
     for part in &task.parts {
@@ -361,10 +330,12 @@ fn groups_of_each(part: &Part) -> Vec<Groups> {
     let mut out = Vec::with_capacity(part.needed as usize);
     for segment in &part.segments {
         let n = u64::from(segment.primitives);
-        out.extend((0..n).map(|k| Groups {
-            evaluated: (k + 1) * segment.groups / n - k * segment.groups / n,
-            open: segment.open,
-        }));
+        out.extend(
+            (0..n).map(|k| Groups {
+                evaluated: (k + 1) * segment.groups / n - k * segment.groups / n,
+                open: segment.open,
+            }),
+        );
     }
     out
 }

@@ -28,11 +28,7 @@ struct Skipping {
 impl Skipping {
     /// The skip of finished pixels of Gaussian lists, and no other.
     fn of(saturation: Saturation) -> Self {
-        Self {
-            saturation,
-            traversal: Saturation::Tile,
-            hierarchical_depth: false,
-        }
+        Self { saturation, traversal: Saturation::Tile, hierarchical_depth: false }
     }
 
     /// Simulates a frame on a configuration with these skips.
@@ -43,10 +39,7 @@ impl Skipping {
         config.rasterizer.saturation = self.saturation;
         config.rasterizer.triangle_traversal = self.traversal;
         config.rasterizer.hierarchical_depth = self.hierarchical_depth;
-        WhatIf {
-            name,
-            simulation: simulate(frame, &config),
-        }
+        WhatIf { name, simulation: simulate(frame, &config) }
     }
 }
 
@@ -71,56 +64,33 @@ impl Kinds {
 
 /// The variants, the least skipping first.
 pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
-    let with = |name, frame: &FrameWork, saturation| {
-        Skipping::of(saturation).simulate(name, frame, config)
-    };
+    let with = |name, frame: &FrameWork, saturation| Skipping::of(saturation).simulate(name, frame, config);
     let kinds = Kinds::of(frame);
     let mut variants = Vec::new();
     if kinds.gaussians {
         let boxed = frame.with_squares();
         variants.extend([
-            with(
-                "3-sigma squares, no saturation (estimated)",
-                &boxed,
-                Saturation::None,
-            ),
-            with(
-                "3-sigma squares, tiles saturate (estimated)",
-                &boxed,
-                Saturation::Tile,
-            ),
+            with("3-sigma squares, no saturation (estimated)", &boxed, Saturation::None),
+            with("3-sigma squares, tiles saturate (estimated)", &boxed, Saturation::Tile),
             with("exact tile tests, no saturation", frame, Saturation::None),
             with("exact tile tests, tiles saturate", frame, Saturation::Tile),
             with("exact tile tests, rows saturate", frame, Saturation::Row),
-            with(
-                "exact tile tests, blocks saturate",
-                frame,
-                Saturation::Block,
-            ),
+            with("exact tile tests, blocks saturate", frame, Saturation::Block),
         ]);
     }
     // With Gaussians, this is the variant of triangles in whole tiles, too.
-    let blocks = if kinds.gaussians {
-        "exact tile and block tests, blocks saturate"
-    } else {
-        "triangles in whole tiles"
-    };
+    let blocks =
+        if kinds.gaussians { "exact tile and block tests, blocks saturate" } else { "triangles in whole tiles" };
     if kinds.gaussians || kinds.triangles {
         variants.push(with(blocks, frame, Saturation::Reached));
     }
-    let reached = Skipping {
-        traversal: Saturation::Reached,
-        ..Skipping::of(Saturation::Reached)
-    };
+    let reached = Skipping { traversal: Saturation::Reached, ..Skipping::of(Saturation::Reached) };
     if kinds.triangles {
         let name = "triangles in the blocks they cover";
         variants.push(reached.simulate(name, frame, config));
     }
     if kinds.hidden {
-        let depth = Skipping {
-            hierarchical_depth: true,
-            ..reached
-        };
+        let depth = Skipping { hierarchical_depth: true, ..reached };
         let name = "all of these, and hierarchical depth";
         variants.push(depth.simulate(name, frame, config));
     }
@@ -141,28 +111,14 @@ pub fn each_alone(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
         let blocks = Skipping::of(Saturation::Block);
         alone("blocks saturate (estimated)", &squares, blocks);
         let tests = Skipping::of(Saturation::Reached);
-        alone(
-            "exact block tests, blocks saturate (estimated)",
-            &squares,
-            tests,
-        );
+        alone("exact block tests, blocks saturate (estimated)", &squares, tests);
     }
     if kinds.triangles {
-        let covered = Skipping {
-            traversal: Saturation::Reached,
-            ..plain
-        };
-        alone(
-            "triangles in the blocks they cover (estimated)",
-            &squares,
-            covered,
-        );
+        let covered = Skipping { traversal: Saturation::Reached, ..plain };
+        alone("triangles in the blocks they cover (estimated)", &squares, covered);
     }
     if kinds.hidden {
-        let depth = Skipping {
-            hierarchical_depth: true,
-            ..plain
-        };
+        let depth = Skipping { hierarchical_depth: true, ..plain };
         alone("hierarchical depth (estimated)", &squares, depth);
     }
     variants
@@ -191,10 +147,7 @@ mod tests {
             tile.runs = vec![run(n / 4, 16, 16), run(n / 4, 13, 9), run(n / 4, 8, 7)];
         }
         let config = Config::preset("single-module", &[]).unwrap();
-        let cycles: Vec<_> = what_ifs(&frame, &config)
-            .iter()
-            .map(|what_if| what_if.simulation.raster.cycles)
-            .collect();
+        let cycles: Vec<_> = what_ifs(&frame, &config).iter().map(|what_if| what_if.simulation.raster.cycles).collect();
         assert!(cycles[0] > 1.9 * cycles[2]);
         assert!(cycles[2..].is_sorted_by(|a, b| a > b), "{cycles:?}");
     }
@@ -226,11 +179,7 @@ mod tests {
         // The second of the cumulative variants has only the first skip, and so equals the first skip alone.
         assert_eq!(alone[0], together[1]);
         let last = together[together.len() - 1];
-        assert!(
-            alone[1..]
-                .iter()
-                .all(|&cycles| last < cycles && cycles < alone[0])
-        );
+        assert!(alone[1..].iter().all(|&cycles| last < cycles && cycles < alone[0]));
     }
 
     #[test]

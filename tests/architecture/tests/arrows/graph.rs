@@ -16,13 +16,7 @@ pub struct Arrow {
 
 impl fmt::Display for Arrow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}:: {} -> {}",
-            self.parent.join("::"),
-            self.from,
-            self.to
-        )
+        write!(f, "{}:: {} -> {}", self.parent.join("::"), self.from, self.to)
     }
 }
 
@@ -33,20 +27,14 @@ pub fn arrow(from: &[String], to: &[String]) -> Option<Arrow> {
         return None;
     }
     let child = |path: &[String]| path.get(common).map_or("mod", String::as_str).to_owned();
-    Some(Arrow {
-        parent: from[..common].to_vec(),
-        from: child(from),
-        to: child(to),
-    })
+    Some(Arrow { parent: from[..common].to_vec(), from: child(from), to: child(to) })
 }
 
 /// The arrows that are part of a cycle.
 pub fn arrows_in_cycles(arrows: &BTreeSet<Arrow>) -> BTreeSet<Arrow> {
     let mut next: BTreeMap<(&[String], &str), BTreeSet<&str>> = BTreeMap::new();
     for arrow in arrows {
-        next.entry((&arrow.parent, &arrow.from))
-            .or_default()
-            .insert(&arrow.to);
+        next.entry((&arrow.parent, &arrow.from)).or_default().insert(&arrow.to);
     }
     let reaches = |arrow: &Arrow| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![arrow.to.as_str()]);
@@ -55,20 +43,12 @@ pub fn arrows_in_cycles(arrows: &BTreeSet<Arrow>) -> BTreeSet<Arrow> {
                 return true;
             }
             if seen.insert(node) {
-                open.extend(
-                    next.get(&(arrow.parent.as_slice(), node))
-                        .into_iter()
-                        .flatten(),
-                );
+                open.extend(next.get(&(arrow.parent.as_slice(), node)).into_iter().flatten());
             }
         }
         false
     };
-    arrows
-        .iter()
-        .filter(|arrow| reaches(arrow))
-        .cloned()
-        .collect()
+    arrows.iter().filter(|arrow| reaches(arrow)).cloned().collect()
 }
 
 #[gaurast_runner::test]
@@ -82,9 +62,6 @@ fn cycles_are_found_among_children() {
         arrow("c::a::x", "c::a"),
         arrow("c::a", "c::a::y"),
     ]);
-    let found: Vec<String> = arrows_in_cycles(&arrows)
-        .iter()
-        .map(Arrow::to_string)
-        .collect();
+    let found: Vec<String> = arrows_in_cycles(&arrows).iter().map(Arrow::to_string).collect();
     assert_eq!(found, ["c:: a -> b", "c:: b -> a"]);
 }

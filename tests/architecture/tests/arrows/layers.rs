@@ -30,16 +30,11 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 /// The additional folders on which tests of a folder may depend.
-const TESTS: &[(&str, &[&str])] = &[
-    ("api/render", &["driver"]),
-    ("driver/spirv", &["simdevice/devmem"]),
-];
+const TESTS: &[(&str, &[&str])] = &[("api/render", &["driver"]), ("driver/spirv", &["simdevice/devmem"])];
 
 /// Returns true if `folder` is `of` or is inside it.
 fn is_in(folder: &str, of: &str) -> bool {
-    folder
-        .strip_prefix(of)
-        .is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    folder.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 /// The allowed folders in a table's first matching row.
@@ -60,20 +55,13 @@ fn is_allowed(dependency: &Dependency) -> bool {
 fn packages_depend_as_the_layers_say() {
     let dependencies = workspace::dependencies();
     assert!(dependencies.len() > 50, "{}", dependencies.len());
-    let wrong: Vec<_> = dependencies
-        .iter()
-        .filter(|dependency| !is_allowed(dependency))
-        .collect();
+    let wrong: Vec<_> = dependencies.iter().filter(|dependency| !is_allowed(dependency)).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[gaurast_runner::test]
 fn wrong_arrows_are_found() {
-    let dependency = |from: &str, to: &str, is_dev| Dependency {
-        from: from.to_owned(),
-        to: to.to_owned(),
-        is_dev,
-    };
+    let dependency = |from: &str, to: &str, is_dev| Dependency { from: from.to_owned(), to: to.to_owned(), is_dev };
     for (from, to, is_dev, expected) in [
         ("api/gaurast", "driver", false, false),
         ("api/layer", "driver", false, false),

@@ -24,10 +24,7 @@ fn main() -> ExitCode {
 
 fn targets() -> Vec<Target> {
     let packages = workspace::packages();
-    packages
-        .iter()
-        .flat_map(|package| package.targets())
-        .collect()
+    packages.iter().flat_map(|package| package.targets()).collect()
 }
 
 fn names() -> Vec<Variant> {
@@ -44,15 +41,9 @@ fn known() -> impl Iterator<Item = &'static str> {
 #[gaurast_runner::test(each = names())]
 fn modules_have_no_cycle(case: &Case) {
     let targets = targets();
-    let target = targets
-        .iter()
-        .find(|target| target.name == case.variant())
-        .expect("a crate");
+    let target = targets.iter().find(|target| target.name == case.variant()).expect("a crate");
     let source = Crate::read(&target.name.replace('-', "_"), &target.root);
-    let found: String = graph::arrows_in_cycles(&source.arrows())
-        .iter()
-        .map(|arrow| format!("{arrow}\n"))
-        .collect();
+    let found: String = graph::arrows_in_cycles(&source.arrows()).iter().map(|arrow| format!("{arrow}\n")).collect();
     if known().any(|name| name == target.name) {
         assert!(!found.is_empty(), "no cycle any more: off the list with it");
     } else {

@@ -49,11 +49,7 @@ pub fn packages() -> Vec<Package> {
             let folder = member.as_str().expect("a path").to_owned();
             let manifest = read(&root.join(&folder).join("Cargo.toml"));
             let package = manifest["package"].as_table().expect("a package");
-            Package {
-                name: text(package, "name").expect("a name").to_owned(),
-                folder,
-                manifest,
-            }
+            Package { name: text(package, "name").expect("a name").to_owned(), folder, manifest }
         })
         .collect()
 }
@@ -61,10 +57,8 @@ pub fn packages() -> Vec<Package> {
 /// The dependencies of the workspace's packages on each other.
 pub fn dependencies() -> Vec<Dependency> {
     let packages = packages();
-    let folders: BTreeMap<&str, &str> = packages
-        .iter()
-        .map(|package| (package.name.as_str(), package.folder.as_str()))
-        .collect();
+    let folders: BTreeMap<&str, &str> =
+        packages.iter().map(|package| (package.name.as_str(), package.folder.as_str())).collect();
     let mut found = Vec::new();
     for package in &packages {
         let targets = package.manifest.get("target").and_then(Value::as_table);
@@ -108,12 +102,7 @@ impl Package {
         if library.exists() {
             found.insert(library, self.name.clone());
         }
-        for (kind, place) in [
-            ("bin", "src/bin"),
-            ("test", "tests"),
-            ("example", "examples"),
-            ("bench", "benches"),
-        ] {
+        for (kind, place) in [("bin", "src/bin"), ("test", "tests"), ("example", "examples"), ("bench", "benches")] {
             let listed = self.manifest.get(kind).and_then(Value::as_array);
             let tables = listed.into_iter().flatten().filter_map(Value::as_table);
             for path in tables.filter_map(|table| text(table, "path")) {
@@ -136,10 +125,7 @@ impl Package {
         if program.exists() {
             found.insert(program.clone(), self.target_name(&program));
         }
-        found
-            .into_iter()
-            .map(|(root, name)| Target { name, root })
-            .collect()
+        found.into_iter().map(|(root, name)| Target { name, root }).collect()
     }
 
     fn target_name(&self, path: &Path) -> String {

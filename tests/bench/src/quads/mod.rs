@@ -74,9 +74,7 @@ impl QuadRenderer {
     pub fn new(entry: ash::Entry, device_name: &str, threads: usize) -> Result<Self, QuadError> {
         let device = Arc::new(Device::new(entry, Purpose::Triangles(device_name))?);
         Ok(Self {
-            pool: rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()?,
+            pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build()?,
             pairs: [Vec::new(), Vec::new()],
             buffers: None,
             target: None,
@@ -92,8 +90,7 @@ impl QuadRenderer {
     /// If there is no loader, no such device, or Vulkan fails.
     pub fn through_the_loader(device_name: &str, threads: usize) -> Result<Self, QuadError> {
         // SAFETY: the system's loader is sound.
-        let entry = unsafe { ash::Entry::load() }
-            .map_err(|error| QuadError::NoLoader(error.to_string()))?;
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| QuadError::NoLoader(error.to_string()))?;
         Self::new(entry, device_name, threads)
     }
 
@@ -122,13 +119,7 @@ impl QuadRenderer {
         let processor = start.and_then(|start| Some(processor_time()? - start));
         let picture = prepared.picture()?;
         let Steps { sum, counters, .. } = prepared.steps;
-        Ok(Frame {
-            picture,
-            time: sum,
-            processor_time: processor,
-            counters,
-            depth: None,
-        })
+        Ok(Frame { picture, time: sum, processor_time: processor, counters, depth: None })
     }
 
     /// Does the processor's part of [`QuadRenderer::render`]: the sorted quads are in the buffers afterwards.
@@ -158,12 +149,7 @@ impl QuadRenderer {
         let [pairs, scratch] = &mut self.pairs;
         pairs.clear();
         // From back to front. Depths are positive, so their bits sort as the depths do.
-        pairs.extend(
-            splats
-                .iter()
-                .zip(0..)
-                .map(|((depth, _), i)| (!depth.to_bits(), i)),
-        );
+        pairs.extend(splats.iter().zip(0..).map(|((depth, _), i)| (!depth.to_bits(), i)));
         sort::sort(pairs, scratch);
         steps.end("sort");
 
@@ -178,14 +164,11 @@ impl QuadRenderer {
         let buffers = self.buffers.insert(buffers);
         buffers.splats.fill(pairs.len(), |places| {
             self.pool.install(|| {
-                places
-                    .par_chunks_mut(CHUNK)
-                    .zip(pairs.par_chunks(CHUNK))
-                    .for_each(|(places, pairs)| {
-                        for (place, pair) in places.iter_mut().zip(pairs) {
-                            place.write(splats[pair.1 as usize].1);
-                        }
-                    });
+                places.par_chunks_mut(CHUNK).zip(pairs.par_chunks(CHUNK)).for_each(|(places, pairs)| {
+                    for (place, pair) in places.iter_mut().zip(pairs) {
+                        place.write(splats[pair.1 as usize].1);
+                    }
+                });
             });
         })?;
         steps.end("write");
@@ -221,14 +204,7 @@ impl Prepared<'_> {
     /// If Vulkan fails.
     pub fn draw(&mut self) -> Result<(), QuadError> {
         self.commands.record(0, |_, commands| {
-            record_draw(
-                self.device,
-                self.pipeline,
-                commands,
-                self.target,
-                self.buffers,
-                (self.count, self.push),
-            );
+            record_draw(self.device, self.pipeline, commands, self.target, self.buffers, (self.count, self.push));
             record_copy(self.device, commands, self.target);
         })?;
         self.commands.submit_and_wait(&[0])?;
@@ -244,11 +220,7 @@ impl Prepared<'_> {
         let vk::Extent2D { width, height } = self.target.image.extent();
         let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
         self.target.readback.read(&mut pixels)?;
-        Ok(Picture {
-            width,
-            height,
-            pixels,
-        })
+        Ok(Picture { width, height, pixels })
     }
 }
 
@@ -258,9 +230,7 @@ fn project_all(projection: &Projection, scene: &Scene) -> Vec<(f32, Splat)> {
         .into_par_iter()
         .map(|chunk| {
             let first = chunk * CHUNK;
-            (first..scene.len().min(first + CHUNK))
-                .filter_map(|index| projection.splat(scene, index))
-                .collect()
+            (first..scene.len().min(first + CHUNK)).filter_map(|index| projection.splat(scene, index)).collect()
         })
         .collect();
     chunks.concat()
@@ -275,11 +245,7 @@ struct Steps {
 
 impl Steps {
     fn start() -> Self {
-        Self {
-            since: Instant::now(),
-            sum: Duration::ZERO,
-            counters: Vec::new(),
-        }
+        Self { since: Instant::now(), sum: Duration::ZERO, counters: Vec::new() }
     }
 
     fn end(&mut self, name: &str) {
@@ -301,8 +267,7 @@ impl Buffers {
     fn new(device: &Arc<Device>, count: usize) -> Result<Self, RenderError> {
         use vk::BufferUsageFlags as Usage;
         let capacity = (count + count / 4).max(1024) as u32;
-        let buffer =
-            |size, usage| Buffer::new(device, u64::from(capacity) * size, usage, Memory::Host);
+        let buffer = |size, usage| Buffer::new(device, u64::from(capacity) * size, usage, Memory::Host);
         let splats = buffer(size_of::<Splat>() as u64, Usage::STORAGE_BUFFER)?;
         let indices = buffer(size_of_val(&QUAD) as u64, Usage::INDEX_BUFFER)?;
         indices.fill::<[u32; 6]>(capacity as usize, |quads| {
@@ -328,25 +293,17 @@ fn record_draw(
     (count, push): (u32, Push),
 ) {
     let area = vk::Rect2D::default().extent(target.image.extent());
-    let viewport = vk::Viewport::default()
-        .width(area.extent.width as f32)
-        .height(area.extent.height as f32)
-        .max_depth(1.0);
+    let viewport =
+        vk::Viewport::default().width(area.extent.width as f32).height(area.extent.height as f32).max_depth(1.0);
     let attachments = [vk::RenderingAttachmentInfo::default()
         .image_view(target.image.view())
         .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
         .load_op(vk::AttachmentLoadOp::CLEAR)
         .store_op(vk::AttachmentStoreOp::STORE)];
-    let rendering = vk::RenderingInfo::default()
-        .render_area(area)
-        .layer_count(1)
-        .color_attachments(&attachments);
+    let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
     let to_attachment = target
         .image
-        .barrier(
-            vk::ImageLayout::UNDEFINED,
-            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-        )
+        .barrier(vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
         .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
     let raw = device.raw();
     // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same

@@ -47,16 +47,12 @@ impl Projection {
         let size = Vec2::new(camera.width as f32, camera.height as f32);
         let beyond = 0.15 * size;
         Self {
-            rotation: Mat3::from_cols_array_2d(&camera.rotation.map(|row| row.map(|c| c as f32)))
-                .transpose(),
+            rotation: Mat3::from_cols_array_2d(&camera.rotation.map(|row| row.map(|c| c as f32))).transpose(),
             eye: Vec3::from_array(camera.eye.map(|c| c as f32)),
             focal,
             principal,
             size,
-            slopes: [
-                -(principal + beyond) / focal,
-                (size - principal + beyond) / focal,
-            ],
+            slopes: [-(principal + beyond) / focal, (size - principal + beyond) / focal],
             alpha_floor,
             coefficients: (sh_degree as usize + 1).pow(2).min(COEFFICIENTS),
         }
@@ -78,17 +74,13 @@ impl Projection {
         let radius = reach.sqrt();
         // The greatest reach is along the longest axis, enlarged by the slope of the view.
         let longest = Vec3::from_array(shape.scale).max_element();
-        let bound = radius
-            * (longest / view.z * self.focal.max_element() * (1.0 + self.widest_slope())
-                + LOW_PASS.sqrt());
+        let bound =
+            radius * (longest / view.z * self.focal.max_element() * (1.0 + self.widest_slope()) + LOW_PASS.sqrt());
         if self.misses(mean, Vec2::splat(bound)) {
             return None;
         }
         let [xx, xy, yy] = self.covariance(shape.scale, shape.rotation, view, slope);
-        if self.misses(
-            mean,
-            Vec2::new(xx, yy).max(Vec2::ZERO).map(f32::sqrt) * radius,
-        ) {
+        if self.misses(mean, Vec2::new(xx, yy).max(Vec2::ZERO).map(f32::sqrt) * radius) {
             return None;
         }
         let (major, minor) = axes(xx, xy, yy)?;
@@ -136,12 +128,8 @@ impl Projection {
         let stride = scene.sh_stride();
         let sh = &scene.sh()[index * stride..][..stride.min(self.coefficients)];
         let weights = harmonics((position - self.eye).normalize(), sh.len());
-        let sum = sh
-            .iter()
-            .zip(weights)
-            .fold(Vec3::splat(0.5), |sum, (sh, weight)| {
-                sum + weight * Vec3::from_array(*sh)
-            });
+        let sum =
+            sh.iter().zip(weights).fold(Vec3::splat(0.5), |sum, (sh, weight)| sum + weight * Vec3::from_array(*sh));
         sum.max(Vec3::ZERO)
     }
 }
@@ -157,11 +145,7 @@ fn axes(xx: f32, xy: f32, yy: f32) -> Option<(Vec2, Vec2)> {
         return None;
     }
     // The longer of the two rows to which the axis is perpendicular.
-    let direction = if half >= 0.0 {
-        Vec2::new(half + spread, xy)
-    } else {
-        Vec2::new(xy, spread - half)
-    };
+    let direction = if half >= 0.0 { Vec2::new(half + spread, xy) } else { Vec2::new(xy, spread - half) };
     let direction = direction.try_normalize().unwrap_or(Vec2::X);
     Some((direction * greatest.sqrt(), direction.perp() * least.sqrt()))
 }
@@ -207,14 +191,9 @@ mod tests {
 
     #[test]
     fn axes_are_those_of_the_covariance() {
-        for [xx, xy, yy] in [
-            [4.0, 0.0, 1.0],
-            [1.0, 0.0, 4.0],
-            [2.0, 0.0, 2.0],
-            [5.0, 1.5, 1.0],
-            [1.0, -2.0, 9.0],
-            [100.0, 99.0, 99.0],
-        ] {
+        for [xx, xy, yy] in
+            [[4.0, 0.0, 1.0], [1.0, 0.0, 4.0], [2.0, 0.0, 2.0], [5.0, 1.5, 1.0], [1.0, -2.0, 9.0], [100.0, 99.0, 99.0]]
+        {
             let (major, minor) = axes(xx, xy, yy).expect("an ellipse");
             let sum = [
                 major.x * major.x + minor.x * minor.x,
@@ -222,10 +201,7 @@ mod tests {
                 major.y * major.y + minor.y * minor.y,
             ];
             for (sum, expected) in sum.into_iter().zip([xx, xy, yy]) {
-                assert!(
-                    (sum - expected).abs() < 1e-4 * xx.max(yy),
-                    "{sum} {expected}"
-                );
+                assert!((sum - expected).abs() < 1e-4 * xx.max(yy), "{sum} {expected}");
             }
             assert!(major.dot(minor).abs() < 1e-3, "{major} {minor}");
         }
@@ -235,20 +211,12 @@ mod tests {
 
     #[test]
     fn only_what_may_be_seen_is_projected() {
-        let camera = Camera::look_at([0.; 3], [0., 0., 1.], [0., -1., 0.], 90.0, [64, 64])
-            .expect("a camera");
+        let camera = Camera::look_at([0.; 3], [0., 0., 1.], [0., -1., 0.], 90.0, [64, 64]).expect("a camera");
         let mut scene = Scene::with_capacity(0, 4);
-        for (position, opacity) in [
-            ([0.0, 0.0, 4.0], 0.5),
-            ([0.0, 0.0, -4.0], 0.5),
-            ([0.0, 0.0, 4.0], 0.001),
-            ([9.0, 0.0, 4.0], 0.5),
-        ] {
-            let shape = gaurast_scene::GaussianShape {
-                scale: [0.1; 3],
-                rotation: [2.0, 0.0, 0.0, 0.0],
-                opacity,
-            };
+        for (position, opacity) in
+            [([0.0, 0.0, 4.0], 0.5), ([0.0, 0.0, -4.0], 0.5), ([0.0, 0.0, 4.0], 0.001), ([9.0, 0.0, 4.0], 0.5)]
+        {
+            let shape = gaurast_scene::GaussianShape { scale: [0.1; 3], rotation: [2.0, 0.0, 0.0, 0.0], opacity };
             scene.push(position, shape, &[[0.0; 3]]);
         }
         let projection = Projection::new(&camera, 0, 1.0 / 255.0);

@@ -5,9 +5,7 @@ const BITS: u32 = 11;
 
 /// Sorts `pairs` by their keys, ascending and stably. `scratch` is working memory.
 pub(super) fn sort(pairs: &mut Vec<(u32, u32)>, scratch: &mut Vec<(u32, u32)>) {
-    let differing = pairs
-        .iter()
-        .fold(0, |bits, pair| bits | (pair.0 ^ pairs[0].0));
+    let differing = pairs.iter().fold(0, |bits, pair| bits | (pair.0 ^ pairs[0].0));
     scratch.resize(pairs.len(), (0, 0));
     for shift in (0..u32::BITS).step_by(BITS as usize) {
         let digit = |key: u32| (key >> shift & ((1 << BITS) - 1)) as usize;

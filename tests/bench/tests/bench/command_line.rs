@@ -55,9 +55,7 @@ fn frames_are_benchmarked_and_held_against_the_oracle() {
     assert_eq!(["gaurast", "quads on gaurast"].map(frames), [3, 3]);
     let series = json["scenes"][0]["series"].as_array().expect("series");
     let error = |contender: &str| {
-        let of = series
-            .iter()
-            .find(|series| series["contender"] == contender);
+        let of = series.iter().find(|series| series["contender"] == contender);
         of.expect("measured")["error"].clone()
     };
     let max = error("Gaurast")["max"].as_f64().expect("a number");
@@ -78,9 +76,7 @@ fn lavapipe_is_benchmarked_where_it_is_installed() {
 #[gaurast_runner::test]
 fn frames_of_a_path_and_a_cold_picture_are_timed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let arguments = [
-        "path", "--count", "300", "--size", "40x30", "--frames", "14", "--csv", "path.csv",
-    ];
+    let arguments = ["path", "--count", "300", "--size", "40x30", "--frames", "14", "--csv", "path.csv"];
     let output = bench(&folder, &arguments);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");

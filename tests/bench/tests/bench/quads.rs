@@ -13,14 +13,8 @@ const ALPHA_FLOOR: f32 = 1.0 / 255.0;
 /// Scenes with their views, of Gaussians small and large.
 fn scenes() -> Vec<(Scene, Camera)> {
     vec![
-        (
-            gaurast_oracle::scenes::synthetic(2, 5000),
-            gaurast_oracle::scenes::synthetic_camera(SIZE),
-        ),
-        (
-            gaurast_scene::garden::scene(2, 8000),
-            gaurast_scene::garden::camera(None, SIZE).expect("a camera"),
-        ),
+        (gaurast_oracle::scenes::synthetic(2, 5000), gaurast_oracle::scenes::synthetic_camera(SIZE)),
+        (gaurast_scene::garden::scene(2, 8000), gaurast_scene::garden::camera(None, SIZE).expect("a camera")),
     ]
 }
 
@@ -42,16 +36,8 @@ fn compare(quads: &mut QuadRenderer) {
                 continue;
             }
             let statistics = Statistics::new(&drawn.pixels, &expected.pixels, SIZE[0]);
-            assert!(
-                statistics.psnr > 60.0,
-                "{}: {statistics}",
-                quads.device_name()
-            );
-            assert!(
-                statistics.max < 0.02,
-                "{}: {statistics}",
-                quads.device_name()
-            );
+            assert!(statistics.psnr > 60.0, "{}: {statistics}", quads.device_name());
+            assert!(statistics.max < 0.02, "{}: {statistics}", quads.device_name());
         }
     }
 }
@@ -68,9 +54,7 @@ fn quads_on_lavapipe_show_what_gaussians_are() {
 
 #[gaurast_runner::test]
 fn a_device_that_is_not_there_is_named() {
-    let error = QuadRenderer::new(vulkan_gaurast::entry(), "no such device", 1)
-        .err()
-        .expect("no device");
+    let error = QuadRenderer::new(vulkan_gaurast::entry(), "no such device", 1).err().expect("no device");
     assert!(error.to_string().contains("no such device"), "{error}");
 }
 
@@ -78,13 +62,7 @@ fn a_device_that_is_not_there_is_named() {
 fn an_empty_scene_is_an_empty_picture() {
     let mut quads = QuadRenderer::new(vulkan_gaurast::entry(), "", 1).expect("a device");
     let scene = Scene::with_capacity(0, 0);
-    let frame = quads
-        .render(
-            &scene,
-            &gaurast_oracle::scenes::synthetic_camera([8, 8]),
-            0,
-            ALPHA_FLOOR,
-        )
-        .expect("a frame");
+    let frame =
+        quads.render(&scene, &gaurast_oracle::scenes::synthetic_camera([8, 8]), 0, ALPHA_FLOOR).expect("a frame");
     assert_eq!(frame.picture.pixels, vec![[0.0; 4]; 64]);
 }

@@ -36,15 +36,7 @@ impl<'a> Chapter<'a> {
     }
 
     /// Adds a case.
-    pub(super) fn add(
-        &mut self,
-        name: impl Into<String>,
-        make: impl Fn() -> Draw + Send + Sync + 'static,
-    ) {
-        self.cases.push(Case {
-            chapter: self.name,
-            name: name.into(),
-            make: Box::new(make),
-        });
+    pub(super) fn add(&mut self, name: impl Into<String>, make: impl Fn() -> Draw + Send + Sync + 'static) {
+        self.cases.push(Case { chapter: self.name, name: name.into(), make: Box::new(make) });
     }
 }

@@ -11,19 +11,14 @@ use super::modes::ORDERS;
 use super::scenes::{Gaussian, ball, cameras, cloud, dense, layered, many, strange};
 use crate::draw::{Depth, Draw, Footprint};
 
-const CUT_OFFS: [(&str, CutOff); 3] = [
-    ("ellipse", CutOff::ELLIPSE),
-    ("tile_square", CutOff::TILE_SQUARE),
-    ("tile_rectangle", CutOff::TILE_RECTANGLE),
-];
+const CUT_OFFS: [(&str, CutOff); 3] =
+    [("ellipse", CutOff::ELLIPSE), ("tile_square", CutOff::TILE_SQUARE), ("tile_rectangle", CutOff::TILE_RECTANGLE)];
 
 pub(super) fn footprint(chapter: &mut Chapter<'_>) {
     for (name, cut_off) in CUT_OFFS {
         for (camera_name, camera) in cameras() {
             chapter.add(format!("{name}.{camera_name}"), move || {
-                Draw::new(dense(301, 1))
-                    .seen_by(camera)
-                    .within(cut_off, 1.5)
+                Draw::new(dense(301, 1)).seen_by(camera).within(cut_off, 1.5)
             });
         }
         for deviations in [0.25, 1.0, 3.0, 3.33, 10.0] {
@@ -32,15 +27,10 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
             });
         }
         for seed in 303..306 {
-            chapter.add(format!("{name}.strange_{seed}"), move || {
-                Draw::new(strange(seed)).within(cut_off, 2.0)
-            });
+            chapter.add(format!("{name}.strange_{seed}"), move || Draw::new(strange(seed)).within(cut_off, 2.0));
         }
         // One alone shows where the shape ends.
-        for (at, mean) in [[0.0, 0.0], [0.13, -0.41], [1.9, 1.2]]
-            .into_iter()
-            .enumerate()
-        {
+        for (at, mean) in [[0.0, 0.0], [0.13, -0.41], [1.9, 1.2]].into_iter().enumerate() {
             chapter.add(format!("{name}.one_{at}"), move || {
                 Draw::new(many(1, |_| Gaussian {
                     position: [mean[0], mean[1], 4.0],
@@ -54,9 +44,7 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
         }
         for (order_name, order) in ORDERS {
             chapter.add(format!("{name}.{order_name}"), move || {
-                Draw::new(layered(307, 0))
-                    .in_state(|state| state.order(order))
-                    .within(cut_off, 1.0)
+                Draw::new(layered(307, 0)).in_state(|state| state.order(order)).within(cut_off, 1.0)
             });
         }
         chapter.add(format!("{name}.lax"), move || {
@@ -75,14 +63,7 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
                 .within(cut_off, 1.5)
         });
         chapter.add(format!("{name}.viewport"), move || Draw {
-            viewport: Some(
-                vk::Viewport::default()
-                    .x(13.0)
-                    .y(7.0)
-                    .width(61.0)
-                    .height(58.0)
-                    .max_depth(1.0),
-            ),
+            viewport: Some(vk::Viewport::default().x(13.0).y(7.0).width(61.0).height(58.0).max_depth(1.0)),
             ..Draw::new(dense(311, 0)).within(cut_off, 1.0)
         });
         chapter.add(format!("{name}.four_samples"), move || Draw {
@@ -113,11 +94,8 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
         for low_pass in [0.05, 0.3, 1.0] {
             chapter.add(format!("floor_{floor}.low_pass_{low_pass}"), move || Draw {
                 footprint: Some(Footprint::default().compensation_floor(floor)),
-                ..Draw::new(cloud(314, 800, 1)).in_state(|state| {
-                    state
-                        .antialiasing(Antialiasing::OPACITY_COMPENSATED)
-                        .low_pass_variance(low_pass)
-                })
+                ..Draw::new(cloud(314, 800, 1))
+                    .in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED).low_pass_variance(low_pass))
             });
         }
     }

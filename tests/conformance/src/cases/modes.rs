@@ -3,14 +3,13 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model,
-    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization,
-    GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
+    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision,
 };
 
 use super::chapter::Chapter;
 use super::scenes::{
-    Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels,
-    pinholes, strange,
+    Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels, pinholes, strange,
 };
 use crate::draw::{Draw, State};
 
@@ -33,9 +32,7 @@ pub(super) fn camera(chapter: &mut Chapter<'_>) {
     ];
     for (name, camera) in cameras() {
         for (scene_name, scene) in scenes {
-            chapter.add(format!("{name}.{scene_name}"), move || {
-                Draw::new(scene()).seen_by(camera)
-            });
+            chapter.add(format!("{name}.{scene_name}"), move || Draw::new(scene()).seen_by(camera));
         }
     }
     for index in [0, 5, 7, 9] {
@@ -62,17 +59,10 @@ pub(super) fn camera(chapter: &mut Chapter<'_>) {
         ("no_far", front().near_plane(2.0)),
         ("parallel", parallels()[0].1.near_plane(2.0).far_plane(5.0)),
     ] {
-        chapter.add(format!("planes.{name}"), move || {
-            Draw::new(in_planes()).seen_by(camera)
-        });
+        chapter.add(format!("planes.{name}"), move || Draw::new(in_planes()).seen_by(camera));
     }
     // Outside the picture the Jacobian uses a clamped slope.
-    for (name, by) in [
-        ("left", [-1.0, 0.0]),
-        ("right", [1.0, 0.0]),
-        ("above", [0.0, -1.0]),
-        ("below", [0.0, 1.0]),
-    ] {
+    for (name, by) in [("left", [-1.0, 0.0]), ("right", [1.0, 0.0]), ("above", [0.0, -1.0]), ("below", [0.0, 1.0])] {
         chapter.add(format!("beside.{name}"), move || {
             Draw::new(many(1, |_| Gaussian {
                 position: [4.5 * by[0], 4.5 * by[1], 4.0],
@@ -89,9 +79,7 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
         for (name, camera) in cameras() {
             for (scene_name, scene) in scenes {
                 chapter.add(format!("{order_name}.{name}.{scene_name}"), move || {
-                    Draw::new(scene())
-                        .in_state(|state| state.order(order))
-                        .seen_by(camera)
+                    Draw::new(scene()).in_state(|state| state.order(order)).seen_by(camera)
                 });
             }
         }
@@ -112,11 +100,7 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
     chapter.add("ties.neighbours_differ", || {
         Draw::new(many(64, |index| Gaussian {
             // The Gaussians are one unit in the last place apart, in the reverse order of the draw.
-            position: [
-                0.0,
-                0.0,
-                f32::from_bits(4.0_f32.to_bits() + 64 - index as u32),
-            ],
+            position: [0.0, 0.0, f32::from_bits(4.0_f32.to_bits() + 64 - index as u32)],
             opacity: 0.3,
             sh: vec![[index as f32 / 32.0 - 1.0, 0.0, 1.0 - index as f32 / 32.0]],
             ..ball()
@@ -126,11 +110,7 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
         chapter.add(format!("ties.all_of_{count}"), move || {
             Draw::new(many(count, |index| Gaussian {
                 opacity: 0.9 / (1.0 + count as f32 / 20.0) + 0.01,
-                sh: vec![[
-                    (index % 7) as f32 / 3.0 - 1.0,
-                    (index % 5) as f32 / 2.0 - 1.0,
-                    0.0,
-                ]],
+                sh: vec![[(index % 7) as f32 / 3.0 - 1.0, (index % 5) as f32 / 2.0 - 1.0, 0.0]],
                 ..ball()
             }))
         });
@@ -138,46 +118,31 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
 }
 
 pub(super) fn surfel(chapter: &mut Chapter<'_>) {
-    let flat = |state: State, filter| {
-        state
-            .geometry(Geometry::GAUSSIAN_2D)
-            .low_pass_variance(filter)
-    };
+    let flat = |state: State, filter| state.geometry(Geometry::GAUSSIAN_2D).low_pass_variance(filter);
     let cameras: Vec<_> = pinholes().into_iter().chain(parallels()).collect();
     for (name, camera) in cameras {
         for (order_name, order) in [ORDERS[0], ORDERS[1], ORDERS[3]] {
             for filter in [0.0, 0.5, 2.0] {
                 chapter.add(format!("{name}.{order_name}.filter_{filter}"), move || {
-                    Draw::new(dense(6, 1))
-                        .in_state(|state| flat(state, filter).order(order))
-                        .seen_by(camera)
+                    Draw::new(dense(6, 1)).in_state(|state| flat(state, filter).order(order)).seen_by(camera)
                 });
             }
         }
     }
     for seed in 210..218 {
-        chapter.add(format!("strange_{seed}"), move || {
-            Draw::new(strange(seed)).in_state(|state| flat(state, 0.5))
-        });
+        chapter.add(format!("strange_{seed}"), move || Draw::new(strange(seed)).in_state(|state| flat(state, 0.5)));
     }
 }
 
 pub(super) fn unscented(chapter: &mut Chapter<'_>) {
-    let antialiasing = [
-        ("dilate", Antialiasing::DILATE),
-        ("compensated", Antialiasing::OPACITY_COMPENSATED),
-    ];
+    let antialiasing = [("dilate", Antialiasing::DILATE), ("compensated", Antialiasing::OPACITY_COMPENSATED)];
     let scenes: [(&str, Scene); 2] = [("dense", || dense(7, 1)), ("strange", || strange(205))];
     for (name, camera) in cameras() {
         for (mode, antialiasing) in antialiasing {
             for (scene_name, scene) in scenes {
                 chapter.add(format!("{name}.{mode}.{scene_name}"), move || {
                     Draw::new(scene())
-                        .in_state(|state| {
-                            state
-                                .linearization(Linearization::UNSCENTED)
-                                .antialiasing(antialiasing)
-                        })
+                        .in_state(|state| state.linearization(Linearization::UNSCENTED).antialiasing(antialiasing))
                         .seen_by(camera)
                 });
             }
@@ -190,8 +155,7 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
     for low_pass in [0.0, 0.05, 0.3, 1.0] {
         for floor in [1e-4, 1.0 / 255.0, 0.05] {
             for (ceiling, end) in ends {
-                let name =
-                    format!("low_pass_{low_pass}.floor_{floor:.4}.ceiling_{ceiling}.end_{end}");
+                let name = format!("low_pass_{low_pass}.floor_{floor:.4}.ceiling_{ceiling}.end_{end}");
                 chapter.add(name, move || {
                     Draw::new(dense(8, 0)).in_state(|state| {
                         state
@@ -204,70 +168,39 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
             }
         }
         for floor in [1e-4, 1.0 / 255.0] {
-            chapter.add(
-                format!("compensated.low_pass_{low_pass}.floor_{floor:.4}"),
-                move || {
-                    Draw::new(cloud(9, 800, 1)).in_state(|state| {
-                        state
-                            .antialiasing(Antialiasing::OPACITY_COMPENSATED)
-                            .low_pass_variance(low_pass)
-                            .alpha_floor(floor)
-                    })
-                },
-            );
+            chapter.add(format!("compensated.low_pass_{low_pass}.floor_{floor:.4}"), move || {
+                Draw::new(cloud(9, 800, 1)).in_state(|state| {
+                    state.antialiasing(Antialiasing::OPACITY_COMPENSATED).low_pass_variance(low_pass).alpha_floor(floor)
+                })
+            });
         }
     }
     // If the floor equals the ceiling, alphas at the ceiling still contribute.
     chapter.add("floor_is_ceiling", || {
-        Draw::new(many(3, |index| Gaussian {
-            position: [0.8 * index as f32 - 0.8, 0.0, 4.0],
-            opacity: 0.9,
-            ..ball()
-        }))
-        .in_state(|state| state.alpha_floor(0.5).alpha_ceiling(0.5))
+        Draw::new(many(3, |index| Gaussian { position: [0.8 * index as f32 - 0.8, 0.0, 4.0], opacity: 0.9, ..ball() }))
+            .in_state(|state| state.alpha_floor(0.5).alpha_ceiling(0.5))
     });
-    chapter.add("floor_0", || {
-        Draw::new(dense(10, 0)).in_state(|state| state.alpha_floor(0.0))
-    });
+    chapter.add("floor_0", || Draw::new(dense(10, 0)).in_state(|state| state.alpha_floor(0.0)));
     chapter.add("floor_1", || {
-        Draw::new(many(1, |_| Gaussian {
-            opacity: 4.0,
-            ..ball()
-        }))
-        .in_state(|state| {
-            state
-                .alpha_floor(1.0)
-                .alpha_ceiling(1.0)
-                .transmittance_floor(0.0)
-        })
+        Draw::new(many(1, |_| Gaussian { opacity: 4.0, ..ball() }))
+            .in_state(|state| state.alpha_floor(1.0).alpha_ceiling(1.0).transmittance_floor(0.0))
     });
     // The first Gaussian would leave a transmittance of zero, so nothing contributes.
     chapter.add("opaque_first", || {
-        Draw::new(many(1, |_| Gaussian {
-            opacity: 4.0,
-            ..ball()
-        }))
-        .in_state(|state| state.alpha_ceiling(1.0).transmittance_floor(0.01))
+        Draw::new(many(1, |_| Gaussian { opacity: 4.0, ..ball() }))
+            .in_state(|state| state.alpha_ceiling(1.0).transmittance_floor(0.01))
     });
     for opacity in [1.0, 3.0, 100.0] {
         chapter.add(format!("opacity_{opacity}"), move || {
             let mut scene = dense(11, 0);
-            scene
-                .opacities
-                .iter_mut()
-                .step_by(3)
-                .for_each(|o| *o = opacity);
+            scene.opacities.iter_mut().step_by(3).for_each(|o| *o = opacity);
             Draw::new(scene)
         });
     }
     // Only wide Gaussians show where the cut-off is.
     for floor in [1e-6, 1e-4, 1.0 / 255.0] {
         chapter.add(format!("reach.floor_{floor:.6}"), move || {
-            Draw::new(many(1, |_| Gaussian {
-                opacity: 1.0,
-                ..ball()
-            }))
-            .in_state(|state| state.alpha_floor(floor))
+            Draw::new(many(1, |_| Gaussian { opacity: 1.0, ..ball() })).in_state(|state| state.alpha_floor(floor))
         });
     }
     // The Gaussian that ends a pixel does not contribute.
@@ -285,73 +218,43 @@ pub(super) fn harmonics(chapter: &mut Chapter<'_>) {
             let mut scene = dense(13, degree);
             let triples = (degree + 1).pow(2) as usize;
             for (at, triple) in scene.sh.iter_mut().enumerate() {
-                *triple = if at % triples == function {
-                    [0.6, -0.6, 0.2]
-                } else {
-                    [0.0; 3]
-                };
+                *triple = if at % triples == function { [0.6, -0.6, 0.2] } else { [0.0; 3] };
             }
             Draw::new(scene).seen_by(front().eye([0.3, -0.2, 5.0]).focal_length([30.0; 2]))
         });
     }
     for degree in 0..=4 {
         for (name, camera) in [cameras()[0], cameras()[2], cameras()[6], cameras()[9]] {
-            chapter.add(format!("degree_{degree}.{name}"), move || {
-                Draw::new(dense(14, degree)).seen_by(camera)
-            });
+            chapter.add(format!("degree_{degree}.{name}"), move || Draw::new(dense(14, degree)).seen_by(camera));
         }
-        chapter.add(format!("degree_{degree}_of_4"), move || Draw {
-            degree,
-            ..Draw::new(dense(15, 4))
-        });
+        chapter.add(format!("degree_{degree}_of_4"), move || Draw { degree, ..Draw::new(dense(15, 4)) });
     }
     chapter.add("bright", || {
         let mut scene = dense(16, 1);
-        scene
-            .sh
-            .as_flattened_mut()
-            .iter_mut()
-            .for_each(|k| *k *= 20.0);
+        scene.sh.as_flattened_mut().iter_mut().for_each(|k| *k *= 20.0);
         Draw::new(scene)
     });
 }
 
 pub(super) fn binary16(chapter: &mut Chapter<'_>) {
     let half = |state: State| state.precision(Precision::FLOAT16);
-    let cameras = cameras()
-        .into_iter()
-        .filter(|(_, camera)| camera.model != Model::EQUIRECTANGULAR);
+    let cameras = cameras().into_iter().filter(|(_, camera)| camera.model != Model::EQUIRECTANGULAR);
     for (name, camera) in cameras {
         for (order_name, order) in &ORDERS[..3] {
             let order = *order;
             chapter.add(format!("{name}.{order_name}"), move || {
-                Draw::new(few(17, 1))
-                    .in_state(|state| half(state).order(order))
-                    .seen_by(camera)
+                Draw::new(few(17, 1)).in_state(|state| half(state).order(order)).seen_by(camera)
             });
         }
     }
     let states: [(&str, Change); 4] = [
-        ("compensated", |state| {
-            state.antialiasing(Antialiasing::OPACITY_COMPENSATED)
-        }),
-        ("lax", |state| {
-            state.alpha_floor(1e-3).transmittance_floor(0.0)
-        }),
-        ("strict", |state| {
-            state
-                .alpha_floor(0.05)
-                .alpha_ceiling(0.9)
-                .transmittance_floor(0.02)
-        }),
-        ("unscented", |state| {
-            state.linearization(Linearization::UNSCENTED)
-        }),
+        ("compensated", |state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED)),
+        ("lax", |state| state.alpha_floor(1e-3).transmittance_floor(0.0)),
+        ("strict", |state| state.alpha_floor(0.05).alpha_ceiling(0.9).transmittance_floor(0.02)),
+        ("unscented", |state| state.linearization(Linearization::UNSCENTED)),
     ];
     for (name, change) in states {
-        chapter.add(name, move || {
-            Draw::new(few(18, 0)).in_state(|state| change(half(state)))
-        });
+        chapter.add(name, move || Draw::new(few(18, 0)).in_state(|state| change(half(state))));
     }
 }
 
@@ -361,31 +264,21 @@ pub(super) fn approximation(chapter: &mut Chapter<'_>) {
             position: [0.0, 0.0, 3.0 + 0.01 * layer as f32],
             scale: [3.0, 3.0, 0.01],
             opacity: 0.02 + 0.0005 * layer as f32,
-            sh: vec![if layer % 2 == 0 {
-                [1.5, 0.0, -1.5]
-            } else {
-                [-1.5, 0.0, 1.5]
-            }],
+            sh: vec![if layer % 2 == 0 { [1.5, 0.0, -1.5] } else { [-1.5, 0.0, 1.5] }],
             ..ball()
         })
     };
     for error in [0.0, 1e-4, 2e-3] {
         for budget in [0.0, 1.0 / 255.0, 16.0 / 255.0] {
             let allowed = Some([error, budget]);
-            chapter.add(
-                format!("error_{error}.budget_{budget:.4}.cloud"),
-                move || Draw {
-                    approximation: allowed,
-                    ..Draw::new(cloud(19, 800, 1))
-                },
-            );
-            chapter.add(
-                format!("error_{error}.budget_{budget:.4}.layers"),
-                move || Draw {
-                    approximation: allowed,
-                    ..Draw::new(layers())
-                },
-            );
+            chapter.add(format!("error_{error}.budget_{budget:.4}.cloud"), move || Draw {
+                approximation: allowed,
+                ..Draw::new(cloud(19, 800, 1))
+            });
+            chapter.add(format!("error_{error}.budget_{budget:.4}.layers"), move || Draw {
+                approximation: allowed,
+                ..Draw::new(layers())
+            });
         }
     }
 }

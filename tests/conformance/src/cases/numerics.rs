@@ -11,12 +11,7 @@ use crate::draw::{Camera, Draw};
 /// A rotation that differs for each Gaussian index.
 fn turned(index: usize) -> [f32; 4] {
     let angle = index as f32;
-    [
-        (0.7 * angle).cos(),
-        (1.3 * angle).sin(),
-        (0.4 * angle).sin(),
-        (0.9 * angle).cos(),
-    ]
+    [(0.7 * angle).cos(), (1.3 * angle).sin(), (0.4 * angle).sin(), (0.9 * angle).cos()]
 }
 
 /// A position in front of the camera for each Gaussian index, in no particular order.
@@ -55,28 +50,17 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
             });
         }
     }
-    for (name, scale) in [
-        ("needles", [3.0, 3e-4, 3e-4]),
-        ("discs", [0.5, 0.5, 0.0]),
-        ("points", [0.0; 3]),
-    ] {
+    for (name, scale) in [("needles", [3.0, 3e-4, 3e-4]), ("discs", [0.5, 0.5, 0.0]), ("points", [0.0; 3])] {
         chapter.add(format!("compensated.{name}"), move || {
-            shaped(40, scale, 0.8)
-                .in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED))
+            shaped(40, scale, 0.8).in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED))
         });
     }
     // Discs seen at a grazing angle.
     for angle in [0.0, 1e-6, 1e-3] {
         chapter.add(format!("edge_on_{angle}"), move || {
-            let [sin, cos] = [0.5 * (std::f32::consts::FRAC_PI_2 + angle)]
-                .map(f32::sin_cos)
-                .map(|(s, c)| [s, c])[0];
+            let [sin, cos] = [0.5 * (std::f32::consts::FRAC_PI_2 + angle)].map(f32::sin_cos).map(|(s, c)| [s, c])[0];
             Draw::new(many(9, |index| Gaussian {
-                position: [
-                    0.7 * (index % 3) as f32 - 0.7,
-                    0.6 * (index / 3) as f32 - 0.6,
-                    3.0,
-                ],
+                position: [0.7 * (index % 3) as f32 - 0.7, 0.6 * (index / 3) as f32 - 0.6, 3.0],
                 scale: [0.3, 0.3, 0.0],
                 rotation: [cos, sin, 0.0, 0.0],
                 ..ball()
@@ -97,10 +81,7 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
         chapter.add(format!("units.{scale:e}"), move || {
             let mut scene = dense(52, 1);
             for values in [&mut scene.positions, &mut scene.scales] {
-                values
-                    .as_flattened_mut()
-                    .iter_mut()
-                    .for_each(|c| *c *= scale);
+                values.as_flattened_mut().iter_mut().for_each(|c| *c *= scale);
             }
             Draw::new(scene).seen_by(front().near_plane(0.2 * scale))
         });
@@ -112,40 +93,25 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
                 position: [0.01 * z, -0.02 * z, z],
                 scale: [0.05, 0.04, 0.01],
                 opacity,
-                sh: vec![[
-                    (index % 7) as f32 / 3.0 - 1.0,
-                    0.0,
-                    (index % 3) as f32 - 1.0,
-                ]],
+                sh: vec![[(index % 7) as f32 / 3.0 - 1.0, 0.0, (index % 3) as f32 - 1.0]],
                 ..ball()
             }
         }));
-        Draw {
-            size: [33, 29],
-            ..draw.seen_by(camera)
-        }
-        .in_state(|state| state.transmittance_floor(0.0))
+        Draw { size: [33, 29], ..draw.seen_by(camera) }.in_state(|state| state.transmittance_floor(0.0))
     };
-    let small = front()
-        .focal_length([26.0; 2])
-        .principal_point([16.5, 14.5]);
+    let small = front().focal_length([26.0; 2]).principal_point([16.5, 14.5]);
     for (name, order) in ORDERS {
         for (count, opacity) in [(1_000, 0.02), (10_000, 0.02), (10_000, 0.005)] {
-            chapter.add(
-                format!("layers_{count}.opacity_{opacity}.{name}"),
-                move || layers(count, opacity, small).in_state(|state| state.order(order)),
-            );
+            chapter.add(format!("layers_{count}.opacity_{opacity}.{name}"), move || {
+                layers(count, opacity, small).in_state(|state| state.order(order))
+            });
         }
     }
     // The eye is inside the Gaussians, with their centres just in front of it.
     for z in [0.201_f32, 0.25, 0.5] {
         chapter.add(format!("close_{z}"), move || {
             Draw::new(many(5, |index| Gaussian {
-                position: [
-                    0.05 * (index as f32 - 2.0),
-                    0.02 * index as f32,
-                    z + 0.01 * index as f32,
-                ],
+                position: [0.05 * (index as f32 - 2.0), 0.02 * index as f32, z + 0.01 * index as f32],
                 scale: [0.02, 0.1, 0.05],
                 rotation: turned(index),
                 opacity: 0.5,
@@ -154,15 +120,12 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
         });
     }
     for opacity in [1e4_f32, 1e10, 1e30] {
-        chapter.add(format!("opacity_{opacity:e}"), move || {
-            shaped(30, [0.1, 0.03, 0.2], opacity)
-        });
+        chapter.add(format!("opacity_{opacity:e}"), move || shaped(30, [0.1, 0.03, 0.2], opacity));
     }
     for seed in 300..324 {
         chapter.add(format!("strange.{seed}"), move || Draw::new(strange(seed)));
         chapter.add(format!("strange.{seed}.lax"), move || {
-            Draw::new(strange(seed))
-                .in_state(|state| state.alpha_floor(1e-4).transmittance_floor(0.0))
+            Draw::new(strange(seed)).in_state(|state| state.alpha_floor(1e-4).transmittance_floor(0.0))
         });
     }
 }

@@ -2,8 +2,7 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff,
-    GaussianGeometryGAURAST as Geometry,
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
 };
 use gaurast_oracle::oracle::OracleInstance;
 
@@ -14,12 +13,7 @@ use crate::draw::{Blend, Call, Draw, Shown};
 
 /// A draw whose fragments are what a shader shows of them; elsewhere the picture is less than anything.
 fn showing(shown: Shown, scene: SceneBuffers) -> Draw {
-    Draw {
-        shown: Some(shown),
-        behind: [-1e9; 4],
-        blend: Blend::Replace,
-        ..Draw::new(scene)
-    }
+    Draw { shown: Some(shown), behind: [-1e9; 4], blend: Blend::Replace, ..Draw::new(scene) }
 }
 
 const OF_GAUSSIANS: [(&str, Shown); 4] = [
@@ -32,9 +26,7 @@ const OF_GAUSSIANS: [(&str, Shown); 4] = [
 pub(super) fn resolve(chapter: &mut Chapter<'_>) {
     for (name, shown) in OF_GAUSSIANS {
         for (camera_name, camera) in cameras() {
-            chapter.add(format!("{name}.{camera_name}"), move || {
-                showing(shown, dense(321, 1)).seen_by(camera)
-            });
+            chapter.add(format!("{name}.{camera_name}"), move || showing(shown, dense(321, 1)).seen_by(camera));
         }
         for (order_name, order) in &ORDERS[..3] {
             let order = *order;
@@ -43,34 +35,21 @@ pub(super) fn resolve(chapter: &mut Chapter<'_>) {
             });
         }
         for seed in 323..326 {
-            chapter.add(format!("{name}.strange_{seed}"), move || {
-                showing(shown, strange(seed))
-            });
+            chapter.add(format!("{name}.strange_{seed}"), move || showing(shown, strange(seed)));
         }
         // Without a floor, what underflows may be the first to contribute or not.
         chapter.add(format!("{name}.lax"), move || {
-            showing(shown, dense(327, 0)).in_state(|state| {
-                state
-                    .alpha_floor(1e-6)
-                    .transmittance_floor(0.0)
-                    .alpha_ceiling(1.0)
-            })
+            showing(shown, dense(327, 0))
+                .in_state(|state| state.alpha_floor(1e-6).transmittance_floor(0.0).alpha_ceiling(1.0))
         });
         chapter.add(format!("{name}.compensated"), move || {
-            showing(shown, cloud(328, 800, 0))
-                .in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED))
+            showing(shown, cloud(328, 800, 0)).in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED))
         });
         chapter.add(format!("{name}.surfel"), move || {
-            showing(shown, dense(329, 0))
-                .in_state(|state| state.geometry(Geometry::GAUSSIAN_2D).low_pass_variance(0.5))
+            showing(shown, dense(329, 0)).in_state(|state| state.geometry(Geometry::GAUSSIAN_2D).low_pass_variance(0.5))
         });
-        for (cut_name, cut_off) in [
-            ("ellipse", CutOff::ELLIPSE),
-            ("tile_square", CutOff::TILE_SQUARE),
-        ] {
-            chapter.add(format!("{name}.{cut_name}"), move || {
-                showing(shown, dense(330, 0)).within(cut_off, 1.0)
-            });
+        for (cut_name, cut_off) in [("ellipse", CutOff::ELLIPSE), ("tile_square", CutOff::TILE_SQUARE)] {
+            chapter.add(format!("{name}.{cut_name}"), move || showing(shown, dense(330, 0)).within(cut_off, 1.0));
         }
     }
     for location in 0..6 {
@@ -88,26 +67,15 @@ pub(super) fn resolve(chapter: &mut Chapter<'_>) {
 fn names(chapter: &mut Chapter<'_>) {
     let gaussians = || showing(Shown::Gaussians, dense(332, 0));
     chapter.add("names.first_vertex", move || Draw {
-        calls: vec![Call::Draw {
-            vertices: [100, 300],
-            instances: [0, 1],
-        }],
+        calls: vec![Call::Draw { vertices: [100, 300], instances: [0, 1] }],
         ..gaussians()
     });
     chapter.add("names.indices", move || Draw {
         indices: (0..400).map(|index| (index * 7) % 450).collect(),
-        calls: vec![Call::Indexed {
-            indices: [20, 350],
-            offset: 40,
-        }],
+        calls: vec![Call::Indexed { indices: [20, 350], offset: 40 }],
         ..gaussians()
     });
-    chapter.add("names.indirect", move || Draw {
-        calls: vec![Call::Indirect {
-            vertices: [50, 400],
-        }],
-        ..gaussians()
-    });
+    chapter.add("names.indirect", move || Draw { calls: vec![Call::Indirect { vertices: [50, 400] }], ..gaussians() });
     chapter.add("names.instances", move || {
         let placed = (0..5).map(|instance| OracleInstance {
             matrix: [
@@ -119,10 +87,7 @@ fn names(chapter: &mut Chapter<'_>) {
         });
         Draw {
             instances: Some((vk::VertexInputRate::INSTANCE, placed.collect())),
-            calls: vec![Call::Draw {
-                vertices: [10, 120],
-                instances: [2, 3],
-            }],
+            calls: vec![Call::Draw { vertices: [10, 120], instances: [2, 3] }],
             ..gaussians()
         }
     });
@@ -130,18 +95,9 @@ fn names(chapter: &mut Chapter<'_>) {
         merged: true,
         indices: (0..100).rev().collect(),
         calls: vec![
-            Call::Draw {
-                vertices: [300, 150],
-                instances: [0, 1],
-            },
-            Call::Indexed {
-                indices: [0, 100],
-                offset: 0,
-            },
-            Call::Draw {
-                vertices: [100, 200],
-                instances: [7, 1],
-            },
+            Call::Draw { vertices: [300, 150], instances: [0, 1] },
+            Call::Indexed { indices: [0, 100], offset: 0 },
+            Call::Draw { vertices: [100, 200], instances: [7, 1] },
         ],
         ..gaussians()
     });

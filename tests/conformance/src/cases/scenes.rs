@@ -76,31 +76,16 @@ pub(super) fn pinholes() -> Vec<(&'static str, Camera)> {
         ),
         (
             "pinhole_mirrored",
-            front
-                .rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
-                .near_plane(3.0)
-                .far_plane(8.0),
+            front.rotation([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).near_plane(3.0).far_plane(8.0),
         ),
-        (
-            "pinhole_wide",
-            front.focal_length([22.0, 25.0]).eye([0.0, 0.0, 4.0]),
-        ),
+        ("pinhole_wide", front.focal_length([22.0, 25.0]).eye([0.0, 0.0, 4.0])),
     ]
 }
 
 /// Orthographic cameras.
 pub(super) fn parallels() -> Vec<(&'static str, Camera)> {
-    let parallel = front()
-        .model(Model::ORTHOGRAPHIC)
-        .focal_length([16.0, 14.0])
-        .depth_coefficients([0.0, 0.05]);
-    vec![
-        ("parallel", parallel),
-        (
-            "parallel_inside",
-            parallel.eye([0.2, -0.1, 5.0]).near_plane(-4.0),
-        ),
-    ]
+    let parallel = front().model(Model::ORTHOGRAPHIC).focal_length([16.0, 14.0]).depth_coefficients([0.0, 0.05]);
+    vec![("parallel", parallel), ("parallel_inside", parallel.eye([0.2, -0.1, 5.0]).near_plane(-4.0))]
 }
 
 /// Cameras of all models: from the front, from inside, rotated, mirrored and wide.
@@ -109,18 +94,12 @@ pub(super) fn cameras() -> Vec<(&'static str, Camera)> {
     let panorama = fisheye
         .model(Model::EQUIRECTANGULAR)
         .eye([0.2, -0.1, 5.0])
-        .focal_length([
-            SIZE[0] as f32 / std::f32::consts::TAU,
-            SIZE[1] as f32 / std::f32::consts::PI,
-        ]);
+        .focal_length([SIZE[0] as f32 / std::f32::consts::TAU, SIZE[1] as f32 / std::f32::consts::PI]);
     let mut cameras = pinholes();
     cameras.extend(parallels());
     cameras.extend([
         ("fisheye", fisheye.focal_length([60.0, 55.0])),
-        (
-            "fisheye_inside",
-            fisheye.eye([0.2, -0.1, 5.0]).focal_length([16.0; 2]),
-        ),
+        ("fisheye_inside", fisheye.eye([0.2, -0.1, 5.0]).focal_length([16.0; 2])),
         ("panorama", panorama),
         (
             "panorama_turned",

@@ -20,19 +20,11 @@ pub struct Limits {
 
 impl Limits {
     /// The contract for trained scenes at ordinary sizes.
-    pub const CONTRACT: Self = Self {
-        distance: 5e-6,
-        other_branch: 0.0002,
-        undecidable: 0.01,
-    };
+    pub const CONTRACT: Self = Self { distance: 5e-6, other_branch: 0.0002, undecidable: 0.01 };
 
     /// The contract's distance without limits on shares of pixels. It serves scenes that are made to be difficult, and
     /// scenes too small for shares to be significant. No pixel is excluded, but any number may be undecidable.
-    pub const ENVELOPE_ONLY: Self = Self {
-        other_branch: 1.0,
-        undecidable: 1.0,
-        ..Self::CONTRACT
-    };
+    pub const ENVELOPE_ONLY: Self = Self { other_branch: 1.0, undecidable: 1.0, ..Self::CONTRACT };
 }
 
 /// The result of judging an image by a reference.
@@ -132,17 +124,10 @@ pub fn verdict(image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Ver
 /// Panics with the verdict unless the image keeps the limits, and leaves a picture of the
 /// difference in `target/differences/<name>.png`.
 #[track_caller]
-pub fn assert_contract(
-    name: &str,
-    image: &[[f32; 4]],
-    reference: &Reference,
-    limits: Limits,
-) -> Verdict {
+pub fn assert_contract(name: &str, image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Verdict {
     let verdict = verdict(image, reference, limits);
     if !verdict.holds() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../target/differences")
-            .join(format!("{name}.png"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/differences").join(format!("{name}.png"));
         let picture = match write_difference(&path, image, reference, limits.distance) {
             Ok(()) => format!("see {}", path.display()),
             Err(error) => format!("no picture: {error}"),
@@ -183,12 +168,7 @@ mod tests {
     #[test]
     fn the_limit_is_5e_6_outside_the_envelope() {
         let reference = reference();
-        for (value, holds) in [
-            (0.500004, true),
-            (0.500006, false),
-            (0.499994, false),
-            (f32::NAN, false),
-        ] {
+        for (value, holds) in [(0.500004, true), (0.500006, false), (0.499994, false), (f32::NAN, false)] {
             let mut image = reference.to_f32();
             image[123][2] = value;
             let verdict = verdict(&image, &reference, Limits::CONTRACT);
@@ -206,10 +186,7 @@ mod tests {
             image[7] = rgba;
             let verdict = verdict(&image, &reference, Limits::CONTRACT);
             assert!(verdict.holds(), "{verdict}");
-            assert_eq!(
-                (verdict.other_branch, verdict.between_branches),
-                (1, between)
-            );
+            assert_eq!((verdict.other_branch, verdict.between_branches), (1, between));
         }
         let mut image = reference.to_f32();
         image[7] = [0.2; 4];
@@ -241,11 +218,6 @@ mod tests {
         let reference = reference();
         let mut image = reference.to_f32();
         image[0][0] = 1.0;
-        assert_contract(
-            "assert_contract_panics",
-            &image,
-            &reference,
-            Limits::CONTRACT,
-        );
+        assert_contract("assert_contract_panics", &image, &reference, Limits::CONTRACT);
     }
 }

@@ -12,9 +12,7 @@ use rayon::prelude::*;
 use super::panorama;
 use super::project::project;
 use super::splat::Splat;
-use super::{
-    OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference, SkipCounts,
-};
+use super::{OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference, SkipCounts};
 
 /// The error that binary64 may have in an input of a pixel, relative to the terms of the input.
 const SLACK: f64 = 1e-10;
@@ -43,11 +41,7 @@ struct Few {
 }
 
 impl Few {
-    const NONE: Self = Self {
-        values: [0.0; 8],
-        count: 0,
-        exhausted: false,
-    };
+    const NONE: Self = Self { values: [0.0; 8], count: 0, exhausted: false };
 
     fn one(value: f64) -> Self {
         let mut one = Self::NONE;
@@ -93,10 +87,7 @@ impl Few {
 
     /// The possible rounded values of `f` of one of these and one of `other`.
     fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let mut results = Self {
-            exhausted: self.exhausted || other.exhausted,
-            ..Self::NONE
-        };
+        let mut results = Self { exhausted: self.exhausted || other.exhausted, ..Self::NONE };
         for &a in self.all() {
             for &b in other.all() {
                 results.add(round(f(a, b)));
@@ -127,12 +118,7 @@ fn exp2(exponent: f64) -> Few {
 
 /// The sums of the absolute values of a colour's terms. No basis function is greater than 3.
 fn magnitude(coefficients: &[[f32; 3]]) -> [f64; 3] {
-    let sum = |c: usize| {
-        coefficients
-            .iter()
-            .map(|k| f64::from(k[c]).abs())
-            .sum::<f64>()
-    };
+    let sum = |c: usize| coefficients.iter().map(|k| f64::from(k[c]).abs()).sum::<f64>();
     [0, 1, 2].map(|c| 0.5 + 3.0 * sum(c))
 }
 
@@ -188,10 +174,7 @@ impl<'a> Rounded<'a> {
         let v = along.with(&across, |a, b| a + b).map(square);
         let q = u.with(&v, |u, v| u + v);
         let exponents = self.log2_opacity.with(&q, |o, q| o - q);
-        let mut alphas = Few {
-            exhausted: exponents.exhausted,
-            ..Few::NONE
-        };
+        let mut alphas = Few { exhausted: exponents.exhausted, ..Few::NONE };
         for &exponent in exponents.all() {
             if exponent.is_nan() {
                 alphas.add(f64::NAN);
@@ -221,11 +204,7 @@ struct Way {
 }
 
 impl Way {
-    const START: Self = Self {
-        transmittance: 1.0,
-        finished: false,
-        colors: [[0.0; 3]; 2],
-    };
+    const START: Self = Self { transmittance: 1.0, finished: false, colors: [[0.0; 3]; 2] };
 
     /// Step 7, with the least and the greatest colour that the Gaussian may have.
     fn behind(mut self, alpha: f64, colors: [[f64; 3]; 2], thresholds: &Thresholds) -> Self {
@@ -258,8 +237,7 @@ impl Way {
 
     /// Least and greatest (C, 1 - T).
     fn rgba(&self) -> [[f64; 4]; 2] {
-        self.colors
-            .map(|[r, g, b]| [r, g, b, 1.0 - self.transmittance])
+        self.colors.map(|[r, g, b]| [r, g, b, 1.0 - self.transmittance])
     }
 }
 
@@ -271,11 +249,7 @@ struct Pixel {
 
 impl Pixel {
     fn new() -> Self {
-        Self {
-            nominal: Way::START,
-            ways: vec![Way::START],
-            exhausted: false,
-        }
+        Self { nominal: Way::START, ways: vec![Way::START], exhausted: false }
     }
 
     fn is_finished(&self) -> bool {
@@ -289,9 +263,7 @@ impl Pixel {
         for way in &self.ways {
             for &alpha in alphas.all() {
                 let way = way.behind(alpha, [least, greatest], to);
-                let alike = |other: &Way| {
-                    other.finished == way.finished && other.transmittance == way.transmittance
-                };
+                let alike = |other: &Way| other.finished == way.finished && other.transmittance == way.transmittance;
                 match ways.iter().position(alike) {
                     Some(at) => ways[at].take_colors_of(&way),
                     None if ways.len() < MAX_WAYS => ways.push(way),
@@ -322,11 +294,7 @@ impl Pixel {
 ///
 /// # Panics
 /// If the state asks for discs, or for the per-pixel order.
-pub fn render_binary16(
-    scene: &OracleScene,
-    camera: &OracleCamera,
-    state: &OracleState,
-) -> Reference {
+pub fn render_binary16(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Reference {
     assert_eq!(state.geometry, OracleGeometry::Volume);
     assert_ne!(state.order, OracleOrder::PerPixel);
     let (mut drawn, mut skips) = (Vec::new(), SkipCounts::default());
@@ -338,10 +306,7 @@ pub fn render_binary16(
     }
     // Stable, so that ties stay in primitive order.
     drawn.sort_by(|(a, _), (b, _)| a.key.total_cmp(&b.key));
-    let splats: Vec<_> = drawn
-        .iter()
-        .map(|(splat, magnitude)| Rounded::new(splat, *magnitude))
-        .collect();
+    let splats: Vec<_> = drawn.iter().map(|(splat, magnitude)| Rounded::new(splat, *magnitude)).collect();
     let thresholds = Thresholds {
         alpha_floor: round(state.alpha_floor.into()),
         alpha_ceiling: round(state.alpha_ceiling.into()),
@@ -359,18 +324,14 @@ pub fn render_binary16(
         pixel
     };
     let count = camera.width * camera.height;
-    let pixels: Vec<Pixel> = (0..count)
-        .into_par_iter()
-        .map(|index| pixel(index % camera.width, index / camera.width))
-        .collect();
+    let pixels: Vec<Pixel> =
+        (0..count).into_par_iter().map(|index| pixel(index % camera.width, index / camera.width)).collect();
     let with_alternatives = pixels.iter().map(Pixel::alternatives).enumerate();
     Reference {
         width: camera.width,
         height: camera.height,
         nominal: pixels.iter().map(|pixel| pixel.nominal.rgba()[0]).collect(),
-        alternatives: with_alternatives
-            .filter_map(|(index, alternatives)| Some((index, alternatives?)))
-            .collect(),
+        alternatives: with_alternatives.filter_map(|(index, alternatives)| Some((index, alternatives?))).collect(),
         exhausted: pixels.iter().filter(|pixel| pixel.exhausted).count(),
         skips,
         undecidable_keys: 0,

@@ -69,18 +69,12 @@ fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
         return [0, 1].map(|axis| {
             let mean = place.mean[axis] - 0.5;
             let slack = side(mean, radius);
-            [
-                ((mean - radius - slack) / TILE).floor(),
-                ((mean + radius + slack + (TILE - 1.0)) / TILE).floor(),
-            ]
+            [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack + (TILE - 1.0)) / TILE).floor()]
         });
     }
     [0, 1].map(|axis| {
         let (mean, radius) = (place.mean[axis], radius([xx, yy][axis]));
         let slack = side(mean, radius);
-        [
-            ((mean - radius - slack) / TILE).floor(),
-            ((mean + radius + slack) / TILE).ceil(),
-        ]
+        [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack) / TILE).ceil()]
     })
 }

@@ -54,23 +54,15 @@ pub struct ErrorModel {
 impl ErrorModel {
     /// The model of a Gaussian: `spread` is `b_0, b_1`; `area` is `|m0 x m1|` if opacity is compensated.
     pub(super) fn new(spread: [f64; 2], opacity: f64, area: Option<f64>) -> Self {
-        let folded = if opacity > 0.0 {
-            2.0 * opacity.log2().abs()
-        } else {
-            0.0
-        };
+        let folded = if opacity > 0.0 { 2.0 * opacity.log2().abs() } else { 0.0 };
         let compensation = area.map_or(0.0, |area| GEOMETRY * spread[0] * spread[1] / area);
-        Self {
-            spread,
-            fixed: FIXED + folded + compensation,
-        }
+        Self { spread, fixed: FIXED + folded + compensation }
     }
 
     /// Bound on the relative error of alpha, at most 1, with `w = S^-1 d` and `q = d . w`.
     pub fn alpha(&self, w: [f64; 2], q: f64) -> f64 {
         let root = q.sqrt();
-        let geometry =
-            w[0].abs() * (self.spread[0] * root + 1.0) + w[1].abs() * (self.spread[1] * root + 1.0);
+        let geometry = w[0].abs() * (self.spread[0] * root + 1.0) + w[1].abs() * (self.spread[1] * root + 1.0);
         (UNIT_ROUNDOFF * (self.fixed + GEOMETRY * geometry)).min(1.0)
     }
 
@@ -96,19 +88,11 @@ pub struct Transmittance {
 
 impl Transmittance {
     /// The transmittance in front of the first Gaussian.
-    pub const ONE: Self = Self {
-        value: 1.0,
-        error: 0.0,
-    };
+    pub const ONE: Self = Self { value: 1.0, error: 0.0 };
 
     /// The transmittance behind a layer of `alpha`, which is known to within `alpha_error`.
     pub fn behind(self, alpha: f64, alpha_error: f64) -> Self {
         let value = self.value * (1.0 - alpha);
-        Self {
-            value,
-            error: self.error * (1.0 - alpha)
-                + self.value * alpha_error
-                + 2.0 * UNIT_ROUNDOFF * value,
-        }
+        Self { value, error: self.error * (1.0 - alpha) + self.value * alpha_error + 2.0 * UNIT_ROUNDOFF * value }
     }
 }

@@ -1,10 +1,9 @@
 //! The inputs of a draw after conversion to binary32: Gaussians, camera and state.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianCutOffGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use super::spherical_harmonics;
@@ -45,14 +44,7 @@ pub struct OracleInstance {
 
 impl Default for OracleInstance {
     fn default() -> Self {
-        Self {
-            matrix: [
-                [1.0, 0.0, 0.0, 0.0],
-                [0.0, 1.0, 0.0, 0.0],
-                [0.0, 0.0, 1.0, 0.0],
-            ],
-            opacity: 1.0,
-        }
+        Self { matrix: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]], opacity: 1.0 }
     }
 }
 
@@ -195,10 +187,7 @@ pub struct OracleState {
 impl OracleState {
     /// The same with a pipeline's structure of footprints.
     #[must_use]
-    pub fn with_footprint(
-        self,
-        footprint: &PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
-    ) -> Self {
+    pub fn with_footprint(self, footprint: &PipelineGaussianFootprintStateCreateInfoGAURAST<'_>) -> Self {
         Self {
             cut_off: match footprint.cut_off {
                 GaussianCutOffGAURAST::ELLIPSE => OracleCutOff::Ellipse,
@@ -217,8 +206,7 @@ impl OracleState {
     pub(super) fn compensation(&self, area: f64, determinant: f64) -> Option<[f64; 2]> {
         let floor = f64::from(self.compensation_floor);
         let area = area.max((floor * determinant).sqrt());
-        self.opacity_compensated
-            .then(|| [area / determinant.sqrt(), area])
+        self.opacity_compensated.then(|| [area / determinant.sqrt(), area])
     }
 }
 
@@ -290,8 +278,7 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             alpha_floor: info.alpha_floor,
             alpha_ceiling: info.alpha_ceiling,
             transmittance_floor: info.transmittance_floor,
-            opacity_compensated: info.antialiasing
-                == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+            opacity_compensated: info.antialiasing == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
             unscented: info.linearization == GaussianLinearizationGAURAST::UNSCENTED,
             geometry: match info.geometry {
                 GaussianGeometryGAURAST::GAUSSIAN_2D => OracleGeometry::Surfel,

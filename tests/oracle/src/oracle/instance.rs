@@ -14,10 +14,7 @@ pub struct Model {
 impl Model {
     pub fn new(instance: &OracleInstance) -> Self {
         let matrix = instance.matrix.map(|row| row.map(f64::from));
-        Self {
-            linear: matrix.map(|[x, y, z, _]| [x, y, z]),
-            translation: matrix.map(|row| row[3]),
-        }
+        Self { linear: matrix.map(|[x, y, z, _]| [x, y, z]), translation: matrix.map(|row| row[3]) }
     }
 
     /// A p + b.
@@ -67,19 +64,12 @@ fn determinant3(a: &[[f64; 3]; 3]) -> f64 {
 #[test]
 fn solving_undoes_the_matrix() {
     let model = Model::new(&OracleInstance {
-        matrix: [
-            [1.0, 2.0, 0.5, 9.0],
-            [-1.0, 3.0, 0.25, 8.0],
-            [0.0, 4.0, -2.0, 7.0],
-        ],
+        matrix: [[1.0, 2.0, 0.5, 9.0], [-1.0, 3.0, 0.25, 8.0], [0.0, 4.0, -2.0, 7.0]],
         opacity: 1.0,
     });
     let p = [0.3, -0.7, 1.9];
     let moved = model.point(p);
     let back = model.solve(std::array::from_fn(|i| moved[i] - model.translation[i]));
-    assert!(
-        back.iter().zip(p).all(|(a, b)| (a - b).abs() < 1e-12),
-        "{back:?}"
-    );
+    assert!(back.iter().zip(p).all(|(a, b)| (a - b).abs() < 1e-12), "{back:?}");
     assert!(model.is_regular());
 }

@@ -72,12 +72,9 @@ mod tests;
 
 pub use binary16::render_binary16;
 pub use inputs::{
-    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleModel, OracleOrder,
-    OracleScene, OracleState,
+    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene, OracleState,
 };
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
-pub use sample_tests::{
-    OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested,
-};
+pub use sample_tests::{OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested};
 pub use skips::{SkipCounts, SkipReason};

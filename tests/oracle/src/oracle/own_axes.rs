@@ -34,20 +34,13 @@ pub struct RayDepth {
 
 impl OwnAxes {
     /// The depth of a Gaussian that has no place in space, only in the picture.
-    pub(super) const NONE: Self = Self {
-        rows: [[0.0; 3]; 3],
-        offset: [0.0; 3],
-    };
+    pub(super) const NONE: Self = Self { rows: [[0.0; 3]; 3], offset: [0.0; 3] };
 
     /// The own axes of a Gaussian: the columns of `axes` (row-major), with its centre at `offset` from the eye.
     pub(super) fn new(axes: &[f64; 9], scale: [f64; 3], offset: [f64; 3]) -> Self {
         let greatest = scale[0].max(scale[1]).max(scale[2]);
         let rows = [0, 1, 2].map(|row| {
-            let stretch = if greatest == 0.0 {
-                1.0
-            } else {
-                1.0 / (scale[row] / greatest).max(LEAST_RATIO)
-            };
+            let stretch = if greatest == 0.0 { 1.0 } else { 1.0 / (scale[row] / greatest).max(LEAST_RATIO) };
             [0, 1, 2].map(|column| axes[3 * column + row] * stretch)
         });
         Self { rows, offset }
@@ -62,11 +55,7 @@ impl OwnAxes {
             OracleModel::Orthographic => ([u, v, 0.0], [0.0, 0.0, 1.0]),
             OracleModel::Fisheye => {
                 let angle = u.hypot(v);
-                let across = if angle == 0.0 {
-                    1.0
-                } else {
-                    angle.sin() / angle
-                };
+                let across = if angle == 0.0 { 1.0 } else { angle.sin() / angle };
                 ([0.0; 3], [across * u, across * v, angle.cos()])
             }
             OracleModel::Equirectangular => {
@@ -92,12 +81,7 @@ impl OwnAxes {
         // The sum of the rounding errors of all terms, even if the terms cancel.
         let unit = 0.5 * f64::EPSILON * ROUNDINGS;
         let size = |v: [f64; 3]| dot(v, v).sqrt();
-        let stretch = self
-            .rows
-            .iter()
-            .map(|&row| dot(row, row))
-            .sum::<f64>()
-            .sqrt();
+        let stretch = self.rows.iter().map(|&row| dot(row, row)).sum::<f64>().sqrt();
         let error_a = unit * stretch * size(direction);
         let error_b = unit * stretch * (size(self.offset) + size(origin));
         let error = error_b / square.sqrt() + 3.0 * size(b) * error_a / square;

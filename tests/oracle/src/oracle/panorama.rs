@@ -19,11 +19,7 @@ pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 
     let (sin, cos) = if r == 0.0 { (0.0, 1.0) } else { (x / r, z / r) };
     let jacobian = [
         [fx * cos / from_axis, 0.0, -fx * sin / from_axis],
-        [
-            -fy * y * sin / square,
-            fy * r / square,
-            -fy * y * cos / square,
-        ],
+        [-fy * y * sin / square, fy * r / square, -fy * y * cos / square],
     ];
     ([fx * x.atan2(z) + cx, fy * y.atan2(r) + cy], jacobian)
 }

@@ -88,15 +88,7 @@ impl Path {
         color: [0.0; 3],
         transmittance: Transmittance::ONE,
         covered: false,
-        medians: Medians {
-            of: [Median {
-                z: 0.0,
-                distance: 0.0,
-                index: 0,
-            }; MAX_MEDIANS],
-            count: 0,
-            exhausted: false,
-        },
+        medians: Medians { of: [Median { z: 0.0, distance: 0.0, index: 0 }; MAX_MEDIANS], count: 0, exhausted: false },
         nearest: None,
         depths: [0.0; 2],
         distances: 0.0,
@@ -114,9 +106,7 @@ impl Path {
             depths: self.depths,
             distances: self.distances,
             nearest: self.nearest,
-            median_gaussians: (medians.iter())
-                .map(|median| (median.index, median.distance))
-                .collect(),
+            median_gaussians: (medians.iter()).map(|median| (median.index, median.distance)).collect(),
         }
     }
 
@@ -139,11 +129,7 @@ pub struct Pixel {
 
 impl Pixel {
     /// A pixel with nothing in it.
-    pub const EMPTY: Self = Self {
-        nominal: Path::START,
-        alternatives: Vec::new(),
-        exhausted: false,
-    };
+    pub const EMPTY: Self = Self { nominal: Path::START, alternatives: Vec::new(), exhausted: false };
 
     /// True if no further Gaussian can change it.
     pub fn is_finished(&self) -> bool {
@@ -158,11 +144,7 @@ impl Pixel {
         }
         let mut step = Step {
             color: splat.color,
-            median: Median {
-                z: splat.z,
-                distance: splat.distance,
-                index: splat.index,
-            },
+            median: Median { z: splat.z, distance: splat.distance, index: splat.index },
             depth: splat.depth,
             alpha,
             state,
@@ -201,9 +183,7 @@ impl Pixel {
 
     /// The outcome of every path, the binary64 one first.
     pub fn outcomes(&self) -> impl Iterator<Item = Outcome> {
-        std::iter::once(&self.nominal)
-            .chain(&self.alternatives)
-            .map(Path::outcome)
+        std::iter::once(&self.nominal).chain(&self.alternatives).map(Path::outcome)
     }
 
     /// True if a path met more undecidable decisions than are followed.
@@ -231,12 +211,7 @@ impl Step<'_> {
             return;
         }
         let floor = f64::from(self.state.alpha_floor);
-        let Alpha {
-            value,
-            error,
-            is_cut,
-            cut_undecidable,
-        } = self.alpha;
+        let Alpha { value, error, is_cut, cut_undecidable } = self.alpha;
         let contributes = value >= floor && !is_cut;
         // No alpha is below a floor of 0, whatever its error.
         let at_floor = floor > 0.0 && (value - floor).abs() < error;
@@ -258,13 +233,10 @@ impl Step<'_> {
     /// Step 7's decision, `T (1 - alpha) < transmittanceFloor`, and its consequence.
     fn finish_or_blend(&mut self, path: &mut Path) {
         let floor = f64::from(self.state.transmittance_floor);
-        let behind = path
-            .transmittance
-            .behind(self.alpha.value, self.alpha.error);
+        let behind = path.transmittance.behind(self.alpha.value, self.alpha.error);
         // If 1 - alpha rounds to 1, T does not change, and it has passed this test before.
-        let undecidable = floor > 0.0
-            && self.alpha.value > 0.5 * UNIT_ROUNDOFF
-            && (behind.value - floor).abs() < behind.error;
+        let undecidable =
+            floor > 0.0 && self.alpha.value > 0.5 * UNIT_ROUNDOFF && (behind.value - floor).abs() < behind.error;
         let finishes = behind.value < floor;
         if let Some(mut other) = self.part(path, undecidable) {
             if finishes {

@@ -10,9 +10,7 @@ use super::splat::{Cholesky, Splat};
 use super::surfel::Surfel;
 use super::unscented;
 use super::vectors::{dot, length, multiply_row, subtract, transform};
-use super::{
-    OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason,
-};
+use super::{OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason};
 
 /// Projects Gaussian `index`, or returns the reason for which it is not drawn.
 pub fn project(
@@ -52,11 +50,7 @@ pub fn project(
     let m = jacobian.map(|row| {
         let in_world = multiply_row(row, &rotation);
         let in_axes = multiply_row(model.row(in_world), &axes);
-        [
-            in_axes[0] * scale[0],
-            in_axes[1] * scale[1],
-            in_axes[2] * scale[2],
-        ]
+        [in_axes[0] * scale[0], in_axes[1] * scale[1], in_axes[2] * scale[2]]
     });
 
     // The columns of M, or those of the unscented transform in their place.
@@ -107,9 +101,7 @@ pub fn project(
     let lost = if instance == OracleInstance::default() {
         0.0
     } else {
-        let terms = model
-            .linear
-            .map(|row| dot(row.map(f64::abs), position.map(f64::abs)));
+        let terms = model.linear.map(|row| dot(row.map(f64::abs), position.map(f64::abs)));
         4.0 * f64::EPSILON * (length(terms) + length(model.translation) + length(camera.eye))
     };
     let area_for_opacity = compensation.map(|[_, area]| area);
@@ -166,11 +158,7 @@ fn scales(scene: &OracleScene, state: &OracleState, index: usize) -> [f32; 3] {
 }
 
 /// Step 1: the checks that need no camera.
-fn check_attributes(
-    scene: &OracleScene,
-    state: &OracleState,
-    index: usize,
-) -> Result<(), SkipReason> {
+fn check_attributes(scene: &OracleScene, state: &OracleState, index: usize) -> Result<(), SkipReason> {
     let (scale, quaternion) = (scales(scene, state, index), scene.rotations[index]);
     let opacity = scene.opacity(index);
     let matrix = scene.instance(index).matrix;
@@ -179,11 +167,7 @@ fn check_attributes(
         && quaternion.iter().all(|c| c.is_finite())
         && opacity.is_finite()
         && matrix.as_flattened().iter().all(|c| c.is_finite())
-        && scene
-            .coefficients(index)
-            .as_flattened()
-            .iter()
-            .all(|c| c.is_finite());
+        && scene.coefficients(index).as_flattened().iter().all(|c| c.is_finite());
     if !finite {
         return Err(SkipReason::NonFinite);
     }
@@ -224,13 +208,7 @@ fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
 /// Camera coordinates are sums of three products of differences: five roundings at most on each term. A length adds
 /// three more, and its error is at most that of the vector.
 fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], lost: f64, sort_by: f64) -> bool {
-    let magnitude = |row: usize| -> f64 {
-        (0..3)
-            .map(|i| (rotation[3 * row + i] * offset[i]).abs())
-            .sum()
-    };
-    let error = lost
-        + 2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude))
-        + 2.0 * f64::EPSILON * sort_by.abs();
+    let magnitude = |row: usize| -> f64 { (0..3).map(|i| (rotation[3 * row + i] * offset[i]).abs()).sum() };
+    let error = lost + 2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude)) + 2.0 * f64::EPSILON * sort_by.abs();
     (sort_by - error) as f32 != (sort_by + error) as f32
 }

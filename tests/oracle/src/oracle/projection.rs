@@ -28,16 +28,9 @@ fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let [cx, cy] = camera.principal.map(f64::from);
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
-    let u = tan_x
-        .max(-(cx / fx + 0.15 * width / fx))
-        .min((width - cx) / fx + 0.15 * width / fx);
-    let v = tan_y
-        .max(-(cy / fy + 0.15 * height / fy))
-        .min((height - cy) / fy + 0.15 * height / fy);
-    let jacobian = [
-        [fx / t[2], 0.0, -fx * u / t[2]],
-        [0.0, fy / t[2], -fy * v / t[2]],
-    ];
+    let u = tan_x.max(-(cx / fx + 0.15 * width / fx)).min((width - cx) / fx + 0.15 * width / fx);
+    let v = tan_y.max(-(cy / fy + 0.15 * height / fy)).min((height - cy) / fy + 0.15 * height / fy);
+    let jacobian = [[fx / t[2], 0.0, -fx * u / t[2]], [0.0, fy / t[2], -fy * v / t[2]]];
     ([fx * tan_x + cx, fy * tan_y + cy], jacobian)
 }
 
@@ -59,20 +52,13 @@ fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     // On the axis the limits hold: only movement across the axis counts, by 1 / t.z.
     if r == 0.0 {
         let scale = if t[2] > 0.0 { 1.0 / t[2] } else { f64::NAN };
-        return (
-            principal,
-            [[focal[0] * scale, 0.0, 0.0], [0.0, focal[1] * scale, 0.0]],
-        );
+        return (principal, [[focal[0] * scale, 0.0, 0.0], [0.0, focal[1] * scale, 0.0]]);
     }
     let row = |axis: usize| {
         // The position is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
         let gradient: [f64; 3] = std::array::from_fn(|k| {
             let r_k = if k < 2 { t[k] / r } else { 0.0 };
-            let a_k = if k < 2 {
-                t[2] * t[k] / (r * square)
-            } else {
-                -r / square
-            };
+            let a_k = if k < 2 { t[2] * t[k] / (r * square) } else { -r / square };
             let of_ratio = (a_k * r - angle * r_k) / (r * r);
             let own = if k == axis { angle / r } else { 0.0 };
             of_ratio * t[axis] + own

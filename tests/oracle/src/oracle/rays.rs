@@ -27,9 +27,7 @@ pub(super) fn composite<T>(reached: &[(RayDepth, T)], add: impl Fn(&mut Pixel, &
         pixel
     };
     let mut pixel = draw(&nominal);
-    let swaps: Vec<usize> = (1..nominal.len())
-        .filter(|&at| may_swap(reached, nominal[at - 1], nominal[at]))
-        .collect();
+    let swaps: Vec<usize> = (1..nominal.len()).filter(|&at| may_swap(reached, nominal[at - 1], nominal[at])).collect();
     let followed = swaps.len().min(MAX_DECISIONS as usize);
     for which in 1..1usize << followed {
         let mut order = nominal.clone();
@@ -73,10 +71,7 @@ mod tests {
 
     #[test]
     fn orders_are_followed_where_they_cannot_be_told() {
-        let depth = |value: f64| RayDepth {
-            value,
-            error: 1e-14,
-        };
+        let depth = |value: f64| RayDepth { value, error: 1e-14 };
         let step = 2.0f64.powi(-36);
         let swap = |a: f64, b: f64| may_swap(&[(depth(a), ()), (depth(b), ())], 0, 1);
         assert!(!swap(1.0, 2.0));

@@ -45,24 +45,18 @@ impl Reference {
     pub fn envelope(&self, index: usize) -> ([f64; 4], [f64; 4]) {
         let start = (self.nominal[index], self.nominal[index]);
         self.outcomes(index).fold(start, |(least, greatest), rgba| {
-            (
-                std::array::from_fn(|c| least[c].min(rgba[c])),
-                std::array::from_fn(|c| greatest[c].max(rgba[c])),
-            )
+            (std::array::from_fn(|c| least[c].min(rgba[c])), std::array::from_fn(|c| greatest[c].max(rgba[c])))
         })
     }
 
     /// Every outcome blended (`ONE`, `ONE_MINUS_SRC_ALPHA`) over `behind`, the pixels behind it.
     #[must_use]
     pub fn over(&self, behind: &[[f64; 4]]) -> Self {
-        let blend = |index: usize, rgba: &[f64; 4]| {
-            std::array::from_fn(|c| rgba[c] + (1.0 - rgba[3]) * behind[index][c])
-        };
+        let blend =
+            |index: usize, rgba: &[f64; 4]| std::array::from_fn(|c| rgba[c] + (1.0 - rgba[3]) * behind[index][c]);
         let alternatives = self.alternatives.iter();
         Self {
-            nominal: (self.nominal.iter().enumerate())
-                .map(|(index, rgba)| blend(index, rgba))
-                .collect(),
+            nominal: (self.nominal.iter().enumerate()).map(|(index, rgba)| blend(index, rgba)).collect(),
             alternatives: alternatives
                 .map(|(&index, outcomes)| {
                     let outcomes = outcomes.iter().map(|rgba| blend(index, rgba));
@@ -75,19 +69,12 @@ impl Reference {
 
     /// The binary64 image rounded to binary32.
     pub fn to_f32(&self) -> Vec<[f32; 4]> {
-        self.nominal
-            .iter()
-            .map(|rgba| rgba.map(|c| c as f32))
-            .collect()
+        self.nominal.iter().map(|rgba| rgba.map(|c| c as f32)).collect()
     }
 }
 
 /// Draws every Gaussian at every pixel: the definition itself, for small scenes.
-pub fn render_literal(
-    scene: &OracleScene,
-    camera: &OracleCamera,
-    state: &OracleState,
-) -> Reference {
+pub fn render_literal(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Reference {
     let projected = Projected::new(scene, camera, state);
     if state.order == OracleOrder::PerPixel {
         return render_per_pixel(camera, state, &projected, |_, _| 0..camera.width);
@@ -102,28 +89,18 @@ pub fn render_literal(
         row
     });
     let rows: Vec<Vec<Pixel>> = rows.collect();
-    collect([camera.width, camera.height], &projected, || {
-        rows.iter().flatten()
-    })
+    collect([camera.width, camera.height], &projected, || rows.iter().flatten())
 }
 
 /// Draws every Gaussian where its alpha can reach the floor, rows in parallel.
 ///
 /// Gives the same bits as [`render_literal`]: the alphas that it skips are certainly below the floor.
-pub fn render_bounded(
-    scene: &OracleScene,
-    camera: &OracleCamera,
-    state: &OracleState,
-) -> Reference {
+pub fn render_bounded(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Reference {
     let projected = Projected::new(scene, camera, state);
     if state.order == OracleOrder::PerPixel {
         let bounds = bounds(&projected, state);
         return render_per_pixel(camera, state, &projected, |index, y| {
-            if bounds[index].rows(camera.height).contains(&y) {
-                bounds[index].columns(y, camera.width)
-            } else {
-                0..0
-            }
+            if bounds[index].rows(camera.height).contains(&y) { bounds[index].columns(y, camera.width) } else { 0..0 }
         });
     }
     bounded(&projected, [camera.width, camera.height], state)
@@ -142,11 +119,7 @@ fn bounds(projected: &Projected, state: &OracleState) -> Vec<Bound> {
 }
 
 /// The rows of pixels that [`bounded`] draws.
-pub(super) fn bounded_pixels(
-    projected: &Projected,
-    [width, height]: [u32; 2],
-    state: &OracleState,
-) -> Vec<Vec<Pixel>> {
+pub(super) fn bounded_pixels(projected: &Projected, [width, height]: [u32; 2], state: &OracleState) -> Vec<Vec<Pixel>> {
     let bounds = bounds(projected, state);
     let mut members = vec![Vec::new(); height as usize];
     for (index, bound) in bounds.iter().enumerate() {
@@ -199,10 +172,7 @@ fn render_per_pixel(
             })
         })
     };
-    let pixels: Vec<Pixel> = (0..camera.height)
-        .into_par_iter()
-        .flat_map_iter(row)
-        .collect();
+    let pixels: Vec<Pixel> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
     collect([camera.width, camera.height], projected, || pixels.iter())
 }
 
@@ -249,11 +219,7 @@ pub(super) fn collect<'a, I: Iterator<Item = &'a Pixel>>(
             .collect(),
         exhausted: pixels().filter(|pixel| pixel.is_exhausted()).count(),
         skips: projected.skips,
-        undecidable_keys: projected
-            .splats
-            .iter()
-            .filter(|splat| splat.key_undecidable)
-            .count(),
+        undecidable_keys: projected.splats.iter().filter(|splat| splat.key_undecidable).count(),
     }
 }
 
@@ -276,9 +242,7 @@ impl Bound {
         // error is at most 1, which bounds q; that q in turn bounds the error.
         let level = 2.0 * (splat.opacity / f64::from(state.alpha_floor)).ln();
         let furthest = (level + 2.0 * std::f64::consts::LN_2).max(0.0);
-        let error = splat
-            .error
-            .alpha_up_to(furthest, splat.covariance, splat.determinant);
+        let error = splat.error.alpha_up_to(furthest, splat.covariance, splat.determinant);
         let q = level + 2.0 * error.ln_1p();
         Self {
             mean: splat.mean,

@@ -38,18 +38,10 @@ impl Resolved {
         Self {
             accumulated: outcome.rgba,
             covered: outcome.covered,
-            expected_depth: if weights > 0.0 {
-                depths / weights
-            } else {
-                last
-            },
+            expected_depth: if weights > 0.0 { depths / weights } else { last },
             median_depths,
             medians_exhausted: outcome.medians_exhausted,
-            expected_distance: if weights > 0.0 {
-                outcome.distances / weights
-            } else {
-                last_distance
-            },
+            expected_distance: if weights > 0.0 { outcome.distances / weights } else { last_distance },
             median_gaussians: outcome.median_gaussians.clone(),
             nearest: outcome.nearest,
         }
@@ -68,9 +60,7 @@ fn resolve(
     let pixels = bounded_pixels(&projected, size, state);
     let ways = |pixel: &Pixel| {
         let outcomes = pixel.outcomes();
-        outcomes
-            .map(|outcome| Resolved::new(&outcome, &depth))
-            .collect()
+        outcomes.map(|outcome| Resolved::new(&outcome, &depth)).collect()
     };
     pixels.iter().flatten().map(ways).collect()
 }

@@ -52,11 +52,7 @@ pub struct OracleStencil {
 impl OracleStencil {
     fn passes(&self, stored: u8) -> bool {
         let s = &self.state;
-        compare(
-            s.compare_op,
-            s.reference & s.compare_mask,
-            u32::from(stored) & s.compare_mask,
-        )
+        compare(s.compare_op, s.reference & s.compare_mask, u32::from(stored) & s.compare_mask)
     }
 
     fn apply(&self, op: vk::StencilOp, stored: u8) -> u8 {
@@ -103,17 +99,10 @@ impl OracleTests {
         let z = f64::from(z);
         let depth = match model {
             OracleModel::Orthographic => c0 + c1 * z,
-            OracleModel::Pinhole | OracleModel::Fisheye | OracleModel::Equirectangular => {
-                c0 + c1 / z
-            }
+            OracleModel::Pinhole | OracleModel::Fisheye | OracleModel::Equirectangular => c0 + c1 / z,
         };
-        let depth = if self.negative_one_to_one {
-            depth / 2.0 + 0.5
-        } else {
-            depth
-        };
-        self.format
-            .code(near + depth.clamp(0.0, 1.0) * (far - near))
+        let depth = if self.negative_one_to_one { depth / 2.0 + 0.5 } else { depth };
+        self.format.code(near + depth.clamp(0.0, 1.0) * (far - near))
     }
 }
 
@@ -200,9 +189,7 @@ impl Sample<'_> {
         let writes = tests.depth.is_some_and(|(_, write)| write);
         let (mut depths, mut stencils) = (Some(Vec::new()), Vec::new());
         for outcome in self.pixel.outcomes() {
-            let Outcome {
-                covered, medians, ..
-            } = &outcome;
+            let Outcome { covered, medians, .. } = &outcome;
             match &mut depths {
                 Some(depths) if *covered && writes => {
                     depths.extend(medians.iter().map(|&z| code(z)));
@@ -227,11 +214,7 @@ impl Sample<'_> {
         if covered {
             return vec![stencil.apply(state.pass_op, old)];
         }
-        let failed = if self.stencil_passes {
-            state.depth_fail_op
-        } else {
-            state.fail_op
-        };
+        let failed = if self.stencil_passes { state.depth_fail_op } else { state.fail_op };
         let failed = stencil.apply(failed, old);
         match self.reached {
             [true, _] => vec![failed],
@@ -250,16 +233,8 @@ pub fn render_tested(
     stored: &Stored,
 ) -> TestedReference {
     let projected = Projected::new(scene, camera, state);
-    let codes: Vec<u32> = projected
-        .splats
-        .iter()
-        .map(|splat| tests.code(camera.model, splat.z))
-        .collect();
-    let bounds: Vec<Bound> = projected
-        .splats
-        .iter()
-        .map(|splat| Bound::new(splat, state))
-        .collect();
+    let codes: Vec<u32> = projected.splats.iter().map(|splat| tests.code(camera.model, splat.z)).collect();
+    let bounds: Vec<Bound> = projected.splats.iter().map(|splat| Bound::new(splat, state)).collect();
     let per_pixel = state.order == OracleOrder::PerPixel;
     let row = |y: u32| {
         let first = (y * camera.width) as usize;
@@ -280,10 +255,8 @@ pub fn render_tested(
                 }
                 let alpha = splat.alpha(x, y, state);
                 sample.reach(alpha, state);
-                let passes = sample.stencil_passes
-                    && tests
-                        .depth
-                        .is_none_or(|(op, _)| compare(op, code, sample.stored.0));
+                let passes =
+                    sample.stencil_passes && tests.depth.is_none_or(|(op, _)| compare(op, code, sample.stored.0));
                 if passes && per_pixel {
                     let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
                     let depth = splat.own_axes.depth(camera, center);
@@ -301,14 +274,8 @@ pub fn render_tested(
         }
         row
     };
-    let samples: Vec<Sample> = (0..camera.height)
-        .into_par_iter()
-        .flat_map_iter(row)
-        .collect();
-    let (depth, stencil) = samples
-        .iter()
-        .map(|sample| sample.after(tests, |z| tests.code(camera.model, z)))
-        .unzip();
+    let samples: Vec<Sample> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
+    let (depth, stencil) = samples.iter().map(|sample| sample.after(tests, |z| tests.code(camera.model, z))).unzip();
     let covered = |sample: &Sample| -> Vec<bool> {
         let outcomes = sample.pixel.outcomes();
         outcomes.map(|outcome| outcome.covered).collect()
@@ -318,9 +285,7 @@ pub fn render_tested(
         samples.iter().filter(holds).count()
     };
     TestedReference {
-        color: collect([camera.width, camera.height], &projected, || {
-            samples.iter().map(|s| &s.pixel)
-        }),
+        color: collect([camera.width, camera.height], &projected, || samples.iter().map(|s| &s.pixel)),
         depth,
         stencil,
         fragments: [

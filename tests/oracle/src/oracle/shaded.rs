@@ -31,11 +31,7 @@ pub struct OracleViewport {
 }
 
 /// Projects a shader's outputs, or returns the reason for which the Gaussian is not drawn.
-pub fn project(
-    outputs: &OracleOutputs,
-    viewport: &OracleViewport,
-    state: &OracleState,
-) -> Result<Splat, SkipReason> {
+pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &OracleState) -> Result<Splat, SkipReason> {
     let [x, y, z, w] = outputs.position.map(f64::from);
     let key = outputs.key.unwrap_or(outputs.position[3]);
     let finite = [x, y, z, w].iter().all(|c| c.is_finite())
@@ -98,11 +94,7 @@ pub fn project(
         z: (z / w) as f32,
         depth: 0.0,
         key_undecidable: false,
-        error: ErrorModel::new(
-            [covariance[0].sqrt(), covariance[2].sqrt()],
-            opacity,
-            area_for_opacity,
-        ),
+        error: ErrorModel::new([covariance[0].sqrt(), covariance[2].sqrt()], opacity, area_for_opacity),
     })
 }
 

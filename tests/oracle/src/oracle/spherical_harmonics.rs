@@ -59,11 +59,7 @@ pub fn basis(degree: u32, direction: [f64; 3]) -> [f64; 25] {
 pub fn color(degree: u32, direction: [f64; 3], coefficients: &[[f32; 3]]) -> [f64; 3] {
     let basis = basis(degree, direction);
     std::array::from_fn(|channel| {
-        let sum: f64 = basis
-            .iter()
-            .zip(coefficients)
-            .map(|(b, k)| b * f64::from(k[channel]))
-            .sum();
+        let sum: f64 = basis.iter().zip(coefficients).map(|(b, k)| b * f64::from(k[channel])).sum();
         (0.5 + sum).max(0.0).min(f32::MAX.into())
     })
 }

@@ -59,20 +59,13 @@ impl Cholesky {
         let swapped = yy > xx;
         let larger = if swapped { yy } else { xx };
         let l11 = larger.sqrt();
-        Self {
-            swapped,
-            l: [l11, xy / l11, (determinant / larger).sqrt()],
-        }
+        Self { swapped, l: [l11, xy / l11, (determinant / larger).sqrt()] }
     }
 
     /// `q = d^T S^-1 d` as a sum of two squares, and `w = S^-1 d`.
     pub fn solve(&self, d: [f64; 2]) -> (f64, [f64; 2]) {
         let [l11, l21, l22] = self.l;
-        let (first, second) = if self.swapped {
-            (d[1], d[0])
-        } else {
-            (d[0], d[1])
-        };
+        let (first, second) = if self.swapped { (d[1], d[0]) } else { (d[0], d[1]) };
         let y1 = first / l11;
         let y2 = (second - l21 * y1) / l22;
         let w2 = y2 / l22;
@@ -96,12 +89,7 @@ pub struct Alpha {
 }
 
 impl Alpha {
-    const NOTHING: Self = Self {
-        value: 0.0,
-        error: 0.0,
-        is_cut: false,
-        cut_undecidable: false,
-    };
+    const NOTHING: Self = Self { value: 0.0, error: 0.0, is_cut: false, cut_undecidable: false };
 
     /// Returns true if it is cut off for certain.
     pub fn is_certainly_cut(&self) -> bool {
@@ -133,32 +121,16 @@ impl Splat {
             error: relative,
         };
         let (is_cut, cut_undecidable) = is_cut(&place, state);
-        let whole = Alpha {
-            is_cut,
-            cut_undecidable,
-            ..Alpha::NOTHING
-        };
+        let whole = Alpha { is_cut, cut_undecidable, ..Alpha::NOTHING };
         let unclamped = self.opacity * (-0.5 * q).exp();
         let error = unclamped * relative;
         let ceiling = f64::from(state.alpha_ceiling);
         if unclamped - error > ceiling {
-            Alpha {
-                value: ceiling,
-                error: 0.0,
-                ..whole
-            }
+            Alpha { value: ceiling, error: 0.0, ..whole }
         } else if unclamped > ceiling {
-            Alpha {
-                value: ceiling,
-                error,
-                ..whole
-            }
+            Alpha { value: ceiling, error, ..whole }
         } else {
-            Alpha {
-                value: unclamped,
-                error,
-                ..whole
-            }
+            Alpha { value: unclamped, error, ..whole }
         }
     }
 }

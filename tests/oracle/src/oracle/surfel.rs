@@ -32,9 +32,7 @@ impl Surfel {
     pub(super) fn distance(&self, [x, y]: [f64; 2]) -> (f64, f64) {
         let camera = &self.camera;
         let place = [x, y];
-        let ray = [0, 1].map(|axis| {
-            (place[axis] - f64::from(camera.principal[axis])) / f64::from(camera.focal[axis])
-        });
+        let ray = [0, 1].map(|axis| (place[axis] - f64::from(camera.principal[axis])) / f64::from(camera.focal[axis]));
         let (origin, direction) = match camera.model {
             OracleModel::Orthographic => ([ray[0], ray[1], 0.0], [0.0, 0.0, 1.0]),
             _ => ([0.0; 3], [ray[0], ray[1], 1.0]),
@@ -51,9 +49,7 @@ impl Surfel {
         let unit = 0.5 * f64::EPSILON * ROUNDINGS;
         let (size_a, size_b) = (length(a), length(b));
         let error_w = unit * size_a * size_b * length(direction) / w.abs();
-        let error_uv =
-            unit * (size_a + size_b) * (length(self.centre) + length(origin)) * length(direction)
-                / w.abs();
+        let error_uv = unit * (size_a + size_b) * (length(self.centre) + length(origin)) * length(direction) / w.abs();
         let met = u * u + v * v;
         let met_error = 2.0 * met.sqrt() * error_uv + 2.0 * met * error_w;
         let d = [x - self.mean[0], y - self.mean[1]];
@@ -72,29 +68,20 @@ impl Surfel {
 
     /// Left, right, top and bottom of the pixels that a squared distance of `q` may reach.
     pub(super) fn bounds(&self, q: f64) -> [f64; 4] {
-        let everything = [
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-        ];
+        let everything = [f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY];
         // The ball about the disc.
         let radius = q.sqrt() * (length(self.axes[0]) + length(self.axes[1]));
         let circle = (q * self.low_pass).sqrt();
         let z = self.centre[2];
         let mut bounds = everything;
         for axis in 0..2 {
-            let (focal, principal) = (
-                f64::from(self.camera.focal[axis]),
-                f64::from(self.camera.principal[axis]),
-            );
+            let (focal, principal) = (f64::from(self.camera.focal[axis]), f64::from(self.camera.principal[axis]));
             let sides = [self.centre[axis] - radius, self.centre[axis] + radius];
             let places = match self.camera.model {
                 OracleModel::Orthographic => vec![sides[0], sides[1]],
-                _ if z - radius > 1e-6 * z => sides
-                    .iter()
-                    .flat_map(|side| [side / (z - radius), side / (z + radius)])
-                    .collect(),
+                _ if z - radius > 1e-6 * z => {
+                    sides.iter().flat_map(|side| [side / (z - radius), side / (z + radius)]).collect()
+                }
                 _ => return everything,
             };
             let pixels = places.iter().map(|place| focal * place + principal);
@@ -115,9 +102,5 @@ fn length(a: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

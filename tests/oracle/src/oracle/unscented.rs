@@ -18,18 +18,12 @@ pub type Deviations = Vec<[f64; 2]>;
 
 /// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera
 /// axes, and its deviations. `None` if a sigma point is not visible together with the mean.
-pub fn transform(
-    camera: &OracleCamera,
-    t: [f64; 3],
-    axes: &[[f64; 3]; 3],
-) -> Option<([f64; 2], Deviations)> {
+pub fn transform(camera: &OracleCamera, t: [f64; 3], axes: &[[f64; 3]; 3]) -> Option<([f64; 2], Deviations)> {
     let lambda = ALPHA * ALPHA * (N + KAPPA) - N;
     let mut points = vec![t];
     for axis in axes {
         for sign in [1.0, -1.0] {
-            points.push(std::array::from_fn(|k| {
-                t[k] + sign * (N + lambda).sqrt() * axis[k]
-            }));
+            points.push(std::array::from_fn(|k| t[k] + sign * (N + lambda).sqrt() * axis[k]));
         }
     }
     if !points[1..].iter().all(|&point| is_seen(camera, t, point)) {
@@ -47,11 +41,7 @@ pub fn transform(
         .collect();
     let other = 1.0 / (2.0 * (N + lambda));
     let in_mean = |index: usize| {
-        if index == 0 {
-            lambda / (N + lambda)
-        } else {
-            other
-        }
+        if index == 0 { lambda / (N + lambda) } else { other }
     };
     let in_covariance = |index: usize| match index {
         0 => lambda / (N + lambda) + 1.0 - ALPHA * ALPHA + BETA,
@@ -59,13 +49,12 @@ pub fn transform(
     };
     let mean = [0, 1].map(|axis| {
         let places = places.iter().enumerate();
-        places
-            .map(|(index, place)| in_mean(index) * place[axis])
-            .sum::<f64>()
+        places.map(|(index, place)| in_mean(index) * place[axis]).sum::<f64>()
     });
-    let deviations = places.iter().enumerate().map(|(index, place)| {
-        [0, 1].map(|axis| in_covariance(index).sqrt() * (place[axis] - mean[axis]))
-    });
+    let deviations = places
+        .iter()
+        .enumerate()
+        .map(|(index, place)| [0, 1].map(|axis| in_covariance(index).sqrt() * (place[axis] - mean[axis])));
     Some((mean, deviations.collect()))
 }
 
@@ -76,8 +65,7 @@ fn is_seen(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
     let cosine = dot(t, point);
     let sine = length(cross(t, point));
     let apart = sine.atan2(cosine);
-    let from =
-        |axis: f64, rest: [f64; 2]| (rest[0] * rest[0] + rest[1] * rest[1]).sqrt().atan2(axis);
+    let from = |axis: f64, rest: [f64; 2]| (rest[0] * rest[0] + rest[1] * rest[1]).sqrt().atan2(axis);
     match camera.model {
         OracleModel::Orthographic => true,
         OracleModel::Pinhole => point[2] > f64::from(camera.near),

@@ -12,11 +12,7 @@ type Gaussian = ([f32; 3], GaussianShape, Vec<[f32; 3]>);
 fn mapped(scene: &Scene, mut change: impl FnMut(usize, &mut Gaussian)) -> Scene {
     let mut made = Scene::with_capacity(scene.sh_degree(), scene.len());
     let coefficients = scene.sh().chunks(scene.sh_stride());
-    let gaussians = scene
-        .positions()
-        .iter()
-        .zip(scene.shapes())
-        .zip(coefficients);
+    let gaussians = scene.positions().iter().zip(scene.shapes()).zip(coefficients);
     for (index, ((position, shape), sh)) in gaussians.enumerate() {
         let mut gaussian = (*position, *shape, sh.to_vec());
         change(index, &mut gaussian);
@@ -90,16 +86,8 @@ mod tests {
         assert_eq!(away, 250);
         let scene = synthetic(1, 10);
         assert_eq!(partly_moved_away(&scene, 0.0), scene);
-        assert_eq!(
-            scene.shapes()[3].scale[1] * 2.0,
-            scaled(&scene, 2.0).shapes()[3].scale[1]
-        );
-        assert!(
-            view_independent(&scene)
-                .sh()
-                .chunks(16)
-                .all(|sh| sh[1..] == [[0.0; 3]; 15])
-        );
+        assert_eq!(scene.shapes()[3].scale[1] * 2.0, scaled(&scene, 2.0).shapes()[3].scale[1]);
+        assert!(view_independent(&scene).sh().chunks(16).all(|sh| sh[1..] == [[0.0; 3]; 15]));
     }
 
     #[test]
@@ -112,10 +100,7 @@ mod tests {
         for (number, position) in both.positions().iter().enumerate() {
             let find = |scene: &Scene| {
                 let at = scene.positions().iter().position(|p| p == position)?;
-                Some((
-                    scene.shapes()[at],
-                    scene.sh()[at * stride..][..stride].to_vec(),
-                ))
+                Some((scene.shapes()[at], scene.sh()[at * stride..][..stride].to_vec()))
             };
             let (shape, sh) = find(&a).or_else(|| find(&b)).unwrap();
             assert_eq!(both.shapes()[number], shape);

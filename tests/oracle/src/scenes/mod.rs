@@ -49,10 +49,7 @@ pub struct SceneBuffers {
 impl SceneBuffers {
     /// A scene of these Gaussians, all of which have `(degree + 1)^2` coefficients.
     pub fn new(degree: u32, gaussians: impl IntoIterator<Item = Gaussian>) -> Self {
-        let mut scene = Self {
-            degree,
-            ..Self::default()
-        };
+        let mut scene = Self { degree, ..Self::default() };
         for gaussian in gaussians {
             assert_eq!(gaussian.sh.len(), coefficient_count(degree));
             scene.positions.push(gaussian.position);
@@ -116,26 +113,13 @@ pub fn cloud(seed: u64, count: usize, degree: u32) -> SceneBuffers {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let gaussians = (0..count).map(|_| {
         let z = rng.random_range(2.0_f32..12.0);
-        let size =
-            0.012 * (rng.random_range(-1.2_f32..1.2) + rng.random_range(-1.2_f32..1.2)).exp();
+        let size = 0.012 * (rng.random_range(-1.2_f32..1.2) + rng.random_range(-1.2_f32..1.2)).exp();
         let opaque = rng.random_bool(0.4);
         Gaussian {
-            position: [
-                z * rng.random_range(-0.75..0.75),
-                z * rng.random_range(-0.75..0.75),
-                z,
-            ],
-            scale: [
-                size,
-                size * rng.random_range(0.2..1.0),
-                size * rng.random_range(0.02..0.4),
-            ],
+            position: [z * rng.random_range(-0.75..0.75), z * rng.random_range(-0.75..0.75), z],
+            scale: [size, size * rng.random_range(0.2..1.0), size * rng.random_range(0.02..0.4)],
             rotation: quaternion(&mut rng),
-            opacity: if opaque {
-                rng.random_range(0.6..1.0)
-            } else {
-                rng.random_range(0.002..0.6)
-            },
+            opacity: if opaque { rng.random_range(0.6..1.0) } else { rng.random_range(0.002..0.6) },
             sh: coefficients(&mut rng, degree),
         }
     });

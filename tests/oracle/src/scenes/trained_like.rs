@@ -40,12 +40,8 @@ pub fn trained_like(seed: u64, count: usize, cameras: &[Camera]) -> Scene {
         };
         let size = 0.8 * spacing * (0.7 * normal(&mut rng)).exp();
         let shape = GaussianShape {
-            scale: [
-                1.0,
-                (-0.5 * normal(&mut rng).abs()).exp(),
-                (-2.0 + 0.5 * normal(&mut rng)).exp(),
-            ]
-            .map(|s| (size * s) as f32),
+            scale: [1.0, (-0.5 * normal(&mut rng).abs()).exp(), (-2.0 + 0.5 * normal(&mut rng)).exp()]
+                .map(|s| (size * s) as f32),
             rotation: std::array::from_fn(|_| normal(&mut rng) as f32),
             opacity: sigmoid(2.0 * normal(&mut rng)),
         };
@@ -77,12 +73,8 @@ impl Surroundings {
         let (mut matrix, mut sum) = (DMat3::ZERO, DVec3::ZERO);
         for (camera, eye) in cameras.iter().zip(eyes()) {
             let forward = DVec3::from_array(camera.rotation[2]);
-            let across = DMat3::IDENTITY
-                - DMat3::from_cols(
-                    forward * forward.x,
-                    forward * forward.y,
-                    forward * forward.z,
-                );
+            let across =
+                DMat3::IDENTITY - DMat3::from_cols(forward * forward.x, forward * forward.y, forward * forward.z);
             matrix += across;
             sum += across * eye;
         }
@@ -94,17 +86,10 @@ impl Surroundings {
         };
         let mut distances: Vec<f64> = eyes().map(|eye| eye.distance(middle)).collect();
         distances.sort_by(f64::total_cmp);
-        let down: DVec3 = cameras
-            .iter()
-            .map(|camera| DVec3::from_array(camera.rotation[1]))
-            .sum();
+        let down: DVec3 = cameras.iter().map(|camera| DVec3::from_array(camera.rotation[1])).sum();
         let up = (-down).try_normalize().unwrap_or(DVec3::NEG_Y);
         let (x, y) = up.any_orthonormal_pair();
-        Self {
-            middle,
-            radius: distances[distances.len() / 2].max(1e-3),
-            axes: DMat3::from_cols(x, y, up),
-        }
+        Self { middle, radius: distances[distances.len() / 2].max(1e-3), axes: DMat3::from_cols(x, y, up) }
     }
 }
 
@@ -124,10 +109,7 @@ fn spacing(area: f64, share: u32, count: usize) -> f64 {
 fn object(rng: &mut ChaCha8Rng, blobs: &[(DVec3, f64); BLOBS], count: usize) -> (DVec3, f64) {
     let (middle, radius) = blobs[rng.random_range(0..BLOBS)];
     let area = 2.0 * TAU * radius * radius * BLOBS as f64;
-    (
-        middle + radius * direction(rng),
-        spacing(area, OBJECT, count),
-    )
+    (middle + radius * direction(rng), spacing(area, OBJECT, count))
 }
 
 /// A point of the ground, which is denser where the cameras are.
@@ -136,10 +118,7 @@ fn ground(rng: &mut ChaCha8Rng, radius: f64, count: usize) -> (DVec3, f64) {
     let (sin, cos) = rng.random_range(0.0..TAU).sin_cos();
     let area = TAU * distance.max(0.1 * radius) * 3.0 * radius;
     let height = -0.35 * radius + 0.02 * radius * normal(rng);
-    (
-        DVec3::new(distance * cos, distance * sin, height),
-        spacing(area, GROUND, count),
-    )
+    (DVec3::new(distance * cos, distance * sin, height), spacing(area, GROUND, count))
 }
 
 /// A point far behind.

@@ -14,8 +14,7 @@ use syn::{Expr, ItemFn, Meta, ReturnType, Token, parse_macro_input};
 /// - `alone`: the test runs in a process of its own.
 #[proc_macro_attribute]
 pub fn test(arguments: TokenStream, item: TokenStream) -> TokenStream {
-    let arguments =
-        parse_macro_input!(arguments with Punctuated::<Meta, Token![,]>::parse_terminated);
+    let arguments = parse_macro_input!(arguments with Punctuated::<Meta, Token![,]>::parse_terminated);
     let function = parse_macro_input!(item as ItemFn);
     match registration(&arguments, &function) {
         Ok(registration) => quote! { #function #registration }.into(),
@@ -24,10 +23,7 @@ pub fn test(arguments: TokenStream, item: TokenStream) -> TokenStream {
 }
 
 /// Makes the item that registers `function`.
-fn registration(
-    arguments: &Punctuated<Meta, Token![,]>,
-    function: &ItemFn,
-) -> syn::Result<proc_macro2::TokenStream> {
+fn registration(arguments: &Punctuated<Meta, Token![,]>, function: &ItemFn) -> syn::Result<proc_macro2::TokenStream> {
     let mut needs: Option<&Expr> = None;
     let mut each: Option<&Expr> = None;
     let mut alone = false;
@@ -51,10 +47,8 @@ fn registration(
     } else {
         quote! { #name }
     };
-    let needs = needs.map_or_else(
-        || quote! { ::std::vec::Vec::new },
-        |needs| quote! { || ::std::vec::Vec::from(#needs) },
-    );
+    let needs =
+        needs.map_or_else(|| quote! { ::std::vec::Vec::new }, |needs| quote! { || ::std::vec::Vec::from(#needs) });
     let each = each.map_or_else(
         || quote! { ::core::option::Option::None },
         |each| quote! { ::core::option::Option::Some(|| #each) },

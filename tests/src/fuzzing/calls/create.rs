@@ -2,27 +2,18 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use super::run::{FORMATS, OBJECTS, Resource, Run, pick};
 use crate::fuzzing::bytes::Bytes;
 use gaurast_testkit::gaussians::{attribute_locations, attributes, scene_bindings};
 
-fn memory(
-    run: &mut Run,
-    bytes: &mut Bytes<'_>,
-    needed: vk::MemoryRequirements,
-) -> Option<vk::DeviceMemory> {
+fn memory(run: &mut Run, bytes: &mut Bytes<'_>, needed: vk::MemoryRequirements) -> Option<vk::DeviceMemory> {
     let count = run.types.memory_type_count;
-    let allowed: Vec<_> = (0..count)
-        .filter(|index| needed.memory_type_bits >> index & 1 == 1)
-        .collect();
-    let info = vk::MemoryAllocateInfo::default()
-        .allocation_size(needed.size)
-        .memory_type_index(bytes.one(&allowed));
+    let allowed: Vec<_> = (0..count).filter(|index| needed.memory_type_bits >> index & 1 == 1).collect();
+    let info = vk::MemoryAllocateInfo::default().allocation_size(needed.size).memory_type_index(bytes.one(&allowed));
     // SAFETY: see above.
     let memory = unsafe { run.device.allocate_memory(&info, None) };
     run.note(memory)
@@ -46,11 +37,7 @@ pub(super) fn create_buffer(run: &mut Run, bytes: &mut Bytes<'_>) {
             return;
         };
         let needed = run.device.get_buffer_memory_requirements(handle);
-        let memory = if needed.size <= 1 << 24 {
-            memory(run, bytes, needed)
-        } else {
-            None
-        };
+        let memory = if needed.size <= 1 << 24 { memory(run, bytes, needed) } else { None };
         let Some(memory) = memory else {
             run.device.destroy_buffer(handle, None);
             return;
@@ -58,12 +45,7 @@ pub(super) fn create_buffer(run: &mut Run, bytes: &mut Bytes<'_>) {
         let bound = run.device.bind_buffer_memory(handle, memory, 0);
         run.note(bound);
         let (format, extent) = (vk::Format::UNDEFINED, [0; 2]);
-        run.buffers.push(Resource {
-            handle,
-            memory,
-            format,
-            extent,
-        });
+        run.buffers.push(Resource { handle, memory, format, extent });
     }
 }
 
@@ -73,33 +55,17 @@ pub(super) fn create_image(run: &mut Run, bytes: &mut Bytes<'_>) {
     }
     let format = bytes.one(&FORMATS);
     let depth = format == vk::Format::D32_SFLOAT || format == vk::Format::D24_UNORM_S8_UINT;
-    let attachment = if depth {
-        vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
-    } else {
-        vk::ImageUsageFlags::COLOR_ATTACHMENT
-    };
-    let extent = [0; 2].map(|_| {
-        if bytes.rarely(12) {
-            bytes.number(5000) % 20_000
-        } else {
-            1 + bytes.below(90) as u32
-        }
-    });
+    let attachment =
+        if depth { vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT } else { vk::ImageUsageFlags::COLOR_ATTACHMENT };
+    let extent =
+        [0; 2].map(|_| if bytes.rarely(12) { bytes.number(5000) % 20_000 } else { 1 + bytes.below(90) as u32 });
     let info = vk::ImageCreateInfo::default()
         .image_type(vk::ImageType::TYPE_2D)
         .format(format)
-        .extent(vk::Extent3D {
-            width: extent[0],
-            height: extent[1],
-            depth: 1,
-        })
+        .extent(vk::Extent3D { width: extent[0], height: extent[1], depth: 1 })
         .mip_levels(1)
         .array_layers(1)
-        .samples(bytes.one(&[
-            vk::SampleCountFlags::TYPE_1,
-            vk::SampleCountFlags::TYPE_1,
-            vk::SampleCountFlags::TYPE_4,
-        ]))
+        .samples(bytes.one(&[vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4]))
         .usage(attachment | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST);
     if extent.contains(&0) {
         return;
@@ -111,11 +77,7 @@ pub(super) fn create_image(run: &mut Run, bytes: &mut Bytes<'_>) {
             return;
         };
         let needed = run.device.get_image_memory_requirements(handle);
-        let memory = if needed.size <= 1 << 24 {
-            memory(run, bytes, needed)
-        } else {
-            None
-        };
+        let memory = if needed.size <= 1 << 24 { memory(run, bytes, needed) } else { None };
         let Some(memory) = memory else {
             run.device.destroy_image(handle, None);
             return;
@@ -124,9 +86,7 @@ pub(super) fn create_image(run: &mut Run, bytes: &mut Bytes<'_>) {
         run.note(bound);
         let aspect = match format {
             vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,
-            vk::Format::D24_UNORM_S8_UINT => {
-                vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL
-            }
+            vk::Format::D24_UNORM_S8_UINT => vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL,
             _ => vk::ImageAspectFlags::COLOR,
         };
         let info = vk::ImageViewCreateInfo::default()
@@ -142,15 +102,7 @@ pub(super) fn create_image(run: &mut Run, bytes: &mut Bytes<'_>) {
             });
         let view = run.device.create_image_view(&info, None);
         match run.note(view) {
-            Some(view) => run.images.push((
-                Resource {
-                    handle,
-                    memory,
-                    format,
-                    extent,
-                },
-                view,
-            )),
+            Some(view) => run.images.push((Resource { handle, memory, format, extent }, view)),
             None => {
                 run.device.destroy_image(handle, None);
                 run.device.free_memory(memory, None);
@@ -167,19 +119,13 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
     let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
         .vertex_binding_descriptions(&bindings)
         .vertex_attribute_descriptions(&attributes);
-    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-        .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
-    let viewport = vk::PipelineViewportStateCreateInfo::default()
-        .viewport_count(1)
-        .scissor_count(1);
+    let assembly =
+        vk::PipelineInputAssemblyStateCreateInfo::default().topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-    let samples = bytes.one(&[
-        vk::SampleCountFlags::TYPE_1,
-        vk::SampleCountFlags::TYPE_1,
-        vk::SampleCountFlags::TYPE_4,
-    ]);
-    let multisample =
-        vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(samples);
+    let samples =
+        bytes.one(&[vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4]);
+    let multisample = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(samples);
     let blend = [gaurast_testkit::over()];
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
     let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -190,17 +136,12 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         .depth_write_enable(bytes.rarely(2))
         .depth_compare_op(vk::CompareOp::from_raw(bytes.below(8) as i32));
     let formats = [bytes.one(&FORMATS[..3])];
-    let mut rendering =
-        vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
     if depth_test {
         rendering = rendering.depth_attachment_format(vk::Format::D32_SFLOAT);
     }
     let mut or = |usual: f32| {
-        if bytes.rarely(5) {
-            bytes.float()
-        } else {
-            usual
-        }
+        if bytes.rarely(5) { bytes.float() } else { usual }
     };
     let mut state = PipelineGaussianStateCreateInfoGAURAST::default()
         .alpha_floor(or(1.0 / 255.0))
@@ -224,10 +165,7 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
             GaussianPrecisionGAURAST::FLOAT32,
             GaussianPrecisionGAURAST::FLOAT16,
         ]))
-        .linearization(bytes.one(&[
-            GaussianLinearizationGAURAST::JACOBIAN,
-            GaussianLinearizationGAURAST::UNSCENTED,
-        ]));
+        .linearization(bytes.one(&[GaussianLinearizationGAURAST::JACOBIAN, GaussianLinearizationGAURAST::UNSCENTED]));
     let info = vk::GraphicsPipelineCreateInfo::default()
         .vertex_input_state(&vertex_input)
         .input_assembly_state(&assembly)
@@ -241,10 +179,7 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         .push_next(&mut rendering)
         .push_next(&mut state);
     // SAFETY: see above.
-    let pipelines = unsafe {
-        run.device
-            .create_graphics_pipelines(vk::PipelineCache::null(), &[info], None)
-    };
+    let pipelines = unsafe { run.device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
     let pipelines = run.note(pipelines.map_err(|(_, error)| error));
     run.pipelines.extend(pipelines.into_iter().flatten());
 }
@@ -257,9 +192,7 @@ pub(super) fn map(run: &mut Run, bytes: &mut Bytes<'_>) {
     let (offset, size) = (bytes.long(5000), bytes.long(5000));
     // SAFETY: see above; the written bytes are in the mapped range.
     unsafe {
-        let mapped = run
-            .device
-            .map_memory(memory, offset, size, vk::MemoryMapFlags::empty());
+        let mapped = run.device.map_memory(memory, offset, size, vk::MemoryMapFlags::empty());
         if let Some(mapped) = run.note(mapped) {
             // The given size may be any; the size that the buffer requires is used.
             let whole = run.device.get_buffer_memory_requirements(handle).size;

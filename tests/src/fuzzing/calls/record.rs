@@ -15,11 +15,7 @@ pub(super) fn begin_rendering(run: &mut Run, bytes: &mut Bytes<'_>) {
     let color = [vk::RenderingAttachmentInfo::default()
         .image_view(*view)
         .image_layout(vk::ImageLayout::GENERAL)
-        .load_op(bytes.one(&[
-            vk::AttachmentLoadOp::CLEAR,
-            vk::AttachmentLoadOp::LOAD,
-            vk::AttachmentLoadOp::DONT_CARE,
-        ]))
+        .load_op(bytes.one(&[vk::AttachmentLoadOp::CLEAR, vk::AttachmentLoadOp::LOAD, vk::AttachmentLoadOp::DONT_CARE]))
         .store_op(vk::AttachmentStoreOp::STORE)];
     let depth = depth.map(|(_, view)| {
         vk::RenderingAttachmentInfo::default()
@@ -30,26 +26,13 @@ pub(super) fn begin_rendering(run: &mut Run, bytes: &mut Bytes<'_>) {
     });
     let extent = image.extent;
     let mut side = |usual: u32| {
-        if bytes.rarely(8) {
-            bytes.number(200)
-        } else {
-            usual
-        }
+        if bytes.rarely(8) { bytes.number(200) } else { usual }
     };
     let area = vk::Rect2D {
-        offset: vk::Offset2D {
-            x: side(0).cast_signed(),
-            y: side(0).cast_signed(),
-        },
-        extent: vk::Extent2D {
-            width: side(extent[0]),
-            height: side(extent[1]),
-        },
+        offset: vk::Offset2D { x: side(0).cast_signed(), y: side(0).cast_signed() },
+        extent: vk::Extent2D { width: side(extent[0]), height: side(extent[1]) },
     };
-    let mut info = vk::RenderingInfo::default()
-        .render_area(area)
-        .layer_count(1)
-        .color_attachments(&color);
+    let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
     if let Some(depth) = &depth {
         info = info.depth_attachment(depth);
         if has_stencil {
@@ -72,25 +55,15 @@ pub(super) fn copy(run: &mut Run, bytes: &mut Bytes<'_>) {
         base_array_layer: bytes.number(2),
         layer_count: bytes.number(2),
     };
-    let region = [vk::BufferCopy::default()
-        .src_offset(bytes.long(3000))
-        .dst_offset(bytes.long(3000))
-        .size(bytes.long(3000))];
+    let region =
+        [vk::BufferCopy::default().src_offset(bytes.long(3000)).dst_offset(bytes.long(3000)).size(bytes.long(3000))];
     let texels = [vk::BufferImageCopy {
         buffer_offset: bytes.long(3000),
         buffer_row_length: bytes.number(60),
         buffer_image_height: bytes.number(60),
         image_subresource: layers,
-        image_offset: vk::Offset3D {
-            x: bytes.number(30).cast_signed(),
-            y: bytes.number(30).cast_signed(),
-            z: 0,
-        },
-        image_extent: vk::Extent3D {
-            width: bytes.number(60),
-            height: bytes.number(60),
-            depth: 1,
-        },
+        image_offset: vk::Offset3D { x: bytes.number(30).cast_signed(), y: bytes.number(30).cast_signed(), z: 0 },
+        image_extent: vk::Extent3D { width: bytes.number(60), height: bytes.number(60), depth: 1 },
     }];
     let layout = vk::ImageLayout::GENERAL;
     let (device, commands) = (&run.device, run.commands);
@@ -99,13 +72,7 @@ pub(super) fn copy(run: &mut Run, bytes: &mut Bytes<'_>) {
         match (bytes.below(6), image) {
             (0, _) => device.cmd_copy_buffer(commands, from, to, &region),
             (1, _) => {
-                device.cmd_fill_buffer(
-                    commands,
-                    to,
-                    bytes.long(3000),
-                    bytes.long(3000),
-                    bytes.word(),
-                );
+                device.cmd_fill_buffer(commands, to, bytes.long(3000), bytes.long(3000), bytes.word());
             }
             (2, _) => {
                 device.cmd_update_buffer(commands, to, bytes.long(3000), &[bytes.byte(); 64]);
@@ -124,9 +91,7 @@ pub(super) fn copy(run: &mut Run, bytes: &mut Bytes<'_>) {
                     base_array_layer: layers.base_array_layer,
                     layer_count: layers.layer_count,
                 };
-                let color = vk::ClearColorValue {
-                    float32: [0; 4].map(|_| bytes.float()),
-                };
+                let color = vk::ClearColorValue { float32: [0; 4].map(|_| bytes.float()) };
                 device.cmd_clear_color_image(commands, image, layout, &color, &[range]);
             }
             (_, None) => {}
@@ -166,8 +131,7 @@ pub(super) fn query(run: &mut Run, bytes: &mut Bytes<'_>) {
                 let mut results = [0u64; 4];
                 let count = count as usize % 5;
                 let flags = vk::QueryResultFlags::TYPE_64;
-                let got =
-                    device.get_query_pool_results(queries, first, &mut results[..count], flags);
+                let got = device.get_query_pool_results(queries, first, &mut results[..count], flags);
                 run.note(got);
             }
         }
@@ -176,11 +140,7 @@ pub(super) fn query(run: &mut Run, bytes: &mut Bytes<'_>) {
 
 pub(super) fn set_state(run: &mut Run, bytes: &mut Bytes<'_>) {
     let mut or = |usual: f32| {
-        if bytes.rarely(8) {
-            bytes.float()
-        } else {
-            usual
-        }
+        if bytes.rarely(8) { bytes.float() } else { usual }
     };
     let camera = GaussianCameraGAURAST::default()
         .eye([or(0.0).into(), or(0.0).into(), or(-3.0).into()])
@@ -203,28 +163,19 @@ pub(super) fn set_state(run: &mut Run, bytes: &mut Bytes<'_>) {
         GaussianCameraModelGAURAST::EQUIRECTANGULAR,
     ]));
     let scissor = vk::Rect2D {
-        offset: vk::Offset2D {
-            x: bytes.number(9).cast_signed(),
-            y: bytes.number(9).cast_signed(),
-        },
-        extent: vk::Extent2D {
-            width: bytes.number(90),
-            height: bytes.number(90),
-        },
+        offset: vk::Offset2D { x: bytes.number(9).cast_signed(), y: bytes.number(9).cast_signed() },
+        extent: vk::Extent2D { width: bytes.number(90), height: bytes.number(90) },
     };
     // SAFETY: see above.
     unsafe {
-        run.gaussian
-            .cmd_set_gaussian_cameras(run.commands, &[camera]);
-        run.device
-            .cmd_set_viewport(run.commands, bytes.number(1), &[viewport]);
+        run.gaussian.cmd_set_gaussian_cameras(run.commands, &[camera]);
+        run.device.cmd_set_viewport(run.commands, bytes.number(1), &[viewport]);
         run.device.cmd_set_scissor(run.commands, 0, &[scissor]);
         if bytes.rarely(2) {
             let (offset, stage) = (bytes.number(1), vk::ShaderStageFlags::VERTEX);
             let constants = [0; 4].map(|_| bytes.float());
             let constants: &[u8] = bytemuck::cast_slice(&constants);
-            run.device
-                .cmd_push_constants(run.commands, run.layout, stage, offset, constants);
+            run.device.cmd_push_constants(run.commands, run.layout, stage, offset, constants);
         }
         if let Some(pipeline) = pick(bytes, &run.pipelines) {
             let point = vk::PipelineBindPoint::GRAPHICS;
@@ -241,14 +192,9 @@ pub(super) fn bind_vertex_buffers(run: &mut Run, bytes: &mut Bytes<'_>) {
     let offsets = [0; 5].map(|_| bytes.long(2000));
     // SAFETY: see above.
     unsafe {
-        run.device
-            .cmd_bind_vertex_buffers(run.commands, 0, &buffers, &offsets);
-        let (offset, ty) = (
-            bytes.long(2000),
-            bytes.one(&[vk::IndexType::UINT16, vk::IndexType::UINT32]),
-        );
-        run.device
-            .cmd_bind_index_buffer(run.commands, buffers[0], offset, ty);
+        run.device.cmd_bind_vertex_buffers(run.commands, 0, &buffers, &offsets);
+        let (offset, ty) = (bytes.long(2000), bytes.one(&[vk::IndexType::UINT16, vk::IndexType::UINT32]));
+        run.device.cmd_bind_index_buffer(run.commands, buffers[0], offset, ty);
     }
 }
 
@@ -260,30 +206,19 @@ pub(super) fn clear(run: &mut Run, bytes: &mut Bytes<'_>) {
             vk::ImageAspectFlags::STENCIL,
         ]),
         color_attachment: bytes.number(3),
-        clear_value: vk::ClearValue {
-            color: vk::ClearColorValue {
-                float32: [0; 4].map(|_| bytes.float()),
-            },
-        },
+        clear_value: vk::ClearValue { color: vk::ClearColorValue { float32: [0; 4].map(|_| bytes.float()) } },
     }];
     let rect = [vk::ClearRect {
         rect: vk::Rect2D {
-            offset: vk::Offset2D {
-                x: bytes.number(30).cast_signed(),
-                y: bytes.number(30).cast_signed(),
-            },
-            extent: vk::Extent2D {
-                width: bytes.number(60),
-                height: bytes.number(60),
-            },
+            offset: vk::Offset2D { x: bytes.number(30).cast_signed(), y: bytes.number(30).cast_signed() },
+            extent: vk::Extent2D { width: bytes.number(60), height: bytes.number(60) },
         },
         base_array_layer: bytes.number(2),
         layer_count: bytes.number(2),
     }];
     // SAFETY: see above.
     unsafe {
-        run.device
-            .cmd_clear_attachments(run.commands, &clear, &rect);
+        run.device.cmd_clear_attachments(run.commands, &clear, &rect);
     };
 }
 

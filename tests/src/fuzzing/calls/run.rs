@@ -18,8 +18,7 @@ pub(super) const FORMATS: [vk::Format; 6] = [
     vk::Format::R16_UINT,
 ];
 
-pub(super) const DEPTH_FORMATS: [vk::Format; 2] =
-    [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
+pub(super) const DEPTH_FORMATS: [vk::Format; 2] = [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
 
 /// The result of a run.
 #[derive(Clone, Debug, Default)]
@@ -73,15 +72,12 @@ impl Run {
         unsafe {
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
             let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
-            let info = vk::InstanceCreateInfo::default()
-                .application_info(&application)
-                .enabled_extension_names(&extensions);
+            let info =
+                vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&extensions);
             let instance = entry.create_instance(&info, None).expect("an instance");
             let messages = Box::<Messages>::default();
             let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
-            let messenger = debug_utils
-                .create_debug_utils_messenger(&messages.messenger(), None)
-                .expect("a messenger");
+            let messenger = debug_utils.create_debug_utils_messenger(&messages.messenger(), None).expect("a messenger");
             let physical = instance.enumerate_physical_devices().expect("devices")[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
             let extensions = [gaussian_primitive_topology::NAME.as_ptr()];
@@ -107,32 +103,20 @@ impl Run {
                 .enabled_extension_names(&extensions)
                 .push_next(&mut core)
                 .push_next(&mut gaussian);
-            let device = instance
-                .create_device(physical, &info, None)
-                .expect("a device");
+            let device = instance.create_device(physical, &info, None).expect("a device");
             let flags = vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER;
             let pool = vk::CommandPoolCreateInfo::default().flags(flags);
             let pool = device.create_command_pool(&pool, None).expect("a pool");
-            let info = vk::CommandBufferAllocateInfo::default()
-                .command_pool(pool)
-                .command_buffer_count(1);
-            let commands = device
-                .allocate_command_buffers(&info)
-                .expect("a command buffer")[0];
-            let constants = [vk::PushConstantRange::default()
-                .stage_flags(vk::ShaderStageFlags::VERTEX)
-                .size(16)];
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let commands = device.allocate_command_buffers(&info).expect("a command buffer")[0];
+            let constants = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(16)];
             let layout = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
-            let queries = vk::QueryPoolCreateInfo::default()
-                .query_type(vk::QueryType::TIMESTAMP)
-                .query_count(4);
+            let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(4);
             Self {
                 gaussian: gaussian_primitive_topology::Device::new(&instance, &device),
                 types: instance.get_physical_device_memory_properties(physical),
                 queue: device.get_device_queue(0, 0),
-                layout: device
-                    .create_pipeline_layout(&layout, None)
-                    .expect("a layout"),
+                layout: device.create_pipeline_layout(&layout, None).expect("a layout"),
                 queries: device.create_query_pool(&queries, None).expect("queries"),
                 instance,
                 device,
@@ -202,10 +186,7 @@ impl Run {
     }
 
     pub(super) fn begin(&mut self, bytes: &mut Bytes<'_>) {
-        let flags = bytes.one(&[
-            vk::CommandBufferUsageFlags::empty(),
-            vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT,
-        ]);
+        let flags = bytes.one(&[vk::CommandBufferUsageFlags::empty(), vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT]);
         let info = vk::CommandBufferBeginInfo::default().flags(flags);
         // SAFETY: see above.
         let begun = unsafe { self.device.begin_command_buffer(self.commands, &info) };
@@ -219,9 +200,7 @@ impl Run {
         unsafe {
             let ended = self.device.end_command_buffer(self.commands);
             self.note(ended);
-            let submitted = self
-                .device
-                .queue_submit(self.queue, &submits, vk::Fence::null());
+            let submitted = self.device.queue_submit(self.queue, &submits, vk::Fence::null());
             if self.note(submitted).is_some() {
                 self.ended.submitted += 1;
             }
@@ -258,8 +237,7 @@ impl Drop for Run {
             self.device.destroy_pipeline_layout(self.layout, None);
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
-            self.debug_utils
-                .destroy_debug_utils_messenger(self.messenger, None);
+            self.debug_utils.destroy_debug_utils_messenger(self.messenger, None);
             self.instance.destroy_instance(None);
         }
     }

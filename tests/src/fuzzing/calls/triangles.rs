@@ -42,9 +42,7 @@ fn blend(bytes: &mut Bytes<'_>) -> vk::PipelineColorBlendAttachmentState {
         .dst_color_blend_factor(factors[1])
         .src_alpha_blend_factor(factors[2])
         .dst_alpha_blend_factor(factors[3])
-        .color_write_mask(vk::ColorComponentFlags::from_raw(
-            bytes.one(&[15, 15, 15, 5]),
-        ))
+        .color_write_mask(vk::ColorComponentFlags::from_raw(bytes.one(&[15, 15, 15, 5])))
 }
 
 fn raster(bytes: &mut Bytes<'_>) -> vk::PipelineRasterizationStateCreateInfo<'static> {
@@ -73,11 +71,7 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
     }
     let bindings = [0, 1].map(|binding| vk::VertexInputBindingDescription {
         binding,
-        stride: if bytes.rarely(8) {
-            bytes.number(60)
-        } else {
-            bytes.one(&[16, 32, 0, 4])
-        },
+        stride: if bytes.rarely(8) { bytes.number(60) } else { bytes.one(&[16, 32, 0, 4]) },
         input_rate: vk::VertexInputRate::from_raw(bytes.rarely(4).into()),
     });
     let attributes = [0, 1].map(|location| vk::VertexInputAttributeDescription {
@@ -90,13 +84,9 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         .vertex_binding_descriptions(&bindings)
         .vertex_attribute_descriptions(&attributes);
     let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-        .topology(vk::PrimitiveTopology::from_raw(
-            bytes.one(&[3, 3, 0, 1, 2, 4, 5]),
-        ))
+        .topology(vk::PrimitiveTopology::from_raw(bytes.one(&[3, 3, 0, 1, 2, 4, 5])))
         .primitive_restart_enable(bytes.rarely(4));
-    let viewport = vk::PipelineViewportStateCreateInfo::default()
-        .viewport_count(1)
-        .scissor_count(1);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = raster(bytes);
     let samples = bytes.one(&[1, 1, 1, 4]);
     let multisample = vk::PipelineMultisampleStateCreateInfo::default()
@@ -117,8 +107,7 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         .front(stencil(bytes))
         .back(stencil(bytes));
     let formats = [bytes.one(&FORMATS[..3])];
-    let mut rendering =
-        vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
     if let Some(depth) = depth {
         rendering = rendering.depth_attachment_format(depth);
         if depth == DEPTH_FORMATS[1] {
@@ -131,20 +120,11 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         let [vertex, fragment] = [VERTEX, fragment].map(|spirv| {
             let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("words");
             let info = vk::ShaderModuleCreateInfo::default().code(&words);
-            run.device
-                .create_shader_module(&info, None)
-                .expect("a module")
+            run.device.create_shader_module(&info, None).expect("a module")
         });
-        let stage = |stage, module| {
-            vk::PipelineShaderStageCreateInfo::default()
-                .stage(stage)
-                .module(module)
-                .name(c"main")
-        };
-        let stages = [
-            stage(vk::ShaderStageFlags::VERTEX, vertex),
-            stage(vk::ShaderStageFlags::FRAGMENT, fragment),
-        ];
+        let stage =
+            |stage, module| vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main");
+        let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), stage(vk::ShaderStageFlags::FRAGMENT, fragment)];
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)

@@ -2,8 +2,7 @@
 
 use super::super::assembler::{Assembler, Id};
 use super::program::{
-    ARRAY, Binary, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program, Statement,
-    Switch, VARIABLES,
+    ARRAY, Binary, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program, Statement, Switch, VARIABLES,
 };
 use spirv::{BuiltIn, Op, StorageClass};
 
@@ -77,11 +76,7 @@ pub fn assemble(programs: &[Program]) -> Vec<u32> {
         let zero = asm.u32(0);
         asm.act(Op::Store, &[hash, zero]);
         asm.act(Op::Store, &[lent, zero]);
-        let result = asm.emit(
-            Op::FunctionCall,
-            types.u32,
-            &[entry, inputs[0], inputs[1], lent],
-        );
+        let result = asm.emit(Op::FunctionCall, types.u32, &[entry, inputs[0], inputs[1], lent]);
         let left = asm.emit(Op::Load, types.u32, &[lent]);
         mix(&mut asm, &types, hash, left);
         let hash = asm.emit(Op::Load, types.u32, &[hash]);
@@ -116,30 +111,13 @@ fn mix(asm: &mut Assembler, types: &Types, hash: Id, value: Id) {
     asm.act(Op::Store, &[hash, new]);
 }
 
-fn write_function(
-    asm: &mut Assembler,
-    types: &Types,
-    hash: Id,
-    callable: &[Id],
-    function: &Function,
-) -> Id {
+fn write_function(asm: &mut Assembler, types: &Types, hash: Id, callable: &[Id], function: &Function) -> Id {
     let parameters = [asm.id(), asm.id()];
     let borrowed = asm.id();
     let variables = (0..VARIABLES).map(|_| asm.local(types.u32)).collect();
     let counters = (0..function.loops).map(|_| asm.local(types.u32)).collect();
     let array = asm.local(types.array);
-    let mut writer = Writer {
-        asm,
-        types,
-        callable,
-        hash,
-        parameters,
-        borrowed,
-        variables,
-        counters,
-        array,
-        block: 0,
-    };
+    let mut writer = Writer { asm, types, callable, hash, parameters, borrowed, variables, counters, array, block: 0 };
     writer.initialize();
     if writer.list(&function.body, Targets::default()) {
         let result = writer.value(&function.result);
@@ -147,11 +125,7 @@ fn write_function(
     }
     let id = asm.id();
     let (u32, local) = (types.u32, types.local);
-    let parameters = [
-        (parameters[0], u32),
-        (parameters[1], u32),
-        (borrowed, local),
-    ];
+    let parameters = [(parameters[0], u32), (parameters[1], u32), (borrowed, local)];
     asm.function(id, u32, &parameters);
     id
 }
@@ -187,8 +161,7 @@ impl Writer<'_> {
     fn element(&mut self, index: Id) -> Id {
         let mask = self.asm.u32(ARRAY as u32 - 1);
         let index = self.emit(Op::BitwiseAnd, &[index, mask]);
-        self.asm
-            .emit(Op::AccessChain, self.types.local, &[self.array, index])
+        self.asm.emit(Op::AccessChain, self.types.local, &[self.array, index])
     }
 
     fn label(&mut self, id: Id) {
@@ -202,9 +175,7 @@ impl Writer<'_> {
 
     /// Emits statements; returns true if their end is reachable.
     fn list(&mut self, statements: &[Statement], targets: Targets) -> bool {
-        statements
-            .iter()
-            .all(|statement| self.statement(statement, targets))
+        statements.iter().all(|statement| self.statement(statement, targets))
     }
 
     fn statement(&mut self, statement: &Statement, targets: Targets) -> bool {
@@ -227,12 +198,7 @@ impl Writer<'_> {
                 let value = self.value(value);
                 mix(self.asm, self.types, self.hash, value);
             }
-            Statement::Call {
-                function,
-                arguments: [first, second],
-                lent,
-                to,
-            } => {
+            Statement::Call { function, arguments: [first, second], lent, to } => {
                 let (first, second) = (self.value(first), self.value(second));
                 let function = self.callable[*function];
                 let operands = [function, first, second, self.variables[*lent]];
@@ -270,19 +236,13 @@ impl Writer<'_> {
         reachable
     }
 
-    fn branches(
-        &mut self,
-        condition: &Condition,
-        [then, otherwise]: [&[Statement]; 2],
-        targets: Targets,
-    ) -> bool {
+    fn branches(&mut self, condition: &Condition, [then, otherwise]: [&[Statement]; 2], targets: Targets) -> bool {
         let condition = self.holds(condition);
         let [inside, outside, after] = [(); 3].map(|()| self.asm.id());
         // Without an else part the branch may go straight to the end.
         let other = if otherwise.is_empty() { after } else { outside };
         self.asm.act(Op::SelectionMerge, &[after, 0]);
-        self.asm
-            .act(Op::BranchConditional, &[condition, inside, other]);
+        self.asm.act(Op::BranchConditional, &[condition, inside, other]);
         let mut reachable = otherwise.is_empty();
         let parts = [(inside, then), (outside, otherwise)];
         for (label, statements) in &parts[..if reachable { 1 } else { 2 }] {
@@ -321,10 +281,7 @@ impl Writer<'_> {
             self.goes_on(it, [body, end]);
         }
         self.label(body);
-        let targets = Targets {
-            breaks: end,
-            continues,
-        };
+        let targets = Targets { breaks: end, continues };
         if self.list(&it.body, targets) {
             self.branch(continues);
         }
@@ -355,10 +312,7 @@ impl Writer<'_> {
         }
         self.asm.act(Op::SelectionMerge, &[after, 0]);
         self.asm.act(Op::Switch, &operands);
-        let inside = Targets {
-            breaks: after,
-            ..targets
-        };
+        let inside = Targets { breaks: after, ..targets };
         let mut reachable = default.is_none();
         for (index, case) in it.cases.iter().enumerate() {
             self.label(labels[index]);
@@ -389,9 +343,7 @@ impl Writer<'_> {
                 let (left, right) = (self.value(left), self.value(right));
                 self.binary(*binary, left, right)
             }
-            Expression::Choose(condition, then, otherwise) => {
-                self.choose(condition, [then, otherwise])
-            }
+            Expression::Choose(condition, then, otherwise) => self.choose(condition, [then, otherwise]),
         }
     }
 
@@ -404,14 +356,8 @@ impl Writer<'_> {
             Binary::And => (Op::BitwiseAnd, right),
             Binary::Or => (Op::BitwiseOr, right),
             Binary::Xor => (Op::BitwiseXor, right),
-            Binary::ShiftLeft => (
-                Op::ShiftLeftLogical,
-                self.emit(Op::BitwiseAnd, &[right, low]),
-            ),
-            Binary::ShiftRight => (
-                Op::ShiftRightLogical,
-                self.emit(Op::BitwiseAnd, &[right, low]),
-            ),
+            Binary::ShiftLeft => (Op::ShiftLeftLogical, self.emit(Op::BitwiseAnd, &[right, low])),
+            Binary::ShiftRight => (Op::ShiftRightLogical, self.emit(Op::BitwiseAnd, &[right, low])),
             Binary::Divide => (Op::UDiv, self.emit(Op::BitwiseOr, &[right, one])),
             Binary::Remainder => (Op::UMod, self.emit(Op::BitwiseOr, &[right, one])),
         };
@@ -422,8 +368,7 @@ impl Writer<'_> {
         let condition = self.holds(condition);
         let [inside, outside, after] = [(); 3].map(|()| self.asm.id());
         self.asm.act(Op::SelectionMerge, &[after, 0]);
-        self.asm
-            .act(Op::BranchConditional, &[condition, inside, outside]);
+        self.asm.act(Op::BranchConditional, &[condition, inside, outside]);
         let mut operands = Vec::with_capacity(4);
         for (label, part) in [inside, outside].into_iter().zip(parts) {
             self.label(label);

@@ -2,8 +2,7 @@
 
 use super::interpret::run;
 use super::program::{
-    Binary, Case, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch,
-    VARIABLES,
+    Binary, Case, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch, VARIABLES,
 };
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -28,20 +27,10 @@ fn program(random: &mut ChaCha8Rng) -> Program {
     let count = random.random_range(1..=3);
     let functions = (0..count)
         .map(|index| {
-            let mut maker = Maker {
-                random,
-                callable: index,
-                loops: 0,
-                running: Vec::new(),
-                budget: 14,
-            };
+            let mut maker = Maker { random, callable: index, loops: 0, running: Vec::new(), budget: 14 };
             let body = maker.list(0, Place::default());
             let result = maker.expression(2);
-            Function {
-                body,
-                result,
-                loops: maker.loops,
-            }
+            Function { body, result, loops: maker.loops }
         })
         .collect();
     Program { functions }
@@ -132,22 +121,13 @@ impl Maker<'_> {
         self.running.push(counter);
         let condition = match self.random.random_ratio(1, 3) {
             true => self.condition(),
-            false => Condition {
-                compare: Compare::Less,
-                left: Expression::Constant(0),
-                right: Expression::Constant(1),
-            },
+            false => {
+                Condition { compare: Compare::Less, left: Expression::Constant(0), right: Expression::Constant(1) }
+            }
         };
-        let inside = Place {
-            breaks: true,
-            continues: true,
-            calm: false,
-        };
+        let inside = Place { breaks: true, continues: true, calm: false };
         let body = self.list(depth + 1, inside);
-        let calm = Place {
-            calm: true,
-            ..Place::default()
-        };
+        let calm = Place { calm: true, ..Place::default() };
         let continuing = match self.random.random_ratio(1, 2) {
             true => self.list(depth + 1, calm),
             false => Vec::new(),
@@ -164,10 +144,7 @@ impl Maker<'_> {
     }
 
     fn switch(&mut self, depth: usize, place: Place) -> Switch {
-        let inside = Place {
-            breaks: true,
-            ..place
-        };
+        let inside = Place { breaks: true, ..place };
         let count = self.random.random_range(1..=4);
         let default = self.random.random_range(0..=count);
         let mut next = 0;
@@ -186,22 +163,12 @@ impl Maker<'_> {
                 }
             })
             .collect();
-        let selector = Expression::Binary(
-            Binary::And,
-            self.expression(2).into(),
-            Expression::Constant(7).into(),
-        );
+        let selector = Expression::Binary(Binary::And, self.expression(2).into(), Expression::Constant(7).into());
         Switch { selector, cases }
     }
 
     fn condition(&mut self) -> Condition {
-        let compares = [
-            Compare::Equal,
-            Compare::NotEqual,
-            Compare::Less,
-            Compare::SignedLess,
-            Compare::Meet,
-        ];
+        let compares = [Compare::Equal, Compare::NotEqual, Compare::Less, Compare::SignedLess, Compare::Meet];
         Condition {
             compare: *compares.choose(self.random).expect("some"),
             left: self.expression(2),

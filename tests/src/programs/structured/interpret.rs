@@ -1,8 +1,7 @@
 //! Interprets programs, one invocation at a time.
 
 use super::program::{
-    ARRAY, Binary, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch,
-    VARIABLES, mixed,
+    ARRAY, Binary, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch, VARIABLES, mixed,
 };
 
 enum Flow {
@@ -28,11 +27,7 @@ struct Frame {
 
 /// The hash and the result of an invocation with these inputs; `None` if it takes too many steps.
 pub fn run(program: &Program, inputs: [u32; 2], steps: u32) -> Option<[u32; 2]> {
-    let mut invocation = Invocation {
-        program,
-        hash: 0,
-        steps,
-    };
+    let mut invocation = Invocation { program, hash: 0, steps };
     let last = program.functions.len() - 1;
     let (result, lent) = invocation.call(last, inputs, 0)?;
     Some([mixed(invocation.hash, lent), result])
@@ -45,9 +40,7 @@ impl Invocation<'_> {
         let function: &Function = &program.functions[function];
         let mut frame = Frame {
             parameters,
-            variables: std::array::from_fn(|index| {
-                parameters[index % 2].wrapping_add(index as u32)
-            }),
+            variables: std::array::from_fn(|index| parameters[index % 2].wrapping_add(index as u32)),
             array: std::array::from_fn(|index| index as u32),
             counters: vec![0; function.loops],
             borrowed: lent,
@@ -79,23 +72,14 @@ impl Invocation<'_> {
                 frame.array[index] = frame.value(value);
             }
             Statement::Mix(value) => self.hash = mixed(self.hash, frame.value(value)),
-            Statement::Call {
-                function,
-                arguments: [first, second],
-                lent,
-                to,
-            } => {
+            Statement::Call { function, arguments: [first, second], lent, to } => {
                 let arguments = [frame.value(first), frame.value(second)];
                 let (result, left) = self.call(*function, arguments, frame.variables[*lent])?;
                 frame.variables[*lent] = left;
                 frame.variables[*to] = result;
             }
             Statement::If(condition, then, otherwise) => {
-                let chosen = if frame.holds(condition) {
-                    then
-                } else {
-                    otherwise
-                };
+                let chosen = if frame.holds(condition) { then } else { otherwise };
                 return self.list(frame, chosen);
             }
             Statement::Loop(it) => return self.repeat(frame, it),
@@ -109,8 +93,7 @@ impl Invocation<'_> {
 
     fn repeat(&mut self, frame: &mut Frame, it: &Loop) -> Option<Flow> {
         frame.counters[it.counter] = 0;
-        let goes_on =
-            |frame: &Frame| frame.counters[it.counter] < it.count && frame.holds(&it.condition);
+        let goes_on = |frame: &Frame| frame.counters[it.counter] < it.count && frame.holds(&it.condition);
         loop {
             if !it.at_end && !goes_on(frame) {
                 return Some(Flow::Next);
@@ -172,11 +155,7 @@ impl Frame {
                 }
             }
             Expression::Choose(condition, then, otherwise) => {
-                self.value(if self.holds(condition) {
-                    then
-                } else {
-                    otherwise
-                })
+                self.value(if self.holds(condition) { then } else { otherwise })
             }
         }
     }

@@ -11,6 +11,6 @@ pub use assemble::assemble;
 pub use generate::generate;
 pub use interpret::run;
 pub use program::{
-    ARRAY, Binary, Case, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program,
-    Statement, Switch, VARIABLES,
+    ARRAY, Binary, Case, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program, Statement, Switch,
+    VARIABLES,
 };

@@ -27,22 +27,14 @@ const FACTORS: [Factor; 15] = [
     Factor::SRC_ALPHA_SATURATE,
 ];
 
-const OPERATIONS: [Op; 5] = [
-    Op::ADD,
-    Op::SUBTRACT,
-    Op::REVERSE_SUBTRACT,
-    Op::MIN,
-    Op::MAX,
-];
+const OPERATIONS: [Op; 5] = [Op::ADD, Op::SUBTRACT, Op::REVERSE_SUBTRACT, Op::MIN, Op::MAX];
 
 /// Overlapping rectangles. Their colours are exact unorm bytes, so that differences of rounding cannot grow from layer
 /// to layer.
 fn layers() -> Vec<Vertex> {
     let mut vertices = shapes::soup(60, 20);
     for vertex in &mut vertices {
-        vertex.color = vertex
-            .color
-            .map(|channel| (255.0 * channel).round() / 255.0);
+        vertex.color = vertex.color.map(|channel| (255.0 * channel).round() / 255.0);
     }
     for triangle in vertices.chunks_exact_mut(3) {
         let color = triangle[0].color;
@@ -51,26 +43,16 @@ fn layers() -> Vec<Vertex> {
     vertices
 }
 
-fn blended(
-    gpu: &Gpu,
-    format: vk::Format,
-    state: vk::PipelineColorBlendAttachmentState,
-    vertices: &[Vertex],
-) -> Output {
-    let options = PipelineOptions {
-        blend: vec![state],
-        blend_constants: [0.2, 0.4, 0.6, 0.8],
-        ..PipelineOptions::default()
-    };
+fn blended(gpu: &Gpu, format: vk::Format, state: vk::PipelineColorBlendAttachmentState, vertices: &[Vertex]) -> Output {
+    let options =
+        PipelineOptions { blend: vec![state], blend_constants: [0.2, 0.4, 0.6, 0.8], ..PipelineOptions::default() };
     simple(gpu, &TargetOptions::of(format), &options, vertices)
 }
 
 /// Draws one layer over the background in floats, for each pair of factors: nothing is rounded.
 pub fn blend_factors(gpu: &Gpu) -> Drawn {
     let vertices = &layers()[..30];
-    let pairs = FACTORS
-        .into_iter()
-        .flat_map(|from| FACTORS[..14].iter().map(move |&to| (from, to)));
+    let pairs = FACTORS.into_iter().flat_map(|from| FACTORS[..14].iter().map(move |&to| (from, to)));
     let name = |(from, to): &(Factor, Factor)| format!("{from:?} {to:?}");
     Ok(cases(pairs, name, |&(from, to)| {
         let format = vk::Format::R16G16B16A16_SFLOAT;
@@ -89,12 +71,7 @@ pub fn blend_operations(gpu: &Gpu) -> Drawn {
 /// Draws several layers of 8 bits, each rounded.
 pub fn blended_bytes(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD);
-    Ok(blended(
-        gpu,
-        vk::Format::R8G8B8A8_UNORM,
-        state,
-        &layers()[..9],
-    ))
+    Ok(blended(gpu, vk::Format::R8G8B8A8_UNORM, state, &layers()[..9]))
 }
 
 pub fn added_bytes(gpu: &Gpu) -> Drawn {
@@ -104,12 +81,7 @@ pub fn added_bytes(gpu: &Gpu) -> Drawn {
 
 pub fn blended_srgb(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD);
-    Ok(blended(
-        gpu,
-        vk::Format::R8G8B8A8_SRGB,
-        state,
-        &layers()[..6],
-    ))
+    Ok(blended(gpu, vk::Format::R8G8B8A8_SRGB, state, &layers()[..6]))
 }
 
 /// Blends colour and alpha with separate factors and operations.
@@ -131,11 +103,7 @@ pub fn dual_source_blending(gpu: &Gpu) -> Drawn {
              layout(location = 0, index = 1) out vec4 factor;
              void main() { color = v_color; factor = v_color.gbra; }",
         ),
-        blend: vec![blend(
-            Factor::SRC1_COLOR,
-            Factor::ONE_MINUS_SRC1_COLOR,
-            Op::ADD,
-        )],
+        blend: vec![blend(Factor::SRC1_COLOR, Factor::ONE_MINUS_SRC1_COLOR, Op::ADD)],
         ..PipelineOptions::default()
     };
     let target = TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT);
@@ -157,10 +125,7 @@ pub fn logic_operations(gpu: &Gpu) -> Drawn {
     let operations = (0..16).map(vk::LogicOp::from_raw);
     let name = |op: &vk::LogicOp| format!("{op:?}");
     Ok(cases(operations, name, |&op| {
-        let options = PipelineOptions {
-            logic_op: Some(op),
-            ..PipelineOptions::default()
-        };
+        let options = PipelineOptions { logic_op: Some(op), ..PipelineOptions::default() };
         simple(gpu, &TargetOptions::default(), &options, &layers()[..30])
     }))
 }
@@ -227,9 +192,7 @@ pub fn color_formats(gpu: &Gpu) -> Drawn {
         need_format(gpu, format, vk::FormatFeatureFlags::COLOR_ATTACHMENT)?;
     }
     let name = |format: &F| format!("{format:?}");
-    Ok(cases(formats, name, |&format| {
-        blended(gpu, format, opaque(), &shapes::soup(61, 30))
-    }))
+    Ok(cases(formats, name, |&format| blended(gpu, format, opaque(), &shapes::soup(61, 30))))
 }
 
 pub fn integer_formats(gpu: &Gpu) -> Drawn {
@@ -249,10 +212,7 @@ pub fn integer_formats(gpu: &Gpu) -> Drawn {
              layout(location = 0) out {prefix}vec4 color;
              void main() {{ color = {prefix}vec4(ivec4(gl_FragCoord.xyxy) & 127); }}"
         );
-        let options = PipelineOptions {
-            fragment: Some(&fragment),
-            ..PipelineOptions::default()
-        };
+        let options = PipelineOptions { fragment: Some(&fragment), ..PipelineOptions::default() };
         simple(gpu, &TargetOptions::of(format), &options, &layers())
     }))
 }

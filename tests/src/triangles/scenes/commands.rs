@@ -6,8 +6,7 @@ use super::Drawn;
 use super::simple::cases;
 use crate::triangles::shapes;
 use gaurast_testkit::{
-    Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, blend,
-    depth_test,
+    Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, blend, depth_test,
 };
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;
@@ -40,22 +39,16 @@ pub fn dynamic_culling(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::default();
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::soup(120, 40),
-        |commands, half| {
-            let fronts = [vk::FrontFace::CLOCKWISE, vk::FrontFace::COUNTER_CLOCKWISE];
-            let modes = [vk::CullModeFlags::BACK, vk::CullModeFlags::BACK];
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_cull_mode(commands.raw, modes[half]);
-                device.cmd_set_front_face(commands.raw, fronts[half]);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::soup(120, 40), |commands, half| {
+        let fronts = [vk::FrontFace::CLOCKWISE, vk::FrontFace::COUNTER_CLOCKWISE];
+        let modes = [vk::CullModeFlags::BACK, vk::CullModeFlags::BACK];
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_cull_mode(commands.raw, modes[half]);
+            device.cmd_set_front_face(commands.raw, fronts[half]);
+        }
+    })
 }
 
 pub fn dynamic_depth_test(gpu: &Gpu) -> Drawn {
@@ -68,48 +61,33 @@ pub fn dynamic_depth_test(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(D32);
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::soup(121, 40),
-        |commands, half| {
-            let ops = [vk::CompareOp::LESS, vk::CompareOp::GREATER];
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_depth_test_enable(commands.raw, true);
-                device.cmd_set_depth_write_enable(commands.raw, half == 0);
-                device.cmd_set_depth_compare_op(commands.raw, ops[half]);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::soup(121, 40), |commands, half| {
+        let ops = [vk::CompareOp::LESS, vk::CompareOp::GREATER];
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_depth_test_enable(commands.raw, true);
+            device.cmd_set_depth_write_enable(commands.raw, half == 0);
+            device.cmd_set_depth_compare_op(commands.raw, ops[half]);
+        }
+    })
 }
 
 pub fn dynamic_depth_bias(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         depth_stencil: depth_test(vk::CompareOp::LESS),
-        dynamic: vec![
-            vk::DynamicState::DEPTH_BIAS,
-            vk::DynamicState::DEPTH_BIAS_ENABLE,
-        ],
+        dynamic: vec![vk::DynamicState::DEPTH_BIAS, vk::DynamicState::DEPTH_BIAS_ENABLE],
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(D32);
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::flat_soup(122, 40),
-        |commands, half| {
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_depth_bias(commands.raw, 0.0, 0.0, 2.0);
-                device.cmd_set_depth_bias_enable(commands.raw, half == 0);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::flat_soup(122, 40), |commands, half| {
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_depth_bias(commands.raw, 0.0, 0.0, 2.0);
+            device.cmd_set_depth_bias_enable(commands.raw, half == 0);
+        }
+    })
 }
 
 pub fn dynamic_blend_constants(gpu: &Gpu) -> Drawn {
@@ -121,49 +99,31 @@ pub fn dynamic_blend_constants(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT);
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::soup(123, 40),
-        |commands, half| {
-            let constants = [[0.1, 0.5, 0.9, 0.3], [0.7, 0.2, 0.4, 1.0]];
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_blend_constants(commands.raw, &constants[half]);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::soup(123, 40), |commands, half| {
+        let constants = [[0.1, 0.5, 0.9, 0.3], [0.7, 0.2, 0.4, 1.0]];
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_blend_constants(commands.raw, &constants[half]);
+        }
+    })
 }
 
 pub fn dynamic_topology_and_restart(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
-        dynamic: vec![
-            vk::DynamicState::PRIMITIVE_TOPOLOGY,
-            vk::DynamicState::PRIMITIVE_RESTART_ENABLE,
-        ],
+        dynamic: vec![vk::DynamicState::PRIMITIVE_TOPOLOGY, vk::DynamicState::PRIMITIVE_RESTART_ENABLE],
         ..PipelineOptions::default()
     };
     let target = TargetOptions::default();
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::zigzag(124, 24),
-        |commands, half| {
-            let topologies = [
-                vk::PrimitiveTopology::TRIANGLE_STRIP,
-                vk::PrimitiveTopology::TRIANGLE_FAN,
-            ];
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_primitive_topology(commands.raw, topologies[half]);
-                device.cmd_set_primitive_restart_enable(commands.raw, false);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::zigzag(124, 24), |commands, half| {
+        let topologies = [vk::PrimitiveTopology::TRIANGLE_STRIP, vk::PrimitiveTopology::TRIANGLE_FAN];
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_primitive_topology(commands.raw, topologies[half]);
+            device.cmd_set_primitive_restart_enable(commands.raw, false);
+        }
+    })
 }
 
 pub fn dynamic_stencil(gpu: &Gpu) -> Drawn {
@@ -178,34 +138,26 @@ pub fn dynamic_stencil(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT);
-    dynamic(
-        gpu,
-        &target,
-        &options,
-        &shapes::soup(125, 40),
-        |commands, half| {
-            let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
-            let compare = [vk::CompareOp::ALWAYS, vk::CompareOp::EQUAL][half];
-            let pass = [vk::StencilOp::REPLACE, vk::StencilOp::INVERT][half];
-            let keep = vk::StencilOp::KEEP;
-            // SAFETY: see `triangles`.
-            unsafe {
-                let device = commands.device();
-                device.cmd_set_stencil_test_enable(commands.raw, true);
-                device.cmd_set_stencil_op(commands.raw, faces, keep, pass, keep, compare);
-                device.cmd_set_stencil_compare_mask(commands.raw, faces, 0x0f);
-                device.cmd_set_stencil_write_mask(commands.raw, faces, 0x3f);
-                device.cmd_set_stencil_reference(commands.raw, faces, 0x15);
-            }
-        },
-    )
+    dynamic(gpu, &target, &options, &shapes::soup(125, 40), |commands, half| {
+        let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
+        let compare = [vk::CompareOp::ALWAYS, vk::CompareOp::EQUAL][half];
+        let pass = [vk::StencilOp::REPLACE, vk::StencilOp::INVERT][half];
+        let keep = vk::StencilOp::KEEP;
+        // SAFETY: see `triangles`.
+        unsafe {
+            let device = commands.device();
+            device.cmd_set_stencil_test_enable(commands.raw, true);
+            device.cmd_set_stencil_op(commands.raw, faces, keep, pass, keep, compare);
+            device.cmd_set_stencil_compare_mask(commands.raw, faces, 0x0f);
+            device.cmd_set_stencil_write_mask(commands.raw, faces, 0x3f);
+            device.cmd_set_stencil_reference(commands.raw, faces, 0x15);
+        }
+    })
 }
 
 pub fn dynamic_vertex_strides(gpu: &Gpu) -> Drawn {
-    let options = PipelineOptions {
-        dynamic: vec![vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE],
-        ..PipelineOptions::default()
-    };
+    let options =
+        PipelineOptions { dynamic: vec![vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE], ..PipelineOptions::default() };
     let target = Target::new(gpu, &TargetOptions::default());
     let pipeline = Pipeline::new(gpu, &target, &options);
     let buffer = Buffer::of(gpu, &shapes::soup(126, 40));
@@ -232,10 +184,7 @@ pub fn dynamic_vertex_strides(gpu: &Gpu) -> Drawn {
 /// Executes secondary command buffers in dynamic rendering.
 pub fn secondary_command_buffers(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
-    let options = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let buffer = Buffer::of(gpu, &shapes::soup(127, 40));
     let (colors, depth, stencil) = target.formats();
@@ -254,10 +203,7 @@ pub fn secondary_command_buffers(gpu: &Gpu) -> Drawn {
         })
     };
     let buffers = [secondary(0..60), secondary(60..120)];
-    let pass = Pass {
-        flags: vk::RenderingFlags::CONTENTS_SECONDARY_COMMAND_BUFFERS,
-        ..Pass::default()
-    };
+    let pass = Pass { flags: vk::RenderingFlags::CONTENTS_SECONDARY_COMMAND_BUFFERS, ..Pass::default() };
     Ok(target.draw(gpu, &pass, |commands| {
         let raw = [buffers[0].raw, buffers[1].raw];
         // SAFETY: see `triangles`.
@@ -268,10 +214,7 @@ pub fn secondary_command_buffers(gpu: &Gpu) -> Drawn {
 /// Clears part of the target between draws.
 pub fn clears_within_a_pass(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
-    let options = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let buffer = Buffer::of(gpu, &shapes::soup(128, 40));
     Ok(target.draw(gpu, &Pass::default(), |commands| {
@@ -279,31 +222,19 @@ pub fn clears_within_a_pass(gpu: &Gpu) -> Drawn {
         commands.vertices(&buffer);
         commands.draw(0..60);
         let rect = |x, y, width, height| vk::ClearRect {
-            rect: vk::Rect2D {
-                offset: vk::Offset2D { x, y },
-                extent: vk::Extent2D { width, height },
-            },
+            rect: vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } },
             base_array_layer: 0,
             layer_count: 1,
         };
         let color = vk::ClearAttachment {
             aspect_mask: vk::ImageAspectFlags::COLOR,
             color_attachment: 0,
-            clear_value: vk::ClearValue {
-                color: vk::ClearColorValue {
-                    float32: [0.9, 0.8, 0.1, 0.5],
-                },
-            },
+            clear_value: vk::ClearValue { color: vk::ClearColorValue { float32: [0.9, 0.8, 0.1, 0.5] } },
         };
         let depth = vk::ClearAttachment {
             aspect_mask: vk::ImageAspectFlags::DEPTH,
             color_attachment: 0,
-            clear_value: vk::ClearValue {
-                depth_stencil: vk::ClearDepthStencilValue {
-                    depth: 0.4,
-                    stencil: 0,
-                },
-            },
+            clear_value: vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.4, stencil: 0 } },
         };
         // SAFETY: see `triangles`.
         unsafe {
@@ -322,17 +253,11 @@ pub fn load_and_store(gpu: &Gpu) -> Drawn {
     let name = |area: &Option<[u32; 4]>| format!("area {area:?}");
     Ok(cases(areas, name, |&area| {
         let target = Target::new(gpu, &TargetOptions::with_depth(D32));
-        let options = PipelineOptions {
-            depth_stencil: depth_test(vk::CompareOp::LESS),
-            ..PipelineOptions::default()
-        };
+        let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
         let pipeline = Pipeline::new(gpu, &target, &options);
         let buffer = Buffer::of(gpu, &shapes::soup(129, 40));
         let rect = area.map(|[x, y, width, height]| vk::Rect2D {
-            offset: vk::Offset2D {
-                x: x.cast_signed(),
-                y: y.cast_signed(),
-            },
+            offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
             extent: vk::Extent2D { width, height },
         });
         gpu.run(|commands| {
@@ -349,15 +274,9 @@ pub fn load_and_store(gpu: &Gpu) -> Drawn {
                 commands.vertices(&buffer);
                 commands.draw(0..30);
             });
-            let area = Pass {
-                area: rect,
-                ..Pass::load()
-            };
+            let area = Pass { area: rect, ..Pass::load() };
             commands.pass(&target, &area, || draw(30..60));
-            let clearing = Pass {
-                area: rect,
-                ..Pass::default()
-            };
+            let clearing = Pass { area: rect, ..Pass::default() };
             commands.pass(&target, &clearing, || draw(60..90));
         });
         target.output(gpu)
@@ -369,14 +288,8 @@ pub fn several_pipelines(gpu: &Gpu) -> Drawn {
     use vk::BlendFactor as Factor;
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
     let (from, to) = (Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA);
-    let first = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
-    let second = PipelineOptions {
-        blend: vec![blend(from, to, vk::BlendOp::ADD)],
-        ..PipelineOptions::default()
-    };
+    let first = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
+    let second = PipelineOptions { blend: vec![blend(from, to, vk::BlendOp::ADD)], ..PipelineOptions::default() };
     let third = PipelineOptions {
         fragment: Some(
             "layout(location = 0) out vec4 color;

@@ -24,10 +24,7 @@ const COMPARISONS: [Compare; 8] = [
 ];
 
 fn tested(gpu: &Gpu, format: vk::Format, op: Compare, vertices: &[Vertex]) -> Output {
-    let options = PipelineOptions {
-        depth_stencil: depth_test(op),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(op), ..PipelineOptions::default() };
     simple(gpu, &TargetOptions::with_depth(format), &options, vertices)
 }
 
@@ -40,9 +37,7 @@ pub fn depth_comparisons(gpu: &Gpu) -> Drawn {
         vertex.color = [1.0; 4];
     }
     let name = |op: &Compare| format!("{op:?}");
-    Ok(cases(COMPARISONS, name, |&op| {
-        tested(gpu, D32, op, &vertices)
-    }))
+    Ok(cases(COMPARISONS, name, |&op| tested(gpu, D32, op, &vertices)))
 }
 
 fn depth_format(gpu: &Gpu, format: vk::Format) -> Drawn {
@@ -73,10 +68,7 @@ pub fn depth_without_writes(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
-    let writing = PipelineOptions {
-        depth_stencil: depth_test(Compare::LESS),
-        ..PipelineOptions::default()
-    };
+    let writing = PipelineOptions { depth_stencil: depth_test(Compare::LESS), ..PipelineOptions::default() };
     let writing = Pipeline::new(gpu, &target, &writing);
     let testing = Pipeline::new(gpu, &target, &options);
     let vertices = Buffer::of(gpu, &shapes::soup(42, 30));
@@ -96,11 +88,7 @@ fn biased(gpu: &Gpu, format: vk::Format, constant: f32, slope: f32, clamp: f32) 
         .depth_bias_constant_factor(constant)
         .depth_bias_slope_factor(slope)
         .depth_bias_clamp(clamp);
-    let options = PipelineOptions {
-        raster,
-        depth_stencil: depth_test(Compare::LESS),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { raster, depth_stencil: depth_test(Compare::LESS), ..PipelineOptions::default() };
     let vertices = shapes::flat_soup(43, 30);
     simple(gpu, &TargetOptions::with_depth(format), &options, &vertices)
 }
@@ -126,10 +114,7 @@ pub fn clamped_depth_bias(gpu: &Gpu) -> Drawn {
 pub fn depth_bounds(gpu: &Gpu) -> Drawn {
     need("depthBounds", gpu.features().depth_bounds)?;
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
-    let first = PipelineOptions {
-        depth_stencil: depth_test(Compare::LESS),
-        ..PipelineOptions::default()
-    };
+    let first = PipelineOptions { depth_stencil: depth_test(Compare::LESS), ..PipelineOptions::default() };
     let second = PipelineOptions {
         depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_bounds_test_enable(true)
@@ -215,18 +200,11 @@ fn stencil_format(gpu: &Gpu) -> Result<(), super::Missing> {
 }
 
 fn stencil(op: vk::StencilOpState) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
-    depth_test(Compare::LESS)
-        .stencil_test_enable(true)
-        .front(op)
-        .back(op)
+    depth_test(Compare::LESS).stencil_test_enable(true).front(op).back(op)
 }
 
 /// The values that remain after draws with `state` over stripes of values 0 to 7.
-fn over_stripes(
-    gpu: &Gpu,
-    state: &vk::PipelineDepthStencilStateCreateInfo<'static>,
-    vertices: &[Vertex],
-) -> Output {
+fn over_stripes(gpu: &Gpu, state: &vk::PipelineDepthStencilStateCreateInfo<'static>, vertices: &[Vertex]) -> Output {
     let target = Target::new(gpu, &TargetOptions::with_depth(STENCIL));
     let replace = stencil(vk::StencilOpState {
         pass_op: vk::StencilOp::REPLACE,
@@ -241,10 +219,7 @@ fn over_stripes(
         ..PipelineOptions::default()
     };
     let stripes = Pipeline::new(gpu, &target, &stripes);
-    let pipeline = PipelineOptions {
-        depth_stencil: *state,
-        ..PipelineOptions::default()
-    };
+    let pipeline = PipelineOptions { depth_stencil: *state, ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &pipeline);
     let mut all = shapes::whole(0.9, [0.5; 4]);
     all.extend(vertices);
@@ -306,11 +281,7 @@ pub fn stencil_operations(gpu: &Gpu) -> Drawn {
     };
     Ok(cases(all, name, |&(index, place)| {
         let op = |of| {
-            if place == of {
-                operations[index]
-            } else {
-                vk::StencilOp::KEEP
-            }
+            if place == of { operations[index] } else { vk::StencilOp::KEEP }
         };
         let state = stencil(vk::StencilOpState {
             fail_op: op(0),

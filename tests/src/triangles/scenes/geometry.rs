@@ -16,11 +16,7 @@ fn drawn(gpu: &Gpu, topology: Topology, geometry: &str, vertices: &[Vertex]) -> 
 }
 
 fn of(topology: Topology, geometry: &str) -> PipelineOptions<'_> {
-    PipelineOptions {
-        topology,
-        between: vec![(Stage::Geometry, geometry)],
-        ..PipelineOptions::default()
-    }
+    PipelineOptions { topology, between: vec![(Stage::Geometry, geometry)], ..PipelineOptions::default() }
 }
 
 fn needed(gpu: &Gpu) -> Result<(), super::Missing> {
@@ -92,22 +88,14 @@ fn marking(input: &str) -> String {
 const ADJACENT: [(Topology, &str); 4] = [
     (Topology::LINE_LIST_WITH_ADJACENCY, "lines_adjacency"),
     (Topology::LINE_STRIP_WITH_ADJACENCY, "lines_adjacency"),
-    (
-        Topology::TRIANGLE_LIST_WITH_ADJACENCY,
-        "triangles_adjacency",
-    ),
-    (
-        Topology::TRIANGLE_STRIP_WITH_ADJACENCY,
-        "triangles_adjacency",
-    ),
+    (Topology::TRIANGLE_LIST_WITH_ADJACENCY, "triangles_adjacency"),
+    (Topology::TRIANGLE_STRIP_WITH_ADJACENCY, "triangles_adjacency"),
 ];
 
 /// The order of the vertices of primitives with adjacent ones, in runs of all lengths.
 pub fn adjacent_vertices(gpu: &Gpu) -> Drawn {
     needed(gpu)?;
-    let all = ADJACENT
-        .into_iter()
-        .flat_map(|kind| [4, 5, 6, 8, 13, 14].map(|count| (kind, count)));
+    let all = ADJACENT.into_iter().flat_map(|kind| [4, 5, 6, 8, 13, 14].map(|count| (kind, count)));
     let name = |&((topology, _), count): &_| format!("{topology:?} {count}");
     Ok(cases(all, name, |&((topology, input), count)| {
         let vertices = shapes::zigzag(210, count);
@@ -122,26 +110,17 @@ pub fn adjacent_vertices_of_indices(gpu: &Gpu) -> Drawn {
     let name = |&(topology, _): &_| format!("{topology:?}");
     Ok(cases(strips, name, |&(topology, input)| {
         let shader = marking(input);
-        let options = PipelineOptions {
-            restart: true,
-            ..of(topology, &shader)
-        };
+        let options = PipelineOptions { restart: true, ..of(topology, &shader) };
         let indices: Vec<u32> = [9, 2, 7, 0, 5, 1, 8, 3, u32::MAX, 4, 6, u32::MAX]
             .into_iter()
             .chain([0, 1, 2, 3, 4, 5, 6, 7, 8, 9])
             .collect();
         let buffer = Buffer::of(gpu, &indices);
         let vertices = shapes::zigzag(211, 10);
-        with(
-            gpu,
-            &TargetOptions::default(),
-            &options,
-            &vertices,
-            |commands| {
-                commands.indices(&buffer, 0, vk::IndexType::UINT32);
-                commands.draw_indexed(0..indices.len() as u32, 0);
-            },
-        )
+        with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+            commands.indices(&buffer, 0, vk::IndexType::UINT32);
+            commands.draw_indexed(0..indices.len() as u32, 0);
+        })
     }))
 }
 
@@ -174,14 +153,7 @@ pub fn strips_of_geometry(gpu: &Gpu) -> Drawn {
     Ok(cases(
         outputs,
         |output| (*output).to_owned(),
-        |output| {
-            drawn(
-                gpu,
-                Topology::POINT_LIST,
-                &shader(output),
-                &shapes::points(220, 40),
-            )
-        },
+        |output| drawn(gpu, Topology::POINT_LIST, &shader(output), &shapes::points(220, 40)),
     ))
 }
 
@@ -202,12 +174,7 @@ pub fn invocations_of_geometry(gpu: &Gpu) -> Drawn {
                 EmitVertex();
             }
         }";
-    Ok(drawn(
-        gpu,
-        Topology::POINT_LIST,
-        shader,
-        &shapes::points(230, 60),
-    ))
+    Ok(drawn(gpu, Topology::POINT_LIST, shader, &shapes::points(230, 60)))
 }
 
 /// The numbers of primitives that the shader takes and gives.
@@ -251,14 +218,9 @@ pub fn points_become_quads(gpu: &Gpu) -> Drawn {
                 EmitVertex();
             }
         }";
-    let (from, to) = (
-        vk::BlendFactor::SRC_ALPHA,
-        vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-    );
-    let options = PipelineOptions {
-        blend: vec![blend(from, to, vk::BlendOp::ADD)],
-        ..of(Topology::POINT_LIST, shader)
-    };
+    let (from, to) = (vk::BlendFactor::SRC_ALPHA, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+    let options =
+        PipelineOptions { blend: vec![blend(from, to, vk::BlendOp::ADD)], ..of(Topology::POINT_LIST, shader) };
     let vertices = shapes::points(250, 4000);
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
@@ -347,10 +309,7 @@ pub fn sizes_and_distances_of_geometry(gpu: &Gpu) -> Drawn {
                 EmitVertex();
             }
         }";
-    let kinds = [
-        ("sizes", Topology::POINT_LIST, points),
-        ("distances", Topology::TRIANGLE_LIST, clipped),
-    ];
+    let kinds = [("sizes", Topology::POINT_LIST, points), ("distances", Topology::TRIANGLE_LIST, clipped)];
     let name = |&(name, ..): &(&str, _, _)| name.to_owned();
     Ok(cases(kinds, name, |&(_, topology, shader)| {
         let vertices = match topology {

@@ -8,11 +8,7 @@ use crate::triangles::models::{Model, Ready};
 use gaurast_testkit::{Gpu, Output, Pass, Target, TargetOptions};
 
 fn drawn(gpu: &Gpu, model: &Model, direction: Vec3, samples: u32) -> Output {
-    let options = TargetOptions {
-        size: [640, 480],
-        samples,
-        ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
-    };
+    let options = TargetOptions { size: [640, 480], samples, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) };
     let target = Target::new(gpu, &options);
     let ready = Ready::new(gpu, &target, model, direction);
     target.draw(gpu, &Pass::default(), |commands| ready.draw(commands))

@@ -5,9 +5,7 @@ use ash::vk;
 use super::Drawn;
 use super::simple::{need, simple};
 use crate::triangles::shapes;
-use gaurast_testkit::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, depth_test,
-};
+use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, depth_test};
 
 fn four() -> TargetOptions {
     TargetOptions::default().multisampled()
@@ -19,14 +17,8 @@ pub fn four_samples(gpu: &Gpu) -> Drawn {
 }
 
 pub fn four_samples_with_depth(gpu: &Gpu) -> Drawn {
-    let options = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
-    let target = TargetOptions {
-        depth: Some(vk::Format::D32_SFLOAT),
-        ..four()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
+    let target = TargetOptions { depth: Some(vk::Format::D32_SFLOAT), ..four() };
     Ok(simple(gpu, &target, &options, &shapes::soup(71, 30)))
 }
 
@@ -40,18 +32,12 @@ pub fn resolved_integers(gpu: &Gpu) -> Drawn {
         ),
         ..PipelineOptions::default()
     };
-    let target = TargetOptions {
-        colors: vec![vk::Format::R8G8B8A8_UINT],
-        ..four()
-    };
+    let target = TargetOptions { colors: vec![vk::Format::R8G8B8A8_UINT], ..four() };
     Ok(simple(gpu, &target, &options, &shapes::soup(72, 30)))
 }
 
 pub fn resolved_floats(gpu: &Gpu) -> Drawn {
-    let target = TargetOptions {
-        colors: vec![vk::Format::R16G16B16A16_SFLOAT, vk::Format::R8G8B8A8_SRGB],
-        ..four()
-    };
+    let target = TargetOptions { colors: vec![vk::Format::R16G16B16A16_SFLOAT, vk::Format::R8G8B8A8_SRGB], ..four() };
     let options = PipelineOptions {
         fragment: Some(
             "layout(location = 0) in vec4 v_color;
@@ -68,10 +54,7 @@ pub fn resolved_floats(gpu: &Gpu) -> Drawn {
 /// centre; the test `interpolation` compares perspective with exact values.
 pub fn sample_shading(gpu: &Gpu) -> Drawn {
     need("sampleRateShading", gpu.features().sample_rate_shading)?;
-    let options = PipelineOptions {
-        sample_shading: Some(1.0),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { sample_shading: Some(1.0), ..PipelineOptions::default() };
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(74, 30)))
 }
 
@@ -118,12 +101,7 @@ pub fn centroid_qualifier(gpu: &Gpu) -> Drawn {
     let mut vertices = shapes::flat_soup(77, 30);
     // The value is zero along one edge and positive elsewhere, so only extrapolation can make it negative.
     for (index, vertex) in vertices.iter_mut().enumerate() {
-        vertex.color = [
-            f32::from(index % 3 == 0),
-            1.0,
-            f32::from(index % 3 == 1),
-            1.0,
-        ];
+        vertex.color = [f32::from(index % 3 == 0), 1.0, f32::from(index % 3 == 1), 1.0];
     }
     Ok(simple(gpu, &four(), &options, &vertices))
 }
@@ -134,27 +112,18 @@ pub fn alpha_to_coverage(gpu: &Gpu) -> Drawn {
     for (index, vertex) in vertices.iter_mut().enumerate() {
         vertex.color[3] = [0.1, 0.35, 0.6, 0.85, 1.0][index / 3 % 5];
     }
-    let options = PipelineOptions {
-        alpha_to_coverage: true,
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { alpha_to_coverage: true, ..PipelineOptions::default() };
     Ok(simple(gpu, &four(), &options, &vertices))
 }
 
 pub fn alpha_to_one(gpu: &Gpu) -> Drawn {
     need("alphaToOne", gpu.features().alpha_to_one)?;
-    let options = PipelineOptions {
-        alpha_to_one: true,
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { alpha_to_one: true, ..PipelineOptions::default() };
     Ok(simple(gpu, &four(), &options, &shapes::soup(79, 30)))
 }
 
 pub fn sample_mask(gpu: &Gpu) -> Drawn {
-    let options = PipelineOptions {
-        sample_mask: 0b0110,
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { sample_mask: 0b0110, ..PipelineOptions::default() };
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(80, 30)))
 }
 
@@ -197,14 +166,8 @@ pub fn samples_loaded_again(gpu: &Gpu) -> Drawn {
 /// Draws lines and points to an image of four samples.
 pub fn lines_and_points_of_four_samples(gpu: &Gpu) -> Drawn {
     let mut output = gaurast_testkit::Output::default();
-    for topology in [
-        vk::PrimitiveTopology::POINT_LIST,
-        vk::PrimitiveTopology::LINE_LIST,
-    ] {
-        let options = PipelineOptions {
-            topology,
-            ..PipelineOptions::default()
-        };
+    for topology in [vk::PrimitiveTopology::POINT_LIST, vk::PrimitiveTopology::LINE_LIST] {
+        let options = PipelineOptions { topology, ..PipelineOptions::default() };
         let drawn = simple(gpu, &four(), &options, &shapes::points(83, 30));
         output.add(&format!("{topology:?}"), drawn);
     }

@@ -6,8 +6,7 @@ use super::Drawn;
 use super::simple::need_format;
 use crate::triangles::shapes;
 use gaurast_testkit::{
-    Bindings, Buffer, Commands, Gpu, Pipeline, PipelineOptions, Resource, Target, TargetOptions,
-    depth_test,
+    Bindings, Buffer, Commands, Gpu, Pipeline, PipelineOptions, Resource, Target, TargetOptions, depth_test,
 };
 
 /// A render pass with a framebuffer.
@@ -18,51 +17,29 @@ struct Object {
 }
 
 impl Object {
-    fn new(
-        gpu: &Gpu,
-        info: &vk::RenderPassCreateInfo<'_>,
-        views: &[vk::ImageView],
-        [width, height]: [u32; 2],
-    ) -> Self {
+    fn new(gpu: &Gpu, info: &vk::RenderPassCreateInfo<'_>, views: &[vk::ImageView], [width, height]: [u32; 2]) -> Self {
         // SAFETY: see `triangles`.
         unsafe {
             let device = gpu.device();
-            let render_pass = device
-                .create_render_pass(info, None)
-                .expect("a render pass");
+            let render_pass = device.create_render_pass(info, None).expect("a render pass");
             let info = vk::FramebufferCreateInfo::default()
                 .render_pass(render_pass)
                 .attachments(views)
                 .width(width)
                 .height(height)
                 .layers(1);
-            let framebuffer = device
-                .create_framebuffer(&info, None)
-                .expect("a framebuffer");
-            Self {
-                render_pass,
-                framebuffer,
-                gpu: gpu.clone(),
-            }
+            let framebuffer = device.create_framebuffer(&info, None).expect("a framebuffer");
+            Self { render_pass, framebuffer, gpu: gpu.clone() }
         }
     }
 
     /// Records a pass that clears its attachments to `clears`.
-    fn pass(
-        &self,
-        commands: &Commands,
-        target: &Target,
-        clears: &[vk::ClearValue],
-        draws: impl FnOnce(),
-    ) {
+    fn pass(&self, commands: &Commands, target: &Target, clears: &[vk::ClearValue], draws: impl FnOnce()) {
         let [width, height] = target.options.size;
         let info = vk::RenderPassBeginInfo::default()
             .render_pass(self.render_pass)
             .framebuffer(self.framebuffer)
-            .render_area(vk::Rect2D {
-                offset: vk::Offset2D::default(),
-                extent: vk::Extent2D { width, height },
-            })
+            .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } })
             .clear_values(clears);
         let device = commands.device();
         commands.barrier();
@@ -109,35 +86,19 @@ const DEPTH: vk::ImageLayout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL
 const READ: vk::ImageLayout = vk::ImageLayout::GENERAL;
 
 fn clears() -> [vk::ClearValue; 3] {
-    let color = vk::ClearValue {
-        color: vk::ClearColorValue {
-            float32: [0.2, 0.4, 0.6, 1.0],
-        },
-    };
-    let depth = vk::ClearValue {
-        depth_stencil: vk::ClearDepthStencilValue {
-            depth: 1.0,
-            stencil: 0,
-        },
-    };
+    let color = vk::ClearValue { color: vk::ClearColorValue { float32: [0.2, 0.4, 0.6, 1.0] } };
+    let depth = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 } };
     [color, depth, color]
 }
 
 pub fn render_pass_object(gpu: &Gpu) -> Drawn {
     let format = vk::Format::D32_SFLOAT;
     let target = Target::new(gpu, &TargetOptions::with_depth(format));
-    let attachments = [
-        attachment(target.options.colors[0], 1),
-        attachment(format, 1),
-    ];
+    let attachments = [attachment(target.options.colors[0], 1), attachment(format, 1)];
     let colors = [reference(0, COLOR)];
     let depth = reference(1, DEPTH);
-    let subpasses = [vk::SubpassDescription::default()
-        .color_attachments(&colors)
-        .depth_stencil_attachment(&depth)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let subpasses = [vk::SubpassDescription::default().color_attachments(&colors).depth_stencil_attachment(&depth)];
+    let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
     let depth_image = target.depth.as_ref().expect("it has depth");
     let views = [target.colors[0].attachment, depth_image.attachment];
     let object = Object::new(gpu, &info, &views, target.options.size);
@@ -163,28 +124,17 @@ pub fn input_attachments(gpu: &Gpu) -> Drawn {
     let format = vk::Format::D32_SFLOAT;
     let feature = vk::FormatFeatureFlags::SAMPLED_IMAGE;
     need_format(gpu, format, feature)?;
-    let options = TargetOptions {
-        colors: vec![vk::Format::R8G8B8A8_UNORM; 2],
-        ..TargetOptions::with_depth(format)
-    };
+    let options = TargetOptions { colors: vec![vk::Format::R8G8B8A8_UNORM; 2], ..TargetOptions::with_depth(format) };
     let target = Target::new(gpu, &options);
     let depth_image = target.depth.as_ref().expect("it has depth");
-    let attachments = [
-        attachment(options.colors[0], 1),
-        attachment(format, 1),
-        attachment(options.colors[1], 1),
-    ];
+    let attachments = [attachment(options.colors[0], 1), attachment(format, 1), attachment(options.colors[1], 1)];
     let first_colors = [reference(0, COLOR)];
     let depth = reference(1, DEPTH);
     let second_colors = [reference(2, COLOR)];
     let inputs = [reference(0, READ), reference(1, READ)];
     let subpasses = [
-        vk::SubpassDescription::default()
-            .color_attachments(&first_colors)
-            .depth_stencil_attachment(&depth),
-        vk::SubpassDescription::default()
-            .color_attachments(&second_colors)
-            .input_attachments(&inputs),
+        vk::SubpassDescription::default().color_attachments(&first_colors).depth_stencil_attachment(&depth),
+        vk::SubpassDescription::default().color_attachments(&second_colors).input_attachments(&inputs),
     ];
     let dependencies = [vk::SubpassDependency::default()
         .dst_subpass(1)
@@ -193,20 +143,11 @@ pub fn input_attachments(gpu: &Gpu) -> Drawn {
         .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
         .dst_access_mask(vk::AccessFlags::MEMORY_READ)
         .dependency_flags(vk::DependencyFlags::BY_REGION)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses)
-        .dependencies(&dependencies);
-    let views = [
-        target.colors[0].attachment,
-        depth_image.attachment,
-        target.colors[1].attachment,
-    ];
+    let info =
+        vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses).dependencies(&dependencies);
+    let views = [target.colors[0].attachment, depth_image.attachment, target.colors[1].attachment];
     let object = Object::new(gpu, &info, &views, options.size);
-    let resources = [
-        Resource::Input(target.colors[0].view),
-        Resource::Input(depth_image.view),
-    ];
+    let resources = [Resource::Input(target.colors[0].view), Resource::Input(depth_image.view)];
     let bindings = Bindings::new(gpu, &resources);
     // Each subpass has one colour attachment.
     let one = Target::new(gpu, &TargetOptions::with_depth(format));
@@ -259,18 +200,11 @@ pub fn resolve_attachments(gpu: &Gpu) -> Drawn {
     let attachments = [attachment(format, 4), attachment(format, 1)];
     let colors = [reference(0, COLOR)];
     let resolves = [reference(1, COLOR)];
-    let subpasses = [vk::SubpassDescription::default()
-        .color_attachments(&colors)
-        .resolve_attachments(&resolves)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let subpasses = [vk::SubpassDescription::default().color_attachments(&colors).resolve_attachments(&resolves)];
+    let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
     let views = [target.colors[0].attachment, target.resolved[0].attachment];
     let object = Object::new(gpu, &info, &views, target.options.size);
-    let options = PipelineOptions {
-        subpass: Some((object.render_pass, 0)),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { subpass: Some((object.render_pass, 0)), ..PipelineOptions::default() };
     let pipeline = Pipeline::new(gpu, &target, &options);
     let vertices = Buffer::of(gpu, &shapes::flat_soup(142, 40));
     gpu.run(|commands| {

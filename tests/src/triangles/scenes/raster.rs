@@ -9,29 +9,16 @@ use gaurast_testkit::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test}
 
 /// Culls each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {
-    let modes = [
-        vk::CullModeFlags::NONE,
-        vk::CullModeFlags::FRONT,
-        vk::CullModeFlags::BACK,
-        vk::CullModeFlags::FRONT_AND_BACK,
-    ];
+    let modes =
+        [vk::CullModeFlags::NONE, vk::CullModeFlags::FRONT, vk::CullModeFlags::BACK, vk::CullModeFlags::FRONT_AND_BACK];
     let fronts = [vk::FrontFace::CLOCKWISE, vk::FrontFace::COUNTER_CLOCKWISE];
-    let all = modes
-        .into_iter()
-        .flat_map(|mode| fronts.map(|front| (mode, front)));
+    let all = modes.into_iter().flat_map(|mode| fronts.map(|front| (mode, front)));
     let name = |&(mode, front): &_| format!("{mode:?} {front:?}");
     Ok(cases(all, name, |&(mode, front)| {
         let raster = PipelineOptions::default().raster;
-        let options = PipelineOptions {
-            raster: raster.cull_mode(mode).front_face(front),
-            ..PipelineOptions::default()
-        };
-        simple(
-            gpu,
-            &TargetOptions::default(),
-            &options,
-            &shapes::soup(20, 40),
-        )
+        let options =
+            PipelineOptions { raster: raster.cull_mode(mode).front_face(front), ..PipelineOptions::default() };
+        simple(gpu, &TargetOptions::default(), &options, &shapes::soup(20, 40))
     }))
 }
 
@@ -50,10 +37,8 @@ pub fn front_facing(gpu: &Gpu) -> Drawn {
 
 fn polygon_mode(gpu: &Gpu, mode: vk::PolygonMode) -> Drawn {
     need("fillModeNonSolid", gpu.features().fill_mode_non_solid)?;
-    let options = PipelineOptions {
-        raster: PipelineOptions::default().raster.polygon_mode(mode),
-        ..PipelineOptions::default()
-    };
+    let options =
+        PipelineOptions { raster: PipelineOptions::default().raster.polygon_mode(mode), ..PipelineOptions::default() };
     let vertices = shapes::soup(22, 12);
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
@@ -71,10 +56,8 @@ pub fn rasterizer_discard(gpu: &Gpu) -> Drawn {
     let name = |discard: &bool| format!("discard {discard}");
     Ok(cases([false, true], name, |&discard| {
         let raster = PipelineOptions::default().raster;
-        let options = PipelineOptions {
-            raster: raster.rasterizer_discard_enable(discard),
-            ..PipelineOptions::default()
-        };
+        let options =
+            PipelineOptions { raster: raster.rasterizer_discard_enable(discard), ..PipelineOptions::default() };
         simple(gpu, &TargetOptions::default(), &options, &vertices)
     }))
 }
@@ -82,79 +65,50 @@ pub fn rasterizer_discard(gpu: &Gpu) -> Drawn {
 /// Uses a viewport with negative height, which flips y and with it the winding.
 pub fn negative_viewport_height(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
-        raster: PipelineOptions::default()
-            .raster
-            .cull_mode(vk::CullModeFlags::BACK),
+        raster: PipelineOptions::default().raster.cull_mode(vk::CullModeFlags::BACK),
         ..PipelineOptions::default()
     };
     let vertices = shapes::soup(24, 30);
-    Ok(with(
-        gpu,
-        &TargetOptions::default(),
-        &options,
-        &vertices,
-        |commands| {
-            commands.viewport([0.0, 128.0, 128.0, -128.0], [0.0, 1.0]);
-            commands.draw(0..90);
-        },
-    ))
+    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+        commands.viewport([0.0, 128.0, 128.0, -128.0], [0.0, 1.0]);
+        commands.draw(0..90);
+    }))
 }
 
 pub fn viewport_and_depth_range(gpu: &Gpu) -> Drawn {
-    let options = PipelineOptions {
-        depth_stencil: depth_test(vk::CompareOp::LESS),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { depth_stencil: depth_test(vk::CompareOp::LESS), ..PipelineOptions::default() };
     let target = TargetOptions::with_depth(vk::Format::D32_SFLOAT);
-    Ok(with(
-        gpu,
-        &target,
-        &options,
-        &shapes::soup(25, 30),
-        |commands| {
-            commands.viewport([3.25, 7.5, 61.0, 90.75], [0.25, 0.5]);
-            commands.draw(0..45);
-            commands.viewport([60.0, 10.0, 64.0, 100.0], [0.9, 0.1]);
-            commands.draw(45..90);
-        },
-    ))
+    Ok(with(gpu, &target, &options, &shapes::soup(25, 30), |commands| {
+        commands.viewport([3.25, 7.5, 61.0, 90.75], [0.25, 0.5]);
+        commands.draw(0..45);
+        commands.viewport([60.0, 10.0, 64.0, 100.0], [0.9, 0.1]);
+        commands.draw(45..90);
+    }))
 }
 
 pub fn scissors(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions::default();
     let vertices = shapes::soup(26, 30);
-    Ok(with(
-        gpu,
-        &TargetOptions::default(),
-        &options,
-        &vertices,
-        |commands| {
-            commands.scissor([5, 9], [50, 21]);
-            commands.draw(0..30);
-            commands.scissor([64, 64], [0, 10]);
-            commands.draw(0..90);
-            commands.scissor([71, 33], [1000, 1]);
-            commands.draw(0..90);
-            commands.scissor([63, 63], [3, 60]);
-            commands.draw(30..90);
-        },
-    ))
+    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+        commands.scissor([5, 9], [50, 21]);
+        commands.draw(0..30);
+        commands.scissor([64, 64], [0, 10]);
+        commands.draw(0..90);
+        commands.scissor([71, 33], [1000, 1]);
+        commands.draw(0..90);
+        commands.scissor([63, 63], [3, 60]);
+        commands.draw(30..90);
+    }))
 }
 
 /// Uses a viewport that extends far beyond the target on all sides.
 pub fn viewport_beyond_the_target(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions::default();
     let vertices = shapes::flat_soup(27, 30);
-    Ok(with(
-        gpu,
-        &TargetOptions::default(),
-        &options,
-        &vertices,
-        |commands| {
-            commands.viewport([-100.0, -64.0, 328.0, 256.0], [0.0, 1.0]);
-            commands.draw(0..90);
-        },
-    ))
+    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+        commands.viewport([-100.0, -64.0, 328.0, 256.0], [0.0, 1.0]);
+        commands.draw(0..90);
+    }))
 }
 
 /// Draws with clip or cull distances, which cut triangles or remove those wholly outside.
@@ -171,10 +125,7 @@ fn distances(gpu: &Gpu, name: &str) -> Drawn {
              {name}[1] = position.y - position.x + 0.4 * position.w;
          }}"
     );
-    let options = PipelineOptions {
-        vertex: &vertex,
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { vertex: &vertex, ..PipelineOptions::default() };
     let vertices = shapes::soup(28, 30);
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
@@ -230,10 +181,7 @@ pub fn no_fragment_stage(gpu: &Gpu) -> Drawn {
         depth_stencil: depth_test(vk::CompareOp::LESS),
         ..PipelineOptions::default()
     };
-    let target = TargetOptions {
-        colors: Vec::new(),
-        ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
-    };
+    let target = TargetOptions { colors: Vec::new(), ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) };
     Ok(simple(gpu, &target, &options, &shapes::soup(31, 30)))
 }
 
@@ -253,14 +201,8 @@ pub fn primitive_numbers(gpu: &Gpu) -> Drawn {
 
 /// Draws triangles that touch the borders of a target of odd size.
 pub fn odd_target(gpu: &Gpu) -> Drawn {
-    let target = TargetOptions {
-        size: [77, 41],
-        ..TargetOptions::default()
-    };
-    let options = PipelineOptions {
-        fragment: Some(FRAGMENT),
-        ..PipelineOptions::default()
-    };
+    let target = TargetOptions { size: [77, 41], ..TargetOptions::default() };
+    let options = PipelineOptions { fragment: Some(FRAGMENT), ..PipelineOptions::default() };
     let mut vertices = shapes::whole(0.5, [0.2, 0.4, 0.8, 1.0]);
     vertices.extend(shapes::flat_soup(33, 20));
     Ok(simple(gpu, &target, &options, &vertices))

@@ -6,18 +6,12 @@ use super::Drawn;
 use super::simple::{cases, need};
 use crate::triangles::shapes;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Resource, Target,
-    TargetOptions, Vertex, attribute, binding,
+    Bindings, Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Resource, Target, TargetOptions, Vertex, attribute,
+    binding,
 };
 
 /// Draws with colours in a vertex format of their own, from a second binding.
-fn colored(
-    gpu: &Gpu,
-    format: vk::Format,
-    stride: u32,
-    bytes: &[u8],
-    fragment_scale: f32,
-) -> Output {
+fn colored(gpu: &Gpu, format: vk::Format, stride: u32, bytes: &[u8], fragment_scale: f32) -> Output {
     let prefix = match format!("{format:?}") {
         name if name.contains("UINT") => "u",
         name if name.contains("SINT") => "i",
@@ -34,10 +28,7 @@ fn colored(
         vertex_bindings: vec![binding(0, size_of::<Vertex>() as u32), binding(1, stride)],
         vertex_attributes: vec![
             attribute(0, vk::Format::R32G32B32A32_SFLOAT, 0),
-            vk::VertexInputAttributeDescription {
-                binding: 1,
-                ..attribute(1, format, 0)
-            },
+            vk::VertexInputAttributeDescription { binding: 1, ..attribute(1, format, 0) },
         ],
         ..PipelineOptions::default()
     };
@@ -85,20 +76,10 @@ pub fn vertex_formats(gpu: &Gpu) -> Drawn {
 
 pub fn float_vertex_formats(gpu: &Gpu) -> Drawn {
     use vk::Format as F;
-    let floats: Vec<f32> = noise(240)
-        .iter()
-        .map(|&byte| f32::from(byte) / 120.0)
-        .collect();
-    let formats = [
-        (F::R32_SFLOAT, 4),
-        (F::R32G32_SFLOAT, 8),
-        (F::R32G32B32_SFLOAT, 12),
-        (F::R32G32B32A32_SFLOAT, 16),
-    ];
+    let floats: Vec<f32> = noise(240).iter().map(|&byte| f32::from(byte) / 120.0).collect();
+    let formats = [(F::R32_SFLOAT, 4), (F::R32G32_SFLOAT, 8), (F::R32G32B32_SFLOAT, 12), (F::R32G32B32A32_SFLOAT, 16)];
     let name = |(format, _): &(F, u32)| format!("{format:?}");
-    Ok(cases(formats, name, |&(format, stride)| {
-        colored(gpu, format, stride, bytemuck::cast_slice(&floats), 1.0)
-    }))
+    Ok(cases(formats, name, |&(format, stride)| colored(gpu, format, stride, bytemuck::cast_slice(&floats), 1.0)))
 }
 
 /// Reads interleaved vertices with unused bytes, from an offset, and with a stride of zero.
@@ -110,20 +91,14 @@ pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
             vertex_bindings: vec![binding(0, size_of::<Vertex>() as u32), binding(1, stride)],
             vertex_attributes: vec![
                 attribute(0, vk::Format::R32G32B32A32_SFLOAT, 0),
-                vk::VertexInputAttributeDescription {
-                    binding: 1,
-                    ..attribute(1, vk::Format::R32G32B32A32_SFLOAT, 4)
-                },
+                vk::VertexInputAttributeDescription { binding: 1, ..attribute(1, vk::Format::R32G32B32A32_SFLOAT, 4) },
             ],
             ..PipelineOptions::default()
         };
         let target = Target::new(gpu, &TargetOptions::default());
         let pipeline = Pipeline::new(gpu, &target, &options);
         let positions = Buffer::of(gpu, &shapes::soup(102, 20));
-        let floats: Vec<f32> = noise(600)
-            .iter()
-            .map(|&byte| f32::from(byte) / 120.0)
-            .collect();
+        let floats: Vec<f32> = noise(600).iter().map(|&byte| f32::from(byte) / 120.0).collect();
         let colors = Buffer::of(gpu, &floats);
         target.draw(gpu, &Pass::default(), |commands| {
             commands.bind(&pipeline);
@@ -135,13 +110,7 @@ pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
 }
 
 /// Draws with positions and colours that a binding or push constants modify.
-fn fed(
-    gpu: &Gpu,
-    declaration: &str,
-    resource: Option<Resource>,
-    offsets: &[&[u32]],
-    push: &[f32],
-) -> Output {
+fn fed(gpu: &Gpu, declaration: &str, resource: Option<Resource>, offsets: &[&[u32]], push: &[f32]) -> Output {
     let vertex = format!(
         "{declaration}
          layout(location = 0) in vec4 position;
@@ -239,10 +208,7 @@ pub fn push_constants_between_draws(gpu: &Gpu) -> Drawn {
     };
     let target = Target::new(gpu, &TargetOptions::default());
     let pipeline = Pipeline::new(gpu, &target, &options);
-    let vertices = Buffer::of(
-        gpu,
-        &shapes::rectangle([-1.0, -1.0, 1.0, 1.0], 0.5, [0.0; 4]),
-    );
+    let vertices = Buffer::of(gpu, &shapes::rectangle([-1.0, -1.0, 1.0, 1.0], 0.5, [0.0; 4]));
     Ok(target.draw(gpu, &Pass::default(), |commands| {
         commands.bind(&pipeline);
         commands.vertices(&vertices);

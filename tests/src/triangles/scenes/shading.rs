@@ -8,10 +8,7 @@ use crate::triangles::shapes;
 use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions};
 
 fn fragment(gpu: &Gpu, seed: u64, source: &str) -> Output {
-    let options = PipelineOptions {
-        fragment: Some(source),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { fragment: Some(source), ..PipelineOptions::default() };
     let vertices = shapes::soup(seed, 30);
     simple(gpu, &TargetOptions::default(), &options, &vertices)
 }
@@ -29,11 +26,7 @@ fn qualified(gpu: &Gpu, seed: u64, qualifier: &str) -> Drawn {
          layout(location = 0) out vec4 color;
          void main() {{ color = v_color; }}"
     );
-    let options = PipelineOptions {
-        vertex: &vertex,
-        fragment: Some(&fragment),
-        ..PipelineOptions::default()
-    };
+    let options = PipelineOptions { vertex: &vertex, fragment: Some(&fragment), ..PipelineOptions::default() };
     let target = TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT);
     Ok(simple(gpu, &target, &options, &shapes::soup(seed, 30)))
 }

@@ -3,25 +3,15 @@
 use ash::vk;
 
 use super::Missing;
-use gaurast_testkit::{
-    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-};
+use gaurast_testkit::{Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex};
 
 /// Fails with the name of a feature if it is missing.
 pub fn need(name: &str, has: vk::Bool32) -> Result<(), Missing> {
-    if has == vk::TRUE {
-        Ok(())
-    } else {
-        Err(Missing(name.to_owned()))
-    }
+    if has == vk::TRUE { Ok(()) } else { Err(Missing(name.to_owned())) }
 }
 
 /// Fails if images of `format` lack a use.
-pub fn need_format(
-    gpu: &Gpu,
-    format: vk::Format,
-    features: vk::FormatFeatureFlags,
-) -> Result<(), Missing> {
+pub fn need_format(gpu: &Gpu, format: vk::Format, features: vk::FormatFeatureFlags) -> Result<(), Missing> {
     if gpu.format_features(format).contains(features) {
         Ok(())
     } else {
@@ -30,12 +20,7 @@ pub fn need_format(
 }
 
 /// Draws `vertices` once.
-pub fn simple(
-    gpu: &Gpu,
-    target: &TargetOptions,
-    options: &PipelineOptions<'_>,
-    vertices: &[Vertex],
-) -> Output {
+pub fn simple(gpu: &Gpu, target: &TargetOptions, options: &PipelineOptions<'_>, vertices: &[Vertex]) -> Output {
     with(gpu, target, options, vertices, |commands| {
         commands.draw(0..vertices.len() as u32);
     })

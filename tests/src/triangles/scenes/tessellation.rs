@@ -78,10 +78,7 @@ fn of<'a>(patch_vertices: u32, control: &'a str, evaluation: &'a str) -> Pipelin
     PipelineOptions {
         topology: Topology::PATCH_LIST,
         patch_vertices,
-        between: vec![
-            (Stage::TessellationControl, control),
-            (Stage::TessellationEvaluation, evaluation),
-        ],
+        between: vec![(Stage::TessellationControl, control), (Stage::TessellationEvaluation, evaluation)],
         ..PipelineOptions::default()
     }
 }
@@ -89,10 +86,7 @@ fn of<'a>(patch_vertices: u32, control: &'a str, evaluation: &'a str) -> Pipelin
 /// The same with colours that are added, so that the order of a patch's points makes no difference.
 fn adding(options: PipelineOptions<'_>) -> PipelineOptions<'_> {
     let one = vk::BlendFactor::ONE;
-    PipelineOptions {
-        blend: vec![blend(one, one, vk::BlendOp::ADD)],
-        ..options
-    }
+    PipelineOptions { blend: vec![blend(one, one, vk::BlendOp::ADD)], ..options }
 }
 
 /// Parallelograms, as patches of four vertices.
@@ -111,11 +105,7 @@ fn parallelograms(seed: u64, count: usize) -> Vec<Vertex> {
     points.chunks_exact(3).flat_map(patch).collect()
 }
 
-const SPACINGS: [&str; 3] = [
-    "equal_spacing",
-    "fractional_even_spacing",
-    "fractional_odd_spacing",
-];
+const SPACINGS: [&str; 3] = ["equal_spacing", "fractional_even_spacing", "fractional_odd_spacing"];
 
 fn of_each_spacing(gpu: &Gpu, domain: &str, count: u32, vertices: &[Vertex]) -> Drawn {
     needed(gpu)?;
@@ -174,9 +164,7 @@ fn wound(gpu: &Gpu, domain_origin: vk::TessellationDomainOrigin) -> Drawn {
     needed(gpu)?;
     let orders = ["triangles, cw", "triangles, ccw", "quads, cw", "quads, ccw"];
     let modes = [vk::CullModeFlags::FRONT, vk::CullModeFlags::BACK];
-    let all = orders
-        .into_iter()
-        .flat_map(|order| modes.map(|mode| (order, mode)));
+    let all = orders.into_iter().flat_map(|order| modes.map(|mode| (order, mode)));
     let name = |&(order, mode): &(&str, _)| format!("{order} {mode:?}");
     Ok(cases(all, name, |&(order, mode)| {
         let count = if order.starts_with("triangles") { 3 } else { 4 };
@@ -264,10 +252,7 @@ fn pot() -> Vec<Vertex> {
         let w = 1.0 + 0.2 * z;
         [0.8 * x, -0.9 * y, (0.5 + 0.3 * z) * w, w]
     };
-    let vertex = |point| Vertex {
-        position: seen(point),
-        color: [1.0; 4],
-    };
+    let vertex = |point| Vertex { position: seen(point), color: [1.0; 4] };
     points.into_iter().map(vertex).collect()
 }
 
@@ -275,10 +260,7 @@ fn pot() -> Vec<Vertex> {
 /// however patches are divided.
 pub fn pot_of_patches(gpu: &Gpu) -> Drawn {
     needed(gpu)?;
-    let kinds = [
-        ("equal_spacing", "32.0"),
-        ("fractional_even_spacing", "31.3"),
-    ];
+    let kinds = [("equal_spacing", "32.0"), ("fractional_even_spacing", "31.3")];
     let name = |&(spacing, _): &(&str, _)| spacing.to_owned();
     Ok(cases(kinds, name, |&(spacing, level)| {
         let levels = format!(

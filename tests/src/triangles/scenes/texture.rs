@@ -7,8 +7,8 @@ use super::Drawn;
 use super::simple::{cases, need, need_format};
 use crate::triangles::shapes;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Output, Pass, Pipeline, PipelineOptions, Resource,
-    Sampler, Target, TargetOptions,
+    Bindings, Buffer, Gpu, Image, ImageOptions, Output, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
+    TargetOptions,
 };
 
 const RGBA8: vk::Format = vk::Format::R8G8B8A8_UNORM;
@@ -25,12 +25,7 @@ fn texels([width, height, depth]: [u32; 3], layers: u32, levels: u32) -> Vec<Vec
 }
 
 fn image(gpu: &Gpu, view: vk::ImageViewType, size: [u32; 3], layers: u32, levels: u32) -> Image {
-    let options = ImageOptions {
-        view,
-        size,
-        layers,
-        ..ImageOptions::new(RGBA8, [1, 1], vk::ImageUsageFlags::empty())
-    };
+    let options = ImageOptions { view, size, layers, ..ImageOptions::new(RGBA8, [1, 1], vk::ImageUsageFlags::empty()) };
     Image::textured(gpu, &options, &texels(size, layers, levels))
 }
 
@@ -47,13 +42,7 @@ fn linear() -> vk::SamplerCreateInfo<'static> {
 
 /// Draws the whole target with a sampler of type `kind` called `image`. `expression` computes a colour from it and from
 /// `uv`, which goes from -0.5 to 1.5 and is sheared.
-fn sampled(
-    gpu: &Gpu,
-    image: &Image,
-    sampler: &vk::SamplerCreateInfo<'_>,
-    kind: &str,
-    expression: &str,
-) -> Output {
+fn sampled(gpu: &Gpu, image: &Image, sampler: &vk::SamplerCreateInfo<'_>, kind: &str, expression: &str) -> Output {
     let sampler = Sampler::new(gpu, sampler);
     let bindings = Bindings::new(gpu, &[Resource::Texture(image.view, sampler.raw)]);
     let fragment = format!(
@@ -62,11 +51,8 @@ fn sampled(
          layout(location = 0) out vec4 color;
          void main() {{ vec2 uv = v_color.xy; color = {expression}; }}"
     );
-    let options = PipelineOptions {
-        fragment: Some(&fragment),
-        bindings: Some(&bindings),
-        ..PipelineOptions::default()
-    };
+    let options =
+        PipelineOptions { fragment: Some(&fragment), bindings: Some(&bindings), ..PipelineOptions::default() };
     let target = Target::new(gpu, &TargetOptions::default());
     let pipeline = Pipeline::new(gpu, &target, &options);
     let mut vertices = shapes::whole(0.5, [0.0; 4]);
@@ -85,31 +71,16 @@ fn sampled(
 
 pub fn nearest_filter(gpu: &Gpu) -> Drawn {
     let sampler = vk::SamplerCreateInfo::default();
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 1),
-        &sampler,
-        "sampler2D",
-        "texture(image, uv)",
-    ))
+    Ok(sampled(gpu, &flat(gpu, 1), &sampler, "sampler2D", "texture(image, uv)"))
 }
 
 pub fn linear_filter(gpu: &Gpu) -> Drawn {
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 1),
-        &linear(),
-        "sampler2D",
-        "texture(image, uv)",
-    ))
+    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", "texture(image, uv)"))
 }
 
 /// Samples levels that the shader chooses, so that no derivative is used.
 pub fn explicit_levels(gpu: &Gpu) -> Drawn {
-    let modes = [
-        vk::SamplerMipmapMode::NEAREST,
-        vk::SamplerMipmapMode::LINEAR,
-    ];
+    let modes = [vk::SamplerMipmapMode::NEAREST, vk::SamplerMipmapMode::LINEAR];
     let image = flat(gpu, 6);
     let name = |mode: &vk::SamplerMipmapMode| format!("{mode:?}");
     Ok(cases(modes, name, |&mode| {
@@ -158,11 +129,8 @@ pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
 /// Applies the bias of the shader and the sampler, and the sampler's least and greatest level.
 pub fn level_bias_and_limits(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D, [64, 64, 1], 1, 7);
-    let samplers = [
-        ("bias", linear().mip_lod_bias(1.3)),
-        ("least", linear().min_lod(2.0)),
-        ("greatest", linear().max_lod(1.0)),
-    ];
+    let samplers =
+        [("bias", linear().mip_lod_bias(1.3)), ("least", linear().min_lod(2.0)), ("greatest", linear().max_lod(1.0))];
     let name = |(name, _): &(&str, vk::SamplerCreateInfo<'_>)| (*name).to_owned();
     Ok(cases(samplers, name, |(_, sampler)| {
         let expression = "texture(image, 4.5 * uv, 0.4)";
@@ -172,25 +140,14 @@ pub fn level_bias_and_limits(gpu: &Gpu) -> Drawn {
 
 pub fn address_modes(gpu: &Gpu) -> Drawn {
     use vk::SamplerAddressMode as Mode;
-    let modes = [
-        Mode::REPEAT,
-        Mode::MIRRORED_REPEAT,
-        Mode::CLAMP_TO_EDGE,
-        Mode::CLAMP_TO_BORDER,
-        Mode::MIRROR_CLAMP_TO_EDGE,
-    ];
+    let modes =
+        [Mode::REPEAT, Mode::MIRRORED_REPEAT, Mode::CLAMP_TO_EDGE, Mode::CLAMP_TO_BORDER, Mode::MIRROR_CLAMP_TO_EDGE];
     let filters = [vk::Filter::NEAREST, vk::Filter::LINEAR];
-    let all = modes
-        .into_iter()
-        .flat_map(|mode| filters.map(|filter| (mode, filter)));
+    let all = modes.into_iter().flat_map(|mode| filters.map(|filter| (mode, filter)));
     let image = flat(gpu, 1);
     let name = |(mode, filter): &(Mode, vk::Filter)| format!("{mode:?} {filter:?}");
     Ok(cases(all, name, |&(mode, filter)| {
-        let sampler = linear()
-            .mag_filter(filter)
-            .min_filter(filter)
-            .address_mode_u(mode)
-            .address_mode_v(mode);
+        let sampler = linear().mag_filter(filter).min_filter(filter).address_mode_u(mode).address_mode_v(mode);
         let expression = "texture(image, 1.7 * uv - 0.3)";
         sampled(gpu, &image, &sampler, "sampler2D", expression)
     }))
@@ -206,74 +163,37 @@ pub fn border_colors(gpu: &Gpu) -> Drawn {
     let name = |color: &vk::BorderColor| format!("{color:?}");
     Ok(cases(colors, name, |&color| {
         let mode = vk::SamplerAddressMode::CLAMP_TO_BORDER;
-        let sampler = linear()
-            .address_mode_u(mode)
-            .address_mode_v(mode)
-            .border_color(color);
+        let sampler = linear().address_mode_u(mode).address_mode_v(mode).border_color(color);
         sampled(gpu, &image, &sampler, "sampler2D", "texture(image, uv)")
     }))
 }
 
 pub fn unnormalized_coordinates(gpu: &Gpu) -> Drawn {
     let mode = vk::SamplerAddressMode::CLAMP_TO_EDGE;
-    let sampler = linear()
-        .max_lod(0.0)
-        .address_mode_u(mode)
-        .address_mode_v(mode)
-        .unnormalized_coordinates(true);
+    let sampler = linear().max_lod(0.0).address_mode_u(mode).address_mode_v(mode).unnormalized_coordinates(true);
     let expression = "textureLod(image, vec2(32.0, 16.0) * uv, 0.0)";
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 1),
-        &sampler,
-        "sampler2D",
-        expression,
-    ))
+    Ok(sampled(gpu, &flat(gpu, 1), &sampler, "sampler2D", expression))
 }
 
 pub fn texel_fetch(gpu: &Gpu) -> Drawn {
     let expression = "texelFetch(image, (ivec2(gl_FragCoord.xy) / 8) & 7, 1)";
     let sampler = vk::SamplerCreateInfo::default().max_lod(9.0);
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 3),
-        &sampler,
-        "sampler2D",
-        expression,
-    ))
+    Ok(sampled(gpu, &flat(gpu, 3), &sampler, "sampler2D", expression))
 }
 
 pub fn texture_gather(gpu: &Gpu) -> Drawn {
     let expression = "textureGather(image, uv, 1)";
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 1),
-        &linear(),
-        "sampler2D",
-        expression,
-    ))
+    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", expression))
 }
 
 pub fn texel_offsets(gpu: &Gpu) -> Drawn {
     let expression = "textureLodOffset(image, uv, 0.0, ivec2(3, -2))";
-    Ok(sampled(
-        gpu,
-        &flat(gpu, 1),
-        &linear(),
-        "sampler2D",
-        expression,
-    ))
+    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", expression))
 }
 
 pub fn one_dimension(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_1D, [32, 1, 1], 1, 1);
-    Ok(sampled(
-        gpu,
-        &image,
-        &linear(),
-        "sampler1D",
-        "texture(image, uv.x)",
-    ))
+    Ok(sampled(gpu, &image, &linear(), "sampler1D", "texture(image, uv.x)"))
 }
 
 pub fn three_dimensions(gpu: &Gpu) -> Drawn {
@@ -286,21 +206,14 @@ pub fn array_layers(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D_ARRAY, [16, 16, 1], 5, 1);
     // The layer is not near a rounding threshold.
     let expression = "texture(image, vec3(uv, floor(gl_FragCoord.x / 20.0) - 0.9))";
-    Ok(sampled(
-        gpu,
-        &image,
-        &linear(),
-        "sampler2DArray",
-        expression,
-    ))
+    Ok(sampled(gpu, &image, &linear(), "sampler2DArray", expression))
 }
 
 pub fn cube_faces(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::CUBE, [8, 8, 1], 6, 1);
     // Nearest filtering, since filtering across the edges of faces is partly an implementation's choice.
     let sampler = vk::SamplerCreateInfo::default();
-    let expression =
-        "textureLod(image, vec3(3.0 * uv.x - 1.3, 2.0 * uv.y - 0.9, sin(9.0 * uv.x)), 0.0)";
+    let expression = "textureLod(image, vec3(3.0 * uv.x - 1.3, 2.0 * uv.y - 0.9, sin(9.0 * uv.x)), 0.0)";
     Ok(sampled(gpu, &image, &sampler, "samplerCube", expression))
 }
 
@@ -315,13 +228,7 @@ pub fn cube_arrays(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::CUBE_ARRAY, [8, 8, 1], 12, 1);
     let sampler = linear();
     let expression = "textureLod(image, vec4(uv - 0.5, 0.6, step(64.0, gl_FragCoord.x)), 0.0)";
-    Ok(sampled(
-        gpu,
-        &image,
-        &sampler,
-        "samplerCubeArray",
-        expression,
-    ))
+    Ok(sampled(gpu, &image, &sampler, "samplerCubeArray", expression))
 }
 
 pub fn anisotropic_filter(gpu: &Gpu) -> Drawn {
@@ -348,9 +255,7 @@ pub fn depth_comparison_samplers(gpu: &Gpu) -> Drawn {
     let comparisons = [vk::CompareOp::LESS, vk::CompareOp::GREATER_OR_EQUAL];
     let name = |op: &vk::CompareOp| format!("{op:?}");
     Ok(cases(comparisons, name, |&op| {
-        let sampler = vk::SamplerCreateInfo::default()
-            .compare_enable(true)
-            .compare_op(op);
+        let sampler = vk::SamplerCreateInfo::default().compare_enable(true).compare_op(op);
         let expression = "vec4(texture(image, vec3(uv, 0.45)))";
         sampled(gpu, &image, &sampler, "sampler2DShadow", expression)
     }))

@@ -6,15 +6,10 @@ use ash::vk::PrimitiveTopology as Topology;
 use super::Drawn;
 use super::simple::{cases, need, simple, with};
 use crate::triangles::shapes;
-use gaurast_testkit::{
-    Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding,
-};
+use gaurast_testkit::{Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding};
 
 fn of(topology: Topology) -> PipelineOptions<'static> {
-    PipelineOptions {
-        topology,
-        ..PipelineOptions::default()
-    }
+    PipelineOptions { topology, ..PipelineOptions::default() }
 }
 
 fn drawn(gpu: &Gpu, topology: Topology, vertices: &[Vertex]) -> Output {
@@ -56,17 +51,8 @@ pub fn provoking_vertices(gpu: &Gpu) -> Drawn {
     ];
     let name = |topology: &Topology| format!("{topology:?}");
     Ok(cases(topologies, name, |&topology| {
-        let options = PipelineOptions {
-            vertex: FLAT,
-            fragment: Some(FRAGMENT),
-            ..of(topology)
-        };
-        simple(
-            gpu,
-            &TargetOptions::default(),
-            &options,
-            &shapes::zigzag(4, 12),
-        )
+        let options = PipelineOptions { vertex: FLAT, fragment: Some(FRAGMENT), ..of(topology) };
+        simple(gpu, &TargetOptions::default(), &options, &shapes::zigzag(4, 12))
     }))
 }
 
@@ -87,10 +73,7 @@ const SIZED: &str = "
 
 pub fn large_points(gpu: &Gpu) -> Drawn {
     need("largePoints", gpu.features().large_points)?;
-    let options = PipelineOptions {
-        vertex: SIZED,
-        ..of(Topology::POINT_LIST)
-    };
+    let options = PipelineOptions { vertex: SIZED, ..of(Topology::POINT_LIST) };
     let vertices = shapes::points(6, 40);
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
@@ -120,10 +103,8 @@ pub fn line_strip(gpu: &Gpu) -> Drawn {
 
 pub fn wide_lines(gpu: &Gpu) -> Drawn {
     need("wideLines", gpu.features().wide_lines)?;
-    let options = PipelineOptions {
-        raster: PipelineOptions::default().raster.line_width(5.0),
-        ..of(Topology::LINE_LIST)
-    };
+    let options =
+        PipelineOptions { raster: PipelineOptions::default().raster.line_width(5.0), ..of(Topology::LINE_LIST) };
     let vertices = shapes::points(10, 16);
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
@@ -141,16 +122,10 @@ pub fn indices_of_every_type(gpu: &Gpu) -> Drawn {
             _ => Buffer::of(gpu, &words),
         };
         let options = PipelineOptions::default();
-        with(
-            gpu,
-            &TargetOptions::default(),
-            &options,
-            &vertices,
-            |commands| {
-                commands.indices(&indices, 0, index_type);
-                commands.draw_indexed(0..45, 0);
-            },
-        )
+        with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+            commands.indices(&indices, 0, index_type);
+            commands.draw_indexed(0..45, 0);
+        })
     }))
 }
 
@@ -171,31 +146,17 @@ pub fn base_vertex_and_first_index(gpu: &Gpu) -> Drawn {
 pub fn primitive_restart(gpu: &Gpu) -> Drawn {
     let vertices = shapes::zigzag(13, 24);
     let order: Vec<u16> = vec![
-        0, 1, 2, 3, 0xffff, 5, 6, 7, 0xffff, 0xffff, 9, 10, 0xffff, 12, 13, 14, 15, 16, 17, 0xffff,
-        20, 21, 22, 23,
+        0, 1, 2, 3, 0xffff, 5, 6, 7, 0xffff, 0xffff, 9, 10, 0xffff, 12, 13, 14, 15, 16, 17, 0xffff, 20, 21, 22, 23,
     ];
     let indices = Buffer::of(gpu, &order);
-    let topologies = [
-        Topology::TRIANGLE_STRIP,
-        Topology::TRIANGLE_FAN,
-        Topology::LINE_STRIP,
-    ];
+    let topologies = [Topology::TRIANGLE_STRIP, Topology::TRIANGLE_FAN, Topology::LINE_STRIP];
     let name = |topology: &Topology| format!("{topology:?}");
     Ok(cases(topologies, name, |&topology| {
-        let options = PipelineOptions {
-            restart: true,
-            ..of(topology)
-        };
-        with(
-            gpu,
-            &TargetOptions::default(),
-            &options,
-            &vertices,
-            |commands| {
-                commands.indices(&indices, 0, vk::IndexType::UINT16);
-                commands.draw_indexed(0..order.len() as u32, 0);
-            },
-        )
+        let options = PipelineOptions { restart: true, ..of(topology) };
+        with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
+            commands.indices(&indices, 0, vk::IndexType::UINT16);
+            commands.draw_indexed(0..order.len() as u32, 0);
+        })
     }))
 }
 
@@ -220,24 +181,15 @@ fn numbered() -> PipelineOptions<'static> {
 
 pub fn instances_by_number(gpu: &Gpu) -> Drawn {
     let target = TargetOptions::default();
-    Ok(with(
-        gpu,
-        &target,
-        &numbered(),
-        &shapes::whole(0.0, [0.0; 4]),
-        |commands| {
-            commands.draw_instances(0..3, 0..20);
-            commands.draw_instances(3..6, 30..50);
-        },
-    ))
+    Ok(with(gpu, &target, &numbered(), &shapes::whole(0.0, [0.0; 4]), |commands| {
+        commands.draw_instances(0..3, 0..20);
+        commands.draw_instances(3..6, 30..50);
+    }))
 }
 
 /// Draws a rectangle that instances move and colour.
 pub fn instances_by_attribute(gpu: &Gpu) -> Drawn {
-    let moves: Vec<[f32; 4]> = shapes::points(14, 25)
-        .iter()
-        .map(|vertex| vertex.position)
-        .collect();
+    let moves: Vec<[f32; 4]> = shapes::points(14, 25).iter().map(|vertex| vertex.position).collect();
     let moves = Buffer::of(gpu, &moves);
     let options = PipelineOptions {
         vertex: "
@@ -251,18 +203,12 @@ pub fn instances_by_attribute(gpu: &Gpu) -> Drawn {
             }",
         vertex_bindings: vec![
             binding(0, size_of::<Vertex>() as u32),
-            vk::VertexInputBindingDescription {
-                input_rate: vk::VertexInputRate::INSTANCE,
-                ..binding(1, 16)
-            },
+            vk::VertexInputBindingDescription { input_rate: vk::VertexInputRate::INSTANCE, ..binding(1, 16) },
         ],
         vertex_attributes: vec![
             attribute(0, vk::Format::R32G32B32A32_SFLOAT, 0),
             attribute(1, vk::Format::R32G32B32A32_SFLOAT, 16),
-            vk::VertexInputAttributeDescription {
-                binding: 1,
-                ..attribute(2, vk::Format::R32G32B32A32_SFLOAT, 0)
-            },
+            vk::VertexInputAttributeDescription { binding: 1, ..attribute(2, vk::Format::R32G32B32A32_SFLOAT, 0) },
         ],
         ..PipelineOptions::default()
     };
@@ -277,10 +223,7 @@ pub fn instances_by_attribute(gpu: &Gpu) -> Drawn {
 
 pub fn indirect_draws(gpu: &Gpu) -> Drawn {
     need("multiDrawIndirect", gpu.features().multi_draw_indirect)?;
-    need(
-        "drawIndirectFirstInstance",
-        gpu.features().draw_indirect_first_instance,
-    )?;
+    need("drawIndirectFirstInstance", gpu.features().draw_indirect_first_instance)?;
     // Vertices, instances, first vertex, first instance, and a word that is skipped.
     let parameters = [[3u32, 5, 0, 0, 7], [3, 6, 3, 10, 7], [3, 7, 6, 40, 7]];
     let buffer = Buffer::of(gpu, &parameters);

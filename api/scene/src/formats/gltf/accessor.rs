@@ -21,18 +21,12 @@ pub(super) const FLOAT: u32 = 5126;
 impl Component {
     /// Components that are plain integers, or floats.
     pub(super) const fn plain(kind: u32) -> Self {
-        Self {
-            kind,
-            normalized: false,
-        }
+        Self { kind, normalized: false }
     }
 
     /// Components that are integers normalized to fractions.
     pub(super) const fn normalized(kind: u32) -> Self {
-        Self {
-            kind,
-            normalized: true,
-        }
+        Self { kind, normalized: true }
     }
 
     fn size(self) -> usize {
@@ -56,11 +50,7 @@ impl Component {
                 return float;
             }
         };
-        if self.normalized {
-            (value / max).max(-1.0)
-        } else {
-            value
-        }
+        if self.normalized { (value / max).max(-1.0) } else { value }
     }
 
     /// Decodes the index that begins `bytes`.
@@ -84,11 +74,7 @@ impl Component {
             FLOAT => "float",
             _ => return format!("{}", self.kind),
         };
-        if self.normalized {
-            format!("{kind} normalized")
-        } else {
-            kind.to_owned()
-        }
+        if self.normalized { format!("{kind} normalized") } else { kind.to_owned() }
     }
 }
 
@@ -105,30 +91,17 @@ pub(super) struct Demand {
 /// Indices, of vertices and of elements.
 const INDEX: Demand = Demand {
     width: 1,
-    components: &[
-        Component::plain(UNSIGNED_BYTE),
-        Component::plain(UNSIGNED_SHORT),
-        Component::plain(UNSIGNED_INT),
-    ],
+    components: &[Component::plain(UNSIGNED_BYTE), Component::plain(UNSIGNED_SHORT), Component::plain(UNSIGNED_INT)],
     expected: "unsigned byte, short or int",
 };
 
 /// The values of accessor `index`, element after element. Messages name it `place`.
-pub(super) fn values(
-    buffers: &mut Buffers<'_>,
-    index: usize,
-    demand: &Demand,
-    place: &str,
-) -> Result<Vec<f32>, Fault> {
+pub(super) fn values(buffers: &mut Buffers<'_>, index: usize, demand: &Demand, place: &str) -> Result<Vec<f32>, Fault> {
     decoded(buffers, index, demand, place, Component::decode)
 }
 
 /// The indices of accessor `index`. Messages name it `place`.
-pub(super) fn indices(
-    buffers: &mut Buffers<'_>,
-    index: usize,
-    place: &str,
-) -> Result<Vec<u32>, Fault> {
+pub(super) fn indices(buffers: &mut Buffers<'_>, index: usize, place: &str) -> Result<Vec<u32>, Fault> {
     decoded(buffers, index, &INDEX, place, Component::index)
 }
 
@@ -142,10 +115,7 @@ fn decoded<T: Copy + Default>(
 ) -> Result<Vec<T>, Fault> {
     let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
     let document = buffers.document;
-    let accessor = document
-        .accessors
-        .get(index)
-        .ok_or_else(|| at(Reason::Missing))?;
+    let accessor = document.accessors.get(index).ok_or_else(|| at(Reason::Missing))?;
     let shape = match demand.width {
         1 => "SCALAR",
         3 => "VEC3",
@@ -167,13 +137,7 @@ fn decoded<T: Copy + Default>(
     let count = accessor.count;
     let mut values = match accessor.buffer_view {
         Some(view) => {
-            let run = Run {
-                view,
-                offset: accessor.byte_offset,
-                count,
-                component,
-                width: demand.width,
-            };
+            let run = Run { view, offset: accessor.byte_offset, count, component, width: demand.width };
             run.decoded(buffers, place, &decode)?
         }
         None => {
@@ -208,12 +172,7 @@ fn decoded<T: Copy + Default>(
 }
 
 /// The indices of the elements that `sparse` replaces, each below `count`. Messages name it `place`.
-fn sparse_indices(
-    buffers: &mut Buffers<'_>,
-    sparse: &Sparse,
-    count: usize,
-    place: &str,
-) -> Result<Vec<usize>, Fault> {
+fn sparse_indices(buffers: &mut Buffers<'_>, sparse: &Sparse, count: usize, place: &str) -> Result<Vec<usize>, Fault> {
     let place = format!("{place}, indices");
     let at = |reason: Reason| reason.at(Place::Part(place.clone()));
     let component = Component::plain(sparse.indices.component_type);
@@ -280,10 +239,7 @@ impl Run {
         let mut values = reserved(self.count, self.width).map_err(at)?;
         for element in bytes.chunks(stride).take(self.count) {
             for c in 0..self.width {
-                values.push(decode(
-                    self.component,
-                    &element[c * self.component.size()..],
-                ));
+                values.push(decode(self.component, &element[c * self.component.size()..]));
             }
         }
         Ok(values)
@@ -294,8 +250,6 @@ impl Run {
 fn reserved<T>(count: usize, width: usize) -> Result<Vec<T>, Reason> {
     let mut values = Vec::new();
     let memory = |_| Reason::Memory((count as u64).saturating_mul(4 * width as u64));
-    values
-        .try_reserve_exact(count.saturating_mul(width))
-        .map_err(memory)?;
+    values.try_reserve_exact(count.saturating_mul(width)).map_err(memory)?;
     Ok(values)
 }

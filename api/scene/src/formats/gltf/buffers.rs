@@ -20,31 +20,15 @@ pub(super) struct Buffers<'a> {
 
 impl<'a> Buffers<'a> {
     /// The buffers of `document`, whose first one may be a binary file's chunk `binary`.
-    pub(super) fn new(
-        document: &'a Document,
-        binary: Option<&'a [u8]>,
-        origin: Origin<'a>,
-    ) -> Self {
-        Self {
-            document,
-            binary,
-            buffers: document.buffers.iter().map(|_| None).collect(),
-            origin,
-        }
+    pub(super) fn new(document: &'a Document, binary: Option<&'a [u8]>, origin: Origin<'a>) -> Self {
+        Self { document, binary, buffers: document.buffers.iter().map(|_| None).collect(), origin }
     }
 
     /// The bytes of buffer view `index`, and the distance between its elements. Messages name it `place`.
-    pub(super) fn view(
-        &mut self,
-        index: usize,
-        place: &str,
-    ) -> Result<(&[u8], Option<usize>), Fault> {
+    pub(super) fn view(&mut self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
         let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
         let document = self.document;
-        let view = document
-            .buffer_views
-            .get(index)
-            .ok_or_else(|| at(Reason::Missing, "bufferView"))?;
+        let view = document.buffer_views.get(index).ok_or_else(|| at(Reason::Missing, "bufferView"))?;
         // A file that doesn't require the extension has the data uncompressed, too, in a buffer for other readers.
         let compressed = view.extensions.keys().find(|n| n.contains("compression"));
         if let Some(extension) = compressed.filter(|_| !self.has_data(view.buffer)) {
@@ -52,10 +36,7 @@ impl<'a> Buffers<'a> {
             return Err(at(Reason::Unsupported(text), "bufferView"));
         }
         let buffer = self.buffer(view.buffer)?;
-        let bytes = view
-            .byte_offset
-            .checked_add(view.byte_length)
-            .and_then(|end| buffer.get(view.byte_offset..end));
+        let bytes = view.byte_offset.checked_add(view.byte_length).and_then(|end| buffer.get(view.byte_offset..end));
         let bytes = bytes.ok_or_else(|| {
             let claimed = (view.byte_offset as u64).saturating_add(view.byte_length as u64);
             let available = buffer.len() as u64;
@@ -72,33 +53,22 @@ impl<'a> Buffers<'a> {
 
     /// The bytes of all buffers that can be read.
     pub(super) fn total_bytes(&mut self) -> u64 {
-        (0..self.document.buffers.len())
-            .map(|index| self.buffer(index).map_or(0, |bytes| bytes.len() as u64))
-            .sum()
+        (0..self.document.buffers.len()).map(|index| self.buffer(index).map_or(0, |bytes| bytes.len() as u64)).sum()
     }
 
     /// The bytes of buffer `index`.
     fn buffer(&mut self, index: usize) -> Result<&[u8], Fault> {
         let document = self.document;
         let at = |reason: Reason| reason.at(Place::Part(format!("buffer {index}")));
-        let buffer = document
-            .buffers
-            .get(index)
-            .ok_or_else(|| at(Reason::Missing))?;
+        let buffer = document.buffers.get(index).ok_or_else(|| at(Reason::Missing))?;
         if self.buffers[index].is_none() {
             let bytes: Cow<'a, [u8]> = match &buffer.uri {
-                None if index == 0 => {
-                    Cow::Borrowed(self.binary.ok_or_else(|| at(Reason::Missing))?)
-                }
+                None if index == 0 => Cow::Borrowed(self.binary.ok_or_else(|| at(Reason::Missing))?),
                 None => return Err(at(Reason::Missing)),
-                Some(uri) => {
-                    Cow::Owned(
-                        resource(uri, self.origin).map_err(|fault| match fault.place {
-                            Place::File => at(fault.reason),
-                            _ => fault,
-                        })?,
-                    )
-                }
+                Some(uri) => Cow::Owned(resource(uri, self.origin).map_err(|fault| match fault.place {
+                    Place::File => at(fault.reason),
+                    _ => fault,
+                })?),
             };
             self.buffers[index] = Some(bytes);
         }
@@ -123,9 +93,7 @@ fn resource(uri: &str, origin: Origin<'_>) -> Result<Vec<u8>, Fault> {
     if !kind.ends_with(";base64") {
         return Err(malformed());
     }
-    base64::engine::general_purpose::STANDARD
-        .decode(data)
-        .map_err(|_| malformed())
+    base64::engine::general_purpose::STANDARD.decode(data).map_err(|_| malformed())
 }
 
 /// `text` with each `%` and its two hexadecimal digits replaced by the byte that they encode.

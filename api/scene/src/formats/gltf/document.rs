@@ -19,13 +19,8 @@ pub(super) const DRAFTS: [&str; 3] = [
 ];
 
 /// Extensions that a document may require: those that this reader supports, and those that don't concern Gaussians.
-const FOLLOWED: [&str; 5] = [
-    EXTENSION,
-    "KHR_mesh_quantization",
-    "KHR_lights_punctual",
-    "KHR_xmp_json_ld",
-    "KHR_animation_pointer",
-];
+const FOLLOWED: [&str; 5] =
+    [EXTENSION, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld", "KHR_animation_pointer"];
 
 /// Prefixes of names of extensions that don't concern Gaussians, nor triangles without textures.
 const IRRELEVANT: [&str; 3] = ["KHR_materials_", "KHR_texture_", "EXT_texture_"];
@@ -179,10 +174,7 @@ impl Document {
     /// Refuses unsupported versions and required extensions.
     pub(super) fn check(&self) -> Result<(), Fault> {
         if !self.asset.version.starts_with("2.") {
-            let text = format!(
-                "version {:?} is not one of those read (2.x)",
-                self.asset.version
-            );
+            let text = format!("version {:?} is not one of those read (2.x)", self.asset.version);
             return Err(Reason::Unsupported(text).at(Place::Part("asset.version".to_owned())));
         }
         let unknown = self.extensions_required.iter().find(|name| {

@@ -84,13 +84,10 @@ impl Format for Glb {
         let mut chunks = [None; 2];
         let mut rest = bytes[..len as usize].get(HEADER..).unwrap_or_default();
         while let Some((head, after)) = rest.split_first_chunk::<CHUNK_HEADER>() {
-            let [size, kind] =
-                [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
+            let [size, kind] = [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
             let Some((chunk, after)) = after.split_at_checked(size as usize) else {
                 let (claimed, available) = (size.into(), after.len() as u64);
-                return Err(
-                    Reason::TooShort { claimed, available }.at(Place::Header("chunkLength"))
-                );
+                return Err(Reason::TooShort { claimed, available }.at(Place::Header("chunkLength")));
             };
             match &kind.to_le_bytes() {
                 b"JSON" => chunks[0] = chunks[0].or(Some(chunk)),
@@ -107,8 +104,8 @@ impl Format for Glb {
 
 /// Reads the scene of the document `json`, whose first buffer may be a binary file's chunk `binary`.
 fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene, Fault> {
-    let document: Document = serde_json::from_slice(json)
-        .map_err(|error| Reason::Json(one_line(&error)).at(Place::File))?;
+    let document: Document =
+        serde_json::from_slice(json).map_err(|error| Reason::Json(one_line(&error)).at(Place::File))?;
     document.check()?;
     let mut reader = Reader {
         document: &document,
@@ -122,31 +119,22 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
     for root in document.roots()? {
         reader.visit(root, to_scene)?;
     }
-    let Reader {
-        mut scene,
-        other_primitives,
-        has_textures,
-        ..
-    } = reader;
+    let Reader { mut scene, other_primitives, has_textures, .. } = reader;
     if scene.is_empty() && scene.mesh().is_empty() {
         let text = "no node of its scene has Gaussians (KHR_gaussian_splatting) or triangles";
         return Err(Reason::Unsupported(text.to_owned()).at(Place::File));
     }
     if other_primitives > 0 {
-        scene.metadata_mut().note(format!(
-            "what are neither Gaussians nor triangles is ignored: {other_primitives} primitives"
-        ));
-    }
-    if has_textures {
         scene
             .metadata_mut()
-            .note("textures of meshes are ignored, and their materials' colours are taken");
+            .note(format!("what are neither Gaussians nor triangles is ignored: {other_primitives} primitives"));
+    }
+    if has_textures {
+        scene.metadata_mut().note("textures of meshes are ignored, and their materials' colours are taken");
     }
     if document.scenes.len() > 1 {
         let others = document.scenes.len() - 1;
-        scene.metadata_mut().note(format!(
-            "scenes other than the default one are ignored: {others}"
-        ));
+        scene.metadata_mut().note(format!("scenes other than the default one are ignored: {others}"));
     }
     if !document.animations.is_empty() {
         scene.metadata_mut().note("animations are ignored");
@@ -170,15 +158,11 @@ struct Reader<'a> {
 fn local(node: &Node) -> DAffine3 {
     if let Some(matrix) = node.matrix {
         let column = |i: usize| DVec3::from_slice(&matrix[4 * i..4 * i + 3]);
-        return DAffine3 {
-            matrix3: DMat3::from_cols(column(0), column(1), column(2)),
-            translation: column(3),
-        };
+        return DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
     }
     DAffine3::from_scale_rotation_translation(
         node.scale.map_or(DVec3::ONE, DVec3::from_array),
-        node.rotation
-            .map_or(DQuat::IDENTITY, |q| DQuat::from_array(q).normalize()),
+        node.rotation.map_or(DQuat::IDENTITY, |q| DQuat::from_array(q).normalize()),
         node.translation.map_or(DVec3::ZERO, DVec3::from_array),
     )
 }
@@ -190,10 +174,7 @@ impl Reader<'_> {
         while let Some((index, above)) = stack.pop() {
             let place = || Place::Part(format!("node {index}"));
             let document = self.document;
-            let node = document
-                .nodes
-                .get(index)
-                .ok_or_else(|| Reason::Missing.at(place()))?;
+            let node = document.nodes.get(index).ok_or_else(|| Reason::Missing.at(place()))?;
             if std::mem::replace(&mut self.visited[index], true) {
                 let text = "it is in the tree of nodes twice";
                 return Err(Reason::Unsupported(text.to_owned()).at(place()));
@@ -215,30 +196,23 @@ impl Reader<'_> {
     /// Reads the Gaussians and triangles of mesh `index`, transformed by `map`.
     fn mesh(&mut self, index: usize, map: &DAffine3) -> Result<(), Fault> {
         let document = self.document;
-        let mesh = document
-            .meshes
-            .get(index)
-            .ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
+        let mesh =
+            document.meshes.get(index).ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index}, primitive {number}");
             document.check_primitive(primitive, &place)?;
-            let mut scene =
-                if let Some(scene) = primitive::gaussians(&mut self.buffers, primitive, &place)? {
-                    scene
-                } else if let Some(mesh) = triangles::mesh(&mut self.buffers, primitive, &place)? {
-                    self.has_textures |= triangles::has_texture(document, primitive);
-                    let mut scene = Scene::default();
-                    *scene.mesh_mut() = mesh;
-                    scene
-                } else {
-                    self.other_primitives += 1;
-                    continue;
-                };
-            scene.apply(&Motion::new(
-                map.matrix3,
-                map.translation,
-                scene.sh_degree(),
-            ));
+            let mut scene = if let Some(scene) = primitive::gaussians(&mut self.buffers, primitive, &place)? {
+                scene
+            } else if let Some(mesh) = triangles::mesh(&mut self.buffers, primitive, &place)? {
+                self.has_textures |= triangles::has_texture(document, primitive);
+                let mut scene = Scene::default();
+                *scene.mesh_mut() = mesh;
+                scene
+            } else {
+                self.other_primitives += 1;
+                continue;
+            };
+            scene.apply(&Motion::new(map.matrix3, map.translation, scene.sh_degree()));
             self.scene.try_join(scene)?;
         }
         Ok(())

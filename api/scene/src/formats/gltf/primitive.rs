@@ -4,9 +4,7 @@ use std::collections::HashMap;
 
 use serde::Deserialize;
 
-use super::accessor::{
-    BYTE, Component, Demand, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_SHORT, values,
-};
+use super::accessor::{BYTE, Component, Demand, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_SHORT, values};
 use super::buffers::Buffers;
 use super::document::{DRAFTS, EXTENSION, Primitive};
 use crate::error::{Fault, Place, Reason};
@@ -60,11 +58,7 @@ pub(super) const POSITION: Demand = Demand {
 
 const ROTATION: Demand = Demand {
     width: 4,
-    components: &[
-        Component::plain(FLOAT),
-        Component::normalized(BYTE),
-        Component::normalized(SHORT),
-    ],
+    components: &[Component::plain(FLOAT), Component::normalized(BYTE), Component::normalized(SHORT)],
     expected: "float, signed byte normalized or signed short normalized",
 };
 
@@ -82,26 +76,14 @@ const SCALE: Demand = Demand {
 
 const OPACITY: Demand = Demand {
     width: 1,
-    components: &[
-        Component::plain(FLOAT),
-        Component::normalized(UNSIGNED_BYTE),
-        Component::normalized(UNSIGNED_SHORT),
-    ],
+    components: &[Component::plain(FLOAT), Component::normalized(UNSIGNED_BYTE), Component::normalized(UNSIGNED_SHORT)],
     expected: "float, unsigned byte normalized or unsigned short normalized",
 };
 
-const COEFFICIENT: Demand = Demand {
-    width: 3,
-    components: &[Component::plain(FLOAT)],
-    expected: "float",
-};
+const COEFFICIENT: Demand = Demand { width: 3, components: &[Component::plain(FLOAT)], expected: "float" };
 
 /// The Gaussians of `primitive`, in the frame of its mesh. None if it has none. Messages name it `place`.
-pub(super) fn gaussians(
-    buffers: &mut Buffers<'_>,
-    primitive: &Primitive,
-    place: &str,
-) -> Result<Option<Scene>, Fault> {
+pub(super) fn gaussians(buffers: &mut Buffers<'_>, primitive: &Primitive, place: &str) -> Result<Option<Scene>, Fault> {
     let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
     let malformed = |error: serde_json::Error| at(Reason::Json(spz::one_line(&error)), EXTENSION);
     let (splatting, metadata) = match primitive.extensions.get(EXTENSION) {
@@ -113,15 +95,11 @@ pub(super) fn gaussians(
         None => (None, Metadata::default()),
     };
     let within = splatting.iter().flat_map(|splatting| &splatting.extensions);
-    let draft = within
-        .chain(&primitive.extensions)
-        .find(|(name, _)| DRAFTS.contains(&name.as_str()));
+    let draft = within.chain(&primitive.extensions).find(|(name, _)| DRAFTS.contains(&name.as_str()));
     let mut scene = if let Some((name, value)) = draft {
         let compressed = Compressed::deserialize(value).map_err(malformed)?;
         let mut scene = from_spz(buffers, compressed.buffer_view, place)?;
-        scene
-            .metadata_mut()
-            .note(format!("the extension {name} is a draft of glTF's"));
+        scene.metadata_mut().note(format!("the extension {name} is a draft of glTF's"));
         scene
     } else if splatting.is_some() {
         if primitive.mode != Some(POINTS) {
@@ -155,17 +133,10 @@ fn from_spz(buffers: &mut Buffers<'_>, view: usize, place: &str) -> Result<Scene
 }
 
 /// The Gaussians of the attributes of `primitive`.
-fn attributes(
-    buffers: &mut Buffers<'_>,
-    primitive: &Primitive,
-    place: &str,
-) -> Result<Scene, Fault> {
+fn attributes(buffers: &mut Buffers<'_>, primitive: &Primitive, place: &str) -> Result<Scene, Fault> {
     let accessor = |name: &str| primitive.attributes.get(name).copied();
     let name = |l: u32, n: u32| format!("{EXTENSION}:SH_DEGREE_{l}_COEF_{n}");
-    let degree = (1..=MAX_DEGREE)
-        .rev()
-        .find(|l| (0..=2 * l).any(|n| accessor(&name(*l, n)).is_some()))
-        .unwrap_or(0);
+    let degree = (1..=MAX_DEGREE).rev().find(|l| (0..=2 * l).any(|n| accessor(&name(*l, n)).is_some())).unwrap_or(0);
     let mut read = |name: &str, demand: &Demand, count: Option<usize>| {
         let place = format!("{place}, {name}");
         let index = accessor(name).ok_or_else(|| Reason::Missing.at(Place::Part(place.clone())))?;
@@ -205,17 +176,10 @@ fn attributes(
         (vector(&positions, i), shape)
     })?;
     if scales.iter().any(|scale| *scale < 0.0) {
-        scene
-            .metadata_mut()
-            .note("scales are negative, and their magnitudes are taken");
+        scene.metadata_mut().note("scales are negative, and their magnitudes are taken");
     }
-    if opacities
-        .iter()
-        .any(|opacity| !(0.0..=1.0).contains(opacity))
-    {
-        scene
-            .metadata_mut()
-            .note("opacities lie outside 0 to 1, and are clamped");
+    if opacities.iter().any(|opacity| !(0.0..=1.0).contains(opacity)) {
+        scene.metadata_mut().note("opacities lie outside 0 to 1, and are clamped");
     }
     Ok(scene)
 }
@@ -250,9 +214,7 @@ impl Splatting {
         metadata.order = match self.sorting_method.as_deref() {
             None | Some("cameraDistance") => Some(SortOrder::Distance),
             Some(method) => {
-                metadata.note(format!(
-                    "the sorting method {method:?} is unknown and ignored"
-                ));
+                metadata.note(format!("the sorting method {method:?} is unknown and ignored"));
                 None
             }
         };

@@ -45,12 +45,7 @@ const BOUNDS: [&str; 18] = [
 /// The number of bounds in older files, whose colours range over 0 to 1.
 const BOUNDS_WITHOUT_COLOUR: usize = 12;
 
-const PACKED: [&str; 4] = [
-    "packed_position",
-    "packed_rotation",
-    "packed_scale",
-    "packed_color",
-];
+const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
 /// Reads the scene.
 pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
@@ -64,11 +59,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     }
     let chunks = read_chunks(&mut table, count)?;
     let has_sh = table.element("sh").is_some();
-    let (degree, rest) = if has_sh {
-        inria::rest_columns(&table, "sh")?
-    } else {
-        (0, Vec::new())
-    };
+    let (degree, rest) = if has_sh { inria::rest_columns(&table, "sh")? } else { (0, Vec::new()) };
     if has_sh {
         for i in 0..rest.len() {
             table.column_of("sh", &format!("f_rest_{i}"), &ScalarType::UChar, "uchar")?;
@@ -101,14 +92,8 @@ type Bounds = [f64; BOUNDS.len()];
 
 fn read_chunks(table: &mut Table<'_, '_>, gaussians: usize) -> Result<Vec<Bounds>, Fault> {
     let chunk = "chunk";
-    let coloured = table
-        .element(chunk)
-        .is_some_and(|element| element.properties.contains_key("min_r"));
-    let names = if coloured {
-        &BOUNDS[..]
-    } else {
-        &BOUNDS[..BOUNDS_WITHOUT_COLOUR]
-    };
+    let coloured = table.element(chunk).is_some_and(|element| element.properties.contains_key("min_r"));
+    let names = if coloured { &BOUNDS[..] } else { &BOUNDS[..BOUNDS_WITHOUT_COLOUR] };
     let columns = names
         .iter()
         .map(|name| table.column_of(chunk, name, &ScalarType::Float, "float"))
@@ -168,17 +153,11 @@ fn unpack_11_10_11(word: u32) -> [f64; 3] {
 /// components follow in order, over -1/sqrt(2) to 1/sqrt(2).
 fn unpack_rotation(word: u32) -> [f32; 4] {
     let small = [20, 10, 0].map(|shift| (bits(word, shift, 10) - 0.5) / FRAC_1_SQRT_2);
-    let largest = (1.0 - small.iter().map(|c| c * c).sum::<f64>())
-        .max(0.0)
-        .sqrt();
+    let largest = (1.0 - small.iter().map(|c| c * c).sum::<f64>()).max(0.0).sqrt();
     let which = (word >> 30) as usize;
     let mut small = small.into_iter();
     std::array::from_fn(|i| {
-        let component = if i == which {
-            Some(largest)
-        } else {
-            small.next()
-        };
+        let component = if i == which { Some(largest) } else { small.next() };
         component.unwrap_or_default() as f32
     })
 }

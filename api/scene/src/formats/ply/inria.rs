@@ -15,10 +15,8 @@ use crate::shape::{GaussianShape, sigmoid};
 pub(super) const VERTEX: &str = "vertex";
 
 /// The properties that every file has; `gaussian` unpacks them in this order.
-const REQUIRED: [&str; 13] = [
-    "x", "y", "z", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
-    "f_dc_1", "f_dc_2",
-];
+const REQUIRED: [&str; 13] =
+    ["x", "y", "z", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2"];
 
 /// The property that follows those, except in files of 2DGS.
 const THIRD_SCALE: &str = "scale_2";
@@ -28,13 +26,8 @@ const MAX_COLUMNS: usize = REQUIRED.len() + 1 + 3 * 24;
 
 /// Reads the scene.
 pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
-    let mut columns = REQUIRED
-        .iter()
-        .map(|property| table.column(VERTEX, property))
-        .collect::<Result<Vec<_>, _>>()?;
-    let flat = !table
-        .element(VERTEX)
-        .is_some_and(|vertex| vertex.properties.contains_key(THIRD_SCALE));
+    let mut columns = REQUIRED.iter().map(|property| table.column(VERTEX, property)).collect::<Result<Vec<_>, _>>()?;
+    let flat = !table.element(VERTEX).is_some_and(|vertex| vertex.properties.contains_key(THIRD_SCALE));
     if !flat {
         columns.push(table.column(VERTEX, THIRD_SCALE)?);
     }
@@ -64,11 +57,7 @@ fn gaussian(values: &[f64], flat: bool, sh: &mut [[f32; 3]]) -> ([f32; 3], Gauss
     let (required, rest) = values.split_at(REQUIRED.len());
     let (third, rest) = rest.split_at(usize::from(!flat));
     let shape = GaussianShape {
-        scale: [
-            required[3].exp() as f32,
-            required[4].exp() as f32,
-            third.first().map_or(0.0, |log| log.exp() as f32),
-        ],
+        scale: [required[3].exp() as f32, required[4].exp() as f32, third.first().map_or(0.0, |log| log.exp() as f32)],
         rotation: std::array::from_fn(|i| required[5 + i] as f32),
         opacity: sigmoid(required[9]),
     };
@@ -86,21 +75,12 @@ pub(super) fn unpack_rest(rest: &[f64], sh: &mut [[f32; 3]]) {
 }
 
 /// The degree of `element`, and its columns `f_rest_0`, `f_rest_1`, ...
-pub(super) fn rest_columns(
-    table: &Table<'_, '_>,
-    element: &str,
-) -> Result<(u32, Vec<Column>), Fault> {
-    let count = table.element(element).map_or(0, |definition| {
-        definition
-            .properties
-            .keys()
-            .filter(|name| name.starts_with("f_rest_"))
-            .count()
-    });
+pub(super) fn rest_columns(table: &Table<'_, '_>, element: &str) -> Result<(u32, Vec<Column>), Fault> {
+    let count = table
+        .element(element)
+        .map_or(0, |definition| definition.properties.keys().filter(|name| name.starts_with("f_rest_")).count());
     // A gap in the numbering is reported as a missing property.
-    let columns = (0..count)
-        .map(|i| table.column(element, &format!("f_rest_{i}")))
-        .collect::<Result<Vec<_>, _>>()?;
+    let columns = (0..count).map(|i| table.column(element, &format!("f_rest_{i}"))).collect::<Result<Vec<_>, _>>()?;
     let degree = (0..=MAX_SH_DEGREE)
         .find(|degree| 3 * (sh_coefficients(*degree) - 1) == count)
         .ok_or_else(|| Reason::ShCount(count).at(Place::Element(element.to_owned())))?;

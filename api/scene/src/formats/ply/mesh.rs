@@ -16,26 +16,20 @@ const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Returns true if the file has faces, and its vertices have no scales as Gaussians do.
 pub(super) fn is_one(table: &Table<'_, '_>) -> bool {
-    let has_scales = table
-        .element(VERTEX)
-        .is_some_and(|vertex| vertex.properties.contains_key("scale_0"));
+    let has_scales = table.element(VERTEX).is_some_and(|vertex| vertex.properties.contains_key("scale_0"));
     table.element(FACE).is_some() && !has_scales
 }
 
 /// Reads the mesh, as a scene without Gaussians.
 pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     let group = |table: &Table<'_, '_>, names: [&str; 3]| -> Result<Vec<Column>, Fault> {
-        names
-            .iter()
-            .map(|name| table.column(VERTEX, name))
-            .collect()
+        names.iter().map(|name| table.column(VERTEX, name)).collect()
     };
     let mut columns = group(&table, ["x", "y", "z"])?;
     let normals = group(&table, ["nx", "ny", "nz"]).ok();
     let colors = group(&table, ["red", "green", "blue"]).ok();
     // Integers are fractions of their greatest value.
-    let full = (colors.iter().flatten().next())
-        .map_or(1.0, |red| if red.is_float() { 1.0 } else { red.max() });
+    let full = (colors.iter().flatten().next()).map_or(1.0, |red| if red.is_float() { 1.0 } else { red.max() });
     let (has_normals, has_colors) = (normals.is_some(), colors.is_some());
     columns.extend(normals.into_iter().chain(colors).flatten());
 
@@ -52,16 +46,9 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         }
     })?;
     let property = (INDICES.into_iter())
-        .find(|name| {
-            table
-                .element(FACE)
-                .is_some_and(|face| face.properties.contains_key(*name))
-        })
+        .find(|name| table.element(FACE).is_some_and(|face| face.properties.contains_key(*name)))
         .unwrap_or(INDICES[0]);
-    let place = Place::Property {
-        element: FACE.to_owned(),
-        property: property.to_owned(),
-    };
+    let place = Place::Property { element: FACE.to_owned(), property: property.to_owned() };
     let mut fits = true;
     table.read_lists(FACE, property, |polygon| {
         fits &= mesh.triangles.try_reserve(polygon.len()).is_ok();
@@ -74,8 +61,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         return Err(Reason::Memory(bytes).at(place));
     }
     if mesh.triangles.is_empty() {
-        return Err(Reason::Unsupported("it holds no triangle".to_owned())
-            .at(Place::Element(FACE.to_owned())));
+        return Err(Reason::Unsupported("it holds no triangle".to_owned()).at(Place::Element(FACE.to_owned())));
     }
     let mut scene = Scene::default();
     *scene.mesh_mut() = mesh.into_mesh(place)?;

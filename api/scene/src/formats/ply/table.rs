@@ -65,19 +65,14 @@ impl<'i, 'a> Table<'i, 'a> {
     /// Reads the header and checks that the file is large enough for it.
     pub(super) fn open(input: &'i mut Input<'a>) -> Result<Self, Fault> {
         let text = header_text(input)?;
-        let header = Parser::<DefaultElement>::new()
-            .read_header(&mut Reader::new(Cursor::new(&text)))
-            .map_err(|error| {
-                let place = error
-                    .line()
-                    .map_or(Place::Header("its text"), |line| Place::Line(line as u64));
+        let header =
+            Parser::<DefaultElement>::new().read_header(&mut Reader::new(Cursor::new(&text))).map_err(|error| {
+                let place = error.line().map_or(Place::Header("its text"), |line| Place::Line(line as u64));
                 Reason::Header(first_sentence(&error.to_string())).at(place)
             })?;
         // The library keeps the last of two declarations of one name.
         let declared = |keyword: &[u8]| {
-            text.split(|byte| *byte == b'\n')
-                .filter(|line| line.trim_ascii_start().starts_with(keyword))
-                .count()
+            text.split(|byte| *byte == b'\n').filter(|line| line.trim_ascii_start().starts_with(keyword)).count()
         };
         let properties: usize = header.elements.values().map(|e| e.properties.len()).sum();
         if declared(b"element ") > header.elements.len() || declared(b"property ") > properties {
@@ -89,13 +84,7 @@ impl<'i, 'a> Table<'i, 'a> {
             .map(|comment| String::from_utf8_lossy(comment.trim_ascii()).into_owned())
             .collect();
         let lines = text.iter().filter(|byte| **byte == b'\n').count() as u64;
-        Ok(Self {
-            input,
-            header,
-            comments,
-            next: 0,
-            lines,
-        })
+        Ok(Self { input, header, comments, next: 0, lines })
     }
 
     /// The header's comments, without the keyword, in the order of the file.
@@ -112,11 +101,7 @@ impl<'i, 'a> Table<'i, 'a> {
     /// it.
     pub(super) fn count(&self, name: &str) -> Result<usize, Fault> {
         let element = || Place::Element(name.to_owned());
-        let index = self
-            .header
-            .elements
-            .get_index_of(name)
-            .ok_or_else(|| Reason::Missing.at(element()))?;
+        let index = self.header.elements.get_index_of(name).ok_or_else(|| Reason::Missing.at(element()))?;
         let mut claimed = 0_u64;
         let coming = self.header.elements.values().take(index + 1);
         for definition in coming.skip(self.next) {
@@ -141,24 +126,15 @@ impl<'i, 'a> Table<'i, 'a> {
 
     /// Column `property` of element `element`.
     pub(super) fn column(&self, element: &str, property: &str) -> Result<Column, Fault> {
-        let place = || Place::Property {
-            element: element.to_owned(),
-            property: property.to_owned(),
-        };
-        let definition = self
-            .element(element)
-            .ok_or_else(|| Reason::Missing.at(Place::Element(element.to_owned())))?;
+        let place = || Place::Property { element: element.to_owned(), property: property.to_owned() };
+        let definition = self.element(element).ok_or_else(|| Reason::Missing.at(Place::Element(element.to_owned())))?;
         let mut offset = 0;
         for (index, found) in definition.properties.values().enumerate() {
             let wanted = found.name == property;
             match &found.data_type {
                 PropertyType::Scalar(kind) if wanted => {
                     let kind = kind.clone();
-                    return Ok(Column {
-                        index,
-                        offset,
-                        kind,
-                    });
+                    return Ok(Column { index, offset, kind });
                 }
                 PropertyType::List(..) if wanted => return Err(Reason::List.at(place())),
                 PropertyType::Scalar(kind) => offset += size(kind),
@@ -182,10 +158,8 @@ impl<'i, 'a> Table<'i, 'a> {
             return Ok(column);
         }
         let found = format!("{:?}", column.kind).to_lowercase();
-        Err(Reason::Type { found, expected }.at(Place::Property {
-            element: element.to_owned(),
-            property: property.to_owned(),
-        }))
+        Err(Reason::Type { found, expected }
+            .at(Place::Property { element: element.to_owned(), property: property.to_owned() }))
     }
 
     /// Reads element `name`: calls `each` with a row's index and its values of `columns`. Elements before it are
@@ -215,15 +189,10 @@ impl<'i, 'a> Table<'i, 'a> {
         mut each: impl FnMut(&Rows<'_>),
     ) -> Result<(), Fault> {
         self.count(name)?;
-        let index = self
-            .header
-            .elements
-            .get_index_of(name)
-            .filter(|index| *index >= self.next)
-            .ok_or_else(|| {
-                Reason::Header("it stands before an element that it depends on".to_owned())
-                    .at(Place::Element(name.to_owned()))
-            })?;
+        let index = self.header.elements.get_index_of(name).filter(|index| *index >= self.next).ok_or_else(|| {
+            Reason::Header("it stands before an element that it depends on".to_owned())
+                .at(Place::Element(name.to_owned()))
+        })?;
         for passed in self.next..index {
             self.read_element(passed, &[], &mut |_| {})?;
         }
@@ -233,16 +202,8 @@ impl<'i, 'a> Table<'i, 'a> {
 
     /// Reads element `name`, the next one of the file: calls `each` with the values of a row's list `property`. Other
     /// properties are skipped.
-    pub(super) fn read_lists(
-        &mut self,
-        name: &str,
-        property: &str,
-        mut each: impl FnMut(&[u32]),
-    ) -> Result<(), Fault> {
-        let place = || Place::Property {
-            element: name.to_owned(),
-            property: property.to_owned(),
-        };
+    pub(super) fn read_lists(&mut self, name: &str, property: &str, mut each: impl FnMut(&[u32])) -> Result<(), Fault> {
+        let place = || Place::Property { element: name.to_owned(), property: property.to_owned() };
         let index = (self.header.elements.get_index_of(name))
             .filter(|index| *index >= self.next)
             .ok_or_else(|| Reason::Missing.at(Place::Element(name.to_owned())))?;
@@ -251,11 +212,7 @@ impl<'i, 'a> Table<'i, 'a> {
         }
         self.next = index + 1;
         let element = self.header.elements[index].clone();
-        match element
-            .properties
-            .get(property)
-            .map(|found| &found.data_type)
-        {
+        match element.properties.get(property).map(|found| &found.data_type) {
             Some(PropertyType::List(..)) => {}
             Some(PropertyType::Scalar(_)) => {
                 let (found, expected) = ("a number".to_owned(), "a list");
@@ -300,12 +257,7 @@ impl<'i, 'a> Table<'i, 'a> {
         Ok(())
     }
 
-    fn read_element(
-        &mut self,
-        index: usize,
-        columns: &[Column],
-        each: &mut dyn FnMut(&Rows<'_>),
-    ) -> Result<(), Fault> {
+    fn read_element(&mut self, index: usize, columns: &[Column], each: &mut dyn FnMut(&Rows<'_>)) -> Result<(), Fault> {
         let element = self.header.elements[index].clone();
         match self.header.encoding {
             Encoding::Ascii => self.read_text(&element, columns, each),
@@ -332,16 +284,8 @@ impl<'i, 'a> Table<'i, 'a> {
             let count = rows_per_block.min(element.count - row);
             let bytes = &mut block[..count * stride];
             self.input.fill(bytes)?;
-            let source = Source::Binary {
-                bytes,
-                stride,
-                big_endian,
-            };
-            each(&Rows {
-                count,
-                columns,
-                source,
-            });
+            let source = Source::Binary { bytes, stride, big_endian };
+            each(&Rows { count, columns, source });
             row += count;
         }
         Ok(())
@@ -375,11 +319,7 @@ impl<'i, 'a> Table<'i, 'a> {
                 *value = text_number(&column.kind, word)
                     .ok_or_else(|| at_line(Reason::Number(word.to_owned()), self.lines))?;
             }
-            each(&Rows {
-                count: 1,
-                columns,
-                source: Source::Values(&values),
-            });
+            each(&Rows { count: 1, columns, source: Source::Values(&values) });
         }
         Ok(())
     }
@@ -401,23 +341,14 @@ impl<P: FnMut(&u8) -> bool> Numbers<'_, '_, P> {
                 let word = words.find(|word| !word.is_empty());
                 let word = word.ok_or_else(|| Reason::Truncated.at(Place::Line(*line)))?;
                 let word = String::from_utf8_lossy(word);
-                text_number(kind, &word)
-                    .ok_or_else(|| Reason::Number(word.into_owned()).at(Place::Line(*line)))
+                text_number(kind, &word).ok_or_else(|| Reason::Number(word.into_owned()).at(Place::Line(*line)))
             }
             Self::Binary(input, big_endian) => {
                 let mut bytes = [0; 8];
                 let bytes = &mut bytes[..size(kind)];
                 input.fill(bytes)?;
-                let column = Column {
-                    index: 0,
-                    offset: 0,
-                    kind: kind.clone(),
-                };
-                Ok(if *big_endian {
-                    number::<true>(&column, bytes)
-                } else {
-                    number::<false>(&column, bytes)
-                })
+                let column = Column { index: 0, offset: 0, kind: kind.clone() };
+                Ok(if *big_endian { number::<true>(&column, bytes) } else { number::<false>(&column, bytes) })
             }
         }
     }
@@ -447,17 +378,9 @@ impl Rows<'_> {
     /// exactly.
     pub(super) fn get(&self, row: usize, values: &mut [f64]) {
         match self.source {
-            Source::Binary {
-                bytes,
-                stride,
-                big_endian,
-            } => {
+            Source::Binary { bytes, stride, big_endian } => {
                 let bytes = &bytes[row * stride..][..stride];
-                let number = if big_endian {
-                    number::<true>
-                } else {
-                    number::<false>
-                };
+                let number = if big_endian { number::<true> } else { number::<false> };
                 for (value, column) in values.iter_mut().zip(self.columns) {
                     *value = number(column, bytes);
                 }
@@ -490,10 +413,8 @@ fn header_text(input: &mut Input<'_>) -> Result<Vec<u8>, Fault> {
 /// The first sentence of a message of the library, without the line's text and the parser's state that follow.
 fn first_sentence(message: &str) -> String {
     let message = message.lines().next().unwrap_or_default();
-    let message = message
-        .strip_prefix("Line ")
-        .and_then(|rest| rest.split_once(": "))
-        .map_or(message, |(_, rest)| rest);
+    let message =
+        message.strip_prefix("Line ").and_then(|rest| rest.split_once(": ")).map_or(message, |(_, rest)| rest);
     message.trim_end_matches('.').to_owned()
 }
 
@@ -504,10 +425,9 @@ fn stride(element: &ElementDef) -> Result<usize, Fault> {
         .values()
         .map(|property| match &property.data_type {
             PropertyType::Scalar(kind) => Ok(size(kind)),
-            PropertyType::List(..) => Err(Reason::List.at(Place::Property {
-                element: element.name.clone(),
-                property: property.name.clone(),
-            })),
+            PropertyType::List(..) => {
+                Err(Reason::List.at(Place::Property { element: element.name.clone(), property: property.name.clone() }))
+            }
         })
         .sum()
 }

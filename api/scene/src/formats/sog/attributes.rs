@@ -77,17 +77,8 @@ fn fault(name: &str, field: &str, reason: Reason) -> Fault {
 
 impl Attribute {
     /// Image `index` of the attribute `name`, which must have `expected` entries.
-    fn image(
-        &self,
-        name: &str,
-        index: usize,
-        files: &Files<'_>,
-        expected: u64,
-    ) -> Result<Image, Fault> {
-        let file = self
-            .files
-            .get(index)
-            .ok_or_else(|| fault(name, "files", Reason::Missing))?;
+    fn image(&self, name: &str, index: usize, files: &Files<'_>, expected: u64) -> Result<Image, Fault> {
+        let file = self.files.get(index).ok_or_else(|| fault(name, "files", Reason::Missing))?;
         files.image(file, expected)
     }
 
@@ -210,23 +201,15 @@ pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<Scene, Fault> {
     })?;
     let metadata = scene.metadata_mut();
     say_model(meta.model.as_deref(), metadata);
-    let untagged = (0..count as usize)
-        .filter(|index| quaternion(quaternions.texel(*index)).is_none())
-        .count();
+    let untagged = (0..count as usize).filter(|index| quaternion(quaternions.texel(*index)).is_none()).count();
     if untagged > 0 {
-        metadata.note(format!(
-            "{untagged} rotations name no largest component, and are none"
-        ));
+        metadata.note(format!("{untagged} rotations name no largest component, and are none"));
     }
-    let unlabelled = palette.map_or(0, |palette| {
-        (0..count as usize)
-            .filter(|index| palette.label(*index) >= palette.len)
-            .count()
-    });
+    let unlabelled =
+        palette.map_or(0, |palette| (0..count as usize).filter(|index| palette.label(*index) >= palette.len).count());
     if unlabelled > 0 {
-        metadata.note(format!(
-            "{unlabelled} Gaussians name no entry of the palette, and have one colour from all sides"
-        ));
+        metadata
+            .note(format!("{unlabelled} Gaussians name no entry of the palette, and have one colour from all sides"));
     }
     Ok(scene)
 }
@@ -264,12 +247,7 @@ fn quaternion([a, b, c, tag]: [u8; 4]) -> Option<[f32; 4]> {
 
 impl Palette {
     /// Reads the palette of the attribute `rest`; None if it has no bands.
-    fn read(
-        rest: &Attribute,
-        legacy: bool,
-        files: &Files<'_>,
-        count: u64,
-    ) -> Result<Option<Self>, Fault> {
+    fn read(rest: &Attribute, legacy: bool, files: &Files<'_>, count: u64) -> Result<Option<Self>, Fault> {
         let name = "shN";
         let values = if legacy {
             let [values] = linear(rest.bounds::<1>(name)?);
@@ -281,16 +259,12 @@ impl Palette {
         let (degree, len) = if legacy {
             (None, 0)
         } else {
-            let bands = rest
-                .bands
-                .ok_or_else(|| fault(name, "bands", Reason::Missing))?;
+            let bands = rest.bands.ok_or_else(|| fault(name, "bands", Reason::Missing))?;
             let Some(bands) = whole(bands, 3) else {
                 let text = format!("{bands} bands are not 0 to 3");
                 return Err(fault(name, "bands", Reason::Unsupported(text)));
             };
-            let len = rest
-                .count
-                .ok_or_else(|| fault(name, "count", Reason::Missing))?;
+            let len = rest.count.ok_or_else(|| fault(name, "count", Reason::Missing))?;
             let Some(len) = whole(len, 1 << 16) else {
                 let text = format!("a palette of {len} entries is not one of 16-bit labels");
                 return Err(fault(name, "count", Reason::Unsupported(text)));
@@ -303,8 +277,7 @@ impl Palette {
         let width = |degree: u32| PALETTE_ROW * (sh_coefficients(degree) - 1);
         let pixels = degree.map_or(1, |degree| width(degree) * len.div_ceil(PALETTE_ROW));
         let entries = rest.image(name, 0, files, pixels as u64)?;
-        let degree =
-            (1..=3).find(|l| entries.width as usize == width(*l) && degree.is_none_or(|d| d == *l));
+        let degree = (1..=3).find(|l| entries.width as usize == width(*l) && degree.is_none_or(|d| d == *l));
         let Some(degree) = degree else {
             let text = format!("{} pixels are not the width of a palette", entries.width);
             return Err(Reason::Unsupported(text).at(Place::Entry(rest.files[0].clone())));

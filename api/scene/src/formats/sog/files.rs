@@ -46,12 +46,7 @@ impl Image {
     #[inline]
     pub(super) fn texel(&self, index: usize) -> [u8; 4] {
         let texel = &self.texels[self.channels * index..][..self.channels];
-        [
-            texel[0],
-            texel[1],
-            texel[2],
-            texel.get(3).copied().unwrap_or(255),
-        ]
+        [texel[0], texel[1], texel[2], texel.get(3).copied().unwrap_or(255)]
     }
 }
 
@@ -83,9 +78,7 @@ impl<'a> Files<'a> {
     pub(super) fn read(&self, name: &str) -> Result<Vec<u8>, Fault> {
         match self {
             Self::Folder(origin, folder) => origin.companion(&join(folder, name)),
-            Self::Archive(archive) => archive
-                .read(name)
-                .map_err(|reason| reason.at(Place::Entry(name.to_owned()))),
+            Self::Archive(archive) => archive.read(name).map_err(|reason| reason.at(Place::Entry(name.to_owned()))),
         }
     }
 
@@ -98,11 +91,7 @@ impl<'a> Files<'a> {
 
 /// The path of `name` in `folder`.
 pub(super) fn join(folder: &str, name: &str) -> String {
-    if folder.is_empty() {
-        name.to_owned()
-    } else {
-        format!("{folder}/{name}")
-    }
+    if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
 }
 
 impl Archive<'_> {
@@ -112,19 +101,14 @@ impl Archive<'_> {
         }
         let entry = self.entries.get(name.as_bytes()).ok_or(Reason::Missing)?;
         let damaged = |error: &dyn std::fmt::Display| Reason::Zip(one_line(error));
-        let stored = self
-            .archive
-            .get_entry(entry.place)
-            .map_err(|e| damaged(&e))?;
+        let stored = self.archive.get_entry(entry.place).map_err(|e| damaged(&e))?;
         let (claimed, available) = (entry.size, entry.compressed.saturating_mul(MAX_EXPANSION));
         if claimed > available {
             return Err(Reason::TooShort { claimed, available });
         }
         // The reader checks the size and the checksum.
         let bytes = match entry.method {
-            CompressionMethod::STORE => {
-                read_growing(stored.verifying_reader(stored.data()), claimed + 1, 0)
-            }
+            CompressionMethod::STORE => read_growing(stored.verifying_reader(stored.data()), claimed + 1, 0),
             CompressionMethod::DEFLATE => {
                 let decoder = DeflateDecoder::new(stored.data());
                 read_growing(stored.verifying_reader(decoder), claimed + 1, 0)
@@ -149,24 +133,13 @@ fn image(bytes: &[u8], expected: u64) -> Result<Image, Reason> {
     let pixels = u64::from(width) * u64::from(height);
     // Writers round sides up. A few bytes may claim an image of a gigabyte.
     if pixels < expected || pixels > 4 * expected + (1 << 20) {
-        return Err(Reason::Pixels {
-            width,
-            height,
-            expected,
-        });
+        return Err(Reason::Pixels { width, height, expected });
     }
     let channels = if decoder.has_alpha() { 4 } else { 3 };
     let size = decoder.output_buffer_size().unwrap_or(usize::MAX);
     let mut texels = Vec::new();
-    texels
-        .try_reserve_exact(size)
-        .map_err(|_| Reason::Memory(size as u64))?;
+    texels.try_reserve_exact(size).map_err(|_| Reason::Memory(size as u64))?;
     texels.resize(size, 0);
     decoder.read_image(&mut texels).map_err(damaged)?;
-    Ok(Image {
-        channels,
-        texels,
-        width,
-        height,
-    })
+    Ok(Image { channels, texels, width, height })
 }

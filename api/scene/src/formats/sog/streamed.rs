@@ -48,10 +48,7 @@ pub(super) fn load(meta: &[u8], origin: Origin<'_>) -> Result<Scene, Fault> {
     }
     let level = origin.options.level;
     if level >= meta.levels {
-        let text = format!(
-            "level {level} is not one of the scene's {} levels",
-            meta.levels
-        );
+        let text = format!("level {level} is not one of the scene's {} levels", meta.levels);
         return Err(Reason::Unsupported(text).at(part("lodLevels")));
     }
     let mut parts: BTreeMap<usize, Vec<Part>> = BTreeMap::new();
@@ -115,9 +112,7 @@ fn unit(name: &str, origin: Origin<'_>) -> Result<Scene, Fault> {
     // The place of the fault is in the named file.
     read().map_err(|fault| match fault.place {
         Place::Part(place) => fault.reason.at(Place::Part(format!("{name:?}, {place}"))),
-        Place::Entry(entry) if !entry.contains('/') => {
-            fault.reason.at(Place::Entry(join(name, &entry)))
-        }
+        Place::Entry(entry) if !entry.contains('/') => fault.reason.at(Place::Entry(join(name, &entry))),
         _ => fault.reason.at(Place::Entry(name.to_owned())),
     })
 }

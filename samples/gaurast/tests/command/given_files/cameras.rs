@@ -58,8 +58,8 @@ fn colour(index: usize) -> [f64; 3] {
 /// A PLY file of small, opaque Gaussians at `points`, each about a pixel large for `camera`.
 fn scene(camera: &Expected, points: &[DVec3]) -> String {
     let properties = [
-        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
-        "opacity", "f_dc_0", "f_dc_1", "f_dc_2",
+        "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
+        "f_dc_1", "f_dc_2",
     ];
     let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", points.len());
     for property in properties {
@@ -93,8 +93,7 @@ fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
         let expected = camera.project(point);
         // The pixels of the Gaussian are near it, and those of the next one are not.
         let corner = (expected - 12.0).floor();
-        let pixels =
-            (0..24_u32).flat_map(|y| (0..24_u32).map(move |x| DVec2::new(x.into(), y.into())));
+        let pixels = (0..24_u32).flat_map(|y| (0..24_u32).map(move |x| DVec2::new(x.into(), y.into())));
         let (mut sum, mut total, mut colours) = (DVec2::ZERO, 0.0, DVec3::ZERO);
         for offset in pixels {
             let at = corner + offset;
@@ -140,12 +139,7 @@ fn inria_cameras_are_exactly_those_of_the_file() {
         let text = std::fs::read_to_string(&path).expect("text");
         for size in [[1296, 840], [500, 500]] {
             let camera = inria(&text, view, size);
-            let arguments = [
-                "--view",
-                &view.to_string(),
-                "--size",
-                &format!("{}x{}", size[0], size[1]),
-            ];
+            let arguments = ["--view", &view.to_string(), "--size", &format!("{}x{}", size[0], size[1])];
             check(&camera, &path, &arguments);
         }
     }
@@ -159,8 +153,7 @@ fn real_camera_paths_are_read() {
         ("cameras/room.json", 311),
         ("cameras/bonsai.json", 292),
     ] {
-        let views =
-            gaurast_scene::camera_files::load(&gaurast_runner::data(file), [1, 1]).expect(file);
+        let views = gaurast_scene::camera_files::load(&gaurast_runner::data(file), [1, 1]).expect(file);
         assert_eq!(views.len(), count, "{file}");
     }
 }
@@ -197,11 +190,7 @@ fn nerfstudio_cameras_are_exactly_those_of_the_file() {
     };
     check(&camera, &path, &["--view", "1"]);
     // Twice as wide: each axis is scaled separately.
-    let wide = Expected {
-        focal: DVec2::new(1000.0, 520.0),
-        principal: DVec2::new(620.0, 251.0),
-        size: [1280, 480],
-        ..camera
-    };
+    let wide =
+        Expected { focal: DVec2::new(1000.0, 520.0), principal: DVec2::new(620.0, 251.0), size: [1280, 480], ..camera };
     check(&wide, &path, &["--view", "1", "--size", "1280x480"]);
 }

@@ -11,17 +11,9 @@ struct Golden {
     eye: &'static str,
 }
 
-const TINY: Golden = Golden {
-    scene: "reference/tiny.generated.ply",
-    picture: "reference/tiny.webp",
-    eye: "0,5,-8",
-};
+const TINY: Golden = Golden { scene: "reference/tiny.generated.ply", picture: "reference/tiny.webp", eye: "0,5,-8" };
 
-const MID: Golden = Golden {
-    scene: "reference/mid.generated.ply",
-    picture: "reference/mid.webp",
-    eye: "0,10,-15",
-};
+const MID: Golden = Golden { scene: "reference/mid.generated.ply", picture: "reference/mid.webp", eye: "0,10,-15" };
 
 impl Golden {
     fn needs(&self) -> [Need; 2] {
@@ -33,9 +25,7 @@ impl Golden {
         let output = Command::new(env!("CARGO_BIN_EXE_gaurast"))
             .arg("compare")
             .args([data(self.picture), data(self.scene)])
-            .args([
-                "--eye", self.eye, "--target", "0,0,0", "--up", "0,1,0", "--fov", "60", "--json",
-            ])
+            .args(["--eye", self.eye, "--target", "0,0,0", "--up", "0,1,0", "--fov", "60", "--json"])
             .args(options)
             .output()
             .expect("the command starts");

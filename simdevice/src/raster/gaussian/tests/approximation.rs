@@ -24,10 +24,8 @@ fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 
 #[gaurast_runner::test(each = simd_levels())]
 fn powers_of_fewer_terms_are_within_their_bounds(case: &Case) {
     let level = token_of(case);
-    for (worst, bound) in [
-        (worst_error(&CUBIC, level), CUBIC.error),
-        (worst_error(&QUADRATIC, level), QUADRATIC.error),
-    ] {
+    for (worst, bound) in [(worst_error(&CUBIC, level), CUBIC.error), (worst_error(&QUADRATIC, level), QUADRATIC.error)]
+    {
         let bound = f64::from(bound);
         assert!(worst <= bound, "{worst:e} exceeds {bound:e}");
         // A bound that is far off would refuse these powers where they may be used.
@@ -36,13 +34,7 @@ fn powers_of_fewer_terms_are_within_their_bounds(case: &Case) {
 }
 
 fn allowing(exponential_error: f32, contribution_budget: f32) -> GaussianState {
-    GaussianState {
-        approximation: GaussianApproximation {
-            exponential_error,
-            contribution_budget,
-        },
-        ..defaults()
-    }
+    GaussianState { approximation: GaussianApproximation { exponential_error, contribution_budget }, ..defaults() }
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -58,12 +50,7 @@ fn the_kernel_with_fast_powers_equals_its_naive_twin(case: &Case) {
 /// Pixels, and blocks that were left out.
 fn picture(device: &Device, count: u32, state: GaussianState) -> (Vec<Option<[f32; 4]>>, f32, u64) {
     let draw = draw(50, count, state, device, WHOLE);
-    let colors = draw
-        .sorted
-        .splats
-        .iter()
-        .flatten()
-        .flat_map(|splat| splat.look.color);
+    let colors = draw.sorted.splats.iter().flatten().flat_map(|splat| splat.look.color);
     let range = colors.fold(0.0, f32::max);
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
@@ -102,11 +89,7 @@ fn what_is_left_out_is_within_the_budget(case: &Case) {
 
 #[gaurast_runner::test]
 fn skips_that_are_off_leave_nothing_out() {
-    let device = Device::new(&Config {
-        optimizations: Optimizations::NONE,
-        ..Config::default()
-    })
-    .unwrap();
+    let device = Device::new(&Config { optimizations: Optimizations::NONE, ..Config::default() }).unwrap();
     let exact = picture(&device, 1000, defaults());
     assert_eq!(picture(&device, 1000, allowing(0.0, 0.4)), exact);
 }

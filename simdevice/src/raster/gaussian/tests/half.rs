@@ -17,11 +17,7 @@ pub(super) fn naive_sample(
     for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
         let g = &draw.sorted.splats[batch][place];
-        let alpha = alpha_at(
-            draw,
-            g,
-            [0, 1].map(|axis| tile[axis] as usize * TILE + [x, y][axis]),
-        );
+        let alpha = alpha_at(draw, g, [0, 1].map(|axis| tile[axis] as usize * TILE + [x, y][axis]));
         if alpha >= state.alpha_floor {
             out.reached = true;
             if passes(g.look.depth) && pixel.add(&Splat16::new(g), alpha, &state) {
@@ -49,10 +45,7 @@ fn alpha_at(draw: &BinnedDraw, g: &Splat, at: [usize; 2]) -> f32 {
 }
 
 fn state() -> GaussianState {
-    GaussianState {
-        precision: GaussianPrecision::Float16,
-        ..defaults()
-    }
+    GaussianState { precision: GaussianPrecision::Float16, ..defaults() }
 }
 
 #[gaurast_runner::test]
@@ -67,11 +60,7 @@ fn numbers_are_rounded_to_the_nearest_and_even() {
                 (1024 + fraction) as f32 * 2.0f32.powi(exponent as i32 - 25)
             }
         };
-        let next = if half == 0x7BFF {
-            65536.0
-        } else {
-            value(half + 1)
-        };
+        let next = if half == 0x7BFF { 65536.0 } else { value(half + 1) };
         let middle = 0.5 * (value(half) + next);
         let above = if half == 0x7BFF { f32::INFINITY } else { next };
         let even = if half % 2 == 0 { value(half) } else { above };
@@ -95,10 +84,7 @@ fn powers_of_two_are_nearly_the_nearest() {
         x += 1.0 / 4096.0;
     }
     assert!(worst < 0.501, "{worst} ulp");
-    assert_eq!(
-        [-30.0, 0.0, 1.0, 7.0].map(scalar::exp2),
-        [0.0, 1.0, 2.0, 2.0]
-    );
+    assert_eq!([-30.0, 0.0, 1.0, 7.0].map(scalar::exp2), [0.0, 1.0, 2.0, 2.0]);
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -120,10 +106,7 @@ fn it_equals_its_definition(case: &Case) {
 fn tiles_and_blocks_list_whatever_it_reaches() {
     let device = Device::new(&Config::default()).unwrap();
     for (seed, low_pass_variance) in [(50, 0.3), (51, 0.3), (52, 0.01)] {
-        let state = GaussianState {
-            low_pass_variance,
-            ..state()
-        };
+        let state = GaussianState { low_pass_variance, ..state() };
         let draw = draw(seed, 600, state.clone(), &device, WHOLE);
         let mut reached = 0;
         for (batch, splats) in draw.sorted.splats.iter().enumerate() {

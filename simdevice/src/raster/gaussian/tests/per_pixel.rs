@@ -39,8 +39,7 @@ pub(super) fn naive_sample(
         out.reached = true;
         if passes(g.look.depth) {
             let depth = &depths.of[batch][place];
-            let along =
-                dispatch!(Level::baseline(), simd => depth.along(simd, &rays, 0).as_slice()[0]);
+            let along = dispatch!(Level::baseline(), simd => depth.along(simd, &rays, 0).as_slice()[0]);
             reached.push((ordered_key(along), g, alpha));
         }
     }
@@ -68,50 +67,27 @@ pub(super) fn naive_sample(
 
 #[gaurast_runner::test(each = simd_levels())]
 fn it_equals_its_twin(case: &Case) {
-    let state = GaussianState {
-        order: GaussianOrder::PerPixel,
-        ..defaults()
-    };
+    let state = GaussianState { order: GaussianOrder::PerPixel, ..defaults() };
     for seed in 20..23 {
         check(case, seed, 400, &state, WHOLE);
     }
     // Everything contributes everywhere, in several passes.
-    let state = GaussianState {
-        alpha_floor: 0.0,
-        transmittance_floor: 0.0,
-        low_pass_variance: 0.0,
-        ..state
-    };
-    check(
-        case,
-        23,
-        3 * crate::raster::gaussian::per_pixel::HELD as u32,
-        &state,
-        WHOLE,
-    );
+    let state = GaussianState { alpha_floor: 0.0, transmittance_floor: 0.0, low_pass_variance: 0.0, ..state };
+    check(case, 23, 3 * crate::raster::gaussian::per_pixel::HELD as u32, &state, WHOLE);
 }
 
 #[gaurast_runner::test]
 fn it_is_another_order() {
     let device = Device::new(&Config::default()).unwrap();
     let picture = |order| {
-        let state = GaussianState {
-            order,
-            ..defaults()
-        };
+        let state = GaussianState { order, ..defaults() };
         let draw = draw(24, 400, state, &device, WHOLE);
         let mut tile = Box::new(GaussianTile::default());
         tile.render(&draw, device.level(), 2, 2, &mut Counters::default());
-        (0..TILE * TILE)
-            .map(|at| tile.pixel(at % TILE, at / TILE))
-            .collect::<Vec<_>>()
+        (0..TILE * TILE).map(|at| tile.pixel(at % TILE, at / TILE)).collect::<Vec<_>>()
     };
     let by_pixel = picture(GaussianOrder::PerPixel);
-    for order in [
-        GaussianOrder::ViewDepth,
-        GaussianOrder::RadialDistance,
-        GaussianOrder::Primitive,
-    ] {
+    for order in [GaussianOrder::ViewDepth, GaussianOrder::RadialDistance, GaussianOrder::Primitive] {
         assert!(picture(order) != by_pixel, "{order:?}");
     }
 }

@@ -8,18 +8,9 @@ use crate::state::gaussian::GaussianOrder;
 fn lists_and_streams_agree(case: &Case) {
     let states = [
         defaults(),
-        GaussianState {
-            transmittance_floor: 0.0,
-            ..defaults()
-        },
-        GaussianState {
-            order: GaussianOrder::PerPixel,
-            ..defaults()
-        },
-        GaussianState {
-            precision: GaussianPrecision::Float16,
-            ..defaults()
-        },
+        GaussianState { transmittance_floor: 0.0, ..defaults() },
+        GaussianState { order: GaussianOrder::PerPixel, ..defaults() },
+        GaussianState { precision: GaussianPrecision::Float16, ..defaults() },
     ];
     for (seed, state) in (50..).zip(&states) {
         let [listed, streamed] = [Config::default().bin_budget_bytes, 100].map(|budget| {

@@ -10,26 +10,16 @@ use crate::raster::depth_stencil::apply;
 use crate::raster::tests::blender::Blender;
 use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
 use crate::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
-    StencilFace, StencilOp,
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect, StencilFace, StencilOp,
 };
 use crate::stats::recorder::Recorder;
 use rand::seq::IndexedRandom;
 use timing::work::Saturation;
 
-const DEPTHS: [Format; 5] = [
-    Format::D16Unorm,
-    Format::X8D24UnormPack32,
-    Format::D32Sfloat,
-    Format::D24UnormS8Uint,
-    Format::D32SfloatS8Uint,
-];
-const COLORS: [Format; 4] = [
-    Format::R32G32B32A32Sfloat,
-    Format::R8G8B8A8Unorm,
-    Format::B8G8R8A8Srgb,
-    Format::R16G16B16A16Sfloat,
-];
+const DEPTHS: [Format; 5] =
+    [Format::D16Unorm, Format::X8D24UnormPack32, Format::D32Sfloat, Format::D24UnormS8Uint, Format::D32SfloatS8Uint];
+const COLORS: [Format; 4] =
+    [Format::R32G32B32A32Sfloat, Format::R8G8B8A8Unorm, Format::B8G8R8A8Srgb, Format::R16G16B16A16Sfloat];
 const COMPARES: [CompareOp; 8] = [
     CompareOp::Never,
     CompareOp::Less,
@@ -90,19 +80,8 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
         write_mask: one_of(rng, &[0, 0x0F, 0xFF]),
         reference: rng.random_range(0..4),
     };
-    let over = BlendEquation {
-        source: BlendFactor::One,
-        destination: BlendFactor::OneMinusSrcAlpha,
-        op: BlendOp::Add,
-    };
-    let precision = one_of(
-        rng,
-        &[
-            GaussianPrecision::Float32,
-            GaussianPrecision::Float32,
-            GaussianPrecision::Float16,
-        ],
-    );
+    let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
+    let precision = one_of(rng, &[GaussianPrecision::Float32, GaussianPrecision::Float32, GaussianPrecision::Float16]);
     GaussianState {
         precision,
         order: one_of(
@@ -118,10 +97,7 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
         transmittance_floor: one_of(rng, &[0.0, 1e-4, 0.3]),
         sample_mask: one_of(rng, &[u32::MAX, u32::MAX, 0b1011]),
         depth_stencil: DepthStencil {
-            depth: rng.random_bool(0.9).then(|| DepthTest {
-                compare: one_of(rng, &COMPARES),
-                write: rng.random(),
-            }),
+            depth: rng.random_bool(0.9).then(|| DepthTest { compare: one_of(rng, &COMPARES), write: rng.random() }),
             bounds: rng.random_bool(0.2).then_some((0.25, 0.9)),
             stencil: rng.random_bool(0.5).then(|| [face(rng), face(rng)]),
         },
@@ -139,39 +115,19 @@ fn random_scene(seed: u64) -> Scene {
     let (color, depth) = (one_of(&mut rng, &COLORS), one_of(&mut rng, &DEPTHS));
     let coefficients = one_of(&mut rng, &[FORWARD, REVERSE]);
     let state = random_state(&mut rng);
-    let bounds = one_of(
-        &mut rng,
-        &[
-            WHOLE,
-            Rect {
-                x: 5,
-                y: 3,
-                width: 70,
-                height: 51,
-            },
-        ],
-    );
+    let bounds = one_of(&mut rng, &[WHOLE, Rect { x: 5, y: 3, width: 70, height: 51 }]);
     // Depths that Gaussians have, so that equal ones occur.
     let device = Device::new(&Config::default()).unwrap();
     let like = Some((depth.plane(Aspect::Depth).unwrap(), coefficients));
     let tested = GaussianState {
         depth_stencil: DepthStencil {
-            depth: Some(DepthTest {
-                compare: CompareOp::Always,
-                write: true,
-            }),
+            depth: Some(DepthTest { compare: CompareOp::Always, write: true }),
             ..DepthStencil::default()
         },
         ..state.clone()
     };
     let draw = draw_with_depth(seed, 300, tested, &device, WHOLE, like);
-    let depths: Vec<u32> = draw
-        .sorted
-        .splats
-        .iter()
-        .flatten()
-        .map(|g| g.look.depth)
-        .collect();
+    let depths: Vec<u32> = draw.sorted.splats.iter().flatten().map(|g| g.look.depth).collect();
     let count = (96 * 64 * samples) as usize;
     let mut before = Picture {
         color: Vec::with_capacity(count),
@@ -185,43 +141,21 @@ fn random_scene(seed: u64) -> Scene {
         // Large areas of one depth, some of which differ by sample.
         let [x, y] = [pixel % 96, pixel / 96];
         let area = x / 24 + y / 20 * 4;
-        let part = if area % 3 == 0 && x + y < 90 {
-            sample
-        } else {
-            0
-        };
-        before
-            .depth
-            .push(depths[(area * 31 + part * 7) as usize % depths.len()]);
+        let part = if area % 3 == 0 && x + y < 90 { sample } else { 0 };
+        before.depth.push(depths[(area * 31 + part * 7) as usize % depths.len()]);
         let stencil = ((x / 7 + y / 5 + part) % 4) as u8;
         before.stencil.push(if has_stencil { stencil } else { 0 });
         let texel = [0.125, 0.5, 0.25, 1.0].map(|c| c + 0.001 * (x % 9) as f32);
         let bytes = color.encode(texel);
         before.color.push(color.decode(&bytes));
     }
-    Scene {
-        seed,
-        state,
-        samples,
-        bounds,
-        color,
-        depth,
-        coefficients,
-        before,
-    }
+    Scene { seed, state, samples, bounds, color, depth, coefficients, before }
 }
 
 impl Scene {
     fn draw(&self, device: &Device) -> BinnedDraw {
         let depth = Some((self.depth.plane(Aspect::Depth).unwrap(), self.coefficients));
-        draw_with_depth(
-            self.seed,
-            300,
-            self.state.clone(),
-            device,
-            self.bounds,
-            depth,
-        )
+        draw_with_depth(self.seed, 300, self.state.clone(), device, self.bounds, depth)
     }
 
     /// Each sample for itself.
@@ -234,12 +168,7 @@ impl Scene {
         for at in 0..picture.depth.len() {
             let (pixel, sample) = (at as u32 / self.samples, at as u32 % self.samples);
             let [x, y] = [pixel % 96, pixel / 96];
-            let here = Rect {
-                x: x as i32,
-                y: y as i32,
-                width: 1,
-                height: 1,
-            };
+            let here = Rect { x: x as i32, y: y as i32, width: 1, height: 1 };
             if self.bounds.intersect(here).is_empty() || state.sample_mask >> sample & 1 == 0 {
                 continue;
             }
@@ -249,28 +178,18 @@ impl Scene {
                 Format::X8D24UnormPack32 => f64::from(stored) / 16_777_215.0,
                 _ => f32::from_bits(unordered(stored)).into(),
             };
-            if tests
-                .bounds
-                .is_some_and(|(least, greatest)| depth < least.into() || depth > greatest.into())
-            {
+            if tests.bounds.is_some_and(|(least, greatest)| depth < least.into() || depth > greatest.into()) {
                 continue;
             }
-            let face = tests
-                .stencil
-                .map(|[front, _]| front)
-                .filter(|_| has_stencil);
+            let face = tests.stencil.map(|[front, _]| front).filter(|_| has_stencil);
             let stencil_passes = face.is_none_or(|face| {
                 let masked = picture.stencil[at] & face.compare_mask;
-                face.compare
-                    .holds(face.reference & face.compare_mask, masked)
+                face.compare.holds(face.reference & face.compare_mask, masked)
             });
             let tile = [x / 16, y / 16];
             let inside = [x % 16, y % 16].map(|at| at as usize);
             let found = naive_sample(draw, tile, inside, level, |depth| {
-                stencil_passes
-                    && tests
-                        .depth
-                        .is_none_or(|test| test.compare.holds(depth, stored))
+                stencil_passes && tests.depth.is_none_or(|test| test.compare.holds(depth, stored))
             });
             if let Some(face) = face.filter(|_| found.reached) {
                 let op = match (stencil_passes, found.fragment.is_some()) {
@@ -344,9 +263,7 @@ impl Scene {
                 view.image.write_row(layout, place, bytes).unwrap();
             });
         };
-        write(&color, Aspect::Color, &|at| {
-            self.color.encode(before.color[at]).to_vec()
-        });
+        write(&color, Aspect::Color, &|at| self.color.encode(before.color[at]).to_vec());
         write(&depth, Aspect::Depth, &|at| {
             let code = before.depth[at];
             let word = if is_float { unordered(code) } else { code };
@@ -389,14 +306,8 @@ impl Scene {
         let stencils = read(&depth, Aspect::Stencil).into_iter();
         Picture {
             color: colors.map(|bytes| self.color.decode(&bytes)).collect(),
-            depth: depths
-                .map(|word| if is_float { ordered(word) } else { word })
-                .collect(),
-            stencil: if has_stencil {
-                stencils.map(|bytes| bytes[0]).collect()
-            } else {
-                before.stencil.clone()
-            },
+            depth: depths.map(|word| if is_float { ordered(word) } else { word }).collect(),
+            stencil: if has_stencil { stencils.map(|bytes| bytes[0]).collect() } else { before.stencil.clone() },
             passed: counters.get(Counter::SamplesPassed),
         }
     }
@@ -442,34 +353,17 @@ fn hidden_work(
     recorder: Option<Arc<Recorder>>,
     change: impl Fn(&mut BinnedDraw),
 ) -> Counters {
-    let device = Device::new(&Config {
-        recorder,
-        ..Config::default()
-    })
-    .unwrap();
+    let device = Device::new(&Config { recorder, ..Config::default() }).unwrap();
     if let Some(recorder) = &device.runtime().config().recorder {
         recorder.begin_frame(0, WHOLE);
     }
     let state = GaussianState {
         // No pixel finishes, so that what is hidden is all that differs.
         alpha_ceiling: 0.02,
-        depth_stencil: DepthStencil {
-            depth: Some(DepthTest {
-                compare,
-                write: false,
-            }),
-            ..DepthStencil::default()
-        },
+        depth_stencil: DepthStencil { depth: Some(DepthTest { compare, write: false }), ..DepthStencil::default() },
         ..defaults()
     };
-    let mut draw = draw_with_depth(
-        3,
-        300,
-        state,
-        &device,
-        WHOLE,
-        Some((Format::D32Sfloat, coefficients)),
-    );
+    let mut draw = draw_with_depth(3, 300, state, &device, WHOLE, Some((Format::D32Sfloat, coefficients)));
     change(&mut draw);
     if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref()) {
         recorder.add_draw(0, record);
@@ -487,19 +381,12 @@ fn hidden_work(
 
 #[gaurast_runner::test]
 fn what_is_behind_a_whole_tile_is_not_even_fetched() {
-    let (forward, reverse) = (
-        hidden(FORWARD, CompareOp::Less, 0.3),
-        hidden(REVERSE, CompareOp::Greater, 0.7),
-    );
+    let (forward, reverse) = (hidden(FORWARD, CompareOp::Less, 0.3), hidden(REVERSE, CompareOp::Greater, 0.7));
     let everything = hidden(FORWARD, CompareOp::Always, 0.3);
     for counters in [forward, reverse] {
         assert!(counters.get(Counter::GaussianTilesHidden) > 0);
-        let read = |counters: &Counters| {
-            (
-                counters.get(Counter::TilePairsEvaluated),
-                counters.get(Counter::BlockEvaluations),
-            )
-        };
+        let read =
+            |counters: &Counters| (counters.get(Counter::TilePairsEvaluated), counters.get(Counter::BlockEvaluations));
         let (pairs, blocks) = read(&counters);
         let (all_pairs, all_blocks) = read(&everything);
         assert!(pairs <= all_pairs && blocks < all_blocks);
@@ -531,18 +418,8 @@ fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
 fn the_trace_tells_what_depths_hide() {
     let tile_of = |coefficients, compare, stored: [f32; 256]| {
         let recorder = Arc::new(Recorder::default());
-        let counters = hidden_work(
-            coefficients,
-            compare,
-            stored,
-            Some(Arc::clone(&recorder)),
-            |_| {},
-        );
-        assert_eq!(
-            counters,
-            hidden_work(coefficients, compare, stored, None, |_| {}),
-            "recording changes no counter"
-        );
+        let counters = hidden_work(coefficients, compare, stored, Some(Arc::clone(&recorder)), |_| {});
+        assert_eq!(counters, hidden_work(coefficients, compare, stored, None, |_| {}), "recording changes no counter");
         let tile = recorder.trace().frames[0].draws[0].tiles[0].clone();
         (tile, counters)
     };
@@ -558,19 +435,10 @@ fn the_trace_tells_what_depths_hide() {
         let (tile, counters) = tile_of(coefficients, compare, stored);
         let (open, everything) = tile_of(coefficients, CompareOp::Always, stored);
         let reached = |tile: &TileWork| tile.runs.iter().map(|run| run.reached).sum::<u32>();
-        assert_eq!(
-            u64::from(tile.hidden()),
-            counters.get(Counter::GaussianTilesHidden)
-        );
-        assert_eq!(
-            u64::from(reached(&tile)),
-            counters.get(Counter::BlockEvaluations)
-        );
+        assert_eq!(u64::from(tile.hidden()), counters.get(Counter::GaussianTilesHidden));
+        assert_eq!(u64::from(reached(&tile)), counters.get(Counter::BlockEvaluations));
         assert_eq!(reached(&tile) + tile.hidden_blocks(), reached(&open));
-        assert_eq!(
-            u64::from(reached(&open)),
-            everything.get(Counter::BlockEvaluations)
-        );
+        assert_eq!(u64::from(reached(&open)), everything.get(Counter::BlockEvaluations));
         assert_eq!((tile.needed(), open.needed()), (tile.listed, tile.listed));
         assert_eq!((open.hidden(), open.hidden_blocks()), (0, 0));
         assert!(tile.hidden() > 0 && tile.hidden_blocks() > 0);

@@ -61,16 +61,10 @@ pub(in crate::raster) fn covers(primitive: &Primitive, sample: [i64; 2]) -> bool
 }
 
 /// The samples of the framebuffer that [`Coverage`] finds, within `clip`.
-fn fast<const N: usize>(
-    level: Level,
-    primitive: &Primitive,
-    positions: &[[i32; 2]],
-    clip: Rect,
-) -> Vec<[bool; N]> {
+fn fast<const N: usize>(level: Level, primitive: &Primitive, positions: &[[i32; 2]], clip: Rect) -> Vec<[bool; N]> {
     let mut out = vec![[false; N]; (SIZE * SIZE) as usize];
     let mut setup = TriangleSetup::default();
-    if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip, Needs::default()))
-    {
+    if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip, Needs::default())) {
         return out;
     }
     let mut coverage = Coverage::<N>::default();
@@ -93,34 +87,18 @@ fn fast<const N: usize>(
     out
 }
 
-const EVERYTHING: Rect = Rect {
-    x: 0,
-    y: 0,
-    width: SIZE as u32,
-    height: SIZE as u32,
-};
+const EVERYTHING: Rect = Rect { x: 0, y: 0, width: SIZE as u32, height: SIZE as u32 };
 
 /// Compares both ways for all samples, and returns the number of covered samples.
-fn compare<const N: usize>(
-    level: Level,
-    primitive: &Primitive,
-    positions: &[[i32; 2]],
-    clip: Rect,
-) -> usize {
+fn compare<const N: usize>(level: Level, primitive: &Primitive, positions: &[[i32; 2]], clip: Rect) -> usize {
     let fast = fast::<N>(level, primitive, positions, clip);
     let mut count = 0;
     for (at, samples) in fast.iter().enumerate() {
         let (x, y) = (at as i32 % SIZE, at as i32 / SIZE);
-        let inside = x >= clip.x
-            && y >= clip.y
-            && x < clip.x + clip.width as i32
-            && y < clip.y + clip.height as i32;
+        let inside = x >= clip.x && y >= clip.y && x < clip.x + clip.width as i32 && y < clip.y + clip.height as i32;
         for (sample, covered) in samples.iter().enumerate() {
             let [sx, sy] = positions[sample];
-            let sample = [
-                i64::from(x) * 256 + i64::from(sx),
-                i64::from(y) * 256 + i64::from(sy),
-            ];
+            let sample = [i64::from(x) * 256 + i64::from(sx), i64::from(y) * 256 + i64::from(sy)];
             let expected = inside && covers(primitive, sample);
             assert_eq!(*covered, expected, "{primitive:?} at {x}, {y}: {sample:?}");
             count += usize::from(expected);
@@ -140,13 +118,9 @@ fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
         4 => 1 << 28,
         _ => 8192,
     };
-    let middle = [
-        rng.random_range(-2000..18_000),
-        rng.random_range(-2000..18_000),
-    ];
-    let mut corners: [[i32; 2]; 3] = std::array::from_fn(|_| {
-        middle.map(|middle: i32| middle + rng.random_range(-spread..=spread))
-    });
+    let middle = [rng.random_range(-2000..18_000), rng.random_range(-2000..18_000)];
+    let mut corners: [[i32; 2]; 3] =
+        std::array::from_fn(|_| middle.map(|middle: i32| middle + rng.random_range(-spread..=spread)));
     match kind {
         // On centres and corners of pixels, so that samples lie on edges.
         5 => {
@@ -157,10 +131,7 @@ fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
         // A sliver.
         6 => {
             let step = rng.random_range(-3..=3);
-            corners[2] = [
-                corners[1][0] + step,
-                corners[1][1] + rng.random_range(-3..=3),
-            ];
+            corners[2] = [corners[1][0] + step, corners[1][1] + rng.random_range(-3..=3)];
         }
         _ => {}
     }
@@ -228,9 +199,7 @@ fn a_point_covers_a_half_open_square() {
     // From (1.5, 1.5) to (3.5, 3.5): the centres at 1.5 and 2.5 are inside, those at 3.5 are not.
     let square = primitive([[384, 384], [896, 384], [896, 896]], PrimitiveKind::Point);
     let covered = fast::<1>(Level::new(), &square, &CENTER, EVERYTHING);
-    let pixels: Vec<_> = (0..SIZE * SIZE)
-        .filter(|at| covered[*at as usize][0])
-        .map(|at| (at % SIZE, at / SIZE))
-        .collect();
+    let pixels: Vec<_> =
+        (0..SIZE * SIZE).filter(|at| covered[*at as usize][0]).map(|at| (at % SIZE, at / SIZE)).collect();
     assert_eq!(pixels, [(1, 1), (2, 1), (1, 2), (2, 2)]);
 }

@@ -16,10 +16,7 @@ fn tiles(scene: &Scene) -> f64 {
 
 /// The models; the null model is the first.
 pub const MODELS: [Model; 3] = [
-    Model {
-        name: "baseline / constant (null)",
-        features: |scene| vec![scene.baseline_ms],
-    },
+    Model { name: "baseline / constant (null)", features: |scene| vec![scene.baseline_ms] },
     Model {
         name: "pairs from the baseline, and cycles per tile",
         features: |scene| vec![scene.baseline_ms, tiles(scene)],
@@ -32,24 +29,18 @@ pub const MODELS: [Model; 3] = [
 
 /// The predicted raster time of a scene in ms, calibrated on the six others.
 pub fn leave_one_out(model: &Model, left_out: usize) -> f64 {
-    let others: Vec<_> = (0..SCENES.len())
-        .filter(|&index| index != left_out)
-        .collect();
+    let others: Vec<_> = (0..SCENES.len()).filter(|&index| index != left_out).collect();
     let features = (model.features)(&SCENES[left_out]);
     if features.len() == 1 {
         // The null model's constant is the ratio of the sums.
-        let sum =
-            |of: fn(&Scene) -> f64| others.iter().map(|&index| of(&SCENES[index])).sum::<f64>();
+        let sum = |of: fn(&Scene) -> f64| others.iter().map(|&index| of(&SCENES[index])).sum::<f64>();
         return features[0] * sum(|scene| scene.gaurast_ms) / sum(|scene| scene.baseline_ms);
     }
     // Least squares of relative errors, two unknowns.
     let (mut a, mut b, mut c, mut p, mut q) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for &index in &others {
         let scene = &SCENES[index];
-        let f: Vec<_> = (model.features)(scene)
-            .iter()
-            .map(|x| x / scene.gaurast_ms)
-            .collect();
+        let f: Vec<_> = (model.features)(scene).iter().map(|x| x / scene.gaurast_ms).collect();
         a += f[0] * f[0];
         b += f[0] * f[1];
         c += f[1] * f[1];

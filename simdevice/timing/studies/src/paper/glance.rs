@@ -33,35 +33,17 @@ const SHOWN: [(Label, &[&str]); 4] = [
             "Mini-Splatting pipelined: end-to-end speed-up",
         ],
     ),
-    (
-        Label::Solved,
-        &[
-            "raster speed-up, 3DGS",
-            "raster energy, 3DGS",
-            "baseline FPS, 3DGS",
-            "area ratio to GSCore",
-        ],
-    ),
+    (Label::Solved, &["raster speed-up, 3DGS", "raster energy, 3DGS", "baseline FPS, 3DGS", "area ratio to GSCore"]),
     (
         Label::Input,
-        &[
-            "modules of the scaled design",
-            "PEs of a module",
-            "clock",
-            "typical power of a module",
-            "SoC power",
-        ],
+        &["modules of the scaled design", "PEs of a module", "clock", "typical power of a module", "SoC power"],
     ),
 ];
 
 /// The section, of the rows of the others.
 pub fn section(report: &[Section]) -> Section {
     let rows = || report.iter().flat_map(|section| &section.rows);
-    let found = |item: &str, label: Label| {
-        rows()
-            .find(|row| row.item == item && row.label == label)
-            .cloned()
-    };
+    let found = |item: &str, label: Label| rows().find(|row| row.item == item && row.label == label).cloned();
     let mut shown = Vec::new();
     for (label, items) in SHOWN {
         shown.extend(items.iter().filter_map(|item| found(item, label)));
@@ -92,9 +74,6 @@ fn raster_times() -> Row {
     };
     let baseline = range(SCENES.map(|scene| scene.baseline_ms));
     let ours = range(SCENES.map(|scene| scene.gaurast_ms));
-    Row::input(
-        "raster times of seven scenes",
-        format!("{baseline}; {ours}"),
-    )
-    .note("the baseline's; GauRast's. Pairs of a tile and a Gaussian are solved from the latter")
+    Row::input("raster times of seven scenes", format!("{baseline}; {ours}"))
+        .note("the baseline's; GauRast's. Pairs of a tile and a Gaussian are solved from the latter")
 }

@@ -1,8 +1,8 @@
 //! The paper's headline numbers: their consequences, their consistency, and the model's values.
 
 use super::numbers::{
-    AREA_RATIO, AREA_SOC, BASELINE_FPS, FPS, GSCORE_MM2, GSCORE_RATIO, M2_RATE, M2_SPEEDUP,
-    MODULE_W, MODULES, RASTER_ENERGY, RASTER_SHARE, RASTER_SPEEDUP, SCENES, SOC_W, SPEEDUP, mean,
+    AREA_RATIO, AREA_SOC, BASELINE_FPS, FPS, GSCORE_MM2, GSCORE_RATIO, M2_RATE, M2_SPEEDUP, MODULE_W, MODULES,
+    RASTER_ENERGY, RASTER_SHARE, RASTER_SPEEDUP, SCENES, SOC_W, SPEEDUP, mean,
 };
 use super::table::{Label, Row, Section};
 use crate::area;
@@ -21,55 +21,24 @@ fn raster() -> Section {
     let of_sums = mean(|s| s.baseline_ms) / mean(|s| s.gaurast_ms);
     let watts = MODULES * MODULE_W;
     let rows = vec![
-        Row::numbers(
-            "raster speed-up, 3DGS",
-            "x",
-            [RASTER_SPEEDUP[0], ratio],
-            1,
-            Label::Solved,
-        )
-        .note(format!(
-            "mean of the scenes' ratios; ratio of the sums {of_sums:.1}x"
-        )),
-        Row::numbers(
-            "raster energy, 3DGS",
-            "x",
-            [RASTER_ENERGY[0], of_sums * SOC_W / watts],
-            1,
-            Label::Solved,
-        )
-        .note("10 W x baseline over 15 x 1.7 W x GauRast; see below"),
-        Row::new(
-            "raster speed-up, Mini-Splatting",
-            "20x",
-            "20x",
-            Label::Input,
-        )
-        .note("no times are published; enters the schedules below"),
+        Row::numbers("raster speed-up, 3DGS", "x", [RASTER_SPEEDUP[0], ratio], 1, Label::Solved)
+            .note(format!("mean of the scenes' ratios; ratio of the sums {of_sums:.1}x")),
+        Row::numbers("raster energy, 3DGS", "x", [RASTER_ENERGY[0], of_sums * SOC_W / watts], 1, Label::Solved)
+            .note("10 W x baseline over 15 x 1.7 W x GauRast; see below"),
+        Row::new("raster speed-up, Mini-Splatting", "20x", "20x", Label::Input)
+            .note("no times are published; enters the schedules below"),
         Row::new("raster energy, Mini-Splatting", "22x", "", Label::Input).note(format!(
             "no times are published; 20x at 25.5 W against 10 W is {:.1}x",
             RASTER_SPEEDUP[1] * SOC_W / watts
         )),
     ];
-    Section {
-        title: "Headlines of the raster stage",
-        text: "From the published times and powers.".to_owned(),
-        rows,
-    }
+    Section { title: "Headlines of the raster stage", text: "From the published times and powers.".to_owned(), rows }
 }
 
 /// Frames per second of the schedule model for stages 1-2 and stage 3 of these milliseconds.
 fn fps(before: f64, raster: f64, collaborative: bool) -> f64 {
-    let stages = Stages {
-        preprocess: before,
-        raster,
-        ..Stages::default()
-    };
-    let policy = Policy {
-        collaborative,
-        frames_in_flight: 2,
-        has_rasterizer: true,
-    };
+    let stages = Stages { preprocess: before, raster, ..Stages::default() };
+    let policy = Policy { collaborative, frames_in_flight: 2, has_rasterizer: true };
     schedule::fps(stages, policy)
 }
 
@@ -80,36 +49,16 @@ fn schedules() -> Section {
     let before = 1e3 / FPS[0];
     let pace = fps(before, ours, true);
     rows.push(
-        Row::new(
-            "3DGS pipelined: stages 1-2",
-            "",
-            format!("{before:.1} ms"),
-            Label::Solved,
-        )
-        .note(format!(
-            "24 FPS is {before:.1} ms a frame, more than the mean raster {ours:.1} ms"
-        )),
+        Row::new("3DGS pipelined: stages 1-2", "", format!("{before:.1} ms"), Label::Solved)
+            .note(format!("24 FPS is {before:.1} ms a frame, more than the mean raster {ours:.1} ms")),
     );
     let speedup = pace * (before + baseline) * 1e-3;
     rows.push(
-        Row::numbers(
-            "3DGS pipelined: end-to-end speed-up",
-            "x",
-            [SPEEDUP[0], speedup],
-            2,
-            Label::Solved,
-        )
-        .note(format!("({before:.1} + {baseline:.1}) / {before:.1}")),
+        Row::numbers("3DGS pipelined: end-to-end speed-up", "x", [SPEEDUP[0], speedup], 2, Label::Solved)
+            .note(format!("({before:.1} + {baseline:.1}) / {before:.1}")),
     );
     rows.push(
-        Row::numbers(
-            "3DGS pipelined: FPS",
-            "",
-            [FPS[0], pace],
-            1,
-            Label::Calibrated,
-        )
-        .note("by choice of stages 1-2"),
+        Row::numbers("3DGS pipelined: FPS", "", [FPS[0], pace], 1, Label::Calibrated).note("by choice of stages 1-2"),
     );
     let share = baseline / (before + baseline);
     rows.push(
@@ -124,13 +73,8 @@ fn schedules() -> Section {
     // If serial, (s + baseline) / (s + ours) is the speed-up.
     let before = (baseline - SPEEDUP[0] * ours) / (SPEEDUP[0] - 1.0);
     rows.push(
-        Row::new(
-            "3DGS serial: stages 1-2",
-            "",
-            format!("{before:.1} ms"),
-            Label::Solved,
-        )
-        .note(format!("({baseline:.1} - 6 x {ours:.1}) / 5")),
+        Row::new("3DGS serial: stages 1-2", "", format!("{before:.1} ms"), Label::Solved)
+            .note(format!("({baseline:.1} - 6 x {ours:.1}) / 5")),
     );
     let pace = fps(before, ours, false);
     rows.push(
@@ -143,13 +87,7 @@ fn schedules() -> Section {
         )
         .note("by choice of stages 1-2"),
     );
-    rows.push(Row::numbers(
-        "3DGS serial: FPS",
-        "",
-        [FPS[0], pace],
-        1,
-        Label::Solved,
-    ));
+    rows.push(Row::numbers("3DGS serial: FPS", "", [FPS[0], pace], 1, Label::Solved));
     rows.push(
         Row::new(
             "3DGS serial: raster share of the baseline",
@@ -183,11 +121,7 @@ fn slowest(before: f64) -> f64 {
 }
 
 fn fastest(before: f64) -> f64 {
-    1e3 / (before
-        + SCENES
-            .iter()
-            .map(|s| s.baseline_ms)
-            .fold(f64::INFINITY, f64::min))
+    1e3 / (before + SCENES.iter().map(|s| s.baseline_ms).fold(f64::INFINITY, f64::min))
 }
 
 fn mini_splatting() -> Vec<Row> {
@@ -205,13 +139,7 @@ fn mini_splatting() -> Vec<Row> {
             Label::Solved,
         )
         .note("46 FPS, 4x and 20x"),
-        Row::numbers(
-            "Mini-Splatting pipelined: FPS",
-            "",
-            [FPS[1], pace],
-            1,
-            Label::Calibrated,
-        ),
+        Row::numbers("Mini-Splatting pipelined: FPS", "", [FPS[1], pace], 1, Label::Calibrated),
         Row::numbers(
             "Mini-Splatting pipelined: end-to-end speed-up",
             "x",
@@ -222,10 +150,7 @@ fn mini_splatting() -> Vec<Row> {
         Row::new(
             "Mini-Splatting serial: stages 1-2, baseline raster, GauRast raster",
             "",
-            format!(
-                "{serial:.1} / {:.1} / {serial_raster:.1} ms",
-                serial_raster * RASTER_SPEEDUP[1]
-            ),
+            format!("{serial:.1} / {:.1} / {serial_raster:.1} ms", serial_raster * RASTER_SPEEDUP[1]),
             Label::Solved,
         )
         .note("the same three headlines, fitted as well"),
@@ -251,37 +176,14 @@ fn inconsistencies() -> Section {
     let needed = of_sums * SOC_W / RASTER_ENERGY[0] / MODULES;
     let bicycle = SCENES[0];
     let mut rows = vec![
-        Row::new(
-            "PEs",
-            "300",
-            format!("{:.0}", MODULES * 16.0),
-            Label::Solved,
-        )
-        .note(
-            "\"15 instances of the 16-PE module\": 15 x 16; 300 would be 15 x 20, or 18.75 modules",
-        ),
-        Row::numbers(
-            "raster energy ratio",
-            "x",
-            [RASTER_ENERGY[0], of_sums * SOC_W / watts],
-            1,
-            Label::Solved,
-        )
-        .note(format!(
-            "15 x 1.7 W = {watts} W, against 10 W: {of_sums:.1} x 10 / {watts}"
-        )),
-        Row::new(
-            "power of a module for 24x",
-            "1.7 W",
-            format!("{needed:.2} W"),
-            Label::Solved,
-        )
-        .note(format!("{of_sums:.1} x 10 W / 24 / 15")),
+        Row::new("PEs", "300", format!("{:.0}", MODULES * 16.0), Label::Solved)
+            .note("\"15 instances of the 16-PE module\": 15 x 16; 300 would be 15 x 20, or 18.75 modules"),
+        Row::numbers("raster energy ratio", "x", [RASTER_ENERGY[0], of_sums * SOC_W / watts], 1, Label::Solved)
+            .note(format!("15 x 1.7 W = {watts} W, against 10 W: {of_sums:.1} x 10 / {watts}")),
+        Row::new("power of a module for 24x", "1.7 W", format!("{needed:.2} W"), Label::Solved)
+            .note(format!("{of_sums:.1} x 10 W / 24 / 15")),
     ];
-    for scene in SCENES
-        .iter()
-        .filter(|scene| RASTER_SHARE * 1e3 / scene.baseline_ms > BASELINE_FPS[1])
-    {
+    for scene in SCENES.iter().filter(|scene| RASTER_SHARE * 1e3 / scene.baseline_ms > BASELINE_FPS[1]) {
         let fps = RASTER_SHARE * 1e3 / scene.baseline_ms;
         rows.push(
             Row::new(
@@ -290,40 +192,24 @@ fn inconsistencies() -> Section {
                 format!("{fps:.1}"),
                 Label::Solved,
             )
-            .note(format!(
-                "0.8 / {} ms; more than 80 % would be faster still",
-                scene.baseline_ms
-            )),
+            .note(format!("0.8 / {} ms; more than 80 % would be faster still", scene.baseline_ms)),
         );
     }
     let over_m2 = bicycle.baseline_ms / M2_RATE / bicycle.gaurast_ms;
     rows.push(
-        Row::numbers(
-            "bicycle, speed-up over the M2 Pro",
-            "x",
-            [M2_SPEEDUP, over_m2],
-            1,
-            Label::Solved,
-        )
-        .note(format!(
-            "if it is 2.6 times the baseline: {} / 2.6 / {}",
-            bicycle.baseline_ms, bicycle.gaurast_ms
-        )),
+        Row::numbers("bicycle, speed-up over the M2 Pro", "x", [M2_SPEEDUP, over_m2], 1, Label::Solved)
+            .note(format!("if it is 2.6 times the baseline: {} / 2.6 / {}", bicycle.baseline_ms, bicycle.gaurast_ms)),
     );
     rows.extend(m2_rates().unwrap_or_default());
     Section {
         title: "Where the paper's numbers do not fit together",
-        text: "The arithmetic, with no judgement of which number is meant otherwise than it reads."
-            .to_owned(),
+        text: "The arithmetic, with no judgement of which number is meant otherwise than it reads.".to_owned(),
         rows,
     }
 }
 
 fn m2_rates() -> Result<Vec<Row>, ConfigError> {
-    let (pro, paper) = (
-        Config::preset("m2-pro", &[])?,
-        Config::preset("orin-nx-10w", &[])?,
-    );
+    let (pro, paper) = (Config::preset("m2-pro", &[])?, Config::preset("orin-nx-10w", &[])?);
     let m2 = pro.shader.tflops();
     let bicycle = &SCENES[0];
     let stage_3_ms = |config| shader_cores::stage_3_ms(1.0, config);
@@ -376,17 +262,9 @@ fn areas() -> Option<Section> {
             1,
             Label::Calibrated,
         )
-        .note(format!(
-            "by choice of the exponential's area, {:.0} um2 at 28 nm",
-            area.exponential * 1e6
-        )),
-        Row::new(
-            "area added, 240 PEs, fp32",
-            "",
-            format!("{:.2} mm2", area.added),
-            Label::Calibrated,
-        )
-        .note("28 nm, arithmetic units alone"),
+        .note(format!("by choice of the exponential's area, {:.0} um2 at 28 nm", area.exponential * 1e6)),
+        Row::new("area added, 240 PEs, fp32", "", format!("{:.2} mm2", area.added), Label::Calibrated)
+            .note("28 nm, arithmetic units alone"),
         Row::numbers(
             "area added over the SoC",
             " %",
@@ -398,25 +276,10 @@ fn areas() -> Option<Section> {
             "{:.2} mm2 in the SoC's technology (assumed: {} times denser) of {} mm2",
             area.added_in_soc, config.soc.node_scaling, config.soc.area_mm2
         )),
-        Row::numbers(
-            "area ratio to GSCore",
-            "x",
-            [GSCORE_RATIO, gscore / ours],
-            1,
-            Label::Solved,
-        )
-        .note("3.95 / 0.16 mm2; the enhancement alone, GSCore whole"),
-        Row::numbers(
-            "area added for GSCore's speed, fp16",
-            " mm2",
-            [ours, area.added_half],
-            2,
-            Label::Calibrated,
-        )
-        .note(format!(
-            "240 PEs with fp16 units; 0.16 mm2 would hold {:.0} PEs",
-            ours / half_per_pe
-        )),
+        Row::numbers("area ratio to GSCore", "x", [GSCORE_RATIO, gscore / ours], 1, Label::Solved)
+            .note("3.95 / 0.16 mm2; the enhancement alone, GSCore whole"),
+        Row::numbers("area added for GSCore's speed, fp16", " mm2", [ours, area.added_half], 2, Label::Calibrated)
+            .note(format!("240 PEs with fp16 units; 0.16 mm2 would hold {:.0} PEs", ours / half_per_pe)),
         Row::input("area of GSCore", "3.95 mm2"),
     ];
     Some(Section {

@@ -17,20 +17,8 @@ pub struct Scene {
     pub size: [u32; 2],
 }
 
-const fn scene(
-    name: &'static str,
-    baseline_ms: f64,
-    gaurast_ms: f64,
-    gaussians: f64,
-    size: [u32; 2],
-) -> Scene {
-    Scene {
-        name,
-        baseline_ms,
-        gaurast_ms,
-        gaussians,
-        size,
-    }
+const fn scene(name: &'static str, baseline_ms: f64, gaurast_ms: f64, gaussians: f64, size: [u32; 2]) -> Scene {
+    Scene { name, baseline_ms, gaurast_ms, gaussians, size }
 }
 
 /// The scenes, in the paper's order.
@@ -89,7 +77,8 @@ pub fn inputs() -> Section {
         Row::input("typical power of a module", "1.7 W"),
         Row::input("numbers in, per primitive", "9").note("Table II"),
         Row::input("numbers out, per pixel", "3").note("Table II"),
-        Row::input("shared units of a PE", "9 add, 9 mul").note("Table II; computed and counted by the scalar PE's tests"),
+        Row::input("shared units of a PE", "9 add, 9 mul")
+            .note("Table II; computed and counted by the scalar PE's tests"),
         Row::input("added for triangles", "1 div").note("Table II; the same"),
         Row::input("added for Gaussians", "2 add, 1 mul, 1 exp")
             .note("Table II; the same. They suffice with the opacity folded into the exponent, which is modelled"),
@@ -98,13 +87,23 @@ pub fn inputs() -> Section {
             .note("15 x 16 = 240; preset paper-300 has 15 x 20"),
         Row::input("SoC power", "10 W"),
         Row::input("speed-up of GSCore over Xavier NX", "20x").note("as GauRast tells of it; enters nothing"),
-        Row::without_paper("speed-up of GSCore over a mobile GPU", "15.86x", Label::Cited, "GSCore's own abstract (ASPLOS 2024); enters nothing"),
+        Row::without_paper(
+            "speed-up of GSCore over a mobile GPU",
+            "15.86x",
+            Label::Cited,
+            "GSCore's own abstract (ASPLOS 2024); enters nothing",
+        ),
         Row::input("SoC of the evaluation", "Jetson Orin NX, 10 W mode"),
         Row::without_paper("shader cores, 10 W mode", "4 SM, 612 MHz", Label::Cited, "NVIDIA's power mode table"),
         Row::without_paper("bandwidth, 10 W mode", "68.3 GB/s", Label::Cited, "NVIDIA's data sheet"),
         Row::without_paper("shader cores, maximum mode", "8 SM, 918 MHz", Label::Cited, "NVIDIA's power mode table"),
         Row::without_paper("bandwidth, maximum mode", "102.4 GB/s", Label::Cited, "NVIDIA's data sheet"),
-        Row::without_paper("tile side", "16 pixels", Label::Cited, "the original 3DGS code; that the hardware's tiles are as large is assumed"),
+        Row::without_paper(
+            "tile side",
+            "16 pixels",
+            Label::Cited,
+            "the original 3DGS code; that the hardware's tiles are as large is assumed",
+        ),
         Row::without_paper(
             "cycles between pixels of a PE",
             "1",

@@ -51,11 +51,7 @@ struct Bound {
 impl Bound {
     fn of(scene: &Scene, result: &Simulation) -> Self {
         let before_ms = result.stages_alone.preprocess + result.stages_alone.sort;
-        Self {
-            before_ms,
-            fps: 1e3 / before_ms,
-            speedup: (before_ms + scene.baseline_ms) / before_ms,
-        }
+        Self { before_ms, fps: 1e3 / before_ms, speedup: (before_ms + scene.baseline_ms) / before_ms }
     }
 }
 
@@ -92,19 +88,14 @@ pub fn section() -> Result<Section, ConfigError> {
                 )),
             );
             scenes.push(
-                Row::new(
-                    format!("{}, FPS, {paired}", scene.name),
-                    "",
-                    format!("{:.1}", result.fps),
-                    Label::Predicted,
-                )
-                .note(format!(
-                    "{:.1}x; raster {:.1} ms beside stages 1-2, {:.1} ms alone; {:.0} mJ a frame",
-                    result.speedup,
-                    result.stages.raster,
-                    result.stages_alone.raster,
-                    result.energy.total(),
-                )),
+                Row::new(format!("{}, FPS, {paired}", scene.name), "", format!("{:.1}", result.fps), Label::Predicted)
+                    .note(format!(
+                        "{:.1}x; raster {:.1} ms beside stages 1-2, {:.1} ms alone; {:.0} mJ a frame",
+                        result.speedup,
+                        result.stages.raster,
+                        result.stages_alone.raster,
+                        result.energy.total(),
+                    )),
             );
         }
         let bounds = || results.iter().map(|(bound, _)| bound);
@@ -115,25 +106,10 @@ pub fn section() -> Result<Section, ConfigError> {
                 "mean of the scenes; stages 1-2 from this project's operation counts and published counts of Gaussians",
             ));
         };
-        row(
-            "FPS without a raster stage",
-            "",
-            [FPS[0], mean(bounds().map(|b| b.fps))],
-            1,
-        );
-        row(
-            "speed-up without a raster stage",
-            "x",
-            [SPEEDUP[0], mean(bounds().map(|b| b.speedup))],
-            2,
-        );
+        row("FPS without a raster stage", "", [FPS[0], mean(bounds().map(|b| b.fps))], 1);
+        row("speed-up without a raster stage", "x", [SPEEDUP[0], mean(bounds().map(|b| b.speedup))], 2);
         row("FPS", "", [FPS[0], mean(simulated().map(|s| s.fps))], 1);
-        row(
-            "end-to-end speed-up",
-            "x",
-            [SPEEDUP[0], mean(simulated().map(|s| s.speedup))],
-            2,
-        );
+        row("end-to-end speed-up", "x", [SPEEDUP[0], mean(simulated().map(|s| s.speedup))], 2);
     }
     rows.extend(scenes);
     Ok(Section {
@@ -157,18 +133,12 @@ mod tests {
         let config = Config::preset(DEFAULT_PRESET, &[]).unwrap();
         let mut before = f64::INFINITY;
         for listed in BAND {
-            let results: Vec<_> = SCENES
-                .iter()
-                .map(|scene| (scene, simulate(&frame(scene, listed, &config), &config)))
-                .collect();
+            let results: Vec<_> =
+                SCENES.iter().map(|scene| (scene, simulate(&frame(scene, listed, &config), &config))).collect();
             for (scene, result) in &results {
                 let bound = Bound::of(scene, result);
                 assert!(result.fps <= bound.fps * (1.0 + 1e-9), "{}", scene.name);
-                assert!(
-                    result.stages.raster >= result.stages_alone.raster,
-                    "{}",
-                    scene.name
-                );
+                assert!(result.stages.raster >= result.stages_alone.raster, "{}", scene.name);
                 // Both sides have the same lists.
                 assert_eq!(result.gains.lists, 1.0);
             }

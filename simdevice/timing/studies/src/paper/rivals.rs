@@ -36,10 +36,7 @@ fn mean_error(predicted: impl Fn(usize) -> f64) -> f64 {
 
 /// The mean of the other scenes' baselines.
 fn mean_null(left_out: usize) -> f64 {
-    let others = SCENES
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| *index != left_out);
+    let others = SCENES.iter().enumerate().filter(|(index, _)| *index != left_out);
     others.map(|(_, scene)| scene.baseline_ms).sum::<f64>() / (SCENES.len() - 1) as f64
 }
 
@@ -48,8 +45,7 @@ fn mean_null(left_out: usize) -> f64 {
 fn affine_null(left_out: usize) -> f64 {
     let others = || {
         let all = SCENES.iter().enumerate();
-        all.filter(|(index, _)| *index != left_out)
-            .map(|(_, scene)| scene)
+        all.filter(|(index, _)| *index != left_out).map(|(_, scene)| scene)
     };
     let count = (SCENES.len() - 1) as f64;
     let mean = |of: fn(&Scene) -> f64| others().map(of).sum::<f64>() / count;
@@ -64,34 +60,15 @@ fn affine_null(left_out: usize) -> f64 {
 
 fn baseline(config: &Config) -> Section {
     let mut rows = Vec::new();
-    let results: Vec<_> = SCENES
-        .iter()
-        .map(|scene| both(scene, config).map(|frame| simt::simulate(&frame, config)))
-        .collect();
-    let machine =
-        "of the seven baselines; from microarchitecture, steps of the kernel and the implied pairs";
+    let results: Vec<_> =
+        SCENES.iter().map(|scene| both(scene, config).map(|frame| simt::simulate(&frame, config))).collect();
+    let machine = "of the seven baselines; from microarchitecture, steps of the kernel and the implied pairs";
     let others = "of the seven baselines; from the other six and the scene's own GauRast time";
     let errors = [
-        (
-            "SIMT machine, each warp blends",
-            mean_error(|index| results[index][1].milliseconds()),
-            machine,
-        ),
-        (
-            "SIMT machine, no warp blends",
-            mean_error(|index| results[index][0].milliseconds()),
-            machine,
-        ),
-        (
-            "mean of the other scenes (null)",
-            mean_error(mean_null),
-            "of the seven baselines; from the other six",
-        ),
-        (
-            "line through the other scenes (null)",
-            mean_error(affine_null),
-            others,
-        ),
+        ("SIMT machine, each warp blends", mean_error(|index| results[index][1].milliseconds()), machine),
+        ("SIMT machine, no warp blends", mean_error(|index| results[index][0].milliseconds()), machine),
+        ("mean of the other scenes (null)", mean_error(mean_null), "of the seven baselines; from the other six"),
+        ("line through the other scenes (null)", mean_error(affine_null), others),
     ];
     for (name, error, from) in errors {
         let model = format!("{:.1} %", error * 100.0);
@@ -126,18 +103,9 @@ fn baseline(config: &Config) -> Section {
         );
     }
     for parameter in simt::MACHINE {
-        let label = if parameter.source.starts_with("assumed") {
-            Label::Assumed
-        } else {
-            Label::Cited
-        };
+        let label = if parameter.source.starts_with("assumed") { Label::Assumed } else { Label::Cited };
         let value = format!("{}", parameter.value);
-        rows.push(Row::without_paper(
-            parameter.name,
-            value,
-            label,
-            parameter.source,
-        ));
+        rows.push(Row::without_paper(parameter.name, value, label, parameter.source));
     }
     Section {
         title: "The baseline as a SIMT machine",
@@ -161,15 +129,11 @@ fn sorting(config: &Config) -> Section {
         let time = |work| roofline(work, &config.shader, &config.memory).milliseconds();
         let (before, sort) = (time(&one), time(&two));
         let raster = &config.rasterizer;
-        let pixels =
-            f64::from(scene.size[0] * scene.size[1] * raster.numbers_out * raster.number_bytes);
+        let pixels = f64::from(scene.size[0] * scene.size[1] * raster.numbers_out * raster.number_bytes);
         let moved = work.pairs() as f64 * f64::from(raster.primitive_bytes()) + pixels;
         let all = one.bytes + two.bytes + moved;
-        let of = [
-            sort / (before + sort + scene.baseline_ms),
-            sort / (before + sort).max(scene.gaurast_ms),
-            two.bytes / all,
-        ];
+        let of =
+            [sort / (before + sort + scene.baseline_ms), sort / (before + sort).max(scene.gaurast_ms), two.bytes / all];
         for (sum, share) in shares.iter_mut().zip(of) {
             *sum += share / SCENES.len() as f64;
         }
@@ -192,17 +156,12 @@ fn sorting(config: &Config) -> Section {
     }
     rows.insert(
         0,
-        Row::new(
-            "sorting, mean of the scenes",
-            "",
-            format!("{:.0} % of a frame", shares[1] * 100.0),
-            Label::Predicted,
-        )
-        .note(format!(
-            "{:.0} % of the baseline's frame, {:.0} % of all bytes",
-            shares[0] * 100.0,
-            shares[2] * 100.0
-        )),
+        Row::new("sorting, mean of the scenes", "", format!("{:.0} % of a frame", shares[1] * 100.0), Label::Predicted)
+            .note(format!(
+                "{:.0} % of the baseline's frame, {:.0} % of all bytes",
+                shares[0] * 100.0,
+                shares[2] * 100.0
+            )),
     );
     Section {
         title: "Sorting, once rasterizing is fast",
@@ -244,15 +203,8 @@ fn others(config: &Config) -> Section {
             ("source", published.source),
         ];
         let parts = parts.iter().filter(|(_, text)| !text.is_empty());
-        let note: Vec<_> = parts
-            .map(|(name, text)| format!("{name}: {text}"))
-            .collect();
-        rows.push(Row::without_paper(
-            published.name,
-            published.number,
-            Label::Cited,
-            note.join("; "),
-        ));
+        let note: Vec<_> = parts.map(|(name, text)| format!("{name}: {text}")).collect();
+        rows.push(Row::without_paper(published.name, published.number, Label::Cited, note.join("; ")));
     }
     Section {
         title: "Other ways to draw Gaussians",

@@ -18,8 +18,7 @@ pub fn operations_per_evaluation(config: &Config) -> f64 {
         let pes = f64::from(config.rasterizer.pes());
         implied_pairs(ms, pes, config.rasterizer.clock_ghz) * f64::from(TILE_PIXELS)
     };
-    mean(|s| s.baseline_ms) * lanes * config.baseline.efficiency
-        / mean(|s| evaluations(s.gaurast_ms))
+    mean(|s| s.baseline_ms) * lanes * config.baseline.efficiency / mean(|s| evaluations(s.gaurast_ms))
 }
 
 pub fn sections() -> Vec<Section> {
@@ -31,23 +30,13 @@ pub fn sections() -> Vec<Section> {
 fn times() -> Section {
     let mut rows = Vec::new();
     for scene in &SCENES {
-        rows.push(Row::input(
-            format!("{}, baseline raster", scene.name),
-            format!("{} ms", scene.baseline_ms),
-        ));
+        rows.push(Row::input(format!("{}, baseline raster", scene.name), format!("{} ms", scene.baseline_ms)));
         rows.push(
-            Row::input(
-                format!("{}, GauRast raster", scene.name),
-                format!("{} ms", scene.gaurast_ms),
-            )
-            .note(format!("{:.1}x", scene.baseline_ms / scene.gaurast_ms)),
+            Row::input(format!("{}, GauRast raster", scene.name), format!("{} ms", scene.gaurast_ms))
+                .note(format!("{:.1}x", scene.baseline_ms / scene.gaurast_ms)),
         );
     }
-    Section {
-        title: "Raster times",
-        text: "Stage 3 as published, in the 10 W mode.".to_owned(),
-        rows,
-    }
+    Section { title: "Raster times", text: "Stage 3 as published, in the 10 W mode.".to_owned(), rows }
 }
 
 fn implied() -> Section {
@@ -56,13 +45,11 @@ fn implied() -> Section {
         let [fewer, more] = [240.0, 300.0].map(|pes| implied_pairs(scene.gaurast_ms, pes, 1.0));
         let model = format!("{:.1} / {:.1} M", fewer * 1e-6, more * 1e-6);
         let traffic = fewer * 36.0 / (scene.gaurast_ms * 1e6);
-        rows.push(
-            Row::new(format!("{}, pairs", scene.name), "", model, Label::Solved).note(format!(
-                "{:.1} pairs a Gaussian, {:.0} a tile; 36 bytes each are {traffic:.1} of 68.3 GB/s",
-                fewer * 1e-6 / scene.gaussians,
-                fewer / f64::from(scene.size[0].div_ceil(16) * scene.size[1].div_ceil(16)),
-            )),
-        );
+        rows.push(Row::new(format!("{}, pairs", scene.name), "", model, Label::Solved).note(format!(
+            "{:.1} pairs a Gaussian, {:.0} a tile; 36 bytes each are {traffic:.1} of 68.3 GB/s",
+            fewer * 1e-6 / scene.gaussians,
+            fewer / f64::from(scene.size[0].div_ceil(16) * scene.size[1].div_ceil(16)),
+        )));
     }
     Section {
         title: "Pairs that the times imply",
@@ -82,13 +69,8 @@ fn model() -> Result<Vec<Section>, ConfigError> {
     let config = Config::preset("paper-15x16", &[])?;
     let operations = operations_per_evaluation(&config);
     let mut rows = vec![
-        Row::new(
-            "operations of a shader core per evaluation",
-            "",
-            format!("{operations:.1}"),
-            Label::Calibrated,
-        )
-        .note("all scenes' baseline over the evaluations that 240 PEs imply, 90 % of issue slots used"),
+        Row::new("operations of a shader core per evaluation", "", format!("{operations:.1}"), Label::Calibrated)
+            .note("all scenes' baseline over the evaluations that 240 PEs imply, 90 % of issue slots used"),
     ];
     let mut energy_rows = Vec::new();
     let blended = config.energy.blended_share;
@@ -103,10 +85,7 @@ fn model() -> Result<Vec<Section>, ConfigError> {
                 2,
                 Label::Solved,
             )
-            .note(format!(
-                "PEs busy {:.1} % of cycles",
-                alone.utilization() * 100.0
-            )),
+            .note(format!("PEs busy {:.1} % of cycles", alone.utilization() * 100.0)),
         );
         rows.push(
             Row::numbers(
@@ -192,21 +171,14 @@ pub fn left_out() -> Section {
     for (name, error) in ours {
         text += &format!("; {name} {:.1} %", error * 100.0);
     }
-    let best = ours
-        .iter()
-        .map(|(_, error)| *error)
-        .fold(f64::INFINITY, f64::min);
+    let best = ours.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
     text += if best < null.1 {
         ". A second feature helps here; with six scenes and two constants that may be chance."
     } else {
         ". No model of ours is better than the null model: what tells scenes apart is not in the published numbers."
     };
     text += &null_text;
-    Section {
-        title: "Each scene predicted from the others",
-        text,
-        rows,
-    }
+    Section { title: "Each scene predicted from the others", text, rows }
 }
 
 #[cfg(test)]
@@ -224,9 +196,6 @@ mod tests {
     fn the_preset_has_the_calibrated_constant() {
         let config = Config::preset("paper-15x16", &[]).unwrap();
         let calibrated = operations_per_evaluation(&config);
-        assert!(
-            (calibrated - config.baseline.operations_per_evaluation).abs() < 0.05,
-            "{calibrated}"
-        );
+        assert!((calibrated - config.baseline.operations_per_evaluation).abs() < 0.05, "{calibrated}");
     }
 }

@@ -59,12 +59,7 @@ pub struct Row {
 
 impl Row {
     /// A row without a difference or a note.
-    pub fn new(
-        item: impl Into<String>,
-        paper: impl Into<String>,
-        model: impl Into<String>,
-        label: Label,
-    ) -> Self {
+    pub fn new(item: impl Into<String>, paper: impl Into<String>, model: impl Into<String>, label: Label) -> Self {
         Self {
             item: item.into(),
             paper: paper.into(),

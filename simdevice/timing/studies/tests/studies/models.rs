@@ -17,36 +17,19 @@ enum Kind {
     ModeSwitching,
 }
 
-const KINDS: [Kind; 4] = [
-    Kind::Any,
-    Kind::OneTile,
-    Kind::BandwidthBound,
-    Kind::ModeSwitching,
-];
+const KINDS: [Kind; 4] = [Kind::Any, Kind::OneTile, Kind::BandwidthBound, Kind::ModeSwitching];
 
 /// A tile whose pixels finish gradually, or never.
 fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> TileWork {
     let listed = largest.powf(random.random::<f64>()).ceil().max(1.0) as u32;
     let saturates = mode == Mode::Gaussian && random.random_bool(0.5);
-    let needed = if saturates {
-        random.random_range(1..=listed)
-    } else {
-        listed
-    };
-    let stretches = if saturates {
-        random.random_range(1..=needed.min(8))
-    } else {
-        1
-    };
+    let needed = if saturates { random.random_range(1..=listed) } else { listed };
+    let stretches = if saturates { random.random_range(1..=needed.min(8)) } else { 1 };
     let density = random.random_range(0.05..1.0);
     let (mut left, mut rows, mut blocks) = (needed, 16u8, 16u8);
     let mut runs = Vec::new();
     for stretch in 0..stretches {
-        let primitives = if stretch + 1 == stretches {
-            left
-        } else {
-            (left / 2).max(1).min(left)
-        };
+        let primitives = if stretch + 1 == stretches { left } else { (left / 2).max(1).min(left) };
         if primitives == 0 {
             break;
         }
@@ -104,35 +87,21 @@ fn trace(random: &mut ChaCha8Rng, kind: Kind) -> FrameWork {
                 there.then(|| tile(random, [x % 8, x / 8], mode, largest))
             })
             .collect();
-        DrawWork {
-            mode,
-            tiles,
-            ..DrawWork::default()
-        }
+        DrawWork { mode, tiles, ..DrawWork::default() }
     });
     let draws = draws.collect();
-    FrameWork {
-        size: [128, 128],
-        draws,
-        ..FrameWork::default()
-    }
+    FrameWork { size: [128, 128], draws, ..FrameWork::default() }
 }
 
 fn hardware(random: &mut ChaCha8Rng, kind: Kind) -> Config {
-    let presets: Vec<_> = preset_names()
-        .into_iter()
-        .filter(|name| !name.starts_with("orin") && !name.starts_with("m2"))
-        .collect();
+    let presets: Vec<_> =
+        preset_names().into_iter().filter(|name| !name.starts_with("orin") && !name.starts_with("m2")).collect();
     let mut config = Config::preset(presets[random.random_range(0..presets.len())], &[]).unwrap();
     let raster = &mut config.rasterizer;
     raster.saturation = Saturation::ALL[random.random_range(0..Saturation::ALL.len())];
     raster.triangle_traversal = Saturation::ALL[random.random_range(0..Saturation::ALL.len())];
     raster.hierarchical_depth = random.random_bool(0.5);
-    raster.tile_side = if random.random_bool(0.7) {
-        16
-    } else {
-        TILE_SIDES[random.random_range(0..TILE_SIDES.len())]
-    };
+    raster.tile_side = if random.random_bool(0.7) { 16 } else { TILE_SIDES[random.random_range(0..TILE_SIDES.len())] };
     raster.batch = [8, 16, 32, 64, 128][random.random_range(0..5)];
     raster.modules = random.random_range(1..=16);
     raster.port_bytes_per_cycle = [4.0, 8.0, 16.0, 32.0][random.random_range(0..4)];
@@ -171,10 +140,7 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
         assert_eq!(fast.gaussian_evaluations, slow.gaussian_evaluations);
         assert_eq!(fast.triangle_evaluations, slow.triangle_evaluations);
         assert_eq!(fast.bytes_out, slow.bytes_out);
-        assert!(
-            (fast.bytes_in - slow.bytes_in).abs() < 1e-3,
-            "{fast:?} {slow:?}"
-        );
+        assert!((fast.bytes_in - slow.bytes_in).abs() < 1e-3, "{fast:?} {slow:?}");
         assert!((fast.bytes_wasted - slow.bytes_wasted).abs() < 1e-3);
         assert!((fast.modules.busy - slow.modules.busy).abs() < 1e-3);
         assert!((fast.modules.dependency - slow.modules.dependency).abs() < 1e-3);
@@ -183,10 +149,7 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
         assert!((fast.modules.mode_switch - slow.modules.mode_switch).abs() < 1e-3);
         let all = slow.modules.total().max(1.0);
         let apart = (fast.modules.memory - slow.modules.memory).abs() / all;
-        assert!(
-            apart < 0.02,
-            "trace {number}: {apart} of all cycles, {fast:?} {slow:?}"
-        );
+        assert!(apart < 0.02, "trace {number}: {apart} of all cycles, {fast:?} {slow:?}");
         if slow.cycles == 0.0 {
             assert_eq!(fast.cycles, 0.0);
             continue;
@@ -197,12 +160,7 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
             _ => true,
         });
         let error = ((fast.cycles - slow.cycles) / slow.cycles).abs();
-        assert!(
-            error <= 0.02,
-            "trace {number}: {error}, {} instead of {} cycles",
-            fast.cycles,
-            slow.cycles
-        );
+        assert!(error <= 0.02, "trace {number}: {error}, {} instead of {} cycles", fast.cycles, slow.cycles);
         errors.push(error);
     }
     assert!(pressed >= 100, "{pressed}");

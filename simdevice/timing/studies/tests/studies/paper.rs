@@ -46,49 +46,21 @@ fn every_number_of_the_papers_evaluation_has_a_row() {
         ("raster speed-up, Mini-Splatting", "20x", Label::Input),
         ("raster energy, Mini-Splatting", "22x", Label::Input),
         ("FPS, 1.0 listed a needed pair", "24.0", Label::Predicted),
-        (
-            "end-to-end speed-up, 1.0 listed a needed pair",
-            "6.00x",
-            Label::Predicted,
-        ),
+        ("end-to-end speed-up, 1.0 listed a needed pair", "6.00x", Label::Predicted),
         ("Mini-Splatting pipelined: FPS", "46.0", Label::Calibrated),
-        (
-            "Mini-Splatting pipelined: end-to-end speed-up",
-            "4.00x",
-            Label::Calibrated,
-        ),
-        (
-            "3DGS pipelined: raster share of the baseline",
-            "> 80 %",
-            Label::Solved,
-        ),
+        ("Mini-Splatting pipelined: end-to-end speed-up", "4.00x", Label::Calibrated),
+        ("3DGS pipelined: raster share of the baseline", "> 80 %", Label::Solved),
         ("baseline FPS, 3DGS", "2-5", Label::Solved),
-        (
-            "area added over the enhanced units",
-            "21.0 %",
-            Label::Calibrated,
-        ),
+        ("area added over the enhanced units", "21.0 %", Label::Calibrated),
         ("area added over the SoC", "0.20 %", Label::Calibrated),
-        (
-            "area added for GSCore's speed, fp16",
-            "0.16 mm2",
-            Label::Calibrated,
-        ),
+        ("area added for GSCore's speed, fp16", "0.16 mm2", Label::Calibrated),
         ("area of GSCore", "3.95 mm2", Label::Input),
         ("area ratio to GSCore", "24.7x", Label::Solved),
         ("speed-up of GSCore over Xavier NX", "20x", Label::Input),
         ("speed-up of GSCore over a mobile GPU", "", Label::Cited),
         ("bicycle, speed-up over the M2 Pro", "11.2x", Label::Solved),
-        (
-            "bicycle, speed-up over the preset m2-pro",
-            "11.2x",
-            Label::Calibrated,
-        ),
-        (
-            "M2 Pro's fp32 rate over the baseline's",
-            "2.6x",
-            Label::Solved,
-        ),
+        ("bicycle, speed-up over the preset m2-pro", "11.2x", Label::Calibrated),
+        ("M2 Pro's fp32 rate over the baseline's", "2.6x", Label::Solved),
         ("typical power of a module", "1.7 W", Label::Input),
         ("SoC power", "10 W", Label::Input),
         ("PEs of the scaled design", "300", Label::Solved),
@@ -102,11 +74,7 @@ fn every_number_of_the_papers_evaluation_has_a_row() {
     for (item, paper, label) in numbers {
         let of_it: Vec<_> = rows.iter().filter(|row| row.item == item).collect();
         assert_eq!(of_it.len(), 1, "{item}");
-        assert_eq!(
-            (of_it[0].paper.as_str(), of_it[0].label),
-            (paper, label),
-            "{item}"
-        );
+        assert_eq!((of_it[0].paper.as_str(), of_it[0].label), (paper, label), "{item}");
     }
 }
 
@@ -117,12 +85,7 @@ fn the_first_screen_has_predictions_then_calibrations_then_inputs() {
     assert_eq!(first.title, AT_A_GLANCE);
     // A screen has fifty lines.
     assert!(first.rows.len() <= 40, "{}", first.rows.len());
-    let order = [
-        Label::Predicted,
-        Label::Calibrated,
-        Label::Solved,
-        Label::Input,
-    ];
+    let order = [Label::Predicted, Label::Calibrated, Label::Solved, Label::Input];
     let place = |label| order.iter().position(|&known| known == label);
     let places: Vec<_> = first.rows.iter().map(|row| place(row.label)).collect();
     assert!(places.is_sorted() && places.iter().all(Option::is_some));
@@ -130,22 +93,12 @@ fn the_first_screen_has_predictions_then_calibrations_then_inputs() {
     for row in &first.rows {
         if row.label == Label::Predicted {
             assert!(!row.note.is_empty(), "{}", row.item);
-            assert_eq!(
-                row.difference.is_empty(),
-                row.paper.is_empty(),
-                "{}",
-                row.item
-            );
+            assert_eq!(row.difference.is_empty(), row.paper.is_empty(), "{}", row.item);
         }
         // The row is that of a section below; only the raster times are put together.
         let mut below = others.iter().flat_map(|section| &section.rows);
         let is_together = row.item == "raster times of seven scenes";
-        assert_eq!(
-            below.any(|other| other == row),
-            !is_together,
-            "{}",
-            row.item
-        );
+        assert_eq!(below.any(|other| other == row), !is_together, "{}", row.item);
     }
     // No row that should be shown is missing: these, and the raster times.
     assert_eq!(first.rows.len(), 25);
@@ -157,30 +110,17 @@ fn the_first_rows_are_predictions_and_say_how_far_off_they_are() {
     assert_eq!(report[0].title, "Frames, predicted");
     for row in &report[0].rows {
         assert_eq!(row.label, Label::Predicted, "{}", row.item);
-        assert_eq!(
-            row.difference.is_empty(),
-            row.paper.is_empty(),
-            "{}",
-            row.item
-        );
+        assert_eq!(row.difference.is_empty(), row.paper.is_empty(), "{}", row.item);
     }
-    assert!(
-        report[0].rows[..8]
-            .iter()
-            .all(|row| row.difference.ends_with(" %"))
-    );
+    assert!(report[0].rows[..8].iter().all(|row| row.difference.ends_with(" %")));
     let cell = |item: &str| {
         let row = report[0].rows.iter().find(|row| row.item == item);
-        row.map(|row| row.model.clone())
-            .unwrap_or_else(|| panic!("{item}"))
+        row.map(|row| row.model.clone()).unwrap_or_else(|| panic!("{item}"))
     };
     // No rasterizer exceeds the bound.
     let number = |item: &str| cell(item).trim_end_matches('x').parse::<f64>().unwrap();
     for listed in ["1.0", "1.5"] {
         let paired = format!("{listed} listed a needed pair");
-        assert!(
-            number(&format!("FPS, {paired}"))
-                <= number(&format!("FPS without a raster stage, {paired}"))
-        );
+        assert!(number(&format!("FPS, {paired}")) <= number(&format!("FPS without a raster stage, {paired}")));
     }
 }

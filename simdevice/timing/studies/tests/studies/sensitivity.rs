@@ -27,11 +27,7 @@ fn the_document_and_its_plots_are_up_to_date() {
 #[gaurast_runner::test]
 fn the_paper_is_on_every_curve_and_more_is_never_slower() {
     for sweep in sensitivity::sweeps(&sensitivity::frame()).unwrap() {
-        assert!(
-            sweep.points.iter().any(|point| point.x == sweep.paper),
-            "{}",
-            sweep.file
-        );
+        assert!(sweep.points.iter().any(|point| point.x == sweep.paper), "{}", sweep.file);
         if matches!(sweep.file, "pes" | "bandwidth") {
             let speed = |at: usize| sweep.points[at].simulation.raster_speedup;
             for at in 1..sweep.points.len() {

@@ -23,26 +23,12 @@ fn names(value: &Value, found: &mut BTreeSet<String>) {
 fn every_field_of_a_trace_is_documented() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/simulator.md");
     let text = std::fs::read_to_string(path).expect("the document");
-    let (_, chapter) = text
-        .split_once("\n## Traces\n")
-        .expect("a chapter of traces");
+    let (_, chapter) = text.split_once("\n## Traces\n").expect("a chapter of traces");
     let (chapter, _) = chapter.split_once("\n## ").expect("a chapter after it");
-    let tile = TileWork {
-        runs: vec![Run::default()],
-        ..TileWork::default()
-    };
-    let draw = DrawWork {
-        tiles: vec![tile],
-        ..DrawWork::default()
-    };
-    let frame = FrameWork {
-        draws: vec![draw],
-        ..FrameWork::default()
-    };
-    let trace = Trace {
-        version: TRACE_VERSION,
-        frames: vec![frame],
-    };
+    let tile = TileWork { runs: vec![Run::default()], ..TileWork::default() };
+    let draw = DrawWork { tiles: vec![tile], ..DrawWork::default() };
+    let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
+    let trace = Trace { version: TRACE_VERSION, frames: vec![frame] };
     let mut found = BTreeSet::new();
     names(&serde_json::to_value(trace).expect("JSON"), &mut found);
     assert!(found.len() > 30, "{found:?}");

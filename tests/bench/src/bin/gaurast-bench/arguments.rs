@@ -77,12 +77,7 @@ pub struct SweepArguments {
     pub quick: bool,
 
     /// The folder that CSV, JSON, PNG and SVG files go to
-    #[arg(
-        short,
-        long,
-        value_name = "FOLDER",
-        default_value = "samples/benchmarks"
-    )]
+    #[arg(short, long, value_name = "FOLDER", default_value = "samples/benchmarks")]
     pub output: PathBuf,
 
     /// Measured frames of each point

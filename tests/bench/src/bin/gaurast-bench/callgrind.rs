@@ -30,11 +30,7 @@ pub struct Counted {
 ///
 /// # Errors
 /// If Callgrind is not installed, or the process fails.
-pub fn count(
-    arguments: &[&str],
-    environment: &[(&str, &str)],
-    input: &[u8],
-) -> Result<Counted, CallgrindError> {
+pub fn count(arguments: &[&str], environment: &[(&str, &str)], input: &[u8]) -> Result<Counted, CallgrindError> {
     let mut child = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(std::env::current_exe()?)

@@ -59,10 +59,9 @@ pub fn run(arguments: &CommandsArguments) -> Result<(), BenchError> {
     drop(work);
 
     let mut rows = Rows::new(&["work", "count", "ns each", "instructions each"]);
-    for (name, count, times, worker) in [
-        ("draws recorded", draws, recorded, (draws, 0)),
-        ("pipelines created", pipelines, created, (0, pipelines)),
-    ] {
+    for (name, count, times, worker) in
+        [("draws recorded", draws, recorded, (draws, 0)), ("pipelines created", pipelines, created, (0, pipelines))]
+    {
         let time = median(times.iter().map(std::time::Duration::as_secs_f64));
         let instructions = if arguments.instructions {
             let difference = instructions(worker)? - instructions((0, 0))?;

@@ -65,20 +65,12 @@ pub(super) fn run(arguments: &FramesArguments) -> Result<(), BenchError> {
     let machine = Machine::this();
     let roofline = Roofline::measure()?;
     let sources = if arguments.scenes.is_empty() {
-        vec![Source::Benchmark {
-            count: arguments.count,
-        }]
+        vec![Source::Benchmark { count: arguments.count }]
     } else {
         let files = arguments.scenes.iter();
-        files
-            .map(|path| Source::File { path: path.clone() })
-            .collect()
+        files.map(|path| Source::File { path: path.clone() }).collect()
     };
-    let mut results = Results {
-        machine,
-        roofline,
-        scenes: Vec::new(),
-    };
+    let mut results = Results { machine, roofline, scenes: Vec::new() };
     for source in sources {
         let workload = Workload::new(source, arguments.size.0);
         results.scenes.push(measure(workload, arguments)?);
@@ -113,20 +105,11 @@ fn measure(workload: Workload, arguments: &FramesArguments) -> Result<SceneResul
         }
         series.extend(judged(contestants, &judge, &views[1..], arguments.judged)?);
     }
-    Ok(SceneResults {
-        scene: workload.source.to_string(),
-        workload,
-        gaussians,
-        series,
-    })
+    Ok(SceneResults { scene: workload.source.to_string(), workload, gaussians, series })
 }
 
 /// Starts every contender that is available, and draws its first frame.
-fn start(
-    workload: &Workload,
-    threads: usize,
-    view: &Camera,
-) -> Result<Vec<(Worker, Series)>, BenchError> {
+fn start(workload: &Workload, threads: usize, view: &Camera) -> Result<Vec<(Worker, Series)>, BenchError> {
     let mut contestants = Vec::new();
     for contender in CONTENDERS {
         let Some(mut worker) = Worker::start(contender, workload, threads)? else {
@@ -179,11 +162,7 @@ fn show(results: &Results) -> std::io::Result<()> {
     )?;
     for scene in &results.scenes {
         let [width, height] = scene.workload.size;
-        writeln!(
-            out,
-            "\n{}: {} Gaussians, {width}x{height}; medians, ms",
-            scene.scene, scene.gaussians
-        )?;
+        writeln!(out, "\n{}: {} Gaussians, {width}x{height}; medians, ms", scene.scene, scene.gaussians)?;
         writeln!(out, "{}", summary(scene).table())?;
         writeln!(out, "{}", stages(scene).table())?;
         writeln!(out, "{}", rasterization(scene, results.roofline).table())?;
@@ -208,18 +187,11 @@ fn summary(scene: &SceneResults) -> Rows {
     ]);
     for series in &scene.series {
         // Relative to this driver's Gaussians on the same number of threads.
-        let own = scene
-            .series
-            .iter()
-            .find(|other| other.threads == series.threads && other.contender == Contender::Gaurast);
-        let ratio = |figure: &dyn Fn(&Series) -> f64| {
-            own.map_or(f64::NAN, |own| figure(series) / figure(own))
-        };
+        let own =
+            scene.series.iter().find(|other| other.threads == series.threads && other.contender == Contender::Gaurast);
+        let ratio = |figure: &dyn Fn(&Series) -> f64| own.map_or(f64::NAN, |own| figure(series) / figure(own));
         let error = |figure: &dyn Fn(&Error) -> f64| {
-            series
-                .error
-                .as_ref()
-                .map_or("-".to_owned(), |error| number(figure(error)))
+            series.error.as_ref().map_or("-".to_owned(), |error| number(figure(error)))
         };
         rows.rows.push(vec![
             series.contender.name().to_owned(),
@@ -251,9 +223,7 @@ fn stages(scene: &SceneResults) -> Rows {
                 series.contender.name().to_owned(),
                 series.threads.to_string(),
                 stage.clone(),
-                number(median(
-                    series.frames.iter().map(|frame| frame.counter(stage)),
-                )),
+                number(median(series.frames.iter().map(|frame| frame.counter(stage)))),
             ]);
         }
     }
@@ -286,26 +256,15 @@ fn rasterization(scene: &SceneResults, roofline: Roofline) -> Rows {
             number(of(&|frame| useful(frame) * 1e-3 / frame.counter("raster"))),
             number(of(&|frame| evaluations(frame) / useful(frame))),
             percent(of(&|frame| roofline.share(frame, series.threads))),
-            percent(of(&|frame| {
-                roofline.share_of_operations(frame, series.threads)
-            })),
+            percent(of(&|frame| roofline.share_of_operations(frame, series.threads))),
         ]);
     }
     rows
 }
 
 fn csv(results: &Results) -> String {
-    let mut rows = Rows::new(&[
-        "scene",
-        "gaussians",
-        "width",
-        "height",
-        "contender",
-        "threads",
-        "frame",
-        "wall_ms",
-        "cpu_ms",
-    ]);
+    let mut rows =
+        Rows::new(&["scene", "gaussians", "width", "height", "contender", "threads", "frame", "wall_ms", "cpu_ms"]);
     for scene in &results.scenes {
         for series in &scene.series {
             let frames = std::iter::once(&series.first).chain(&series.frames);
@@ -319,9 +278,7 @@ fn csv(results: &Results) -> String {
                     series.threads.to_string(),
                     index.to_string(),
                     format!("{:.3}", frame.wall),
-                    frame
-                        .processor
-                        .map_or(String::new(), |time| format!("{time:.3}")),
+                    frame.processor.map_or(String::new(), |time| format!("{time:.3}")),
                 ]);
             }
         }

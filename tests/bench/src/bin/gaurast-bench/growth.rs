@@ -57,23 +57,12 @@ struct Results {
 
 /// Runs the sweep.
 pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
-    let mut results = Results {
-        machine: Machine::this(),
-        threads: arguments.threads,
-        axes: Vec::new(),
-    };
-    let runs = arguments
-        .runs
-        .unwrap_or(if arguments.quick { 3 } else { 9 });
+    let mut results = Results { machine: Machine::this(), threads: arguments.threads, axes: Vec::new() };
+    let runs = arguments.runs.unwrap_or(if arguments.quick { 3 } else { 9 });
     let _ = writeln!(stdout(), "{}", results.machine.line());
     for (name, amounts) in axes(arguments.quick) {
         let axis = measure(name, amounts, arguments.threads, runs as usize)?;
-        let _ = writeln!(
-            stdout(),
-            "\n{name}\n{}\n{}",
-            steps(&axis).table(),
-            fits(&axis).table()
-        );
+        let _ = writeln!(stdout(), "\n{name}\n{}\n{}", steps(&axis).table(), fits(&axis).table());
         results.axes.push(axis);
         save(&arguments.output, &results)?;
     }
@@ -88,27 +77,11 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<(f64, Workload)>)> {
     } else {
         &[10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000]
     };
-    let widths: &[u32] = if quick {
-        &[320, 640, 1280, 1920]
-    } else {
-        &[320, 640, 1280, 1920, 3840]
-    };
-    let of_scale = |scale: f32| Workload {
-        scale,
-        ..base(COUNT, SIZE)
-    };
-    let of_share = |share: f64| Workload {
-        away: 1.0 - share,
-        ..base(COUNT, SIZE)
-    };
+    let widths: &[u32] = if quick { &[320, 640, 1280, 1920] } else { &[320, 640, 1280, 1920, 3840] };
+    let of_scale = |scale: f32| Workload { scale, ..base(COUNT, SIZE) };
+    let of_share = |share: f64| Workload { away: 1.0 - share, ..base(COUNT, SIZE) };
     vec![
-        (
-            "Gaussians",
-            counts
-                .iter()
-                .map(|&count| (count as f64, base(count, SIZE)))
-                .collect(),
-        ),
+        ("Gaussians", counts.iter().map(|&count| (count as f64, base(count, SIZE))).collect()),
         (
             "pixels",
             widths
@@ -121,25 +94,16 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<(f64, Workload)>)> {
         ),
         (
             "overlap (area of each Gaussian, relative)",
-            [1.0, 2.0, 4.0, 8.0]
-                .map(|scale: f32| (f64::from(scale * scale), of_scale(scale)))
-                .into(),
+            [1.0, 2.0, 4.0, 8.0].map(|scale: f32| (f64::from(scale * scale), of_scale(scale))).into(),
         ),
         (
             "share of Gaussians not moved off the screen",
-            [0.1, 0.25, 0.5, 1.0]
-                .map(|share| (share, of_share(share)))
-                .into(),
+            [0.1, 0.25, 0.5, 1.0].map(|share| (share, of_share(share))).into(),
         ),
     ]
 }
 
-fn measure(
-    name: &'static str,
-    amounts: Vec<(f64, Workload)>,
-    threads: usize,
-    runs: usize,
-) -> Result<Axis, BenchError> {
+fn measure(name: &'static str, amounts: Vec<(f64, Workload)>, threads: usize, runs: usize) -> Result<Axis, BenchError> {
     let mut steps = Vec::new();
     for (amount, workload) in amounts {
         let views = workload.views(&workload.scene()?, runs + 1)?;
@@ -173,10 +137,7 @@ fn measure(
         .map(|&contender| {
             let of = |value: &dyn Fn(&Step) -> f64| {
                 let own = steps.iter().filter(|step| step.contender == contender);
-                exponent(
-                    &own.map(|step| [step.amount, value(step)])
-                        .collect::<Vec<_>>(),
-                )
+                exponent(&own.map(|step| [step.amount, value(step)]).collect::<Vec<_>>())
             };
             Fit {
                 contender,
@@ -219,25 +180,13 @@ fn steps(axis: &Axis) -> Rows {
 fn fits(axis: &Axis) -> Rows {
     let mut rows = Rows::new(&["contender", "exponent of time", "exponent of memory"]);
     for fit in &axis.fits {
-        rows.rows.push(vec![
-            fit.contender.name().to_owned(),
-            format!("{:.2}", fit.time),
-            format!("{:.2}", fit.memory),
-        ]);
+        rows.rows.push(vec![fit.contender.name().to_owned(), format!("{:.2}", fit.time), format!("{:.2}", fit.memory)]);
     }
     rows
 }
 
 fn save(folder: &Path, results: &Results) -> Result<(), BenchError> {
-    let mut rows = Rows::new(&[
-        "axis",
-        "amount",
-        "contender",
-        "threads",
-        "wall_ms",
-        "cpu_ms",
-        "peak_bytes",
-    ]);
+    let mut rows = Rows::new(&["axis", "amount", "contender", "threads", "wall_ms", "cpu_ms", "peak_bytes"]);
     for axis in &results.axes {
         for step in &axis.steps {
             rows.rows.push(vec![

@@ -57,9 +57,7 @@ pub struct Judge {
 
 impl Judge {
     pub fn new(scene: &Scene) -> Self {
-        Self {
-            scene: scene.into(),
-        }
+        Self { scene: scene.into() }
     }
 
     /// The reference picture of the scene, seen by `camera`.
@@ -67,10 +65,7 @@ impl Judge {
         let size = [camera.width, camera.height];
         let oracle = OracleCamera::new(&camera.to_vulkan(), size).ok_or(BenchError::NoOracle)?;
         let drawn = render_bounded(&self.scene.as_oracle(), &oracle, &OracleState::default());
-        Ok(Reference {
-            pixels: drawn.to_f32(),
-            size,
-        })
+        Ok(Reference { pixels: drawn.to_f32(), size })
     }
 }
 
@@ -109,9 +104,8 @@ fn stretch(pixels: &[[f32; 4]], from: [u32; 2], to: [u32; 2]) -> Vec<[f32; 4]> {
         let (top, bottom, down) = neighbours(1, y);
         for x in 0..to[0] {
             let (left, right, along) = neighbours(0, x);
-            let mix = |a: [f32; 4], b: [f32; 4], t: f32| -> [f32; 4] {
-                std::array::from_fn(|c| a[c] + t * (b[c] - a[c]))
-            };
+            let mix =
+                |a: [f32; 4], b: [f32; 4], t: f32| -> [f32; 4] { std::array::from_fn(|c| a[c] + t * (b[c] - a[c])) };
             let row = |y: usize| {
                 let at = |x: usize| pixels[y * from[0] as usize + x];
                 mix(at(left), at(right), along)
@@ -129,9 +123,7 @@ pub struct PictureFile {
 
 impl PictureFile {
     pub fn new() -> Result<Self, BenchError> {
-        Ok(Self {
-            folder: tempfile::tempdir()?,
-        })
+        Ok(Self { folder: tempfile::tempdir()? })
     }
 
     pub fn path(&self) -> PathBuf {
@@ -150,9 +142,7 @@ mod tests {
     #[test]
     fn stretching_keeps_what_is_linear() {
         let ramp = |width: u32| -> Vec<[f32; 4]> {
-            (0..width * 2)
-                .map(|i| [(i % width) as f32 + 0.5; 4].map(|x| x / width as f32))
-                .collect()
+            (0..width * 2).map(|i| [(i % width) as f32 + 0.5; 4].map(|x| x / width as f32)).collect()
         };
         let stretched = stretch(&ramp(8), [8, 2], [16, 4]);
         assert_eq!(stretched.len(), 64);

@@ -54,17 +54,9 @@ impl Machine {
             program: format!(
                 "gaurast {}{}",
                 env!("CARGO_PKG_VERSION"),
-                if cfg!(debug_assertions) {
-                    ", built with debug assertions"
-                } else {
-                    ""
-                }
+                if cfg!(debug_assertions) { ", built with debug assertions" } else { "" }
             ),
-            load: read("/proc/loadavg")
-                .split(' ')
-                .next()
-                .and_then(|load| load.parse().ok())
-                .unwrap_or(0.0),
+            load: read("/proc/loadavg").split(' ').next().and_then(|load| load.parse().ok()).unwrap_or(0.0),
         }
     }
 

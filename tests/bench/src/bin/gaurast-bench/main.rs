@@ -25,9 +25,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use arguments::{
-    FramesArguments, OptimizationsArguments, ParetoArguments, PathArguments, SweepArguments,
-};
+use arguments::{FramesArguments, OptimizationsArguments, ParetoArguments, PathArguments, SweepArguments};
 use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use error::BenchError;

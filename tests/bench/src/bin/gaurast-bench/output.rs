@@ -17,10 +17,7 @@ pub struct Rows {
 
 impl Rows {
     pub fn new(header: &[&str]) -> Self {
-        Self {
-            header: header.iter().map(|name| (*name).to_owned()).collect(),
-            rows: Vec::new(),
-        }
+        Self { header: header.iter().map(|name| (*name).to_owned()).collect(), rows: Vec::new() }
     }
 
     /// The rows for a terminal; columns of numbers are right-aligned.
@@ -32,10 +29,7 @@ impl Rows {
             table.add_row(row);
         }
         for index in 0..self.header.len() {
-            let numbers = self
-                .rows
-                .iter()
-                .all(|row| row[index].starts_with(|c: char| c.is_ascii_digit() || c == '-'));
+            let numbers = self.rows.iter().all(|row| row[index].starts_with(|c: char| c.is_ascii_digit() || c == '-'));
             if let Some(column) = table.column_mut(index).filter(|_| numbers) {
                 column.set_cell_alignment(CellAlignment::Right);
             }
@@ -59,11 +53,7 @@ impl Rows {
 }
 
 fn quoted(cell: &str) -> String {
-    if cell.contains([',', '"', '\n']) {
-        format!("\"{}\"", cell.replace('"', "\"\""))
-    } else {
-        cell.to_owned()
-    }
+    if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }
 
 /// A number with as many digits as are significant.
@@ -80,9 +70,7 @@ pub fn number(value: f64) -> String {
 
 /// Bytes as MiB.
 pub fn mebibytes(bytes: Option<u64>) -> String {
-    bytes.map_or("-".to_owned(), |bytes| {
-        format!("{:.0}", bytes as f64 / f64::from(1 << 20))
-    })
+    bytes.map_or("-".to_owned(), |bytes| format!("{:.0}", bytes as f64 / f64::from(1 << 20)))
 }
 
 /// Writes `text` to `path`, making its folder.
@@ -105,23 +93,14 @@ mod tests {
     #[test]
     fn rows_are_quoted_where_they_must_be() {
         let mut rows = Rows::new(&["scene", "ms"]);
-        rows.rows
-            .push(vec!["tile, \"dust\"".to_owned(), number(12.34)]);
-        assert_eq!(
-            rows.csv("machine"),
-            "# machine\nscene,ms\n\"tile, \"\"dust\"\"\",12.3\n"
-        );
+        rows.rows.push(vec!["tile, \"dust\"".to_owned(), number(12.34)]);
+        assert_eq!(rows.csv("machine"), "# machine\nscene,ms\n\"tile, \"\"dust\"\"\",12.3\n");
         assert!(rows.table().to_string().contains("12.3"));
     }
 
     #[test]
     fn numbers_are_short() {
-        let shown: Vec<String> = [0.0, 1e-6, 0.0123, 1.5, 12.34, 899.4, f64::NAN]
-            .map(number)
-            .to_vec();
-        assert_eq!(
-            shown,
-            ["0", "1.00e-6", "0.012", "1.500", "12.3", "899", "-"]
-        );
+        let shown: Vec<String> = [0.0, 1e-6, 0.0123, 1.5, 12.34, 899.4, f64::NAN].map(number).to_vec();
+        assert_eq!(shown, ["0", "1.00e-6", "0.012", "1.500", "12.3", "899", "-"]);
     }
 }

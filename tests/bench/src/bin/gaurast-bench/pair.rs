@@ -73,11 +73,7 @@ impl Pair {
     }
 
     /// Lower quartile, median and upper quartile, over views, of `compare` applied to both workers' quickest draws.
-    pub fn quartiles(
-        &self,
-        of: impl Fn(&Drawn) -> f64,
-        compare: impl Fn(f64, f64) -> f64,
-    ) -> [f64; 3] {
+    pub fn quartiles(&self, of: impl Fn(&Drawn) -> f64, compare: impl Fn(f64, f64) -> f64) -> [f64; 3] {
         let pairs = self.least(0, &of).zip(self.least(1, &of));
         quartiles(pairs.map(|(first, second)| compare(first, second)))
     }
@@ -107,13 +103,7 @@ mod tests {
     use super::*;
 
     fn drawn(wall: f64) -> Drawn {
-        Drawn {
-            wall,
-            processor: None,
-            counters: Vec::new(),
-            stages: Vec::new(),
-            memory: None,
-        }
+        Drawn { wall, processor: None, counters: Vec::new(), stages: Vec::new(), memory: None }
     }
 
     #[test]
@@ -129,18 +119,8 @@ mod tests {
         let view = |one: [f64; 2], other: f64| [one.map(drawn).to_vec(), vec![drawn(other)]];
         let pair = Pair {
             draws: [
-                vec![
-                    view([90., 80.], 95.),
-                    view([12., 10.], 12.),
-                    view([20., 29.], 20.),
-                    view([31., 30.], 34.),
-                ],
-                vec![
-                    view([70., 60.], 99.),
-                    view([10., 18.], 12.),
-                    view([21., 25.], 23.),
-                    view([33., 99.], 33.),
-                ],
+                vec![view([90., 80.], 95.), view([12., 10.], 12.), view([20., 29.], 20.), view([31., 30.], 34.)],
+                vec![view([70., 60.], 99.), view([10., 18.], 12.), view([21., 25.], 23.), view([33., 99.], 33.)],
             ],
         };
         // The quickest draws are 11, 20, 32 and 11, 22, 33; the first view is the warm-up.

@@ -45,11 +45,7 @@ impl Point {
     /// The cost of the point: processor time, which depends least on other load on the machine, or wall time if
     /// processor time is unknown.
     fn cost(&self) -> f64 {
-        if self.processor.is_nan() {
-            self.wall
-        } else {
-            self.processor
-        }
+        if self.processor.is_nan() { self.wall } else { self.processor }
     }
 }
 
@@ -73,24 +69,12 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
     let variants = variants(arguments)?;
     let data = (arguments.data.clone()).or_else(|| std::env::var_os(DATA).map(PathBuf::from));
     let arguments = &arguments.sweep;
-    let mut results = Results {
-        machine: Machine::this(),
-        threads: arguments.threads,
-        scenes: Vec::new(),
-    };
-    let runs = arguments
-        .runs
-        .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
+    let mut results = Results { machine: Machine::this(), threads: arguments.threads, scenes: Vec::new() };
+    let runs = arguments.runs.unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
     let _ = writeln!(stdout(), "{}", results.machine.line());
     for workload in workloads(arguments, data.as_deref()) {
         let scene = measure(workload, arguments.threads, runs, &variants)?;
-        let _ = writeln!(
-            stdout(),
-            "\n{}: {} Gaussians\n{}",
-            scene.scene,
-            scene.gaussians,
-            table(&scene).table()
-        );
+        let _ = writeln!(stdout(), "\n{}: {} Gaussians\n{}", scene.scene, scene.gaussians, table(&scene).table());
         results.scenes.push(scene);
         // The results so far are kept if a later scene fails.
         save(&arguments.output, &results)?;
@@ -117,18 +101,10 @@ fn present(data: Option<&Path>, name: &str, instead: &str) -> Option<PathBuf> {
 
 /// The scenes, the smallest first, with the files of the folder `data`.
 fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
-    let size = if arguments.quick {
-        [640, 360]
-    } else {
-        [1280, 720]
-    };
+    let size = if arguments.quick { [640, 360] } else { [1280, 720] };
     let captured = |count, name: &str| Source::Captured {
         count,
-        cameras: present(
-            data,
-            &format!("cameras/{name}.json"),
-            "an orbit takes its place",
-        ),
+        cameras: present(data, &format!("cameras/{name}.json"), "an orbit takes its place"),
     };
     let mut sources = vec![
         captured(10_000, "room"),
@@ -138,10 +114,7 @@ fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
         captured(1_000_000, "garden"),
     ];
     let files = ["skull.ply", "playbot-125k.ply", "guitar.compressed.ply"];
-    for path in files
-        .into_iter()
-        .filter_map(|name| present(data, &format!("splats/{name}"), "left out"))
-    {
+    for path in files.into_iter().filter_map(|name| present(data, &format!("splats/{name}"), "left out")) {
         sources.insert(2, Source::File { path });
         if arguments.quick {
             break;
@@ -150,38 +123,25 @@ fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
     if !arguments.quick {
         sources.push(captured(6_000_000, "bicycle"));
     }
-    sources
-        .into_iter()
-        .map(|source| Workload::new(source, size))
-        .collect()
+    sources.into_iter().map(|source| Workload::new(source, size)).collect()
 }
 
 /// All variants, or those that the arguments select.
 fn variants(arguments: &ParetoArguments) -> Result<Vec<Variant>, BenchError> {
     let (only, without) = (&arguments.only, &arguments.without);
     let all = all_variants();
-    if let Some(name) = only
-        .iter()
-        .find(|&name| all.iter().all(|variant| variant.name != *name))
-    {
+    if let Some(name) = only.iter().find(|&name| all.iter().all(|variant| variant.name != *name)) {
         return Err(BenchError::NoSuchSetting(name.clone()));
     }
-    let wanted = |variant: &Variant| {
-        (only.is_empty() || only.contains(&variant.name)) && !without.contains(&variant.contender)
-    };
+    let wanted =
+        |variant: &Variant| (only.is_empty() || only.contains(&variant.name)) && !without.contains(&variant.contender);
     Ok(all.into_iter().filter(wanted).collect())
 }
 
 fn all_variants() -> Vec<Variant> {
     let exact = Settings::default();
-    let floor = |alpha: f32| Settings {
-        alpha_floor: alpha / 255.0,
-        ..exact
-    };
-    let finish = |transmittance_floor: f32| Settings {
-        transmittance_floor,
-        ..exact
-    };
+    let floor = |alpha: f32| Settings { alpha_floor: alpha / 255.0, ..exact };
+    let finish = |transmittance_floor: f32| Settings { transmittance_floor, ..exact };
     let degree = |sh_degree: u32| Settings { sh_degree, ..exact };
     let mixed = |sh_degree: u32, alpha: f32, transmittance_floor: f32| Settings {
         sh_degree,
@@ -189,18 +149,9 @@ fn all_variants() -> Vec<Variant> {
         transmittance_floor,
         ..exact
     };
-    let budget = |levels: f32| Settings {
-        contribution_budget: levels / 255.0,
-        ..exact
-    };
-    let powers = |exponential_error: f32| Settings {
-        exponential_error,
-        ..exact
-    };
-    let half = Settings {
-        precision: Precision::Fp16,
-        ..exact
-    };
+    let budget = |levels: f32| Settings { contribution_budget: levels / 255.0, ..exact };
+    let powers = |exponential_error: f32| Settings { exponential_error, ..exact };
+    let half = Settings { precision: Precision::Fp16, ..exact };
     let all = [
         ("as meant", exact, 1),
         ("alpha 2/255", floor(2.0), 1),
@@ -224,66 +175,35 @@ fn all_variants() -> Vec<Variant> {
         ("budget 16/255", budget(16.0), 1),
         (
             "budget 4/255, exponential 2e-3, degree 1",
-            Settings {
-                exponential_error: 2e-3,
-                sh_degree: 1,
-                ..budget(4.0)
-            },
+            Settings { exponential_error: 2e-3, sh_degree: 1, ..budget(4.0) },
             1,
         ),
         ("half size", exact, 2),
-        (
-            "half size, alpha 8/255, T 5e-2, degree 1",
-            mixed(1, 8.0, 5e-2),
-            2,
-        ),
+        ("half size, alpha 8/255, T 5e-2, degree 1", mixed(1, 8.0, 5e-2), 2),
         ("quarter size", exact, 4),
     ];
     // With quads no pixel is finished early.
-    let of_quads = [
-        "as meant",
-        "alpha 4/255",
-        "alpha 16/255",
-        "degree 0",
-        "half size",
-        "quarter size",
-    ];
+    let of_quads = ["as meant", "alpha 4/255", "alpha 16/255", "degree 0", "half size", "quarter size"];
     CONTENDERS
         .iter()
         .flat_map(|&contender| {
             all.iter()
-                .filter(move |(name, ..)| {
-                    contender == Contender::Gaurast || of_quads.contains(name)
-                })
-                .map(move |&(name, settings, divisor)| Variant {
-                    contender,
-                    name: name.to_owned(),
-                    settings,
-                    divisor,
-                })
+                .filter(move |(name, ..)| contender == Contender::Gaurast || of_quads.contains(name))
+                .map(move |&(name, settings, divisor)| Variant { contender, name: name.to_owned(), settings, divisor })
         })
         // Quads on this driver are drawn with the default settings only, since quads on lavapipe show the sweep.
-        .filter(|variant| {
-            variant.contender != Contender::QuadsOnGaurast || variant.name == "as meant"
-        })
+        .filter(|variant| variant.contender != Contender::QuadsOnGaurast || variant.name == "as meant")
         .collect()
 }
 
-fn measure(
-    workload: Workload,
-    threads: usize,
-    runs: usize,
-    variants: &[Variant],
-) -> Result<SceneResults, BenchError> {
+fn measure(workload: Workload, threads: usize, runs: usize, variants: &[Variant]) -> Result<SceneResults, BenchError> {
     let (judge, views, gaussians) = {
         let scene = workload.scene()?;
         let views = workload.views(&scene, runs)?;
         (Judge::new(&scene), views, scene.len())
     };
     let mut workers = Vec::new();
-    let contenders = CONTENDERS
-        .into_iter()
-        .filter(|&contender| variants.iter().any(|one| one.contender == contender));
+    let contenders = CONTENDERS.into_iter().filter(|&contender| variants.iter().any(|one| one.contender == contender));
     for contender in contenders {
         if let Some(worker) = Worker::start(contender, &workload, threads)? {
             workers.push((contender, worker));
@@ -294,15 +214,12 @@ fn measure(
     let mut draws: Vec<(Variant, usize, Vec<Drawn>)> = variants
         .iter()
         .filter_map(|variant| {
-            let worker = workers
-                .iter()
-                .position(|(contender, _)| *contender == variant.contender)?;
+            let worker = workers.iter().position(|(contender, _)| *contender == variant.contender)?;
             Some((variant.clone(), worker, Vec::new()))
         })
         .collect();
-    let smaller = |view: &Camera, divisor: u32| {
-        view.resized([view.width, view.height].map(|side| (side / divisor).max(1)))
-    };
+    let smaller =
+        |view: &Camera, divisor: u32| view.resized([view.width, view.height].map(|side| (side / divisor).max(1)));
     // One view of each is a warm-up; then all take turns.
     for (index, view) in views.iter().take(1).chain(&views).enumerate() {
         for (variant, worker, frames) in &mut draws {
@@ -318,9 +235,7 @@ fn measure(
     let mut points = Vec::new();
     for (variant, worker, frames) in draws {
         let camera = smaller(view, variant.divisor);
-        workers[worker]
-            .1
-            .draw(&camera, variant.settings, Some(&file.path()))?;
+        workers[worker].1.draw(&camera, variant.settings, Some(&file.path()))?;
         points.push(Point {
             wall: median(frames.iter().map(|frame| frame.wall)),
             processor: median(frames.iter().filter_map(|frame| frame.processor)),
@@ -330,19 +245,11 @@ fn measure(
         });
     }
     mark_front(&mut points);
-    Ok(SceneResults {
-        scene: workload.source.to_string(),
-        workload,
-        gaussians,
-        points,
-    })
+    Ok(SceneResults { scene: workload.source.to_string(), workload, gaussians, points })
 }
 
 fn mark_front(points: &mut [Point]) {
-    let places: Vec<[f64; 2]> = points
-        .iter()
-        .map(|point| [point.cost(), point.error.rmse])
-        .collect();
+    let places: Vec<[f64; 2]> = points.iter().map(|point| [point.cost(), point.error.rmse]).collect();
     for (point, on_front) in points.iter_mut().zip(front(&places)) {
         point.on_front = on_front;
     }
@@ -351,24 +258,11 @@ fn mark_front(points: &mut [Point]) {
 /// For each point, true if no other point is better in one coordinate without being worse in the other.
 fn front(places: &[[f64; 2]]) -> Vec<bool> {
     let beats = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1] && a != b;
-    places
-        .iter()
-        .map(|&place| !places.iter().any(|&other| beats(other, place)))
-        .collect()
+    places.iter().map(|&place| !places.iter().any(|&other| beats(other, place))).collect()
 }
 
 fn table(scene: &SceneResults) -> Rows {
-    let mut rows = Rows::new(&[
-        "contender",
-        "settings",
-        "ms",
-        "CPU ms",
-        "RMSE",
-        "PSNR",
-        "max",
-        "FLIP",
-        "front",
-    ]);
+    let mut rows = Rows::new(&["contender", "settings", "ms", "CPU ms", "RMSE", "PSNR", "max", "FLIP", "front"]);
     for point in &scene.points {
         rows.rows.push(vec![
             point.variant.contender.name().to_owned(),
@@ -438,27 +332,14 @@ fn panel(scene: &SceneResults) -> Panel {
     let place = |point: &Point| [point.cost(), point.error.rmse.max(1e-9)];
     let series = CONTENDERS.iter().map(|&contender| Series {
         name: contender.name().to_owned(),
-        points: scene
-            .points
-            .iter()
-            .filter(|point| point.variant.contender == contender)
-            .map(place)
-            .collect(),
+        points: scene.points.iter().filter(|point| point.variant.contender == contender).map(place).collect(),
         joined: false,
     });
-    let mut front: Vec<[f64; 2]> = scene
-        .points
-        .iter()
-        .filter(|point| point.on_front)
-        .map(place)
-        .collect();
+    let mut front: Vec<[f64; 2]> = scene.points.iter().filter(|point| point.on_front).map(place).collect();
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     Panel {
         title: scene.scene.clone(),
-        axes: [
-            "milliseconds of processor time a frame",
-            "root mean square error",
-        ],
+        axes: ["milliseconds of processor time a frame", "root mean square error"],
         series: series.collect(),
         front,
     }
@@ -470,14 +351,7 @@ mod tests {
 
     #[test]
     fn the_front_is_what_nothing_beats() {
-        let places = [
-            [1.0, 5.0],
-            [2.0, 2.0],
-            [3.0, 3.0],
-            [4.0, 1.0],
-            [4.0, 1.0],
-            [2.0, 4.0],
-        ];
+        let places = [[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [4.0, 1.0], [4.0, 1.0], [2.0, 4.0]];
         assert_eq!(front(&places), [true, true, false, true, true, false]);
     }
 }

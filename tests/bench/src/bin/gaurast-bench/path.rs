@@ -45,15 +45,7 @@ impl Measured {
         let (cold, warm) = times.split_at(COLD.min(times.len()));
         let slowest = |times: &[f64]| times.iter().copied().fold(f64::NAN, f64::max);
         let (median, most) = (median(warm.iter().copied()), slowest(warm));
-        [
-            cold[0],
-            cold[1],
-            slowest(&cold[2..]),
-            median,
-            most,
-            most / median,
-        ]
-        .map(number)
+        [cold[0], cold[1], slowest(&cold[2..]), median, most, most / median].map(number)
     }
 
     fn memory(&self) -> Option<u64> {
@@ -87,23 +79,16 @@ pub(super) fn run(arguments: &PathArguments) -> Result<(), BenchError> {
 }
 
 fn measure(scene: String, path: &Path, arguments: &PathArguments) -> Result<Measured, BenchError> {
-    let source = Source::File {
-        path: path.to_owned(),
-    };
+    let source = Source::File { path: path.to_owned() };
     let workload = Workload::new(source, arguments.size.0);
     let (views, gaussians, read) = {
         let start = Instant::now();
         let scene = workload.scene()?;
         let read = milliseconds(start);
-        (
-            workload.turning_views(&scene, arguments.frames as usize, STEP)?,
-            scene.len(),
-            read,
-        )
+        (workload.turning_views(&scene, arguments.frames as usize, STEP)?, scene.len(), read)
     };
     let missing = || BenchError::Worker("there is no device".to_owned());
-    let mut worker =
-        Worker::start(Contender::Gaurast, &workload, arguments.threads)?.ok_or_else(missing)?;
+    let mut worker = Worker::start(Contender::Gaurast, &workload, arguments.threads)?.ok_or_else(missing)?;
     let mut frames = Vec::new();
     for view in &views {
         frames.push(worker.draw_next(view)?);
@@ -111,23 +96,11 @@ fn measure(scene: String, path: &Path, arguments: &PathArguments) -> Result<Meas
     let file = PictureFile::new()?;
     worker.draw(&views[0], Settings::default(), Some(&file.path()))?;
     let [width, height] = workload.size;
-    let picture = Picture {
-        width,
-        height,
-        pixels: file.read()?,
-    };
+    let picture = Picture { width, height, pixels: file.read()? };
     let start = Instant::now();
     let png = tempfile::Builder::new().suffix(".png").tempfile()?;
-    gaurast_picture::write(png.path(), &picture, None)
-        .map_err(|error| BenchError::Worker(error.to_string()))?;
-    Ok(Measured {
-        scene,
-        gaussians,
-        read,
-        upload: worker.ready.upload,
-        frames,
-        png: milliseconds(start),
-    })
+    gaurast_picture::write(png.path(), &picture, None).map_err(|error| BenchError::Worker(error.to_string()))?;
+    Ok(Measured { scene, gaussians, read, upload: worker.ready.upload, frames, png: milliseconds(start) })
 }
 
 fn milliseconds(since: Instant) -> f64 {
@@ -138,11 +111,7 @@ fn show(measured: &[Measured], arguments: &PathArguments) -> std::io::Result<()>
     let mut out = stdout().lock();
     writeln!(out, "{}", Machine::this().line())?;
     let [width, height] = arguments.size.0;
-    writeln!(
-        out,
-        "{} frames of {width}x{height}, threads: {}; ms",
-        arguments.frames, arguments.threads
-    )?;
+    writeln!(out, "{} frames of {width}x{height}, threads: {}; ms", arguments.frames, arguments.threads)?;
     let mut path = Rows::new(&[
         "scene",
         "Gaussians",
@@ -160,14 +129,9 @@ fn show(measured: &[Measured], arguments: &PathArguments) -> std::io::Result<()>
         let wall = one.cells(|frame| frame.wall);
         let processor = one.cells(|frame| frame.processor.unwrap_or(f64::NAN));
         for (time, cells) in [("wall", wall), ("processor", processor)] {
-            let head = [
-                one.scene.clone(),
-                one.gaussians.to_string(),
-                time.to_owned(),
-            ];
+            let head = [one.scene.clone(), one.gaussians.to_string(), time.to_owned()];
             let row = head.into_iter().chain(cells);
-            path.rows
-                .push(row.chain([mebibytes(one.memory())]).collect());
+            path.rows.push(row.chain([mebibytes(one.memory())]).collect());
         }
         let first = one.frames.first().map_or(f64::NAN, |frame| frame.wall);
         let parts = [one.read, one.upload, first, one.png];
@@ -189,9 +153,7 @@ fn frames(measured: &[Measured]) -> Rows {
                 one.scene.clone(),
                 frame.to_string(),
                 format!("{:.3}", drawn.wall),
-                drawn
-                    .processor
-                    .map_or(String::new(), |time| format!("{time:.3}")),
+                drawn.processor.map_or(String::new(), |time| format!("{time:.3}")),
             ]);
         }
     }

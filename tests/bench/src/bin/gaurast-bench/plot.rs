@@ -57,26 +57,10 @@ pub fn write(stem: &Path, caption: &str, panels: &[Panel]) -> Result<(), BenchEr
     let rows = panels.len().div_ceil(COLUMNS).max(1);
     let size = (PANEL[0] * COLUMNS as u32, PANEL[1] * rows as u32 + 30);
     let svg = stem.with_extension("svg");
-    draw(
-        &SVGBackend::new(&svg, size).into_drawing_area(),
-        caption,
-        rows,
-        panels,
-    )?;
+    draw(&SVGBackend::new(&svg, size).into_drawing_area(), caption, rows, panels)?;
     let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
-    draw(
-        &BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area(),
-        caption,
-        rows,
-        panels,
-    )?;
-    image::save_buffer(
-        stem.with_extension("png"),
-        &pixels,
-        size.0,
-        size.1,
-        image::ExtendedColorType::Rgb8,
-    )?;
+    draw(&BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area(), caption, rows, panels)?;
+    image::save_buffer(stem.with_extension("png"), &pixels, size.0, size.1, image::ExtendedColorType::Rgb8)?;
     Ok(())
 }
 
@@ -102,20 +86,10 @@ fn draw_panel<B: DrawingBackend>(
     panel: &Panel,
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
     let range = |axis: usize| {
-        let values = panel
-            .series
-            .iter()
-            .flat_map(|series| &series.points)
-            .map(|point| point[axis]);
-        let (least, greatest) = values
-            .fold((f64::INFINITY, 0.0_f64), |(least, greatest), value| {
-                (least.min(value), greatest.max(value))
-            });
-        if least <= greatest {
-            least / 1.5..greatest * 1.5
-        } else {
-            0.1..10.0
-        }
+        let values = panel.series.iter().flat_map(|series| &series.points).map(|point| point[axis]);
+        let (least, greatest) =
+            values.fold((f64::INFINITY, 0.0_f64), |(least, greatest), value| (least.min(value), greatest.max(value)));
+        if least <= greatest { least / 1.5..greatest * 1.5 } else { 0.1..10.0 }
     };
     let mut chart = ChartBuilder::on(area)
         .caption(&panel.title, ("sans-serif", 16))
@@ -135,9 +109,7 @@ fn draw_panel<B: DrawingBackend>(
         .y_labels(6)
         .label_style(("sans-serif", 12))
         .draw()?;
-    let line = |points: &[[f64; 2]]| -> Vec<(f64, f64)> {
-        points.iter().map(|point| (point[0], point[1])).collect()
-    };
+    let line = |points: &[[f64; 2]]| -> Vec<(f64, f64)> { points.iter().map(|point| (point[0], point[1])).collect() };
     if !panel.front.is_empty() {
         chart
             .draw_series(LineSeries::new(line(&panel.front), BLACK.stroke_width(1)))?
@@ -149,11 +121,7 @@ fn draw_panel<B: DrawingBackend>(
             chart.draw_series(LineSeries::new(line(&series.points), color))?;
         }
         chart
-            .draw_series(
-                line(&series.points)
-                    .into_iter()
-                    .map(|point| Circle::new(point, 4, color.filled())),
-            )?
+            .draw_series(line(&series.points).into_iter().map(|point| Circle::new(point, 4, color.filled())))?
             .label(&series.name)
             .legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
     }
@@ -193,11 +161,7 @@ mod tests {
             title: title.to_owned(),
             axes: ["time", "error"],
             front: points.clone(),
-            series: vec![Series {
-                name: "contender".to_owned(),
-                points,
-                joined: true,
-            }],
+            series: vec![Series { name: "contender".to_owned(), points, joined: true }],
         };
         let panels = [
             panel("first", vec![[1.0, 1e-3], [10.0, 1e-7]]),
@@ -209,14 +173,9 @@ mod tests {
         for word in ["machine", "first", "one point", "contender", "Pareto front"] {
             assert!(svg.contains(word), "{word}");
         }
-        let png = image::open(stem.with_extension("png"))
-            .expect("a picture")
-            .into_rgb8();
+        let png = image::open(stem.with_extension("png")).expect("a picture").into_rgb8();
         assert_eq!(png.dimensions(), (2 * PANEL[0], 2 * PANEL[1] + 30));
         let blue = COLORS[0];
-        assert!(
-            png.pixels()
-                .any(|pixel| pixel.0 == [blue.0, blue.1, blue.2])
-        );
+        assert!(png.pixels().any(|pixel| pixel.0 == [blue.0, blue.1, blue.2]));
     }
 }

@@ -13,26 +13,17 @@ use gaurast_scene::Scene;
 pub(super) fn write(path: &Path, scene: &Scene) -> std::io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
     let stride = scene.sh_stride();
-    write!(
-        out,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
-        scene.len()
-    )?;
+    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", scene.len())?;
     let rest = (0..3 * (stride - 1)).map(|number| format!("f_rest_{number}"));
     let names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"].map(str::to_owned);
-    let others = [
-        "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
-    ]
-    .map(str::to_owned);
+    let others = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"].map(str::to_owned);
     for name in names.into_iter().chain(rest).chain(others) {
         writeln!(out, "property float {name}")?;
     }
     out.write_all(b"end_header\n")?;
     let mut floats: Vec<f32> = Vec::new();
     let harmonics = scene.sh().chunks_exact(stride);
-    for ((position, shape), harmonics) in
-        scene.positions().iter().zip(scene.shapes()).zip(harmonics)
-    {
+    for ((position, shape), harmonics) in scene.positions().iter().zip(scene.shapes()).zip(harmonics) {
         floats.clear();
         floats.extend(position);
         floats.extend(harmonics[0]);

@@ -48,11 +48,7 @@ impl Roofline {
             let time = fastest(whole, many)? - fastest(whole, few)?;
             Ok(((many - few) * TILE_GAUSSIANS) as f64 / time.max(1e-9))
         };
-        Ok(Self {
-            pairs: rate(false)?,
-            pixels: 256.0 * rate(true)?,
-            operations: operations(),
-        })
+        Ok(Self { pairs: rate(false)?, pixels: 256.0 * rate(true)?, operations: operations() })
     }
 
     /// The share of the bound that a frame's rasterization reaches on `threads`. It is the time that the frame's pairs
@@ -120,8 +116,8 @@ fn multiply_and_add<S: Simd>(simd: S) -> f64 {
 fn fastest(whole: bool, tiles: usize) -> Result<f64, BenchError> {
     let workload = Workload::new(Source::Tiles { whole, tiles }, [16 * tiles as u32, 16]);
     let views = workload.views(&workload.scene()?, 1)?;
-    let mut worker = Worker::start(Contender::Gaurast, &workload, 1)?
-        .ok_or(BenchError::Worker("it is not there".to_owned()))?;
+    let mut worker =
+        Worker::start(Contender::Gaurast, &workload, 1)?.ok_or(BenchError::Worker("it is not there".to_owned()))?;
     let mut least = f64::INFINITY;
     for _ in 0..FRAMES {
         let drawn = worker.draw(&views[0], Settings::default(), None)?;

@@ -45,11 +45,7 @@ impl Contender {
 }
 
 /// All contenders, in the order of tables.
-pub const CONTENDERS: [Contender; 3] = [
-    Contender::Gaurast,
-    Contender::QuadsOnLavapipe,
-    Contender::QuadsOnGaurast,
-];
+pub const CONTENDERS: [Contender; 3] = [Contender::Gaurast, Contender::QuadsOnLavapipe, Contender::QuadsOnGaurast];
 
 /// The first message to a worker.
 #[derive(Serialize, Deserialize)]
@@ -117,19 +113,11 @@ impl Drawn {
 /// If it cannot be written as JSON.
 pub fn input(workload: &Workload, views: &[Camera]) -> Result<Vec<u8>, BenchError> {
     let mut input = Vec::new();
-    let setup = Setup {
-        contender: Contender::Gaurast,
-        workload: workload.clone(),
-        threads: 1,
-    };
+    let setup = Setup { contender: Contender::Gaurast, workload: workload.clone(), threads: 1 };
     say(&mut input, &setup)?;
     for camera in views {
-        let request = Request {
-            camera: camera.clone(),
-            settings: Settings::default(),
-            picture: None,
-            is_independent: false,
-        };
+        let request =
+            Request { camera: camera.clone(), settings: Settings::default(), picture: None, is_independent: false };
         say(&mut input, &request)?;
     }
     Ok(input)
@@ -168,11 +156,7 @@ pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 
 impl Worker {
     /// Starts a worker that uses `threads` threads; `None` if its device is not available.
-    pub fn start(
-        contender: Contender,
-        workload: &Workload,
-        threads: usize,
-    ) -> Result<Option<Self>, BenchError> {
+    pub fn start(contender: Contender, workload: &Workload, threads: usize) -> Result<Option<Self>, BenchError> {
         let optimizations = std::env::var("GAURAST_OPTIMIZATIONS");
         let optimizations = optimizations.unwrap_or_else(|_| OPTIMIZATIONS.to_owned());
         Self::with_optimizations(contender, workload, threads, &optimizations)
@@ -209,16 +193,9 @@ impl Worker {
             child,
             requests: Some(requests),
             replies: BufReader::new(replies),
-            ready: Ready {
-                device: String::new(),
-                upload: 0.0,
-            },
+            ready: Ready { device: String::new(), upload: 0.0 },
         };
-        let setup = Setup {
-            contender,
-            workload: workload.clone(),
-            threads,
-        };
+        let setup = Setup { contender, workload: workload.clone(), threads };
         match worker.ask(&setup)? {
             Reply::Ready(ready) => worker.ready = ready,
             reply => return Err(reply.unexpected(contender)),
@@ -227,12 +204,7 @@ impl Worker {
     }
 
     /// Draws a frame, and leaves its pixels in the file `picture` if that is given.
-    pub fn draw(
-        &mut self,
-        camera: &Camera,
-        settings: Settings,
-        picture: Option<&Path>,
-    ) -> Result<Drawn, BenchError> {
+    pub fn draw(&mut self, camera: &Camera, settings: Settings, picture: Option<&Path>) -> Result<Drawn, BenchError> {
         self.request(&Request {
             camera: camera.clone(),
             settings,
@@ -260,10 +232,7 @@ impl Worker {
     }
 
     fn ask(&mut self, message: &impl Serialize) -> Result<Reply, BenchError> {
-        let requests = self
-            .requests
-            .as_mut()
-            .ok_or_else(|| std::io::Error::from(std::io::ErrorKind::BrokenPipe))?;
+        let requests = self.requests.as_mut().ok_or_else(|| std::io::Error::from(std::io::ErrorKind::BrokenPipe))?;
         say(requests, message)?;
         let mut line = String::new();
         self.replies.read_line(&mut line)?;
@@ -299,10 +268,7 @@ pub fn lavapipe() -> Option<PathBuf> {
         .map(|folder| Path::new(folder).join("vulkan/icd.d"))
         .flat_map(|folder| {
             let arch = std::env::consts::ARCH;
-            [
-                folder.join(format!("lvp_icd.{arch}.json")),
-                folder.join("lvp_icd.json"),
-            ]
+            [folder.join(format!("lvp_icd.{arch}.json")), folder.join("lvp_icd.json")]
         })
         .find(|path| path.exists())
 }
@@ -431,11 +397,7 @@ fn describe(frame: &Frame) -> Drawn {
             .counters
             .iter()
             .map(|counter| {
-                let scale = if in_time(&counter.category) {
-                    1e-6
-                } else {
-                    1.0
-                };
+                let scale = if in_time(&counter.category) { 1e-6 } else { 1.0 };
                 (counter.name.clone(), counter.value * scale)
             })
             .collect(),

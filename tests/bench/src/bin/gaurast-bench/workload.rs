@@ -88,14 +88,7 @@ pub struct Workload {
 impl Workload {
     /// The unmodified scene.
     pub fn new(source: Source, size: [u32; 2]) -> Self {
-        Self {
-            source,
-            scale: 1.0,
-            away: 0.0,
-            plain: false,
-            extra: None,
-            size,
-        }
+        Self { source, scale: 1.0, away: 0.0, plain: false, extra: None, size }
     }
 
     /// The scene.
@@ -103,14 +96,9 @@ impl Workload {
         let scene = match &self.source {
             Source::Benchmark { count } => scenes::synthetic(SEED, *count),
             Source::Garden { count } => gaurast_scene::garden::scene(SEED, *count),
-            Source::Captured { count, .. } => {
-                scenes::trained_like(SEED, *count, &self.source.cameras(self.size)?)
-            }
+            Source::Captured { count, .. } => scenes::trained_like(SEED, *count, &self.source.cameras(self.size)?),
             Source::File { path } => gaurast_scene::open(path)?,
-            Source::Tiles {
-                whole,
-                tiles: count,
-            } => tiles(*whole, *count),
+            Source::Tiles { whole, tiles: count } => tiles(*whole, *count),
             Source::Wall => wall(),
         };
         let mut scene = scenes::partly_moved_away(&scenes::scaled(&scene, self.scale), self.away);
@@ -120,14 +108,10 @@ impl Workload {
         let unseen = match self.extra {
             None => return Ok(scene),
             Some(Extra::Beside { count }) => {
-                scenes::moved(&scenes::synthetic(SEED, count), |[x, y, z]| {
-                    [x, y + 30.0, z]
-                })
+                scenes::moved(&scenes::synthetic(SEED, count), |[x, y, z]| [x, y + 30.0, z])
             }
             Some(Extra::Behind { count }) => {
-                scenes::moved(&scenes::synthetic(SEED, count), |position| {
-                    position.map(|at| 0.5 * at)
-                })
+                scenes::moved(&scenes::synthetic(SEED, count), |position| position.map(|at| 0.5 * at))
             }
         };
         Ok(scenes::shuffled_with(&scene, &unseen, SEED))
@@ -141,38 +125,23 @@ impl Workload {
 
     /// `count` views, in the order of the path. A camera that turns around a scene turns by `step` radians from view to
     /// view.
-    pub fn turning_views(
-        &self,
-        scene: &Scene,
-        count: usize,
-        step: f64,
-    ) -> Result<Vec<Camera>, BenchError> {
+    pub fn turning_views(&self, scene: &Scene, count: usize, step: f64) -> Result<Vec<Camera>, BenchError> {
         let size = self.size;
         let around = |camera: Camera, pivot: [f64; 3]| {
-            (0..count)
-                .map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], step * frame as f64))
-                .collect()
+            (0..count).map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], step * frame as f64)).collect()
         };
         Ok(match &self.source {
-            Source::Benchmark { .. } | Source::Wall => {
-                around(scenes::synthetic_camera(size), [0.0; 3])
-            }
+            Source::Benchmark { .. } | Source::Wall => around(scenes::synthetic_camera(size), [0.0; 3]),
             Source::Garden { .. } => around(gaurast_scene::garden::camera(None, size)?, [0.0; 3]),
             Source::Captured { .. } => {
                 let cameras = self.source.cameras(size)?;
-                (0..count)
-                    .map(|frame| {
-                        cameras[frame * cameras.len() / count.max(1) % cameras.len()].clone()
-                    })
-                    .collect()
+                (0..count).map(|frame| cameras[frame * cameras.len() / count.max(1) % cameras.len()].clone()).collect()
             }
             Source::File { .. } => {
                 let camera = gaurast_scene::frame(scene, DEFAULT_FOV, size);
                 // The path goes around a point ahead of the camera, at the distance of the scene's centre.
                 let distance = distance_to(scene, &camera);
-                let pivot = std::array::from_fn(|axis| {
-                    camera.eye[axis] + distance * camera.rotation[2][axis]
-                });
+                let pivot = std::array::from_fn(|axis| camera.eye[axis] + distance * camera.rotation[2][axis]);
                 around(camera, pivot)
             }
             Source::Tiles { .. } => vec![tiles_camera(self.size); count],
@@ -182,32 +151,20 @@ impl Workload {
 
 impl Source {
     fn cameras(&self, size: [u32; 2]) -> Result<Vec<Camera>, BenchError> {
-        let Self::Captured {
-            cameras: Some(path),
-            ..
-        } = self
-        else {
+        let Self::Captured { cameras: Some(path), .. } = self else {
             return Ok(Camera::orbit(90, size));
         };
         let views = gaurast_scene::camera_files::load(path, size)?;
         if views.is_empty() {
             return Err(BenchError::NoCamera(path.clone()));
         }
-        Ok(views
-            .into_iter()
-            .map(|view| view.camera.resized(size))
-            .collect())
+        Ok(views.into_iter().map(|view| view.camera.resized(size)).collect())
     }
 }
 
 impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let stem = |path: &Path| {
-            path.file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        };
+        let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match self {
             Self::Benchmark { count } => write!(f, "synthetic {}", short(*count)),
             Self::Garden { count } => write!(f, "garden {}", short(*count)),
@@ -238,11 +195,7 @@ fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
         .positions()
         .iter()
         .map(|position| {
-            (0..3)
-                .map(|axis| {
-                    camera.rotation[2][axis] * (f64::from(position[axis]) - camera.eye[axis])
-                })
-                .sum()
+            (0..3).map(|axis| camera.rotation[2][axis] * (f64::from(position[axis]) - camera.eye[axis])).sum()
         })
         .filter(|depth: &f64| depth.is_finite())
         .collect();
@@ -257,16 +210,8 @@ fn tiles(whole: bool, tiles: usize) -> Scene {
     for index in 0..TILE_GAUSSIANS {
         // The Gaussian is in the middle of a block and too small to reach another block.
         let block = |i: usize| (4 * (i % 4)) as f32 - 6.0;
-        let (scale, opacity) = if whole {
-            (40.0 * tiles as f32, 0.009)
-        } else {
-            (0.01, 0.05)
-        };
-        let shape = GaussianShape {
-            scale: [scale; 3],
-            rotation: [1.0, 0.0, 0.0, 0.0],
-            opacity,
-        };
+        let (scale, opacity) = if whole { (40.0 * tiles as f32, 0.009) } else { (0.01, 0.05) };
+        let shape = GaussianShape { scale: [scale; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity };
         let depth = 100.0 + 0.001 * index as f32;
         for tile in 0..copies {
             let x = block(index) + (16 * tile) as f32;
@@ -287,16 +232,11 @@ fn wall() -> Scene {
     for layer in 0..LAYERS {
         for column in 0..columns {
             for row in 0..rows {
-                let angle =
-                    std::f32::consts::TAU * (column as f32 + 0.25 * layer as f32) / columns as f32;
+                let angle = std::f32::consts::TAU * (column as f32 + 0.25 * layer as f32) / columns as f32;
                 let radius = RADIUS + 0.01 * layer as f32;
                 let y = 0.25 * (row as f32 - 0.5 * rows as f32);
                 sh[0] = [0.3 + 0.4 * (column % 2) as f32, 0.1, 0.3 * (row % 2) as f32];
-                let shape = GaussianShape {
-                    scale: [0.4; 3],
-                    rotation: [1.0, 0.0, 0.0, 0.0],
-                    opacity: 0.99,
-                };
+                let shape = GaussianShape { scale: [0.4; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 0.99 };
                 scene.push([radius * angle.sin(), y, radius * angle.cos()], shape, &sh);
             }
         }

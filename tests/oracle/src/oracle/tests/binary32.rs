@@ -58,9 +58,7 @@ impl Record {
         let tan = [0, 1].map(|i| {
             let (focal, principal) = (camera.focal[i], camera.principal[i]);
             let margin = 0.15 * size[i] / focal;
-            ((t[i] / t[2]) as f32)
-                .max(-(principal / focal + margin))
-                .min((size[i] - principal) / focal + margin)
+            ((t[i] / t[2]) as f32).max(-(principal / focal + margin)).min((size[i] - principal) / focal + margin)
         });
         let z = t[2] as f32;
         let jacobian = [
@@ -69,8 +67,7 @@ impl Record {
         ];
         let axes = rotation(scene.rotations[index]);
         let m = jacobian.map(|row| {
-            let world: [f32; 3] =
-                std::array::from_fn(|i| (0..3).map(|k| row[k] * camera.rotation[3 * k + i]).sum());
+            let world: [f32; 3] = std::array::from_fn(|i| (0..3).map(|k| row[k] * camera.rotation[3 * k + i]).sum());
             std::array::from_fn::<f32, 3, _>(|i| {
                 (0..3).map(|k| world[k] * axes[k][i]).sum::<f32>() * scene.scales[index][i]
             })
@@ -94,17 +91,12 @@ impl Record {
                 let larger = xx.max(yy) + low_pass;
                 Conic::Cholesky {
                     swapped: yy > xx,
-                    l: [
-                        larger.sqrt(),
-                        xy / larger.sqrt(),
-                        (determinant / larger).sqrt(),
-                    ],
+                    l: [larger.sqrt(), xy / larger.sqrt(), (determinant / larger).sqrt()],
                 }
             }
-            Carelessness::None | Carelessness::Mean => Conic::Cholesky {
-                swapped: splat.cholesky.swapped,
-                l: splat.cholesky.l.map(|l| l as f32),
-            },
+            Carelessness::None | Carelessness::Mean => {
+                Conic::Cholesky { swapped: splat.cholesky.swapped, l: splat.cholesky.l.map(|l| l as f32) }
+            }
         };
         let pixel = match carelessness {
             Carelessness::Mean => [0.0; 2],
@@ -121,13 +113,9 @@ impl Record {
     }
 
     fn alpha(&self, x: u32, y: u32) -> f32 {
-        let [x, y] = [(0, x), (1, y)]
-            .map(|(i, at)| ((f64::from(at) - self.pixel[i]) as f32 + 0.5) - self.fraction[i]);
+        let [x, y] = [(0, x), (1, y)].map(|(i, at)| ((f64::from(at) - self.pixel[i]) as f32 + 0.5) - self.fraction[i]);
         let q = match self.conic {
-            Conic::Cholesky {
-                swapped,
-                l: [l11, l21, l22],
-            } => {
+            Conic::Cholesky { swapped, l: [l11, l21, l22] } => {
                 let (first, second) = if swapped { (y, x) } else { (x, y) };
                 let y1 = first / l11;
                 let y2 = (second - l21 * y1) / l22;
@@ -135,9 +123,7 @@ impl Record {
             }
             Conic::Adjugate([a, b, c]) => a * x * x + 2.0 * b * x * y + c * y * y,
         };
-        (self.log2_opacity - 0.5 * std::f32::consts::LOG2_E * q)
-            .exp2()
-            .min(0.99)
+        (self.log2_opacity - 0.5 * std::f32::consts::LOG2_E * q).exp2().min(0.99)
     }
 }
 
@@ -147,21 +133,9 @@ fn rotation(quaternion: [f32; 4]) -> [[f32; 3]; 3] {
     let norm = scaled.iter().map(|c| c * c).sum::<f32>().sqrt();
     let [w, x, y, z] = scaled.map(|c| c / norm);
     [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
 }
 
@@ -170,11 +144,7 @@ fn judge(scene: &SceneBuffers, camera: &OracleCamera, carelessness: Carelessness
     let state = OracleState::default();
     let input = scene.as_oracle();
     let mut records: Vec<Record> = (0..input.len())
-        .filter_map(|i| {
-            project(&input, camera, &state, i)
-                .ok()
-                .map(|splat| (i, splat))
-        })
+        .filter_map(|i| project(&input, camera, &state, i).ok().map(|splat| (i, splat)))
         .map(|(i, splat)| Record::new(&splat, scene, i, camera, carelessness))
         .collect();
     records.sort_by(|a, b| a.key.total_cmp(&b.key));
@@ -212,11 +182,7 @@ fn needles(seed: u64) -> SceneBuffers {
 }
 
 /// The greatest ratio of alpha's error to the model's bound, over all pixels to which Gaussians contribute.
-fn greatest_share_of_the_bound(
-    scene: &SceneBuffers,
-    camera: &OracleCamera,
-    carelessness: Carelessness,
-) -> f64 {
+fn greatest_share_of_the_bound(scene: &SceneBuffers, camera: &OracleCamera, carelessness: Carelessness) -> f64 {
     let state = OracleState::default();
     let input = scene.as_oracle();
     let mut greatest = 0.0_f64;
@@ -238,16 +204,9 @@ fn greatest_share_of_the_bound(
 
 #[test]
 fn the_model_bounds_what_binary32_does() {
-    let camera = OracleCamera {
-        principal: [20.0, 40.0],
-        ..scenes::camera(96, 64)
-    };
+    let camera = OracleCamera { principal: [20.0, 40.0], ..scenes::camera(96, 64) };
     for seed in 0..3 {
-        for scene in [
-            scenes::cloud(seed, 400, 0),
-            scenes::awkward(seed, 200, 0),
-            needles(seed),
-        ] {
+        for scene in [scenes::cloud(seed, 400, 0), scenes::awkward(seed, 200, 0), needles(seed)] {
             let projected = greatest_share_of_the_bound(&scene, &camera, Carelessness::Projection);
             let careful = greatest_share_of_the_bound(&scene, &camera, Carelessness::None);
             assert!(projected < 1.0 && careful < 1.0, "{projected} {careful}");
@@ -271,11 +230,7 @@ fn careful_binary32_lies_within_the_envelope() {
 #[test]
 fn a_projection_in_binary32_is_enough_unless_there_are_needles() {
     let camera = scenes::camera(96, 64);
-    let judged = judge(
-        &scenes::cloud(1, 1500, 0),
-        &camera,
-        Carelessness::Projection,
-    );
+    let judged = judge(&scenes::cloud(1, 1500, 0), &camera, Carelessness::Projection);
     assert!(judged.holds(), "{judged}");
     let judged = judge(&needles(2), &camera, Carelessness::Projection);
     assert!(!judged.holds(), "{judged}");
@@ -284,10 +239,7 @@ fn a_projection_in_binary32_is_enough_unless_there_are_needles() {
 #[test]
 fn a_mean_in_one_number_does_not() {
     // Small Gaussians on a picture so wide that binary32 pixels are coarse at its right end.
-    let camera = OracleCamera {
-        focal: [6553.6; 2],
-        ..scenes::camera(8192, 2)
-    };
+    let camera = OracleCamera { focal: [6553.6; 2], ..scenes::camera(8192, 2) };
     let mut scene = scenes::cloud(1, 400, 0);
     for (position, scale) in scene.positions.iter_mut().zip(&mut scene.scales) {
         position[1] *= 0.001;

@@ -20,25 +20,10 @@ fn states() -> [OracleState; 5] {
     let default = OracleState::default();
     [
         default,
-        OracleState {
-            opacity_compensated: true,
-            ..default
-        },
-        OracleState {
-            low_pass: 0.0,
-            alpha_floor: 0.02,
-            ..default
-        },
-        OracleState {
-            alpha_floor: 0.0,
-            ..default
-        },
-        OracleState {
-            alpha_floor: 1e-12,
-            transmittance_floor: 0.0,
-            alpha_ceiling: 1.0,
-            ..default
-        },
+        OracleState { opacity_compensated: true, ..default },
+        OracleState { low_pass: 0.0, alpha_floor: 0.02, ..default },
+        OracleState { alpha_floor: 0.0, ..default },
+        OracleState { alpha_floor: 1e-12, transmittance_floor: 0.0, alpha_ceiling: 1.0, ..default },
     ]
 }
 

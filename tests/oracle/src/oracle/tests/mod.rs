@@ -24,10 +24,7 @@ fn camera() -> OracleCamera {
 
 /// The default state without the low-pass filter, so that covariances are round numbers.
 fn unfiltered() -> OracleState {
-    OracleState {
-        low_pass: 0.0,
-        ..OracleState::default()
-    }
+    OracleState { low_pass: 0.0, ..OracleState::default() }
 }
 
 /// A sphere at depth 1 on the axis whose projection has a standard deviation of 2 px (4 px^2).

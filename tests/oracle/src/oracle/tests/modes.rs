@@ -15,10 +15,7 @@ fn turned(angle: f64, color: [f32; 3]) -> Gaussian {
 }
 
 fn flat() -> OracleState {
-    OracleState {
-        geometry: OracleGeometry::Surfel,
-        ..unfiltered()
-    }
+    OracleState { geometry: OracleGeometry::Surfel, ..unfiltered() }
 }
 
 #[test]
@@ -40,16 +37,10 @@ fn a_disc_is_where_rays_meet_its_plane() {
 
 #[test]
 fn a_disc_is_no_less_than_its_filter() {
-    let state = OracleState {
-        low_pass: 0.5,
-        ..flat()
-    };
+    let state = OracleState { low_pass: 0.5, ..flat() };
     // Edge on, and a point.
     let edge = turned(std::f64::consts::FRAC_PI_2, [0.5; 3]);
-    let point = Gaussian {
-        scale: [0.0; 3],
-        ..edge.clone()
-    };
+    let point = Gaussian { scale: [0.0; 3], ..edge.clone() };
     for gaussian in [edge, point] {
         let picture = render(&[gaussian], &camera(), &state);
         assert_close(at(&picture, 32, 32), [0.25, 0.25, 0.25, 0.5], 1e-7);
@@ -63,23 +54,13 @@ fn discs_that_cross_are_in_front_of_each_other() {
     let (red, green) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
     let crossing = [turned(0.7, red), turned(-0.7, green)];
     for state in [
-        OracleState {
-            order: OracleOrder::PerPixel,
-            ..flat()
-        },
-        OracleState {
-            order: OracleOrder::PerPixel,
-            low_pass: 0.05,
-            ..unfiltered()
-        },
+        OracleState { order: OracleOrder::PerPixel, ..flat() },
+        OracleState { order: OracleOrder::PerPixel, low_pass: 0.05, ..unfiltered() },
     ] {
         let picture = render(&crossing, &camera(), &state);
         let [left, right] = [31, 33].map(|x| at(&picture, x, 32));
         // The first goes behind the second on the left, where its x is negative: -x sin.
-        assert!(
-            left[1] > left[0] && right[0] > right[1],
-            "{left:?} {right:?}"
-        );
+        assert!(left[1] > left[0] && right[0] > right[1], "{left:?} {right:?}");
         // In the middle their depths are equal, so they are in the order of the draw.
         assert_close(at(&picture, 32, 32), [0.5, 0.25, 0.0, 0.75], 1e-6);
     }

@@ -6,10 +6,7 @@ use super::{assert_close, at, unfiltered};
 use crate::oracle::OracleState;
 
 const SIZE: [u32; 2] = [64, 64];
-const VIEWPORT: OracleViewport = OracleViewport {
-    corner: [0.0; 2],
-    size: [64.0; 2],
-};
+const VIEWPORT: OracleViewport = OracleViewport { corner: [0.0; 2], size: [64.0; 2] };
 
 /// A vertex shader's outputs for a disc in the middle of pixel (40, 24), 4 px^2, at depth `z` of 1.
 fn disc(z: f32) -> OracleOutputs {
@@ -29,14 +26,8 @@ fn one_gaussian_where_the_viewport_puts_it() {
     let alpha = 0.5 * (-0.5_f64 * 10.0 / 4.0).exp();
     assert!((at(&picture, 43, 23)[3] - alpha).abs() < 1e-15);
     // With a flipped viewport the mean is mirrored, and the covariance is not.
-    let flipped = OracleViewport {
-        corner: [0.0, 64.0],
-        size: [64.0, -64.0],
-    };
-    let slanted = OracleOutputs {
-        covariance: [4.0, 1.0, 2.0],
-        ..disc(0.5)
-    };
+    let flipped = OracleViewport { corner: [0.0, 64.0], size: [64.0, -64.0] };
+    let slanted = OracleOutputs { covariance: [4.0, 1.0, 2.0], ..disc(0.5) };
     let upright = project(&slanted, &VIEWPORT, &unfiltered()).unwrap();
     let flipped = project(&slanted, &flipped, &unfiltered()).unwrap();
     assert_eq!(upright.mean, [40.5, 24.5]);
@@ -46,28 +37,17 @@ fn one_gaussian_where_the_viewport_puts_it() {
 
 #[test]
 fn compensation_takes_the_determinant_of_what_was_written() {
-    let state = OracleState {
-        low_pass: 0.25,
-        opacity_compensated: true,
-        ..OracleState::default()
-    };
+    let state = OracleState { low_pass: 0.25, opacity_compensated: true, ..OracleState::default() };
     let splat = project(&disc(0.5), &VIEWPORT, &state).unwrap();
     assert!((splat.opacity - 0.5 * 4.0 / 4.25).abs() < 1e-15);
     // Rounding may have left a slightly negative area.
-    let less = OracleOutputs {
-        covariance: [4.0, 4.000_001, 4.0],
-        ..disc(0.5)
-    };
+    let less = OracleOutputs { covariance: [4.0, 4.000_001, 4.0], ..disc(0.5) };
     assert_eq!(project(&less, &VIEWPORT, &state).unwrap().opacity, 0.0);
 }
 
 #[test]
 fn depths_are_expected_and_median() {
-    let layers = [0.75, 0.25].map(|z| OracleOutputs {
-        key: Some(z),
-        opacity: 0.25,
-        ..disc(z)
-    });
+    let layers = [0.75, 0.25].map(|z| OracleOutputs { key: Some(z), opacity: 0.25, ..disc(z) });
     let pixels = resolve_shaded(&layers, SIZE, &VIEWPORT, &unfiltered());
     let [way] = &pixels[24 * 64 + 40][..] else {
         panic!("the pixel is undecidable");

@@ -30,39 +30,19 @@ impl Moments {
 
 /// A wide field: more than 120 degrees.
 fn wide(model: OracleModel) -> OracleCamera {
-    OracleCamera {
-        model,
-        width: 400,
-        height: 200,
-        focal: [100.0, 100.0],
-        principal: [200.0, 100.0],
-        ..camera()
-    }
+    OracleCamera { model, width: 400, height: 200, focal: [100.0, 100.0], principal: [200.0, 100.0], ..camera() }
 }
 
 fn gaussian(position: [f32; 3], scale: [f32; 3]) -> Gaussian {
-    Gaussian {
-        position,
-        scale,
-        rotation: [0.9, 0.2, -0.3, 0.1],
-        opacity: 0.8,
-        sh: vec![[0.5; 3]],
-    }
+    Gaussian { position, scale, rotation: [0.9, 0.2, -0.3, 0.1], opacity: 0.8, sh: vec![[0.5; 3]] }
 }
 
 /// The moments of a Gaussian's projection.
 fn projected(gaussian: &Gaussian, camera: &OracleCamera, unscented: bool) -> Moments {
     let scene = SceneBuffers::new(0, [gaussian.clone()]);
-    let state = OracleState {
-        low_pass: 0.0,
-        unscented,
-        ..OracleState::default()
-    };
+    let state = OracleState { low_pass: 0.0, unscented, ..OracleState::default() };
     let splat = project(&scene.as_oracle(), camera, &state, 0).expect("it is drawn");
-    Moments {
-        mean: splat.mean,
-        covariance: splat.covariance,
-    }
+    Moments { mean: splat.mean, covariance: splat.covariance }
 }
 
 /// The moments of the pictures of many points of it, from one side of a seam.
@@ -77,27 +57,12 @@ fn truth(gaussian: &Gaussian, camera: &OracleCamera) -> Moments {
     let norm = largest.iter().map(|c| c * c).sum::<f64>().sqrt();
     let [w, x, y, z] = largest.map(|c| c / norm);
     let rotation = [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ];
     let (fx, fy) = (f64::from(camera.focal[0]), f64::from(camera.focal[1]));
-    let (cx, cy) = (
-        f64::from(camera.principal[0]),
-        f64::from(camera.principal[1]),
-    );
+    let (cx, cy) = (f64::from(camera.principal[0]), f64::from(camera.principal[1]));
     let mut places = Vec::with_capacity(POINTS);
     while places.len() < POINTS {
         let own = gaussian.scale.map(|s| f64::from(s) * normal());
@@ -124,21 +89,13 @@ fn truth(gaussian: &Gaussian, camera: &OracleCamera) -> Moments {
         let products = places.iter().map(|p| (p[i] - mean[i]) * (p[j] - mean[j]));
         products.sum::<f64>() / count
     };
-    Moments {
-        mean,
-        covariance: [moment(0, 0), moment(0, 1), moment(1, 1)],
-    }
+    Moments { mean, covariance: [moment(0, 0), moment(0, 1), moment(1, 1)] }
 }
 
 #[test]
 fn it_agrees_with_the_jacobian_on_what_is_small_and_far() {
     let far = gaussian([3.0, -2.0, 20.0], [0.02, 0.03, 0.01]);
-    for model in [
-        OracleModel::Pinhole,
-        OracleModel::Orthographic,
-        OracleModel::Fisheye,
-        OracleModel::Equirectangular,
-    ] {
+    for model in [OracleModel::Pinhole, OracleModel::Orthographic, OracleModel::Fisheye, OracleModel::Equirectangular] {
         let camera = wide(model);
         let [unscented, jacobian] = [true, false].map(|way| projected(&far, &camera, way));
         let distance = unscented.distance(&jacobian);
@@ -151,47 +108,19 @@ fn it_is_nearer_to_the_truth_in_wide_fields_and_near_the_eye() {
     // The least factor by which the unscented transform is nearer. Near the poles of a panorama neither is good.
     let cases = [
         // Beyond the edge of the picture, where the Jacobian's slope is clamped.
-        (
-            OracleModel::Pinhole,
-            gaussian([5.6, 0.4, 2.0], [0.45, 0.3, 0.25]),
-            5.0,
-        ),
-        (
-            OracleModel::Pinhole,
-            gaussian([-4.4, 3.0, 1.6], [0.25, 0.3, 0.2]),
-            20.0,
-        ),
+        (OracleModel::Pinhole, gaussian([5.6, 0.4, 2.0], [0.45, 0.3, 0.25]), 5.0),
+        (OracleModel::Pinhole, gaussian([-4.4, 3.0, 1.6], [0.25, 0.3, 0.2]), 20.0),
         // Near the eye.
-        (
-            OracleModel::Pinhole,
-            gaussian([0.5, 0.3, 1.2], [0.2, 0.25, 0.2]),
-            4.0,
-        ),
-        (
-            OracleModel::Fisheye,
-            gaussian([1.5, 1.0, 0.2], [0.5, 0.3, 0.4]),
-            1.5,
-        ),
-        (
-            OracleModel::Fisheye,
-            gaussian([1.5, 1.0, -0.9], [0.4, 0.3, 0.3]),
-            1.5,
-        ),
-        (
-            OracleModel::Equirectangular,
-            gaussian([0.7, 1.0, -0.2], [0.1, 0.25, 0.2]),
-            10.0,
-        ),
+        (OracleModel::Pinhole, gaussian([0.5, 0.3, 1.2], [0.2, 0.25, 0.2]), 4.0),
+        (OracleModel::Fisheye, gaussian([1.5, 1.0, 0.2], [0.5, 0.3, 0.4]), 1.5),
+        (OracleModel::Fisheye, gaussian([1.5, 1.0, -0.9], [0.4, 0.3, 0.3]), 1.5),
+        (OracleModel::Equirectangular, gaussian([0.7, 1.0, -0.2], [0.1, 0.25, 0.2]), 10.0),
     ];
     for (model, gaussian, factor) in cases {
         let camera = wide(model);
         let truth = truth(&gaussian, &camera);
-        let [unscented, jacobian] =
-            [true, false].map(|way| projected(&gaussian, &camera, way).distance(&truth));
-        assert!(
-            factor * unscented < jacobian,
-            "{model:?}: {unscented:.5}, by the Jacobian {jacobian:.5}"
-        );
+        let [unscented, jacobian] = [true, false].map(|way| projected(&gaussian, &camera, way).distance(&truth));
+        assert!(factor * unscented < jacobian, "{model:?}: {unscented:.5}, by the Jacobian {jacobian:.5}");
     }
 }
 

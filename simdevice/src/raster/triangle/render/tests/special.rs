@@ -8,10 +8,7 @@ use isa::machine::Stopped;
 use std::time::Duration;
 
 fn single() -> Config {
-    Config {
-        threads: 1,
-        ..Config::default()
-    }
+    Config { threads: 1, ..Config::default() }
 }
 
 /// A triangle with these corners in 1/256 pixels, clockwise in the framebuffer.
@@ -54,11 +51,7 @@ fn each_sample_is_shaded_for_itself() {
         FragmentInput::SampleId,
         FragmentInput::SamplePosition(0),
         FragmentInput::FragCoord(1),
-        FragmentInput::Varying {
-            index: 0,
-            interpolation: Interpolation::Linear,
-            sampling: Sampling::Sample,
-        },
+        FragmentInput::Varying { index: 0, interpolation: Interpolation::Linear, sampling: Sampling::Sample },
     ];
     let pass = rendering(vec![attachment(&target, ClearValue::Float([-1.0; 4]))]);
     let counters = run(&single(), &pass, |device| {
@@ -66,14 +59,7 @@ fn each_sample_is_shaded_for_itself() {
         let values = LARGE.map(|[x, _]| (x as f32 / 256.0).to_bits());
         let stage = fragments(inputs.clone(), color(0, 0), false);
         let primitives = vec![over(LARGE, 0)];
-        vec![draw(
-            device,
-            Some(stage),
-            state(4),
-            primitives,
-            values.to_vec(),
-            1,
-        )]
+        vec![draw(device, Some(stage), state(4), primitives, values.to_vec(), 1)]
     });
     for sample in 0..4u32 {
         let [dx, dy] = SAMPLES_4[sample as usize].map(|at| at as f32 / 256.0);
@@ -95,11 +81,7 @@ fn centroids_lie_within_the_primitive() {
     // Half a pixel wide, between the edge of pixels and their centres. The centres are outside, where the varying is
     // above 1.
     let corners = [[1020, 10], [1150, 10], [1020, 15_000]];
-    let varying = |sampling| FragmentInput::Varying {
-        index: 0,
-        interpolation: Interpolation::Perspective,
-        sampling,
-    };
+    let varying = |sampling| FragmentInput::Varying { index: 0, interpolation: Interpolation::Perspective, sampling };
     let inputs = vec![
         varying(Sampling::Centroid),
         varying(Sampling::Center),
@@ -111,25 +93,14 @@ fn centroids_lie_within_the_primitive() {
         let values = [0.0f32, 1.0, 0.0].map(f32::to_bits);
         let stage = fragments(inputs.clone(), color(0, 0), false);
         let primitives = vec![over(corners, 0)];
-        vec![draw(
-            device,
-            Some(stage),
-            state(4),
-            primitives,
-            values.to_vec(),
-            1,
-        )]
+        vec![draw(device, Some(stage), state(4), primitives, values.to_vec(), 1)]
     });
     let (mut covered, mut outside) = (0, 0);
     for at in 0..WIDTH * HEIGHT {
         let place = [at % WIDTH, at / WIDTH];
-        let samples: Vec<[f32; 4]> = (0..4)
-            .map(|sample| WIDE.decode(&texel(&target, Aspect::Color, 0, sample, place)))
-            .collect();
-        let mask: u32 = (0..4)
-            .filter(|&sample| samples[sample as usize][0] != -9.0)
-            .map(|sample| 1 << sample)
-            .sum();
+        let samples: Vec<[f32; 4]> =
+            (0..4).map(|sample| WIDE.decode(&texel(&target, Aspect::Color, 0, sample, place))).collect();
+        let mask: u32 = (0..4).filter(|&sample| samples[sample as usize][0] != -9.0).map(|sample| 1 << sample).sum();
         for found in samples.iter().filter(|found| found[0] != -9.0) {
             covered += 1;
             outside += u32::from(!(0.0..=1.0).contains(&found[1]));
@@ -143,41 +114,24 @@ fn centroids_lie_within_the_primitive() {
 
 #[gaurast_runner::test]
 fn primitives_go_to_their_layer_and_samples_are_resolved() {
-    let (target, resolved) = (
-        image(Format::R8G8B8A8Unorm, 4, 2),
-        image(Format::R8G8B8A8Unorm, 1, 2),
-    );
+    let (target, resolved) = (image(Format::R8G8B8A8Unorm, 4, 2), image(Format::R8G8B8A8Unorm, 1, 2));
     let mut color_attachment = attachment(&target, ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     color_attachment.resolve = Some((resolved.clone(), ResolveMode::Average));
-    let pass = Rendering {
-        layer_count: 2,
-        view_mask: 0,
-        ..rendering(vec![color_attachment])
-    };
+    let pass = Rendering { layer_count: 2, view_mask: 0, ..rendering(vec![color_attachment]) };
     let corners = [[0, 0], [9000, 100], [100, 9000]];
     run(&single(), &pass, |device| {
         let inputs = varyings(4, Interpolation::Flat, Sampling::Center);
         let stage = fragments(inputs, color(0, 0), false);
         let values = [1.0f32, 0.6, 0.2, 1.0].map(f32::to_bits).to_vec();
-        vec![draw(
-            device,
-            Some(stage),
-            state(4),
-            vec![over(corners, 1)],
-            values,
-            4,
-        )]
+        vec![draw(device, Some(stage), state(4), vec![over(corners, 1)], values, 4)]
     });
     let mut partial = 0;
     for at in 0..WIDTH * HEIGHT {
         let place = [at % WIDTH, at / WIDTH];
         let empty = texel(&resolved, Aspect::Color, 0, 0, place);
         assert_eq!(empty, [0, 0, 0, 255], "layer 0 is as it was cleared");
-        let covered = (0..4)
-            .filter(|&sample| {
-                texel(&target, Aspect::Color, 1, sample, place) == [255, 153, 51, 255]
-            })
-            .count();
+        let covered =
+            (0..4).filter(|&sample| texel(&target, Aspect::Color, 1, sample, place) == [255, 153, 51, 255]).count();
         let mean = covered as f32 / 4.0;
         let expected = Format::R8G8B8A8Unorm.encode([mean, mean * 0.6, mean * 0.2, 1.0]);
         assert_eq!(texel(&resolved, Aspect::Color, 1, 0, place), expected[..4]);
@@ -190,16 +144,8 @@ fn primitives_go_to_their_layer_and_samples_are_resolved() {
 fn counting() -> FragmentPrograms {
     let mut b = Builder::new();
     let one = b.u32(1);
-    let space = Space::Buffer(Binding {
-        slot: 0,
-        count: 1,
-        index: None,
-    });
-    let address = Address {
-        space,
-        base: None,
-        offset: 0,
-    };
+    let space = Space::Buffer(Binding { slot: 0, count: 1, index: None });
+    let address = Address { space, base: None, offset: 0 };
     b.atomic(AtomicOp::IAdd, address, Element::B32, one, None);
     FragmentPrograms {
         program: b.finish().unwrap(),
@@ -223,21 +169,14 @@ fn a_pass_without_attachments_has_side_effects_of_what_is_covered(case: &Case) {
         let counters = run(&config, &rendering(Vec::new()), |device| {
             let stage = Some(counting());
             let mut draw = draw(device, stage, state(1), primitives.clone(), Vec::new(), 0);
-            draw.bindings.buffers = vec![Some(BufferRange {
-                memory: memory.clone(),
-                offset: 0,
-                size: 64,
-            })];
+            draw.bindings.buffers = vec![Some(BufferRange { memory: memory.clone(), offset: 0, size: 64 })];
             draw.bindings.written = vec![memory.clone()];
             vec![draw]
         });
         let mut word = [0u32];
         memory.read(0, &mut word).unwrap();
         assert!(word[0] > 1000);
-        assert_eq!(
-            u64::from(word[0]),
-            counters.get(Counter::FragmentInvocations)
-        );
+        assert_eq!(u64::from(word[0]), counters.get(Counter::FragmentInvocations));
         assert_eq!(u64::from(word[0]), counters.get(Counter::SamplesPassed));
         assert_ne!(memory.generation(), generation);
     }
@@ -248,29 +187,13 @@ fn a_program_that_does_not_end_is_stopped() {
     let mut b = Builder::new();
     b.begin_loop();
     b.end();
-    let endless = FragmentPrograms {
-        program: b.finish().unwrap(),
-        has_side_effects: true,
-        ..counting()
-    };
-    let config = Config {
-        threads: 2,
-        shader_timeout: Duration::from_millis(5),
-        ..Config::default()
-    };
+    let endless = FragmentPrograms { program: b.finish().unwrap(), has_side_effects: true, ..counting() };
+    let config = Config { threads: 2, shader_timeout: Duration::from_millis(5), ..Config::default() };
     let device = Device::new(&config).unwrap();
     let mut pass = Pass::begin(&rendering(Vec::new())).unwrap();
     let mut counters = Counters::default();
     let primitives = vec![over(LARGE, 0)];
     let draw = draw(&device, Some(endless), state(1), primitives, Vec::new(), 0);
-    pass.push(
-        PassDraw::Primitives(Box::new(draw)),
-        device.runtime(),
-        &mut counters,
-    )
-    .unwrap();
-    assert!(matches!(
-        pass.end(device.runtime(), &mut counters),
-        Err(Stopped::TimedOut { .. })
-    ));
+    pass.push(PassDraw::Primitives(Box::new(draw)), device.runtime(), &mut counters).unwrap();
+    assert!(matches!(pass.end(device.runtime(), &mut counters), Err(Stopped::TimedOut { .. })));
 }

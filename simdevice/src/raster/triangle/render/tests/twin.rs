@@ -20,13 +20,8 @@ const COLORS: [Format; 12] = [
     Format::R32G32B32A32Uint,
     Format::R8G8B8A8Uint,
 ];
-const DEPTHS: [Format; 5] = [
-    Format::D16Unorm,
-    Format::X8D24UnormPack32,
-    Format::D32Sfloat,
-    Format::D24UnormS8Uint,
-    Format::D32SfloatS8Uint,
-];
+const DEPTHS: [Format; 5] =
+    [Format::D16Unorm, Format::X8D24UnormPack32, Format::D32Sfloat, Format::D24UnormS8Uint, Format::D32SfloatS8Uint];
 const COMPARES: [CompareOp; 8] = [
     CompareOp::Never,
     CompareOp::Less,
@@ -115,18 +110,8 @@ fn one_of<T: Copy>(rng: &mut ChaCha8Rng, of: &[T]) -> T {
 }
 
 fn equation(rng: &mut ChaCha8Rng) -> BlendEquation {
-    let ops = [
-        BlendOp::Add,
-        BlendOp::Subtract,
-        BlendOp::ReverseSubtract,
-        BlendOp::Min,
-        BlendOp::Max,
-    ];
-    BlendEquation {
-        source: one_of(rng, &FACTORS),
-        destination: one_of(rng, &FACTORS),
-        op: one_of(rng, &ops),
-    }
+    let ops = [BlendOp::Add, BlendOp::Subtract, BlendOp::ReverseSubtract, BlendOp::Min, BlendOp::Max];
+    BlendEquation { source: one_of(rng, &FACTORS), destination: one_of(rng, &FACTORS), op: one_of(rng, &ops) }
 }
 
 fn face(rng: &mut ChaCha8Rng) -> StencilFace {
@@ -148,10 +133,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
     let draws = (0..3).map(|_| {
         let mut state = state(samples);
         if rng.random_bool(0.7) {
-            state.depth_stencil.depth = Some(DepthTest {
-                compare: one_of(rng, &COMPARES[1..]),
-                write: rng.random(),
-            });
+            state.depth_stencil.depth = Some(DepthTest { compare: one_of(rng, &COMPARES[1..]), write: rng.random() });
         }
         if rng.random_bool(0.2) {
             state.depth_stencil.bounds = Some((0.25, 0.7));
@@ -204,12 +186,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
         }
     });
     let draws = draws.collect();
-    Scene {
-        samples,
-        color,
-        depth,
-        draws,
-    }
+    Scene { samples, color, depth, draws }
 }
 
 /// The content of the images by pixel and sample (bytes of colours, encoded depths, stencils), and the number of
@@ -223,40 +200,26 @@ struct Picture {
 }
 
 fn color_clear(scene: &Scene) -> ClearValue {
-    if scene.color.is_integer() {
-        ClearValue::Uint(CLEAR)
-    } else {
-        ClearValue::Float(CLEAR.map(f32::from_bits))
-    }
+    if scene.color.is_integer() { ClearValue::Uint(CLEAR) } else { ClearValue::Float(CLEAR.map(f32::from_bits)) }
 }
 
 /// The encoding of a depth from 0 to 1 in a depth format.
 fn depth_code(format: Format, depth: f32) -> u32 {
     match format {
         Format::D16Unorm => (f64::from(depth) * 65_535.0).round_ties_even() as u32,
-        Format::X8D24UnormPack32 | Format::D24UnormS8Uint => {
-            (f64::from(depth) * 16_777_215.0).round_ties_even() as u32
-        }
+        Format::X8D24UnormPack32 | Format::D24UnormS8Uint => (f64::from(depth) * 16_777_215.0).round_ties_even() as u32,
         _ => depth.to_bits(),
     }
 }
 
 /// Renders the scene sample by sample.
 fn naive(scene: &Scene) -> Picture {
-    let positions: &[[i32; 2]] = if scene.samples == 1 {
-        &CENTER
-    } else {
-        &SAMPLES_4
-    };
+    let positions: &[[i32; 2]] = if scene.samples == 1 { &CENTER } else { &SAMPLES_4 };
     let count = (WIDTH * HEIGHT * scene.samples) as usize;
     let size = scene.color.texel_size();
     let clear = scene.color.encode_clear(Aspect::Color, color_clear(scene));
-    let depth = scene
-        .depth
-        .map_or(0, |format| depth_code(format, CLEAR_DEPTH));
-    let has_stencil = scene
-        .depth
-        .is_some_and(|format| format.plane(Aspect::Stencil).is_some());
+    let depth = scene.depth.map_or(0, |format| depth_code(format, CLEAR_DEPTH));
+    let has_stencil = scene.depth.is_some_and(|format| format.plane(Aspect::Stencil).is_some());
     let mut picture = Picture {
         color: vec![clear[..size].to_vec(); count],
         depth: vec![depth; count],
@@ -264,11 +227,7 @@ fn naive(scene: &Scene) -> Picture {
         passed: 0,
     };
     for draw in &scene.draws {
-        let blender = Blender::new(
-            &draw.state.blend[0],
-            draw.state.blend_constants,
-            scene.color,
-        );
+        let blender = Blender::new(&draw.state.blend[0], draw.state.blend_constants, scene.color);
         for (primitive, values) in draw.primitives.iter().zip(&draw.values) {
             let left = primitive.corners.map(|c| c[0]).into_iter().min().unwrap() >> 8;
             let right = primitive.corners.map(|c| c[0]).into_iter().max().unwrap() >> 8;
@@ -279,31 +238,15 @@ fn naive(scene: &Scene) -> Picture {
                     continue;
                 }
                 let place = [[x, y], positions[sample as usize]];
-                let place =
-                    std::array::from_fn(|axis| i64::from(place[0][axis] * 256 + place[1][axis]));
-                let here = Rect {
-                    x,
-                    y,
-                    width: 1,
-                    height: 1,
-                };
+                let place = std::array::from_fn(|axis| i64::from(place[0][axis] * 256 + place[1][axis]));
+                let here = Rect { x, y, width: 1, height: 1 };
                 if draw.state.sample_mask >> sample & 1 == 0
                     || draw.state.scissors[0].intersect(here).is_empty()
                     || !covers(primitive, place)
                 {
                     continue;
                 }
-                fragment(
-                    scene,
-                    draw,
-                    &blender,
-                    primitive,
-                    values,
-                    at,
-                    sample,
-                    has_stencil,
-                    &mut picture,
-                );
+                fragment(scene, draw, &blender, primitive, values, at, sample, has_stencil, &mut picture);
             }
         }
     }
@@ -325,11 +268,7 @@ fn fragment(
 ) {
     let alpha = f32::from_bits(values[3]);
     let is_killed = draw.discards && f32::from_bits(values[8]) > 0.5;
-    let least = if scene.samples == 1 {
-        0.5
-    } else {
-        f32::from_bits((sample as f32 / 4.0).to_bits() + 1)
-    };
+    let least = if scene.samples == 1 { 0.5 } else { f32::from_bits((sample as f32 / 4.0).to_bits() + 1) };
     let is_covered = !draw.state.alpha_to_coverage || alpha >= least;
     let kept = !is_killed && is_covered;
     if !kept && !draw.early_tests {
@@ -342,17 +281,10 @@ fn fragment(
             return;
         }
     }
-    let face = tests
-        .stencil
-        .filter(|_| has_stencil)
-        .map(|faces| faces[usize::from(!primitive.front)]);
+    let face = tests.stencil.filter(|_| has_stencil).map(|faces| faces[usize::from(!primitive.front)]);
     let stencil = picture.stencil[at];
-    let stencil_passes = face.is_none_or(|face| {
-        face.compare.holds(
-            face.reference & face.compare_mask,
-            stencil & face.compare_mask,
-        )
-    });
+    let stencil_passes =
+        face.is_none_or(|face| face.compare.holds(face.reference & face.compare_mask, stencil & face.compare_mask));
     let depth = if draw.writes_depth && !draw.early_tests {
         f32::from_bits(values[9]).clamp(0.0, 1.0)
     } else {
@@ -385,13 +317,7 @@ fn fragment(
 }
 
 /// Blends the colour of one sample.
-fn blend(
-    scene: &Scene,
-    draw: &SceneDraw,
-    blender: &Blender,
-    values: &[u32; 10],
-    stored: &mut [u8],
-) {
+fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 10], stored: &mut [u8]) {
     let mut source: [f32; 4] = std::array::from_fn(|c| f32::from_bits(values[c]));
     let mut second: [f32; 4] = std::array::from_fn(|c| f32::from_bits(values[4 + c]));
     if draw.state.alpha_to_one {
@@ -401,21 +327,14 @@ fn blend(
     let logic = draw.state.logic_op.filter(|_| {
         !matches!(
             format,
-            Format::R8G8B8A8Srgb
-                | Format::R16G16B16A16Sfloat
-                | Format::R32G32B32A32Sfloat
-                | Format::R32Sfloat
+            Format::R8G8B8A8Srgb | Format::R16G16B16A16Sfloat | Format::R32G32B32A32Sfloat | Format::R32Sfloat
         )
     });
     let destination = format.decode(stored);
     let value = match (logic, draw.state.logic_op) {
         (Some(op), _) => {
             let new = format.encode(source);
-            let bytes: Vec<u8> = stored
-                .iter()
-                .zip(new)
-                .map(|(&d, s)| logic_byte(op, s, d))
-                .collect();
+            let bytes: Vec<u8> = stored.iter().zip(new).map(|(&d, s)| logic_byte(op, s, d)).collect();
             // -1 has two encodings, and a logic operation may give either.
             if format == Format::R8G8B8A8Snorm {
                 for (byte, new) in bytes.into_iter().enumerate() {
@@ -432,13 +351,12 @@ fn blend(
         (None, None) => blender.blend_dual(source, second, destination),
     };
     let mask = draw.state.blend[0].write_mask;
-    let masked: [f32; 4] = std::array::from_fn(|component| {
-        if mask >> component & 1 == 1 {
-            value[component]
-        } else {
-            destination[component]
-        }
-    });
+    let masked: [f32; 4] =
+        std::array::from_fn(
+            |component| {
+                if mask >> component & 1 == 1 { value[component] } else { destination[component] }
+            },
+        );
     for (byte, new) in format.encode(masked)[..stored.len()].iter().enumerate() {
         // -1 has two encodings, and a component that is not written keeps its own.
         if format != Format::R8G8B8A8Snorm || mask >> byte & 1 == 1 {
@@ -450,8 +368,8 @@ fn blend(
 /// A logic operation by its truth table: the result is bit `2 s + d` of the operation's entry.
 fn logic_byte(op: LogicOp, s: u8, d: u8) -> u8 {
     const TABLE: [u8; 16] = [
-        0b0000, 0b1000, 0b0100, 0b1100, 0b0010, 0b1010, 0b0110, 0b1110, 0b0001, 0b1001, 0b0101,
-        0b1101, 0b0011, 0b1011, 0b0111, 0b1111,
+        0b0000, 0b1000, 0b0100, 0b1100, 0b0010, 0b1010, 0b0110, 0b1110, 0b0001, 0b1001, 0b0101, 0b1101, 0b0011, 0b1011,
+        0b0111, 0b1111,
     ];
     let table = TABLE[LOGIC_OPS.iter().position(|&other| other == op).unwrap()];
     (0..8).fold(0, |out, bit| {
@@ -464,13 +382,8 @@ fn logic_byte(op: LogicOp, s: u8, d: u8) -> u8 {
 fn render(scene: &Scene, config: &Config) -> Picture {
     let target = image(scene.color, scene.samples, 1);
     let depth = scene.depth.map(|format| image(format, scene.samples, 1));
-    let value = ClearValue::DepthStencil {
-        depth: CLEAR_DEPTH,
-        stencil: CLEAR_STENCIL,
-    };
-    let stencil = depth
-        .as_ref()
-        .filter(|view| view.format.plane(Aspect::Stencil).is_some());
+    let value = ClearValue::DepthStencil { depth: CLEAR_DEPTH, stencil: CLEAR_STENCIL };
+    let stencil = depth.as_ref().filter(|view| view.format.plane(Aspect::Stencil).is_some());
     let rendering = Rendering {
         area: EVERYTHING,
         layer_count: 1,
@@ -509,17 +422,13 @@ fn render(scene: &Scene, config: &Config) -> Picture {
     for at in 0..WIDTH * HEIGHT * scene.samples {
         let (pixel, sample) = (at / scene.samples, at % scene.samples);
         let place = [pixel % WIDTH, pixel / WIDTH];
-        picture
-            .color
-            .push(texel(&target, Aspect::Color, 0, sample, place));
+        picture.color.push(texel(&target, Aspect::Color, 0, sample, place));
         picture.depth.push(depth.as_ref().map_or(0, |view| {
             let mut bytes = texel(view, Aspect::Depth, 0, sample, place);
             bytes.resize(4, 0);
             u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
         }));
-        picture
-            .stencil
-            .push(stencil.map_or(0, |view| texel(view, Aspect::Stencil, 0, sample, place)[0]));
+        picture.stencil.push(stencil.map_or(0, |view| texel(view, Aspect::Stencil, 0, sample, place)[0]));
     }
     picture
 }
@@ -542,11 +451,7 @@ fn random_states_agree_with_the_twin_whatever_the_configuration(case: &Case) {
                     scene.color,
                     scene.depth,
                     scene.samples,
-                    scene
-                        .draws
-                        .iter()
-                        .map(|d| (&d.state, d.discards, d.early_tests))
-                        .collect::<Vec<_>>()
+                    scene.draws.iter().map(|d| (&d.state, d.discards, d.early_tests)).collect::<Vec<_>>()
                 );
             }
             assert_eq!(found.passed, expected.passed, "seed {seed}, {config:?}");

@@ -46,11 +46,8 @@ impl Work {
             let instance = entry.create_instance(&info, None)?;
             let physical = instance.enumerate_physical_devices()?[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-            let mut features =
-                vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .push_next(&mut features);
+            let mut features = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
+            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features);
             let device = instance.create_device(physical, &info, None)?;
 
             let allocate = |needs: vk::MemoryRequirements| {
@@ -59,20 +56,14 @@ impl Work {
                     .memory_type_index(needs.memory_type_bits.trailing_zeros());
                 device.allocate_memory(&info, None)
             };
-            let info = vk::BufferCreateInfo::default()
-                .size(4096)
-                .usage(vk::BufferUsageFlags::VERTEX_BUFFER);
+            let info = vk::BufferCreateInfo::default().size(4096).usage(vk::BufferUsageFlags::VERTEX_BUFFER);
             let buffer = device.create_buffer(&info, None)?;
             let of_buffer = allocate(device.get_buffer_memory_requirements(buffer))?;
             device.bind_buffer_memory(buffer, of_buffer, 0)?;
             let info = vk::ImageCreateInfo::default()
                 .image_type(vk::ImageType::TYPE_2D)
                 .format(FORMAT)
-                .extent(vk::Extent3D {
-                    width: SIDE,
-                    height: SIDE,
-                    depth: 1,
-                })
+                .extent(vk::Extent3D { width: SIDE, height: SIDE, depth: 1 })
                 .mip_levels(1)
                 .array_layers(1)
                 .samples(vk::SampleCountFlags::TYPE_1)
@@ -92,19 +83,15 @@ impl Work {
             let view = device.create_image_view(&info, None)?;
 
             let module = |code: &[u8]| {
-                let words: Vec<u32> = code
-                    .chunks_exact(4)
-                    .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-                    .collect();
+                let words: Vec<u32> =
+                    code.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect();
                 let info = vk::ShaderModuleCreateInfo::default().code(&words);
                 device.create_shader_module(&info, None)
             };
             let modules = [module(VERTEX)?, module(FRAGMENT)?];
             let layout = device.create_pipeline_layout(&Default::default(), None)?;
             let pool = device.create_command_pool(&Default::default(), None)?;
-            let info = vk::CommandBufferAllocateInfo::default()
-                .command_pool(pool)
-                .command_buffer_count(1);
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
             let commands = device.allocate_command_buffers(&info)?[0];
             let mut work = Self {
                 instance,
@@ -128,12 +115,8 @@ impl Work {
 
     /// A pipeline with two stages.
     fn pipeline(&self) -> Result<vk::Pipeline, vk::Result> {
-        let stage = |stage, module| {
-            vk::PipelineShaderStageCreateInfo::default()
-                .stage(stage)
-                .module(module)
-                .name(c"main")
-        };
+        let stage =
+            |stage, module| vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main");
         let stages = [
             stage(vk::ShaderStageFlags::VERTEX, self.modules[0]),
             stage(vk::ShaderStageFlags::FRAGMENT, self.modules[1]),
@@ -149,26 +132,18 @@ impl Work {
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let assembly =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let side = SIDE as f32;
-        let viewports = [vk::Viewport::default()
-            .width(side)
-            .height(side)
-            .max_depth(1.0)];
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewports(&viewports)
-            .scissor_count(1);
+        let viewports = [vk::Viewport::default().width(side).height(side).max_depth(1.0)];
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewports(&viewports).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let writes = [vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let samples =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let writes = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&writes);
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default()
-            .dynamic_states(&[vk::DynamicState::SCISSOR]);
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&[FORMAT]);
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&[vk::DynamicState::SCISSOR]);
+        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&[FORMAT]);
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)
@@ -181,10 +156,7 @@ impl Work {
             .layout(self.layout)
             .push_next(&mut rendering);
         // SAFETY: the structures are valid and live until the call returns.
-        let created = unsafe {
-            self.device
-                .create_graphics_pipelines(vk::PipelineCache::null(), &[info], None)
-        };
+        let created = unsafe { self.device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         created.map(|all| all[0]).map_err(|(_, result)| result)
     }
 
@@ -209,25 +181,14 @@ impl Work {
     /// The error of recording or of the submission.
     pub fn record_draws(&self, count: u32, submits: bool) -> Result<Duration, vk::Result> {
         let (device, commands) = (&self.device, self.commands);
-        let area = vk::Rect2D {
-            offset: vk::Offset2D::default(),
-            extent: vk::Extent2D {
-                width: SIDE,
-                height: SIDE,
-            },
-        };
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: SIDE, height: SIDE } };
         let target = [vk::RenderingAttachmentInfo::default()
             .image_view(self.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
             .load_op(vk::AttachmentLoadOp::CLEAR)];
-        let pass = vk::RenderingInfo::default()
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&target);
-        let color = vk::ImageSubresourceRange::default()
-            .aspect_mask(vk::ImageAspectFlags::COLOR)
-            .level_count(1)
-            .layer_count(1);
+        let pass = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&target);
+        let color =
+            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
         let to_target = vk::ImageMemoryBarrier::default()
             .image(self.image)
             .subresource_range(color)

@@ -45,11 +45,8 @@ impl Bodies {
 
         let kind = vk::DescriptorType::STORAGE_BUFFER;
         let (layout, set) = objects.descriptors(kind, 2, vk::ShaderStageFlags::COMPUTE)?;
-        let infos = [&bodies, &pulls].map(|buffer| {
-            [vk::DescriptorBufferInfo::default()
-                .buffer(buffer.handle())
-                .range(vk::WHOLE_SIZE)]
-        });
+        let infos = [&bodies, &pulls]
+            .map(|buffer| [vk::DescriptorBufferInfo::default().buffer(buffer.handle()).range(vk::WHOLE_SIZE)]);
         let write = |binding: u32| {
             vk::WriteDescriptorSet::default()
                 .dst_set(set)
@@ -59,15 +56,11 @@ impl Bodies {
         };
         // SAFETY: the set is unused, and the buffers are storage buffers of the same device.
         unsafe {
-            device
-                .raw()
-                .update_descriptor_sets(&[write(0), write(1)], &[]);
+            device.raw().update_descriptor_sets(&[write(0), write(1)], &[]);
         };
         let code = include_bytes!("shaders/bodies.comp.spv");
         let stage = objects.stage(vk::ShaderStageFlags::COMPUTE, code)?;
-        let create_info = vk::ComputePipelineCreateInfo::default()
-            .stage(stage)
-            .layout(layout);
+        let create_info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
         Ok(Self {
             commands: CommandBuffers::new(&device)?,
             pipeline: objects.compute_pipeline(create_info)?,

@@ -40,9 +40,7 @@ pub enum CountsError {
     Dwarf(#[from] gimli::Error),
     #[error("the program has no symbols: build it without stripping")]
     Stripped,
-    #[error(
-        "the stored counts are those of the profiling profile, and this program has debug assertions"
-    )]
+    #[error("the stored counts are those of the profiling profile, and this program has debug assertions")]
     Profile,
     #[error("{0}")]
     Required(Obstacle),

@@ -20,10 +20,7 @@ const FRAMES: u32 = 3;
 
 /// The first obstacle to counting, if there is one.
 pub(super) fn obstacle() -> Option<Obstacle> {
-    let valgrind = Command::new("valgrind")
-        .arg("--version")
-        .stdout(Stdio::null())
-        .status();
+    let valgrind = Command::new("valgrind").arg("--version").stdout(Stdio::null()).status();
     if !valgrind.is_ok_and(|status| status.success()) {
         return Some(Obstacle::NoValgrind);
     }
@@ -48,9 +45,7 @@ pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), C
     )?;
     let mut rows = Rows::new(&["workload", "instructions", "stored", "change", "spread"]);
     for workload in Workload::stored() {
-        let mut counts = (0..runs)
-            .map(|_| count(workload, None))
-            .collect::<Result<Vec<_>, _>>()?;
+        let mut counts = (0..runs).map(|_| count(workload, None)).collect::<Result<Vec<_>, _>>()?;
         counts.sort_unstable();
         let (count, name) = (counts[counts.len() / 2], workload.name());
         let spread = match runs {
@@ -121,10 +116,7 @@ fn process(workload: Workload, frames: u32, manifest: Option<&Path>) -> Result<u
     let manifest = manifest.map(|path| path.to_string_lossy().into_owned());
     if let Some(manifest) = &manifest {
         arguments.push("--through-the-loader");
-        environment.extend([
-            ("VK_DRIVER_FILES", &**manifest),
-            ("VK_ICD_FILENAMES", manifest),
-        ]);
+        environment.extend([("VK_DRIVER_FILES", &**manifest), ("VK_ICD_FILENAMES", manifest)]);
     }
     Ok(callgrind::count(&arguments, &environment, &[])?.instructions)
 }

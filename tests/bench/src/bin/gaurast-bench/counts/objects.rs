@@ -54,16 +54,12 @@ impl Objects {
         let requirements = unsafe { raw.get_image_memory_requirements(image) };
         let none = vk::MemoryPropertyFlags::empty();
         let wishes = [(vk::MemoryPropertyFlags::DEVICE_LOCAL, none), (none, none)];
-        let memory_type = self
-            .device
-            .memory_type(requirements.memory_type_bits, &wishes)
-            .ok_or(RenderError::NoMemory("device"))?;
-        let allocate_info = vk::MemoryAllocateInfo::default()
-            .allocation_size(requirements.size)
-            .memory_type_index(memory_type);
+        let memory_type =
+            self.device.memory_type(requirements.memory_type_bits, &wishes).ok_or(RenderError::NoMemory("device"))?;
+        let allocate_info =
+            vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(memory_type);
         // SAFETY: the structure is valid.
-        let memory =
-            unsafe { raw.allocate_memory(&allocate_info, None) }.during("vkAllocateMemory")?;
+        let memory = unsafe { raw.allocate_memory(&allocate_info, None) }.during("vkAllocateMemory")?;
         self.memories.push(memory);
         // SAFETY: the memory is new, and of the size and a type that the image requires.
         unsafe { raw.bind_image_memory(image, memory, 0) }.during("vkBindImageMemory")?;
@@ -73,8 +69,7 @@ impl Objects {
             .format(create_info.format)
             .subresource_range(whole(aspects));
         // SAFETY: the structure is valid, and the image is bound to memory.
-        let view =
-            unsafe { raw.create_image_view(&view_info, None) }.during("vkCreateImageView")?;
+        let view = unsafe { raw.create_image_view(&view_info, None) }.during("vkCreateImageView")?;
         if let Some(last) = self.images.last_mut() {
             last.1 = view;
         }
@@ -82,13 +77,9 @@ impl Objects {
     }
 
     /// A sampler.
-    pub(super) fn sampler(
-        &mut self,
-        create_info: &vk::SamplerCreateInfo<'_>,
-    ) -> Result<vk::Sampler, RenderError> {
+    pub(super) fn sampler(&mut self, create_info: &vk::SamplerCreateInfo<'_>) -> Result<vk::Sampler, RenderError> {
         // SAFETY: the structure is valid.
-        let sampler = unsafe { self.device.raw().create_sampler(create_info, None) }
-            .during("vkCreateSampler")?;
+        let sampler = unsafe { self.device.raw().create_sampler(create_info, None) }.during("vkCreateSampler")?;
         self.samplers.push(sampler);
         Ok(sampler)
     }
@@ -113,32 +104,22 @@ impl Objects {
             .collect();
         let create_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: the structure is valid.
-        let set_layout = unsafe { raw.create_descriptor_set_layout(&create_info, None) }
-            .during("vkCreateDescriptorSetLayout")?;
+        let set_layout =
+            unsafe { raw.create_descriptor_set_layout(&create_info, None) }.during("vkCreateDescriptorSetLayout")?;
         self.set_layouts.push(set_layout);
         let set_layouts = [set_layout];
         let create_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
         // SAFETY: the structure is valid.
-        let layout = unsafe { raw.create_pipeline_layout(&create_info, None) }
-            .during("vkCreatePipelineLayout")?;
+        let layout = unsafe { raw.create_pipeline_layout(&create_info, None) }.during("vkCreatePipelineLayout")?;
         self.layouts.push(layout);
-        let sizes = [vk::DescriptorPoolSize {
-            ty: kind,
-            descriptor_count: count,
-        }];
-        let create_info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(1)
-            .pool_sizes(&sizes);
+        let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: count }];
+        let create_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the structure is valid.
-        let pool = unsafe { raw.create_descriptor_pool(&create_info, None) }
-            .during("vkCreateDescriptorPool")?;
+        let pool = unsafe { raw.create_descriptor_pool(&create_info, None) }.during("vkCreateDescriptorPool")?;
         self.pools.push(pool);
-        let allocate_info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(pool)
-            .set_layouts(&set_layouts);
+        let allocate_info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&set_layouts);
         // SAFETY: the structure is valid, and the pool is large enough for the set.
-        let sets = unsafe { raw.allocate_descriptor_sets(&allocate_info) }
-            .during("vkAllocateDescriptorSets")?;
+        let sets = unsafe { raw.allocate_descriptor_sets(&allocate_info) }.during("vkAllocateDescriptorSets")?;
         Ok((layout, sets[0]))
     }
 
@@ -151,13 +132,10 @@ impl Objects {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(code);
         let create_info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the code is valid SPIR-V.
-        let module = unsafe { self.device.raw().create_shader_module(&create_info, None) }
-            .during("vkCreateShaderModule")?;
+        let module =
+            unsafe { self.device.raw().create_shader_module(&create_info, None) }.during("vkCreateShaderModule")?;
         self.modules.push(module);
-        Ok(vk::PipelineShaderStageCreateInfo::default()
-            .stage(stage)
-            .module(module)
-            .name(c"main"))
+        Ok(vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main"))
     }
 
     /// A graphics pipeline, whose structures are valid.
@@ -166,13 +144,8 @@ impl Objects {
         create_info: vk::GraphicsPipelineCreateInfo<'_>,
     ) -> Result<vk::Pipeline, RenderError> {
         // SAFETY: the structures are valid and live until the call returns.
-        let created = unsafe {
-            (self.device.raw()).create_graphics_pipelines(
-                vk::PipelineCache::null(),
-                &[create_info],
-                None,
-            )
-        };
+        let created =
+            unsafe { (self.device.raw()).create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None) };
         self.keep(created, "vkCreateGraphicsPipelines")
     }
 
@@ -182,13 +155,8 @@ impl Objects {
         create_info: vk::ComputePipelineCreateInfo<'_>,
     ) -> Result<vk::Pipeline, RenderError> {
         // SAFETY: the structures are valid and live until the call returns.
-        let created = unsafe {
-            (self.device.raw()).create_compute_pipelines(
-                vk::PipelineCache::null(),
-                &[create_info],
-                None,
-            )
-        };
+        let created =
+            unsafe { (self.device.raw()).create_compute_pipelines(vk::PipelineCache::null(), &[create_info], None) };
         self.keep(created, "vkCreateComputePipelines")
     }
 
@@ -205,10 +173,7 @@ impl Objects {
 
 /// All levels of the only layer of an image.
 fn whole(aspects: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
-    vk::ImageSubresourceRange::default()
-        .aspect_mask(aspects)
-        .level_count(vk::REMAINING_MIP_LEVELS)
-        .layer_count(1)
+    vk::ImageSubresourceRange::default().aspect_mask(aspects).level_count(vk::REMAINING_MIP_LEVELS).layer_count(1)
 }
 
 /// A barrier that changes an image from the undefined layout to layout `to`, without access masks.

@@ -43,9 +43,7 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
         let (one, two) = (hashes(level, 1)?, hashes(level, 2)?);
         for (name, hash) in &one {
             if two.get(name) != Some(hash) {
-                report.fail(format!(
-                    "{name} at {level}: two threads draw another picture than one"
-                ));
+                report.fail(format!("{name} at {level}: two threads draw another picture than one"));
             }
             let stored = table.get(&[name, level]).map(|cells| cells[0].clone());
             if store {
@@ -54,9 +52,7 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
                 equal += 1;
             } else {
                 let stored = stored.as_deref().unwrap_or("no hash");
-                report.fail(format!(
-                    "{name} at {level}: the picture is {hash}, and {stored} is stored"
-                ));
+                report.fail(format!("{name} at {level}: the picture is {hash}, and {stored} is stored"));
             }
         }
     }
@@ -87,7 +83,5 @@ fn hashes(level: &str, threads: usize) -> Result<BTreeMap<String, String>, Count
         let (name, hash) = line.split_once(' ')?;
         Some((name.to_owned(), hash.to_owned()))
     };
-    said.lines()
-        .map(|line| words(line).ok_or_else(|| CountsError::Worker(line.to_owned())))
-        .collect()
+    said.lines().map(|line| words(line).ok_or_else(|| CountsError::Worker(line.to_owned()))).collect()
 }

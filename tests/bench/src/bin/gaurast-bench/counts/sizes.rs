@@ -23,11 +23,7 @@ const LEAST: u64 = 4096;
 const CRATES: [&str; 2] = ["simdevice", "isa"];
 
 /// The type names of the levels, and the levels' names.
-const LEVELS: [(&str, &str); 3] = [
-    ("::Sse2", "sse2"),
-    ("::Avx2", "avx2"),
-    ("::Avx512", "avx512"),
-];
+const LEVELS: [(&str, &str); 3] = [("::Sse2", "sse2"), ("::Avx2", "avx2"), ("::Avx512", "avx512")];
 
 /// The size of a module's functions at a level.
 #[derive(Clone, Copy, Default)]
@@ -67,8 +63,7 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
     for name in names {
         let sum = sums.get(&name).copied().unwrap_or_default();
         let (module, level) = &name;
-        let stored: Option<u64> =
-            (table.get(&[module, level])).and_then(|cells| cells[1].parse().ok());
+        let stored: Option<u64> = (table.get(&[module, level])).and_then(|cells| cells[1].parse().ok());
         let change = stored.map(|stored| percent(sum.bytes, stored));
         if change.is_some_and(|change| change.abs() <= TOLERANCE) {
             continue;
@@ -82,10 +77,7 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
             change.map_or("new".to_owned(), |change| format!("{change:+.1} %")),
         ]);
     }
-    println!(
-        "sizes: {} of {count} are the stored ones",
-        count - rows.rows.len()
-    );
+    println!("sizes: {} of {count} are the stored ones", count - rows.rows.len());
     if !rows.rows.is_empty() {
         println!("{}", rows.table());
         report.fail(format!(
@@ -104,8 +96,7 @@ fn sums(program: &[u8]) -> Result<BTreeMap<(String, String), Sum>, CountsError> 
     let mut seen = HashSet::new();
     for symbol in file.symbols() {
         // Identical functions may be merged: several names have one address.
-        if symbol.kind() != SymbolKind::Text || symbol.size() == 0 || !seen.insert(symbol.address())
-        {
+        if symbol.kind() != SymbolKind::Text || symbol.size() == 0 || !seen.insert(symbol.address()) {
             continue;
         }
         let path = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
@@ -126,17 +117,10 @@ fn sums(program: &[u8]) -> Result<BTreeMap<(String, String), Sum>, CountsError> 
 /// The module or type to which a function belongs, if it is part of one of [`CRATES`]. `debug_name` is
 /// `name<parameters>`.
 fn module(path: &str, debug_name: &str) -> Option<String> {
-    let path = if path.starts_with("<fearless_simd::") {
-        debug_name.split_once('<')?.1
-    } else {
-        path
-    };
+    let path = if path.starts_with("<fearless_simd::") { debug_name.split_once('<')?.1 } else { path };
     let path = path.trim_start_matches(['<', '&']);
     let end = path.find([' ', '<', '{']).unwrap_or(path.len());
-    let parts: Vec<&str> = path[..end]
-        .split("::")
-        .filter(|part| !part.is_empty())
-        .collect();
+    let parts: Vec<&str> = path[..end].split("::").filter(|part| !part.is_empty()).collect();
     if !CRATES.contains(parts.first()?) {
         return None;
     }
@@ -198,8 +182,7 @@ fn name(
         let name = dwarf.attr_string(unit, name)?;
         return Ok(Some(name.to_string_lossy().into_owned()));
     }
-    let Some(AttributeValue::UnitRef(origin)) = entry.attr_value(gimli::DW_AT_abstract_origin)?
-    else {
+    let Some(AttributeValue::UnitRef(origin)) = entry.attr_value(gimli::DW_AT_abstract_origin)? else {
         return Ok(None);
     };
     let origin = unit.entry(origin)?;
@@ -219,14 +202,9 @@ mod tests {
         let of = |path: &str| module(path, "");
         let owned = |text: &str| Some(text.to_owned());
         assert_eq!(of("isa::optimize::optimize"), owned("isa::optimize"));
+        assert_eq!(of("simdevice::gaussian::GaussianSet::sort"), owned("simdevice::gaussian::GaussianSet"));
         assert_eq!(
-            of("simdevice::gaussian::GaussianSet::sort"),
-            owned("simdevice::gaussian::GaussianSet")
-        );
-        assert_eq!(
-            of(
-                "simdevice::raster::gaussian::by_block::<impl simdevice::raster::gaussian::Task>::falls"
-            ),
+            of("simdevice::raster::gaussian::by_block::<impl simdevice::raster::gaussian::Task>::falls"),
             owned("simdevice::raster::gaussian::by_block")
         );
         assert_eq!(
@@ -245,18 +223,9 @@ mod tests {
 
     #[test]
     fn levels_are_known_by_their_types() {
-        assert_eq!(
-            level("run<fearless_simd::generated::avx2::Avx2, 4>"),
-            Some("avx2")
-        );
-        assert_eq!(
-            level("<fearless_simd::generated::avx512::Avx512 as X>"),
-            Some("avx512")
-        );
-        assert_eq!(
-            level("run<fearless_simd::generated::sse2::Sse2>"),
-            Some("sse2")
-        );
+        assert_eq!(level("run<fearless_simd::generated::avx2::Avx2, 4>"), Some("avx2"));
+        assert_eq!(level("<fearless_simd::generated::avx512::Avx512 as X>"), Some("avx512"));
+        assert_eq!(level("run<fearless_simd::generated::sse2::Sse2>"), Some("sse2"));
         assert_eq!(level("run<Other>"), None);
     }
 }

@@ -22,20 +22,13 @@ impl Table {
         header: &'static [&'static str],
         names: usize,
     ) -> Result<Self, CountsError> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("stored")
-            .join(file);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("stored").join(file);
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(error.into()),
         };
-        let mut table = Self {
-            path,
-            comment,
-            header,
-            rows: BTreeMap::new(),
-        };
+        let mut table = Self { path, comment, header, rows: BTreeMap::new() };
         let lines = text.lines().filter(|line| !line.starts_with('#'));
         for line in lines.skip(1) {
             let cells: Vec<&str> = line.split(',').collect();

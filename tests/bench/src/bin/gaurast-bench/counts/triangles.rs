@@ -59,11 +59,7 @@ impl Triangles {
 
     /// Layers that fill the picture, each of one colour. Those of the left half are drawn from back to front, those of
     /// the right half from front to back.
-    pub(super) fn layered(
-        entry: ash::Entry,
-        size: [u32; 2],
-        count: u32,
-    ) -> Result<Self, RenderError> {
+    pub(super) fn layered(entry: ash::Entry, size: [u32; 2], count: u32) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/plain.frag.spv");
         Self::new(entry, size, &layers(count), fragment)
     }
@@ -125,24 +121,17 @@ impl Triangles {
     fn record(&self, raw: &ash::Device, commands: vk::CommandBuffer) {
         use vk::{AccessFlags as Access, ImageLayout as Layout, PipelineStageFlags as Stage};
         let area = vk::Rect2D::default().extent(self.target.image.extent());
-        let viewport = vk::Viewport::default()
-            .width(area.extent.width as f32)
-            .height(area.extent.height as f32)
-            .max_depth(1.0);
+        let viewport =
+            vk::Viewport::default().width(area.extent.width as f32).height(area.extent.height as f32).max_depth(1.0);
         let attachment = |view, layout| {
             vk::RenderingAttachmentInfo::default()
                 .image_view(view)
                 .image_layout(layout)
                 .load_op(vk::AttachmentLoadOp::CLEAR)
         };
-        let colors = [
-            attachment(self.target.image.view(), Layout::COLOR_ATTACHMENT_OPTIMAL)
-                .store_op(vk::AttachmentStoreOp::STORE),
-        ];
-        let far = vk::ClearDepthStencilValue {
-            depth: 1.0,
-            stencil: 0,
-        };
+        let colors = [attachment(self.target.image.view(), Layout::COLOR_ATTACHMENT_OPTIMAL)
+            .store_op(vk::AttachmentStoreOp::STORE)];
+        let far = vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 };
         let depth = attachment(self.depth.1, Layout::DEPTH_ATTACHMENT_OPTIMAL)
             .store_op(vk::AttachmentStoreOp::DONT_CARE)
             .clear_value(vk::ClearValue { depth_stencil: far });
@@ -152,12 +141,8 @@ impl Triangles {
             .color_attachments(&colors)
             .depth_attachment(&depth);
         let barriers = [
-            begin_image(
-                self.target.image.handle(),
-                COLOR,
-                Layout::COLOR_ATTACHMENT_OPTIMAL,
-            )
-            .dst_access_mask(Access::COLOR_ATTACHMENT_WRITE),
+            begin_image(self.target.image.handle(), COLOR, Layout::COLOR_ATTACHMENT_OPTIMAL)
+                .dst_access_mask(Access::COLOR_ATTACHMENT_WRITE),
             begin_image(self.depth.0, DEPTH, Layout::DEPTH_ATTACHMENT_OPTIMAL)
                 .dst_access_mask(Access::DEPTH_STENCIL_ATTACHMENT_WRITE),
         ];
@@ -187,18 +172,13 @@ impl Triangles {
 }
 
 /// A pipeline of triangles with a depth test.
-fn pipeline(
-    objects: &mut Objects,
-    layout: vk::PipelineLayout,
-    fragment: &[u8],
-) -> Result<vk::Pipeline, RenderError> {
+fn pipeline(objects: &mut Objects, layout: vk::PipelineLayout, fragment: &[u8]) -> Result<vk::Pipeline, RenderError> {
     let vertex = include_bytes!("shaders/plain.vert.spv");
     let stages = [
         objects.stage(vk::ShaderStageFlags::VERTEX, vertex)?,
         objects.stage(vk::ShaderStageFlags::FRAGMENT, fragment)?,
     ];
-    let bindings =
-        [vk::VertexInputBindingDescription::default().stride(size_of::<Vertex>() as u32)];
+    let bindings = [vk::VertexInputBindingDescription::default().stride(size_of::<Vertex>() as u32)];
     let attribute = |location, offset| {
         vk::VertexInputAttributeDescription::default()
             .location(location)
@@ -209,20 +189,18 @@ fn pipeline(
     let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
         .vertex_binding_descriptions(&bindings)
         .vertex_attribute_descriptions(&attributes);
-    let input_assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-        .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-    let viewport = vk::PipelineViewportStateCreateInfo::default()
-        .viewport_count(1)
-        .scissor_count(1);
+    let input_assembly =
+        vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-    let multisample = vk::PipelineMultisampleStateCreateInfo::default()
-        .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let multisample =
+        vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
     let depth = vk::PipelineDepthStencilStateCreateInfo::default()
         .depth_test_enable(true)
         .depth_write_enable(true)
         .depth_compare_op(vk::CompareOp::LESS);
-    let attachments = [vk::PipelineColorBlendAttachmentState::default()
-        .color_write_mask(vk::ColorComponentFlags::RGBA)];
+    let attachments =
+        [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
     let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
@@ -255,11 +233,7 @@ fn texture(
     let create_info = vk::ImageCreateInfo::default()
         .image_type(vk::ImageType::TYPE_2D)
         .format(vk::Format::R8G8B8A8_UNORM)
-        .extent(vk::Extent3D {
-            width: TEXTURE,
-            height: TEXTURE,
-            depth: 1,
-        })
+        .extent(vk::Extent3D { width: TEXTURE, height: TEXTURE, depth: 1 })
         .mip_levels(levels)
         .array_layers(1)
         .samples(vk::SampleCountFlags::TYPE_1)
@@ -272,18 +246,12 @@ fn texture(
         .map(|level| {
             let offset = 4 * texels.len() as u64;
             texels.extend((0..side(level).pow(2)).map(|_| rng.random::<[u8; 4]>()));
-            let layers = vk::ImageSubresourceLayers::default()
-                .aspect_mask(COLOR)
-                .mip_level(level)
-                .layer_count(1);
-            vk::BufferImageCopy::default()
-                .buffer_offset(offset)
-                .image_subresource(layers)
-                .image_extent(vk::Extent3D {
-                    width: side(level),
-                    height: side(level),
-                    depth: 1,
-                })
+            let layers = vk::ImageSubresourceLayers::default().aspect_mask(COLOR).mip_level(level).layer_count(1);
+            vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers).image_extent(vk::Extent3D {
+                width: side(level),
+                height: side(level),
+                depth: 1,
+            })
         })
         .collect();
     let device = objects.device().clone();
@@ -293,8 +261,7 @@ fn texture(
     staging.write(bytes)?;
     commands.record(0, |raw, commands| {
         use vk::{AccessFlags as Access, ImageLayout as Layout, PipelineStageFlags as Stage};
-        let to_copy = begin_image(image, COLOR, Layout::TRANSFER_DST_OPTIMAL)
-            .dst_access_mask(Access::TRANSFER_WRITE);
+        let to_copy = begin_image(image, COLOR, Layout::TRANSFER_DST_OPTIMAL).dst_access_mask(Access::TRANSFER_WRITE);
         let to_shader = begin_image(image, COLOR, Layout::SHADER_READ_ONLY_OPTIMAL)
             .old_layout(Layout::TRANSFER_DST_OPTIMAL)
             .src_access_mask(Access::TRANSFER_WRITE)
@@ -308,13 +275,7 @@ fn texture(
         // SAFETY: the command buffer is recording; the regions lie within buffer and image, which live until the
         // submission has ended.
         unsafe {
-            raw.cmd_copy_buffer_to_image(
-                commands,
-                staging.handle(),
-                image,
-                Layout::TRANSFER_DST_OPTIMAL,
-                &regions,
-            );
+            raw.cmd_copy_buffer_to_image(commands, staging.handle(), image, Layout::TRANSFER_DST_OPTIMAL, &regions);
         }
         barrier(Stage::TRANSFER, Stage::FRAGMENT_SHADER, to_shader);
     })?;
@@ -332,10 +293,7 @@ fn texture(
         .sampler(sampler)
         .image_view(view)
         .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
-    let write = vk::WriteDescriptorSet::default()
-        .dst_set(set)
-        .descriptor_type(kind)
-        .image_info(&info);
+    let write = vk::WriteDescriptorSet::default().dst_set(set).descriptor_type(kind).image_info(&info);
     // SAFETY: the set is unused, and view and sampler are of the same device.
     unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
     Ok((layout, set))
@@ -351,10 +309,7 @@ fn small(size: [u32; 2]) -> Vec<Vertex> {
         let z = rng.random_range(0.0..1.0);
         for corner in [[-1.4, -1.4], [1.4, -1.4], [-1.4, 1.4_f32]] {
             let [x, y] = [0, 1].map(|axis| middle[axis] + corner[axis] * pixel[axis]);
-            vertices.push(Vertex {
-                position: [x, y, z, 1.0],
-                color: [x, y, z, 1.0],
-            });
+            vertices.push(Vertex { position: [x, y, z, 1.0], color: [x, y, z, 1.0] });
         }
     }
     vertices
@@ -368,10 +323,8 @@ fn layers(count: u32) -> Vec<Vertex> {
         let near = (layer + 1) as f32 / (count + 1) as f32;
         for (left, right, z) in [(-1.0, 0.0, far), (0.0, 1.0, near)] {
             let corners = [[left, -1.0], [right, -1.0], [left, 1.0], [right, 1.0]];
-            let corners = corners.map(|[x, y]: [f32; 2]| Vertex {
-                position: [x, y, z, 1.0],
-                color: [z, 0.5, 1.0 - z, 1.0],
-            });
+            let corners =
+                corners.map(|[x, y]: [f32; 2]| Vertex { position: [x, y, z, 1.0], color: [z, 0.5, 1.0 - z, 1.0] });
             vertices.extend([0, 1, 2, 2, 1, 3].map(|index: usize| corners[index]));
         }
     }
@@ -380,17 +333,7 @@ fn layers(count: u32) -> Vec<Vertex> {
 
 /// Two triangles that fill the picture: the floor, eight times as far away at the bottom as at the top.
 fn floor() -> Vec<Vertex> {
-    let corners = [
-        [-1.0, -1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [-1.0, 1.0, 8.0],
-        [1.0, 1.0, 8.0],
-    ];
-    let corners = corners.map(|[x, y, w]| Vertex {
-        position: [x * w, y * w, 0.5 * w, w],
-        color: [x * w, w, 0.0, 0.0],
-    });
-    [0, 1, 2, 2, 1, 3]
-        .map(|index: usize| corners[index])
-        .to_vec()
+    let corners = [[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 8.0], [1.0, 1.0, 8.0]];
+    let corners = corners.map(|[x, y, w]| Vertex { position: [x * w, y * w, 0.5 * w, w], color: [x * w, w, 0.0, 0.0] });
+    [0, 1, 2, 2, 1, 3].map(|index: usize| corners[index]).to_vec()
 }

@@ -79,8 +79,7 @@ impl Workload {
 
     /// The name, as in the stored tables.
     pub(super) fn name(self) -> String {
-        self.to_possible_value()
-            .map_or_else(String::new, |value| value.get_name().to_owned())
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
     /// Draws `frames` equal frames on the first device of `entry`, and returns the hash of the last one's pixels.
@@ -88,12 +87,7 @@ impl Workload {
         match self {
             Self::GaussiansSynthetic => {
                 let scene = gaurast_oracle::scenes::synthetic(1, GAUSSIANS);
-                gaussians(
-                    entry,
-                    frames,
-                    &scene,
-                    &gaurast_oracle::scenes::synthetic_camera(SIZE),
-                )
+                gaussians(entry, frames, &scene, &gaurast_oracle::scenes::synthetic_camera(SIZE))
             }
             Self::GaussiansCaptured => {
                 let cameras = Camera::orbit(8, SIZE);
@@ -116,12 +110,7 @@ impl Workload {
     }
 }
 
-fn gaussians(
-    entry: Entry,
-    frames: u32,
-    scene: &Scene,
-    camera: &Camera,
-) -> Result<u64, CountsError> {
+fn gaussians(entry: Entry, frames: u32, scene: &Scene, camera: &Camera) -> Result<u64, CountsError> {
     let mut renderer = Renderer::new(entry)?;
     let scene = renderer.upload(scene, None)?;
     let mut pixels = Vec::new();
@@ -141,12 +130,7 @@ fn triangles(mut triangles: Triangles, frames: u32) -> Result<u64, CountsError> 
 fn quads(entry: Entry, frames: u32) -> Result<u64, CountsError> {
     let scene = gaurast_oracle::scenes::synthetic(1, QUADS);
     let mut renderer = QuadRenderer::new(entry, "", 1)?;
-    let mut prepared = renderer.prepare(
-        &scene,
-        &gaurast_oracle::scenes::synthetic_camera(SIZE),
-        3,
-        ALPHA_FLOOR,
-    )?;
+    let mut prepared = renderer.prepare(&scene, &gaurast_oracle::scenes::synthetic_camera(SIZE), 3, ALPHA_FLOOR)?;
     for _ in 0..frames {
         prepared.draw()?;
     }

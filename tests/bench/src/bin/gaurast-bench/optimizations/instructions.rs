@@ -41,19 +41,11 @@ struct Scene {
 
 impl Scene {
     fn gaussians(name: &str, workload: &Workload, path: Path, frame: usize) -> Self {
-        Self {
-            name: name.to_owned(),
-            work: Work::Gaussians(Box::new(workload.clone()), path),
-            frame,
-        }
+        Self { name: name.to_owned(), work: Work::Gaussians(Box::new(workload.clone()), path), frame }
     }
 
     fn counted(name: &str, workload: &'static str) -> Self {
-        Self {
-            name: name.to_owned(),
-            work: Work::Counted(workload),
-            frame: WARM,
-        }
+        Self { name: name.to_owned(), work: Work::Counted(workload), frame: WARM }
     }
 
     /// The instructions of the frame. It is the difference of two processes: one draws the frame, and the other stops
@@ -87,14 +79,8 @@ impl Scene {
 /// Every optimization, with scenes in which it may save something.
 fn cases() -> Vec<(&'static str, Scene)> {
     let base = Workload::new(Source::Benchmark { count: COUNT }, SIZE);
-    let beside = Workload {
-        extra: Some(Extra::Beside { count: COUNT }),
-        ..base.clone()
-    };
-    let behind = Workload {
-        extra: Some(Extra::Behind { count: COUNT }),
-        ..Workload::new(Source::Wall, SIZE)
-    };
+    let beside = Workload { extra: Some(Extra::Beside { count: COUNT }), ..base.clone() };
+    let behind = Workload { extra: Some(Extra::Behind { count: COUNT }), ..Workload::new(Source::Wall, SIZE) };
     let whole = |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Own, WARM);
     let room = || whole(&base, "20,000 Gaussians");
     let half_seen = || whole(&beside, "20,000 Gaussians, as many beside the picture");
@@ -104,27 +90,15 @@ fn cases() -> Vec<(&'static str, Scene)> {
         Path::Own,
         1,
     );
-    let object = Scene::gaussians(
-        "20,000 Gaussians from afar: an object on an empty background",
-        &base,
-        Path::Afar,
-        WARM,
-    );
-    let still = Scene::gaussians(
-        "20,000 Gaussians, a camera at rest",
-        &base,
-        Path::Still,
-        WARM,
-    );
+    let object =
+        Scene::gaussians("20,000 Gaussians from afar: an object on an empty background", &base, Path::Afar, WARM);
+    let still = Scene::gaussians("20,000 Gaussians, a camera at rest", &base, Path::Still, WARM);
     let small = || Scene::counted("small triangles", "small-triangles");
     let layers = || Scene::counted("layers that hide one another", "layered-triangles");
     let floor = || Scene::counted("a textured floor", "textured-triangles");
     vec![
         ("cluster-culling", half_seen()),
-        (
-            "occlusion-culling",
-            whole(&behind, "20,000 Gaussians behind a wall"),
-        ),
+        ("occlusion-culling", whole(&behind, "20,000 Gaussians behind a wall")),
         (TEMPORAL_REUSE, still),
         ("bounds", room()),
         ("bounds", half_seen()),
@@ -133,16 +107,10 @@ fn cases() -> Vec<(&'static str, Scene)> {
         ("harmonics", half_seen()),
         ("blocks", room()),
         ("early-termination", room()),
-        (
-            "early-termination",
-            whole(&behind, "20,000 Gaussians behind a wall"),
-        ),
+        ("early-termination", whole(&behind, "20,000 Gaussians behind a wall")),
         ("empty-tiles", object),
         ("overwritten-tiles", floor()),
-        (
-            "overwritten-tiles",
-            Scene::counted("a layer that fills the picture", "one-layer"),
-        ),
+        ("overwritten-tiles", Scene::counted("a layer that fills the picture", "one-layer")),
         ("masked-quads", small()),
         ("affine", small()),
         ("affine", layers()),
@@ -159,8 +127,7 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
     let mut rows = Rows::new(&["optimization", "scene", "with", "without", "saved %"]);
     let mut known = HashMap::new();
     let only = &arguments.only;
-    let is_wanted =
-        |optimization: &str| only.is_empty() || only.iter().any(|name| name == optimization);
+    let is_wanted = |optimization: &str| only.is_empty() || only.iter().any(|name| name == optimization);
     for (optimization, scene) in cases() {
         if !is_wanted(optimization) {
             continue;
@@ -183,16 +150,9 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
             without.to_string(),
             number(100.0 * (1.0 - with as f64 / without as f64)),
         ]);
-        let _ = writeln!(
-            stdout(),
-            "{}",
-            rows.rows.last().map_or(String::new(), |row| row.join("; "))
-        );
+        let _ = writeln!(stdout(), "{}", rows.rows.last().map_or(String::new(), |row| row.join("; ")));
     }
     let _ = writeln!(stdout(), "{}", rows.table());
     let csv = rows.csv("Instructions of a frame of 640x360 at AVX2 on one thread");
-    output::write(
-        &arguments.sweep.output.join("optimization_instructions.csv"),
-        &csv,
-    )
+    output::write(&arguments.sweep.output.join("optimization_instructions.csv"), &csv)
 }

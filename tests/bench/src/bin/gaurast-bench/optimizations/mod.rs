@@ -90,9 +90,7 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
         return instructions::run(arguments);
     }
     let arguments = &arguments.sweep;
-    let runs = arguments
-        .runs
-        .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
+    let runs = arguments.runs.unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
     let count = if arguments.quick { 100_000 } else { 300_000 };
     let mut results = Results {
         machine: Machine::this(),
@@ -102,53 +100,31 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
         unseen: Vec::new(),
     };
     let base = Workload::new(Source::Benchmark { count }, SIZE);
-    let with = |extra| Workload {
-        extra: Some(extra),
-        ..base.clone()
-    };
+    let with = |extra| Workload { extra: Some(extra), ..base.clone() };
     let wall = Workload::new(Source::Wall, SIZE);
-    let behind = |count| Workload {
-        extra: Some(Extra::Behind { count }),
-        ..wall.clone()
-    };
-    let plain = Workload {
-        plain: true,
-        ..base.clone()
-    };
+    let behind = |count| Workload { extra: Some(Extra::Behind { count }), ..wall.clone() };
+    let plain = Workload { plain: true, ..base.clone() };
     let scenes = [
         (base.source.to_string(), base.clone()),
         (format!("{}, plain colours", base.source), plain),
-        (
-            format!("{}, as many beside the screen", base.source),
-            with(Extra::Beside { count }),
-        ),
+        (format!("{}, as many beside the screen", base.source), with(Extra::Beside { count })),
         (format!("{count} behind a wall"), behind(count)),
     ];
     for (name, workload) in scenes {
-        results
-            .optimizations
-            .extend(saved(&name, &workload, arguments.threads, runs)?);
+        results.optimizations.extend(saved(&name, &workload, arguments.threads, runs)?);
     }
     let name = format!("{}, still camera", base.source);
     let saved = saved_by(TEMPORAL_REUSE, &name, &base, arguments.threads, runs)?;
     results.optimizations.push(saved);
     let (count, runs) = (UNSEEN_PER_SEEN * count, UNSEEN_VIEWS_PER_RUN * runs);
     let beside = with(Extra::Beside { count });
-    let pairs = [
-        ("off the screen", beside, base),
-        ("behind a wall", behind(count), wall.clone()),
-    ];
+    let pairs = [("off the screen", beside, base), ("behind a wall", behind(count), wall.clone())];
     for (kind, with, without) in pairs {
         let unseen = unseen(kind, count, [&with, &without], arguments.threads, runs)?;
         results.unseen.push(unseen);
     }
     let line = results.machine.line();
-    let _ = writeln!(
-        stdout(),
-        "{line}\n{}\n{}",
-        optimization_rows(&results).table(),
-        unseen_rows(&results).table()
-    );
+    let _ = writeln!(stdout(), "{line}\n{}\n{}", optimization_rows(&results).table(), unseen_rows(&results).table());
     let folder = &arguments.output;
     let about = |views: usize| {
         let threads = results.threads;
@@ -162,12 +138,7 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
 }
 
 /// The saving of each optimization while the camera moves.
-fn saved(
-    scene: &str,
-    workload: &Workload,
-    threads: usize,
-    runs: usize,
-) -> Result<Vec<Saved>, BenchError> {
+fn saved(scene: &str, workload: &Workload, threads: usize, runs: usize) -> Result<Vec<Saved>, BenchError> {
     let names = COUNTERS.iter().map(|(name, _)| *name);
     names
         .filter(|&name| Path::of(name) == Path::Own)
@@ -188,12 +159,7 @@ fn saved_by(
     let path = Path::of(optimization);
     let [with, without] = settings(optimization);
     let setups = [(workload, &*with), (workload, &*without)];
-    let pair = Pair::draw(
-        setups,
-        threads,
-        &path.views(workload, runs + 1)?,
-        path.draws(),
-    )?;
+    let pair = Pair::draw(setups, threads, &path.views(workload, runs + 1)?, path.draws())?;
     let [with, without] = pair.medians(time);
     let [counted, _] = pair.medians(|frame| frame.counter(counter));
     Ok(Saved {
@@ -238,15 +204,7 @@ fn spread([lower, _, upper]: [f64; 3]) -> String {
 }
 
 fn optimization_rows(results: &Results) -> Rows {
-    let mut rows = Rows::new(&[
-        "scene",
-        "optimization",
-        "counted",
-        "ms with",
-        "ms without",
-        "saved %",
-        "quartiles",
-    ]);
+    let mut rows = Rows::new(&["scene", "optimization", "counted", "ms with", "ms without", "saved %", "quartiles"]);
     for saved in &results.optimizations {
         rows.rows.push(vec![
             saved.scene.clone(),

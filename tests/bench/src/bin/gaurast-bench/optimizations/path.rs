@@ -59,13 +59,7 @@ pub const DRAWS: usize = 3;
 /// one in question, because it would hide the savings of others.
 pub fn settings(optimization: &str) -> [String; 2] {
     match Path::of(optimization) {
-        Path::Own | Path::Afar => [
-            OPTIMIZATIONS.to_owned(),
-            format!("{OPTIMIZATIONS},-{optimization}"),
-        ],
-        Path::Still => [
-            OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""),
-            OPTIMIZATIONS.to_owned(),
-        ],
+        Path::Own | Path::Afar => [OPTIMIZATIONS.to_owned(), format!("{OPTIMIZATIONS},-{optimization}")],
+        Path::Still => [OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""), OPTIMIZATIONS.to_owned()],
     }
 }
