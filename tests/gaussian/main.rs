@@ -18,7 +18,6 @@ mod instances;
 mod interactions;
 mod interleavings;
 mod modes;
-mod packets;
 mod pipelines;
 mod popping;
 mod rasterization_modes;

@@ -15,6 +15,7 @@
 //! | [`scene`], [`canvas`] | small pictures of Gaussians, and of points, lines and triangles |
 //! | [`drawn`] | scenes that this driver and lavapipe draw |
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
+//! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
 //! | [`presenter`] | a device that presents to a surface |
 //! | [`texels`], [`exact_lavapipe`] | random texels, and a lavapipe that samples them as accurately as it can |
 //!
@@ -36,6 +37,7 @@ pub mod loader;
 pub mod messages;
 mod open;
 pub mod output;
+pub mod packets;
 pub mod pass;
 pub mod pipeline;
 pub mod presenter;

@@ -1,4 +1,4 @@
-//! Dynamic state, secondary command buffers, clears, load and store operations.
+//! Scenes of dynamic state, secondary command buffers, clears, load and store operations.
 
 use ash::vk;
 

@@ -1,4 +1,4 @@
-//! Topologies, indices, restart, instances, indirect draws.
+//! Scenes of topologies, indices, restart, instances, indirect draws.
 
 use ash::vk;
 use ash::vk::PrimitiveTopology as Topology;

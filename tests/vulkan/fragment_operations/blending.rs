@@ -1,4 +1,4 @@
-//! Blending, write masks, logic operations, several attachments, formats.
+//! Scenes of blending, write masks, logic operations, several attachments, formats.
 
 use ash::vk;
 use ash::vk::BlendFactor as Factor;

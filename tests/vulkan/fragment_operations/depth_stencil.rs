@@ -1,4 +1,4 @@
-//! Depth and stencil tests.
+//! Scenes of depth and stencil tests.
 
 use ash::vk;
 use ash::vk::CompareOp as Compare;

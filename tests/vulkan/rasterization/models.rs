@@ -1,4 +1,4 @@
-//! Textured and lit models from files.
+//! Scenes of textured and lit models from files.
 
 use ash::vk;
 use glam::Vec3;

@@ -1,4 +1,4 @@
-//! Several samples per pixel.
+//! Scenes of several samples per pixel.
 
 use ash::vk;
 

@@ -1,4 +1,4 @@
-//! Culling, faces, polygon modes, viewports, scissors, clipping.
+//! Scenes of culling, faces, polygon modes, viewports, scissors, clipping.
 
 use ash::vk;
 

@@ -1,4 +1,4 @@
-//! Render pass objects: subpasses, input attachments, resolves.
+//! Scenes of render pass objects: subpasses, input attachments, resolves.
 
 use ash::vk;
 

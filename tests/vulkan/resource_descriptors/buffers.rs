@@ -1,4 +1,4 @@
-//! Vertex formats, uniform and storage buffers, push constants.
+//! Scenes of vertex formats, uniform and storage buffers, push constants.
 
 use ash::vk;
 

@@ -1,4 +1,4 @@
-//! Textures: filters, levels, address modes, dimensions, formats.
+//! Scenes of textures: filters, levels, address modes, dimensions, formats.
 
 use ash::vk;
 use rand::Rng;

@@ -1,4 +1,4 @@
-//! Shader features: interpolation, derivatives, control flow, specialization.
+//! Scenes of shader features: interpolation, derivatives, control flow, specialization.
 
 use ash::vk;
 

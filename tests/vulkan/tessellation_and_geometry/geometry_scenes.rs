@@ -1,4 +1,4 @@
-//! Geometry shaders.
+//! Scenes of geometry shaders.
 
 use ash::vk;
 use ash::vk::PrimitiveTopology as Topology;

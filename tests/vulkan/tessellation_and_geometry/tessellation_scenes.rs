@@ -1,4 +1,4 @@
-//! Tessellation shaders. Values are linear over patches, or patches become points or lines, since the triangles of a
+//! Scenes of tessellation shaders. Values are linear over patches, or patches become points or lines, since the triangles of a
 //! patch may differ between drivers.
 
 use ash::vk;

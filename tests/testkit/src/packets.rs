@@ -1,6 +1,6 @@
 //! Resources of packets: buffers, images and the attributes of Gaussians, in device memory.
 
-use gaurast_tests::scenes::SceneBuffers;
+use gaurast_oracle::scenes::SceneBuffers;
 use simdevice::format::Aspect;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
