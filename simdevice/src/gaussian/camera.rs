@@ -4,8 +4,6 @@
 use super::cut_off::TileCutOff;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::state::Viewport;
 use crate::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
@@ -70,8 +68,6 @@ impl ViewConstants {
         let principal = camera.principal_point.map(f64::from);
         let size = [viewport.width, viewport.height].map(f64::from);
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
-        #[cfg(feature = "mistakes")]
-        let margin = if Mistake::SlopesUnclamped.is_made() { [f64::INFINITY; 2] } else { margin };
         Self {
             model: camera.model,
             unscented: state.linearization == GaussianLinearization::Unscented,
@@ -122,10 +118,6 @@ pub(super) fn list_cut_off(state: &GaussianState, camera: &Camera, viewport: &Vi
 
 /// After how many pixels a camera's picture repeats to the right and to the left, if it does.
 pub(super) fn period(camera: &Camera) -> Option<f64> {
-    #[cfg(feature = "mistakes")]
-    if Mistake::PanoramaEnds.is_made() {
-        return None;
-    }
     let focal = f64::from(camera.focal_length[0]);
     (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
 }

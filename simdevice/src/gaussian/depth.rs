@@ -33,10 +33,6 @@ impl CenterDepth {
     /// Of a camera, a viewport and the depths before it, for an attachment of `format`.
     pub(crate) fn new(camera: &Camera, viewport: &Viewport, negative_one_to_one: bool, format: Format) -> Self {
         Self {
-            #[cfg(feature = "mistakes")]
-            is_linear: camera.model == CameraModel::Orthographic
-                && !crate::mistakes::Mistake::ParallelDepthInverse.is_made(),
-            #[cfg(not(feature = "mistakes"))]
             is_linear: camera.model == CameraModel::Orthographic,
             coefficients: camera.depth_coefficients.map(f64::from),
             to_unit: if negative_one_to_one { [0.5, 0.5] } else { [1.0, 0.0] },
@@ -66,10 +62,6 @@ impl CenterDepth {
             DepthEncoding::Unorm(bits) => {
                 let depth = clamp(depth);
                 let greatest = f64::from((1u32 << bits) - 1);
-                #[cfg(feature = "mistakes")]
-                if crate::mistakes::Mistake::DepthRoundedDown.is_made() {
-                    return (depth * greatest).floor() as u32;
-                }
                 (depth * greatest).round_ties_even() as u32
             }
         }

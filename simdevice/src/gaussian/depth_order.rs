@@ -26,10 +26,6 @@ fn keys_of(groups: &[ProjectedGroup]) -> Vec<&[[u32; 2]]> {
 fn settle_ties(keys: &[&[[u32; 2]]], pairs: &mut [Pair]) {
     let sequence = |&(_, name): &Pair| {
         let (group, place) = locate(name);
-        #[cfg(feature = "mistakes")]
-        if crate::mistakes::Mistake::TiesReversed.is_made() {
-            return !keys[group][place][1];
-        }
         keys[group][place][1]
     };
     // Sequence numbers are scattered in memory, so they are prefetched first.

@@ -22,8 +22,6 @@ use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
 use super::{camera, panorama, unscented};
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::packet::GaussianAppend;
 use crate::runtime::Runtime;
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision};
@@ -237,8 +235,6 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
     let number = |value: f64| S::f64s::splat(simd, value);
     let load = |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
-    #[cfg(feature = "mistakes")]
-    let rotation = &mistaken_rotation(rotation);
     let flat = &mut *scratch.flat;
     let r = view.rotation;
     let (one, two) = (number(1.0), number(2.0));
@@ -302,13 +298,6 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
     }
 }
 
-/// Quaternions with the scalar last instead of first, if that mistake is made.
-#[cfg(feature = "mistakes")]
-fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
-    let [w, x, y, z] = *rotation;
-    if Mistake::QuaternionScalarLast.is_made() { [z, w, x, y] } else { [w, x, y, z] }
-}
-
 /// Computes the numbers that rasterization and the search for tiles need, for Gaussians from lane `at` on. The inputs
 /// are the covariances in the picture before the low-pass filter (xx, xy, yy) in px^2, their determinants, and
 /// opacities.
@@ -364,10 +353,6 @@ pub(super) fn shape<S: Simd>(
             flat.extent[lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
         }
         extent = S::f64s::from_slice(simd, &flat.extent[at..at + S::f64s::LEN]);
-    }
-    #[cfg(feature = "mistakes")]
-    if Mistake::ThreeSigmaBox.is_made() {
-        extent = extent.min(number(9.0));
     }
     store(extent, &mut flat.extent);
     for (element, lanes) in [a, b, c].into_iter().zip(&mut flat.covariance) {
@@ -449,10 +434,6 @@ fn find_keys(view: &ViewConstants, sequence: Sequence<'_>, scratch: &mut Scratch
         GaussianOrder::ViewDepth => {
             for (key, &depth) in keys.iter_mut().zip(&*scratch.depth) {
                 *key = ordered_bits(depth as f32);
-                #[cfg(feature = "mistakes")]
-                {
-                    *key = crate::mistakes::key(depth, *key);
-                }
             }
         }
         GaussianOrder::RadialDistance => {
@@ -476,10 +457,6 @@ fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
 
 /// The vectors from the eye to the means of the kept Gaussians, in the axes of the Gaussians' own space.
 fn toward<'a>(source: &Source<'_>, scratch: &'a Scratch) -> &'a [GroupF64; 3] {
-    #[cfg(feature = "mistakes")]
-    if Mistake::DirectionsOfWorld.is_made() {
-        return &scratch.offset;
-    }
     match &scratch.placed {
         Some(placed) if source.matrices.is_some() => &placed.toward,
         _ => &scratch.offset,
@@ -536,8 +513,6 @@ pub(super) fn emit<S: Simd>(
     find_tiles(view, simd, scratch, out);
     find_keys(view, sequence, scratch);
     let degree = view.sh_degree;
-    #[cfg(feature = "mistakes")]
-    let degree = if Mistake::NoDegree4.is_made() { degree.min(3) } else { degree };
     let toward = toward(source, scratch);
     // Elements without a Gaussian have a direction too, so that they do not look like one without.
     let (mut directions, mut bases) = ([[1.0; DIRECTIONS]; 3], Bases::default());
@@ -551,11 +526,6 @@ pub(super) fn emit<S: Simd>(
         }
         if !normalize(simd, &mut directions) {
             normalize_wide(toward, group, &mut directions);
-        }
-        #[cfg(feature = "mistakes")]
-        if Mistake::HarmonicsReversed.is_made() {
-            let parts = directions.as_flattened_mut().iter_mut();
-            parts.for_each(|part| *part = -*part);
         }
         bases.find(simd, degree, &directions);
         // All colours are computed first, so that their reads from memory overlap.

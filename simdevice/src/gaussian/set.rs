@@ -65,8 +65,6 @@ impl GaussianSet {
     /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport. `depth` is the
     /// depth attachment's format, if there is one.
     pub fn begin(begin: &GaussianBegin, area: Rect, depth: Option<Format>) -> Self {
-        #[cfg(feature = "mistakes")]
-        let begin = &crate::mistakes::begin(begin);
         let visible = area.intersect(begin.scissor).intersect(viewport_pixels(&begin.viewport));
         Self {
             begin: begin.clone(),

@@ -76,13 +76,6 @@ impl Surfel {
         Self {
             across: [u, v].map(|c| c.map(|c| c / largest)),
             scale,
-            #[cfg(feature = "mistakes")]
-            limit: if is_parallel || crate::mistakes::Mistake::DiscsBehindNear.is_made() {
-                f64::INFINITY
-            } else {
-                depth * scale[0] / placed.near
-            },
-            #[cfg(not(feature = "mistakes"))]
             limit: if is_parallel { f64::INFINITY } else { depth * scale[0] / placed.near },
             bounds: [0.0; 4],
         }

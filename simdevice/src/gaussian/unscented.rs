@@ -9,8 +9,6 @@ use super::camera::{ViewConstants, linearize};
 use super::lanes::GROUP;
 use super::ray_depth;
 use super::scratch::Scratch;
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::state::gaussian::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -106,8 +104,6 @@ fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) ->
     });
     let deviations: [[f64; 2]; POINTS] = std::array::from_fn(|point| {
         let weight = if point == 0 { CENTER } else { OTHER };
-        #[cfg(feature = "mistakes")]
-        let weight = if point == 0 && Mistake::MeanUnweighted.is_made() { 0.0 } else { weight };
         [0, 1].map(|axis| weight.sqrt() * (places[point][axis] - mean[axis]))
     });
     let (xx, xy, yy, determinant) = sums(&deviations);

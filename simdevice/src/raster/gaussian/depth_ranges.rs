@@ -42,10 +42,6 @@ impl Default for DepthRanges {
 fn range(op: CompareOp, stored: u32) -> Option<(u32, u32)> {
     const LAST: u32 = NO_DEPTH - 1;
     let between = |first: u32, last: u32| last.checked_sub(first).map(|span| (first, span));
-    #[cfg(feature = "mistakes")]
-    if op == CompareOp::Less && crate::mistakes::Mistake::LessOrEqualForLess.is_made() {
-        return between(0, stored);
-    }
     match op {
         CompareOp::Never => None,
         CompareOp::Less => between(0, stored.checked_sub(1)?),

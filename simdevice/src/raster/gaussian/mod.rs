@@ -25,8 +25,6 @@ pub use compositor::GaussianTile;
 
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth_stencil::{Tests, apply};
 use crate::raster::output::{Buffers, Targets};
@@ -182,10 +180,7 @@ impl<'a> GaussianTileDraw<'a> {
         let touched = lanes_within(self.draw.bounds.intersect(tile.pixels), corner);
         let mut samples = Samples::default();
         for sample in 0..self.samples {
-            let is_masked = self.draw.state.sample_mask >> sample & 1 == 0;
-            #[cfg(feature = "mistakes")]
-            let is_masked = is_masked && !Mistake::NoSampleMask.is_made();
-            if is_masked {
+            if self.draw.state.sample_mask >> sample & 1 == 0 {
                 continue;
             }
             let mut lanes = touched;
@@ -324,10 +319,6 @@ impl<'a> GaussianTileDraw<'a> {
                 }
             }
             reached = fragments.reached(self.draw, self.level, tile.at, &reached);
-            #[cfg(feature = "mistakes")]
-            if Mistake::DepthFailAnywhere.is_made() {
-                reached = [u32::MAX; BLOCKS];
-            }
         }
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.stencil.start(tile.index, sample);
@@ -345,8 +336,6 @@ impl<'a> GaussianTileDraw<'a> {
                     face.fail
                 };
                 let value = apply(op, *stored, face.reference);
-                #[cfg(feature = "mistakes")]
-                let value = if Mistake::StencilTwice.is_made() { apply(op, value, face.reference) } else { value };
                 *stored = *stored & !face.write_mask | value & face.write_mask;
             }
         }

@@ -8,8 +8,6 @@ use super::inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, T
 use super::masks::{Tally, only};
 use super::staging::{Reaching, StagedRound};
 use crate::gaussian::splat::{Splat, SplatLook};
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
@@ -420,17 +418,10 @@ fn composite_one<S: Simd>(
     // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
     let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
     pixels.transmittance = goes_on.select(rest, finished);
-    #[cfg(feature = "mistakes")]
-    if Mistake::LastContributes.is_made() {
-        pixels.add(simd, only(simd, !goes_on & t.simd_gt(0.0), weight), color);
-    }
     let weight = only(simd, goes_on, weight);
     if thresholds.depth_mode >= FIND_MEDIAN {
         let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
-        #[cfg(feature = "mistakes")]
-        let first_half =
-            if Mistake::MedianOfOtherHalf.is_made() { weight.simd_gt(0.0) & t.simd_lt(0.5) } else { first_half };
         let median = first_half.select(u32x16::splat(simd, depth), median);
         median.store_slice(&mut accumulator.median[block]);
     }
@@ -451,11 +442,6 @@ impl<S: Simd> Pixels<S> {
     #[inline(always)]
     fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
         let t = self.transmittance;
-        #[cfg(feature = "mistakes")]
-        if Mistake::TransmittanceAfter.is_made() {
-            let rest = t.mul_add(-alpha, t);
-            return Passed { weight: rest * alpha, rest };
-        }
         Passed { weight: t * alpha, rest: t.mul_add(-alpha, t) }
     }
 
