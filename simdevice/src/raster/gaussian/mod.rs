@@ -5,21 +5,22 @@
 //! once for all samples that agree in all of a block, and again only in the blocks of a tile where some differ.
 
 mod accumulator;
-mod binary16;
-mod block_lists;
+mod approximation;
+mod by_block;
 mod compositor;
 mod cut_off;
 mod depth_ranges;
-mod exact;
+mod exponent;
 mod fast;
 mod fragment_stage;
 mod grid;
 mod inputs;
+mod kernel;
 mod masks;
-mod per_pixel;
+mod mode;
 mod pixels;
-mod staging;
-mod tracking;
+mod reached_blocks;
+mod samples;
 
 pub use compositor::GaussianTile;
 
@@ -33,14 +34,14 @@ use crate::raster::tile_buffer::{QuadAddresses, Target};
 use crate::runtime::Runtime;
 use crate::state::{BlendState, StencilFace, StencilOp};
 use crate::stats::counters::{Counter, Counters};
-use accumulator::{SAMPLES, Samples};
 use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
-use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::machine::Stopped;
+use mode::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
+use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 
 /// A Gaussian draw made ready for tiles, which all workers share.
@@ -180,8 +181,7 @@ impl<'a> GaussianTileDraw<'a> {
         let touched = lanes_within(self.draw.bounds.intersect(tile.pixels), corner);
         let mut samples = Samples::default();
         for sample in 0..self.samples {
-            let is_masked = self.draw.state.sample_mask >> sample & 1 == 0;
-            if is_masked {
+            if self.draw.state.sample_mask >> sample & 1 == 0 {
                 continue;
             }
             let mut lanes = touched;
