@@ -31,11 +31,11 @@ pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
             *caught.entry(case.chapter).or_default() += 1;
         }
         let chapters: Vec<String> = chapters.iter().map(|(chapter, count)| format!("{chapter} {count}")).collect();
-        let verdict = match failing.first() {
+        let outcome = match failing.first() {
             Some(first) => format!("{}; first {}", chapters.join(", "), first.path()),
             None => "ESCAPES".to_owned(),
         };
-        println!("{mistake:?} ({}): {verdict}", text.trim());
+        println!("{mistake:?} ({}): {outcome}", text.trim());
         escaped += usize::from(failing.is_empty());
     }
     println!("{} mistakes, {escaped} of them escape", Mistake::ALL.len());

@@ -5,7 +5,7 @@ use gaurast_oracle::oracle::{OracleDepthFormat, OracleScene, OracleTests};
 
 use crate::draw::{Draw, Shown};
 use crate::implementation::Picture;
-use crate::judge::{CONTRACT, gathered, oracle_camera, oracle_state, sets};
+use crate::judge::{CONTRACT, combined_scene, oracle_camera, oracle_state, sets};
 
 /// The distance from its envelope of the farthest number that a picture shows.
 ///
@@ -16,7 +16,7 @@ pub(crate) fn distance(draw: &Draw, shown: Shown, picture: &Picture) -> Result<f
     let [members] = all.as_slice() else {
         return Err("a case with a resolve shader has one set".to_owned());
     };
-    let (scene, instances) = gathered(draw, members);
+    let (scene, instances) = combined_scene(draw, members);
     let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
     let (camera, viewport) = (oracle_camera(draw), draw.viewport());
     let tests = OracleTests {
@@ -101,10 +101,10 @@ impl Judge<'_> {
                 let expected = self.camera(location);
                 let mut farthest = 0.0_f64;
                 for (value, expected) in color.into_iter().zip(expected) {
-                    let room = 1e-7 * expected.abs().max(f64::MIN_POSITIVE);
+                    let tolerance = 1e-7 * expected.abs().max(f64::MIN_POSITIVE);
                     let values = std::iter::once(expected);
                     if f64::from(value) != expected {
-                        farthest = farthest.max(within(values, value, room)?);
+                        farthest = farthest.max(within(values, value, tolerance)?);
                     }
                 }
                 Ok(farthest)
@@ -118,9 +118,9 @@ impl Judge<'_> {
         ways: &[&Resolved],
         mut medians: impl Iterator<Item = f64>,
         value: f64,
-        room: f64,
+        tolerance: f64,
     ) -> Result<(), String> {
-        let is_one = medians.any(|median| (median - value).abs() <= room);
+        let is_one = medians.any(|median| (median - value).abs() <= tolerance);
         let is_unknown = ways.iter().any(|way| way.medians_exhausted);
         if is_one || is_unknown { Ok(()) } else { Err("the median is another one".to_owned()) }
     }
@@ -149,10 +149,10 @@ impl Judge<'_> {
 }
 
 /// The distance of a number from the least and the greatest of others.
-fn within(values: impl Iterator<Item = f64>, value: f32, room: f64) -> Result<f64, String> {
+fn within(values: impl Iterator<Item = f64>, value: f32, tolerance: f64) -> Result<f64, String> {
     let (low, high) =
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let value = f64::from(value);
     let distance = (low - value).max(value - high).max(0.0);
-    if distance <= room { Ok(distance) } else { Err(format!("{value} is not within {low} to {high}")) }
+    if distance <= tolerance { Ok(distance) } else { Err(format!("{value} is not within {low} to {high}")) }
 }

@@ -68,7 +68,7 @@ pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     }
     let expected = expected(&draw, &before);
     match expected.fault(&picture) {
-        None => Outcome::Pass(expected.verdict(&picture).max_distance),
+        None => Outcome::Pass(expected.accuracy(&picture).max_distance),
         Some(message) => Outcome::Fail(Failure { message, picture: Some((Box::new(expected), picture.color)) }),
     }
 }
