@@ -17,7 +17,7 @@ use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{CompareOp, DepthStencil, DepthTest, Rect, Viewport};
 use simdevice::stats::counters::{Counter, Counters};
-use simdevice::{Allocation, Config, Device, Format, Image, ImageView};
+use simdevice::{Allocation, BufferRange, Config, Device, Format, Image, ImageView};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;

@@ -14,7 +14,7 @@ use simdevice::program::interface::{
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{BlendState, DrawState, Topology};
 use simdevice::stats::counters::Counter;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{Allocation, BufferRange, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
 const WIDTH: u32 = 1920;

@@ -14,10 +14,11 @@ use simdevice::program::interface::{
 };
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, Topology,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
+    Rect, Topology,
 };
 use simdevice::stats::counters::Counter;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{Allocation, BufferRange, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
 const WIDTH: u32 = 1920;
@@ -99,7 +100,7 @@ fn state(scene: &Scene) -> DrawState {
             bounds: None,
             stencil: None,
         },
-        blend: vec![BlendState { equations: scene.blend.then_some((over, over)), write_mask: 0xF }],
+        blend: vec![BlendState { equations: scene.blend.then_some(BlendEquations::both(over)), write_mask: 0xF }],
         ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }

@@ -316,8 +316,9 @@ fn spread(value: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::format::Format;
-    use crate::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
+    use crate::packet::{AttributeStream, GaussianAttributes, ModelAttributes};
     use devmem::Allocation;
+    use devmem::BufferRange;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
