@@ -175,7 +175,7 @@ pub struct GeometryPrograms {
     pub vertex_bytes: u32,
     /// The meanings of the values that it gives; `None` is not used.
     pub outputs: Vec<Option<VertexOutput>>,
-    /// The number of corners of the primitives that it output_memory: 1 to 3.
+    /// The number of corners of the primitives that it gives: 1 to 3.
     pub corners: usize,
 }
 
