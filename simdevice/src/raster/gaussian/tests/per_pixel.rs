@@ -73,7 +73,7 @@ fn it_equals_its_twin(case: &Case) {
     }
     // Everything contributes everywhere, in several passes.
     let state = GaussianState { alpha_floor: 0.0, transmittance_floor: 0.0, low_pass_variance: 0.0, ..state };
-    check(case, 23, 3 * crate::raster::gaussian::by_block::per_pixel::HELD as u32, &state, WHOLE);
+    check(case, 23, 3 * by_block::per_pixel::HELD as u32, &state, WHOLE);
 }
 
 #[gaurast_runner::test]
