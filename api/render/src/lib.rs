@@ -46,4 +46,4 @@ pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};
 pub use settings::Settings;
-pub use target::{COLOR_FORMAT, Target, check_size, record_copy};
+pub use target::{COLOR_FORMAT, Target, check_size, copy_image, record_copy};

@@ -1,0 +1,9 @@
+//! The chapter *Initialization*.
+//!
+//! Unit tests: `driver/src/dispatch`.
+
+mod embedded;
+mod leaks;
+mod loaded_draws;
+mod loader;
+mod validation_layer;
