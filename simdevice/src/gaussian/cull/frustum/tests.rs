@@ -17,8 +17,7 @@ use crate::runtime::SimdLevel;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState};
 use crate::stats::optimizations::Optimizations;
-use devmem::BufferRange;
-use devmem::{Allocation, dispatch};
+use devmem::{Allocation, BufferRange, dispatch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
