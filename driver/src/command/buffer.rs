@@ -4,6 +4,7 @@
 use super::Command;
 use super::render_scope::RenderScope;
 use crate::abi::error::Error;
+use crate::abi::guard::guard;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid;
 use crate::device::Device;
@@ -238,6 +239,14 @@ impl Recorder {
         }
     }
 
+    /// Fails a command that isn't supported.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`].
+    pub(crate) fn refuse(&self) -> Result<(), Error> {
+        Err(Error::Unsupported { command: self.command.to_owned() })
+    }
+
     /// Fails within a set of Gaussian draws.
     ///
     /// # Errors
@@ -415,7 +424,7 @@ impl Recorder {
     }
 }
 
-/// Records into a command buffer; see [`CommandBuffer::record`](CommandBuffer::record).
+/// The guarded body of a command that is recorded; see [`CommandBuffer::record`](CommandBuffer::record).
 ///
 /// # Safety
 /// The handle is live.
@@ -423,9 +432,11 @@ pub(crate) unsafe fn record(
     command_buffer: vk::CommandBuffer,
     command: &'static str,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe { handle::get(command_buffer)? }.record(command, record)
+) {
+    guard(command_buffer, command, || {
+        // SAFETY: the caller's promise.
+        unsafe { handle::get(command_buffer)? }.record(command, record)
+    })
 }
 
 /// The colour formats of the pass that a secondary command buffer continues.
