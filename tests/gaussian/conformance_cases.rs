@@ -2,7 +2,6 @@
 
 use gaurast_conformance::{Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
-use gaurast_testkit::{Settings, with_settings};
 
 fn chapters() -> Vec<Variant> {
     cases::chapters().map(Variant::new).collect()
@@ -10,8 +9,7 @@ fn chapters() -> Vec<Variant> {
 
 #[gaurast_runner::test(each = chapters())]
 fn every_case_passes(case: &Case) {
-    let device = with_settings(&Settings::default(), || open("embedded"));
-    let device = device.expect("a device");
+    let device = open("embedded").expect("a device");
     let (mut failures, mut passed) = (Vec::new(), 0);
     for one in all() {
         if one.chapter != case.variant() {

@@ -9,6 +9,7 @@ mod compute;
 mod context;
 mod descriptors;
 mod devices;
+mod driver_options;
 mod dynamic_states;
 mod embedded;
 mod gaussian_draws;
