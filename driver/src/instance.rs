@@ -9,8 +9,8 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid::{self, Structures};
 use crate::convert;
-use crate::options::Options;
 use crate::listeners::{DebugMessenger, DebugReportCallback, Listeners, Message, ReportOrigin};
+use crate::options::Options;
 use crate::registry::extensions::{DEVICE, Extension, INSTANCE};
 use crate::window;
 use ash::vk;
@@ -208,8 +208,7 @@ unsafe fn new_instance(info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance
         return Err(Error::LayerNotPresent("in the driver".to_owned()));
     }
     // SAFETY: as above.
-    let (application, options) =
-        unsafe { (valid::optional(info.p_application_info), Options::of_chain(info.p_next)) };
+    let (application, options) = unsafe { (valid::optional(info.p_application_info), Options::of_chain(info.p_next)) };
     Instance::new(application.map_or(0, |application| application.api_version), &names, options)
 }
 

@@ -155,8 +155,7 @@ impl Options {
             return Ok(Optimizations::default());
         };
         let text = names.to_str().map_err(|_| wrong("pOptimizations-parameter", names, "it is not UTF-8"))?;
-        text.parse()
-            .map_err(|error: UnknownOptimization| wrong("pOptimizations-91002", names, &error.to_string()))
+        text.parse().map_err(|error: UnknownOptimization| wrong("pOptimizations-91002", names, &error.to_string()))
     }
 
     fn simulated_timestamps(&self, environment: &Environment) -> Result<bool, Error> {

@@ -140,8 +140,12 @@ mod tests {
 
     fn queue() -> Arc<Queue> {
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        Queue::start(Instance::new(0, &[], Options::default()).unwrap(), Arc::default(), CommandProcessor::new(Arc::new(simulated)))
-            .unwrap()
+        Queue::start(
+            Instance::new(0, &[], Options::default()).unwrap(),
+            Arc::default(),
+            CommandProcessor::new(Arc::new(simulated)),
+        )
+        .unwrap()
     }
 
     #[test]

@@ -106,8 +106,7 @@ fn the_extension_is_listed() {
     let entry = vulkan_gaurast::entry();
     // SAFETY: the entry is the driver's.
     let listed = unsafe { entry.enumerate_instance_extension_properties(None) }.expect("extensions");
-    let is_it =
-        |it: &&vk::ExtensionProperties| it.extension_name_as_c_str() == Ok(gaurast::driver_options::NAME);
+    let is_it = |it: &&vk::ExtensionProperties| it.extension_name_as_c_str() == Ok(gaurast::driver_options::NAME);
     let found = listed.iter().find(is_it).expect("the extension");
     assert_eq!(found.spec_version, gaurast::driver_options::SPEC_VERSION);
     use_device(&Context::embedded(&[gaurast::driver_options::NAME])).expect("a device");
@@ -139,10 +138,8 @@ fn the_environment_wins(case: &Case) {
 /// A function that is null, and options of zeros, are the defaults.
 #[gaurast_runner::test]
 fn zeros_are_the_defaults() {
-    let options = DriverOptionsGAURAST {
-        p_user_data: ptr::without_provenance_mut(1),
-        ..DriverOptionsGAURAST::default()
-    };
+    let options =
+        DriverOptionsGAURAST { p_user_data: ptr::without_provenance_mut(1), ..DriverOptionsGAURAST::default() };
     let messages = Messages::default();
     use_device(&instance(vulkan_gaurast::entry(), &[], options, &messages)).expect("a device");
     assert_eq!(messages.take(), []);

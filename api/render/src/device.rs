@@ -43,8 +43,7 @@ impl Instance {
         if has_messages {
             let functions = ash::ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             // SAFETY: the extension is enabled, and the options outlive the messenger.
-            let messenger =
-                unsafe { functions.create_debug_utils_messenger(&instance._options.messenger(), None) };
+            let messenger = unsafe { functions.create_debug_utils_messenger(&instance._options.messenger(), None) };
             instance.messenger = Some((functions, messenger.during("vkCreateDebugUtilsMessengerEXT")?));
         }
         Ok(instance)

@@ -43,8 +43,8 @@ mod target;
 
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
-pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 pub use gaurast::WorkTrace;
+pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 pub use options::{DeviceOptions, Message};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};

@@ -242,9 +242,9 @@ pub fn live_handles() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Options;
     use crate::instance::Instance;
     use crate::listeners::DebugMessenger;
+    use crate::options::Options;
 
     fn messenger() -> Arc<DebugMessenger> {
         Arc::new(DebugMessenger::new(&vk::DebugUtilsMessengerCreateInfoEXT::default()))

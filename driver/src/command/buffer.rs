@@ -580,8 +580,8 @@ pub(crate) fn cmd_execute_commands(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Options;
     use crate::instance::Instance;
+    use crate::options::Options;
     use crate::registry::features::Features;
 
     fn record(usage: BeginFlags) -> Recorder {

@@ -212,8 +212,8 @@ pub(crate) unsafe fn queue_submit2(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Options;
     use crate::device_sync::WaitResult;
+    use crate::options::Options;
     use crate::queue::Queue;
     use simdevice::Allocation;
     use simdevice::Device;

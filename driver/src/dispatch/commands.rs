@@ -4090,7 +4090,9 @@ unsafe extern "system" fn vkGetPhysicalDeviceCalibrateableTimeDomainsEXT(
             valid::enumerate(
                 p_time_domain_count,
                 p_time_domains,
-                &crate::calibrated_timestamps::get_physical_device_calibrateable_time_domains()?,
+                &crate::calibrated_timestamps::get_physical_device_calibrateable_time_domains(handle::get(
+                    physical_device,
+                )?)?,
             )
         }
     })

@@ -59,13 +59,7 @@ pub enum HeatmapError {
 ///
 /// # Errors
 /// See [`HeatmapError`].
-pub fn write(
-    path: &Path,
-    quantity: Quantity,
-    work: &Trace,
-    camera: &Camera,
-    force: bool,
-) -> Result<f64, HeatmapError> {
+pub fn write(path: &Path, quantity: Quantity, work: &Trace, camera: &Camera, force: bool) -> Result<f64, HeatmapError> {
     if path.is_file() && !force {
         return Err(HeatmapError::There { path: path.to_owned() });
     }

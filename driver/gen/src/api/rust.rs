@@ -96,7 +96,7 @@ fn add_definitions(code: &mut String, extension: &Extension, defaults: &BTreeSet
             code,
             "{}#[allow(non_camel_case_types, reason = \"the name is Vulkan's\")]
             pub type {} = Option<unsafe extern \"system\" fn({parameters})>;\n",
-            comments.item(&callback.name, &callback.comment, None),
+            comments.text(&callback.comment, None),
             callback.name
         );
     }
@@ -236,7 +236,7 @@ fn setters(structure: &Structure) -> String {
 /// The module of an extension that has no functions.
 pub(super) fn names(extension: &Extension) -> Result<String, Error> {
     let documentation = format!("//! `{}`: name and version.", extension.name);
-    rust_file(&documentation, &format!("use core::ffi::CStr;\n{}", name_constants(extension)))
+    rust_file(&documentation, &format!("use core::ffi::CStr;\n\n{}", name_constants(extension)))
 }
 
 /// The constants with the extension's name, revision and number.

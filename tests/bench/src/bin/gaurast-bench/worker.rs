@@ -212,8 +212,7 @@ impl Worker {
             replies: BufReader::new(replies),
             ready: Ready { device: String::new(), upload: 0.0 },
         };
-        let setup =
-            Setup { contender, workload: workload.clone(), threads, optimizations: optimizations.to_owned() };
+        let setup = Setup { contender, workload: workload.clone(), threads, optimizations: optimizations.to_owned() };
         match worker.ask(&setup)? {
             Reply::Ready(ready) => worker.ready = ready,
             reply => return Err(reply.unexpected(contender)),

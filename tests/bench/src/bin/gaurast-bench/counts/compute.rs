@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast_render::{DeviceOptions, RenderError};
 use gaurast_render::device::{Device, Purpose};
 use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_render::{DeviceOptions, RenderError};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
