@@ -514,13 +514,13 @@ fn wrong_use_is_refused() {
             device.capture(commands, None, || device.bind(commands, &[buffer]));
         }),
         ("VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357", |device, commands, buffer| {
-            device.bind(commands, &[buffer; 5])
+            device.bind(commands, &[buffer; 5]);
         }),
         ("VUID-vkCmdBindTransformFeedbackBuffersEXT-pOffsets-02359", |device, commands, buffer| {
-            device.feedback.bind(commands, 0, &[(buffer, 2)])
+            device.feedback.bind(commands, 0, &[(buffer, 2)]);
         }),
         ("VUID-vkCmdDrawIndirectByteCountEXT-vertexStride-02289", |device, commands, buffer| {
-            device.feedback.draw(commands, 1, (buffer, 0), 0, 0)
+            device.feedback.draw(commands, 1, (buffer, 0), 0, 0);
         }),
     ];
     let device = Device::open(Driver::Embedded);

@@ -233,7 +233,10 @@ fn judge_sample(name: &str, reference: &TestedReference, before: &Held, after: &
     for (at, &depth) in after.stored.depth.iter().enumerate() {
         match &reference.depth[at] {
             Some(allowed) => {
-                assert!(allowed.contains(&depth), "{name}: pixel {at} stores depth {depth:#x}, not one of {allowed:x?}")
+                assert!(
+                    allowed.contains(&depth),
+                    "{name}: pixel {at} stores depth {depth:#x}, not one of {allowed:x?}"
+                );
             }
             None => unknown += 1,
         }

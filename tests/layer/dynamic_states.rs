@@ -110,7 +110,7 @@ fn draws() -> Vec<Mistake> {
         vec![
             draw("a dynamic order that was not set", dynamic, ORDER, |_, _| ()),
             draw("a dynamic alpha ceiling below the pipeline's floor", dynamic, CEILING, |own, commands| {
-                own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3)
+                own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3);
             }),
             draw(
                 "a dynamic degree of more coefficients than the pipeline has",

@@ -120,26 +120,26 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
                 own.cmd_set_gaussian_antialiasing(commands, none);
             }),
             ("VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053", &|own, commands| {
-                own.cmd_set_gaussian_low_pass_variance(commands, f32::INFINITY)
+                own.cmd_set_gaussian_low_pass_variance(commands, f32::INFINITY);
             }),
             ("VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054", &|own, commands| {
                 own.cmd_set_gaussian_alpha_floor(commands, 1.5);
             }),
             ("VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055", &|own, commands| {
-                own.cmd_set_gaussian_alpha_ceiling(commands, 0.0)
+                own.cmd_set_gaussian_alpha_ceiling(commands, 0.0);
             }),
             ("VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-90056", &|own, commands| {
-                own.cmd_set_gaussian_transmittance_floor(commands, 1.0)
+                own.cmd_set_gaussian_transmittance_floor(commands, 1.0);
             }),
             (
                 "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-90057",
                 &|own, commands| own.cmd_set_gaussian_spherical_harmonics_degree(commands, 5),
             ),
             ("VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058", &|own, commands| {
-                own.cmd_set_gaussian_exponential_error(commands, f32::NAN)
+                own.cmd_set_gaussian_exponential_error(commands, f32::NAN);
             }),
             ("VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059", &|own, commands| {
-                own.cmd_set_gaussian_contribution_budget(commands, -1.0)
+                own.cmd_set_gaussian_contribution_budget(commands, -1.0);
             }),
         ]
     };
@@ -155,11 +155,11 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
     };
     // SAFETY: see the crate.
     let ceiling = drawn(DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, &|own, commands| unsafe {
-        own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3)
+        own.cmd_set_gaussian_alpha_ceiling(commands, 1e-3);
     });
     // SAFETY: see the crate.
     let degree = drawn(DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST, &|own, commands| unsafe {
-        own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1)
+        own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1);
     });
     broken
         .extend([("VUID-vkCmdDraw-dynamic-90060", ceiling), ("VUID-vkCmdDraw-sphericalHarmonicsDegree-90061", degree)]);

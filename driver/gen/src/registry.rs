@@ -131,10 +131,10 @@ impl Registry {
                     self.versions.extend(feature.children.into_iter().filter_map(|c| requirement(by, c)));
                 }
                 RegistryChild::Extensions(extensions) => {
-                    self.extensions.extend(extensions.children.into_iter().filter_map(extension))
+                    self.extensions.extend(extensions.children.into_iter().filter_map(extension));
                 }
                 RegistryChild::SpirvCapabilities(capabilities) => {
-                    self.capabilities.extend(capabilities.children.into_iter().map(|c| (c.name, c.enables)))
+                    self.capabilities.extend(capabilities.children.into_iter().map(|c| (c.name, c.enables)));
                 }
                 _ => {}
             }

@@ -272,7 +272,7 @@ impl Format {
                 decode_each(bytes, out, bytemuck::cast::<[u8; 16], _>);
             }
             Self::E5B9G9R9UfloatPack32 => {
-                decode_each(bytes, out, |texel| convert::from_shared_exponent(u32::from_le_bytes(texel)))
+                decode_each(bytes, out, |texel| convert::from_shared_exponent(u32::from_le_bytes(texel)));
             }
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());
@@ -305,7 +305,7 @@ impl Format {
                 encode_each(texels, out, bytemuck::cast::<_, [u8; 16]>);
             }
             Self::E5B9G9R9UfloatPack32 => {
-                encode_each(texels, out, |texel| convert::to_shared_exponent(&texel).to_le_bytes())
+                encode_each(texels, out, |texel| convert::to_shared_exponent(&texel).to_le_bytes());
             }
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());

@@ -103,7 +103,7 @@ impl<'a> Fetcher<'a> {
                     set_lanes(machine.input_mut(slot), vertices, |&number| number as u32);
                 }
                 VertexInput::InstanceIndex => {
-                    set_lanes(machine.input_mut(slot), instances, |&i| draw.first_instance.wrapping_add(i))
+                    set_lanes(machine.input_mut(slot), instances, |&i| draw.first_instance.wrapping_add(i));
                 }
                 VertexInput::BaseVertex => machine.fill_input(slot, offset),
                 VertexInput::BaseInstance => machine.fill_input(slot, draw.first_instance),

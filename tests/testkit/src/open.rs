@@ -45,8 +45,8 @@ impl Driver {
     fn entry(self) -> Result<ash::Entry, OpenError> {
         match self {
             Self::Embedded => Ok(vulkan_gaurast::entry()),
-            // SAFETY: the loader is the system's own.
             Self::Loaded | Self::Lavapipe | Self::Extended => {
+                // SAFETY: the loader is the system's own.
                 unsafe { ash::Entry::load() }.map_err(|error| OpenError::NoLoader(error.to_string()))
             }
         }

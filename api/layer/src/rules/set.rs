@@ -56,7 +56,7 @@ pub(crate) fn check_draw(recording: &mut Recording, faults: &mut Faults) {
         None => {}
         Some(first @ None) => *first = Some(shared),
         Some(Some(first)) if !Arc::ptr_eq(&first.pipeline, &shared.pipeline) => {
-            faults.error("VUID-vkCmdDraw-None-90005", "a set has another pipeline at this draw than at its first one")
+            faults.error("VUID-vkCmdDraw-None-90005", "a set has another pipeline at this draw than at its first one");
         }
         Some(Some(first)) => {
             let differs = if first.cameras == shared.cameras {

@@ -215,7 +215,7 @@ impl Extensions {
                     extensions.coordinates = Some(CoordinateSystem(system));
                 }
                 (COORDINATE_SYSTEM, _) => {
-                    extensions.notes.note("SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed")
+                    extensions.notes.note("SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed");
                 }
                 (SAFE_ORBIT_CAMERA, _) => extensions.notes.note("the extension SPZ_ADOBE_safe_orbit_camera is ignored"),
                 (kind, _) => extensions.notes.note(format!("the extension {kind:#010x} is unknown and ignored")),

@@ -215,10 +215,10 @@ impl Extension {
                             });
                         }
                         EnumSpec::Bitpos { bitpos, .. } => {
-                            made.values.push(Value { name: value.name, value: 1 << bitpos, comment })
+                            made.values.push(Value { name: value.name, value: 1 << bitpos, comment });
                         }
                         EnumSpec::Value { value: number, .. } => {
-                            self.constants.push(Constant { name: value.name, value: number, comment })
+                            self.constants.push(Constant { name: value.name, value: number, comment });
                         }
                         _ => {}
                     }
