@@ -70,7 +70,7 @@ impl Options {
     /// # Errors
     /// [`Error::InitializationFailed`] for a wrong value of the environment, [`Error::InvalidUsage`] for one of the
     /// program.
-    pub(crate) fn device_config(&self, reporter: Arc<dyn Reporter>) -> Result<Config, Error> {
+    pub(crate) fn device_config(&self, reporter: Arc<dyn Reporter + Send + Sync>) -> Result<Config, Error> {
         let environment = Environment::read()?;
         let mut config = self.config(&environment)?;
         let file = environment.trace.map(PathBuf::from);
@@ -263,7 +263,7 @@ unsafe impl Sync for WorkTraceCallback {}
 struct TraceReceivers {
     callback: Option<WorkTraceCallback>,
     file: Option<PathBuf>,
-    reporter: Arc<dyn Reporter>,
+    reporter: Arc<dyn Reporter + Send + Sync>,
 }
 
 impl TraceReceivers {
