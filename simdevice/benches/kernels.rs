@@ -8,7 +8,8 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::gaussian::{BinnedDraw, GaussianSet, sort, sort_and_bin};
+use simdevice::gaussian::sort::radix;
+use simdevice::gaussian::{BinnedDraw, GaussianSet, sort_and_bin};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
 use simdevice::runtime::SimdLevel;
@@ -176,7 +177,7 @@ fn depth_sort(bencher: Bencher, count: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let depth = |rng: &mut ChaCha8Rng| rng.random_range(0.2..100.0_f32).to_bits();
     let pairs: Vec<(u32, u32)> = (0..count as u32).map(|i| (depth(&mut rng), i)).collect();
-    bencher.counter(ItemsCount::new(count)).with_inputs(|| pairs.clone()).bench_local_refs(sort::sort_by_key);
+    bencher.counter(ItemsCount::new(count)).with_inputs(|| pairs.clone()).bench_local_refs(radix::sort_by_key);
 }
 
 /// Items are pairs of the tile and a Gaussian.

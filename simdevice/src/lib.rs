@@ -20,8 +20,6 @@ pub mod geometry;
 mod hardware_model;
 pub mod image;
 pub mod limits;
-#[cfg(feature = "mistakes")]
-pub mod mistakes;
 pub mod packet;
 pub mod pass;
 pub mod program;

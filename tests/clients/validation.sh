@@ -1,6 +1,6 @@
 #!/bin/sh
 # Runs vkcube under the Khronos validation layer: no value that the driver reports may cause a message.
-# tests/driver/loader_door.rs checks the layer's messages about the Gaussian extension, which it does not know.
+# tests/vulkan/initialization/loaded_draws.rs checks the layer's messages about the Gaussian extension, which it does not know.
 . "$(dirname "$0")/common.sh"
 need vkcube
 layer=/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json

@@ -2,7 +2,7 @@
 //! by cause, and the model's share of waiting Gaussians, calibrated without a group of tiles. FOLDER keeps Verilator's
 //! build: `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`.
 
-#[path = "../simulator/tiles.rs"]
+#[path = "../gaussian/simulator/tiles.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod tiles;
 

@@ -1,5 +1,5 @@
 //! Draws the stress scenes on this driver and as blended quads on lavapipe, and compares both with the binary64 oracle.
-//! `stress_table [FILE]` writes the table, by default to `tests/stress/TABLE.md`.
+//! `stress_table [FILE]` writes the table, by default to `tests/gaussian/stress/TABLE.md`.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -13,10 +13,10 @@ use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_binary16, render_bounded};
 
 #[allow(dead_code, unused_imports, reason = "the tests use all of it")]
-#[path = "../stress/scenes.rs"]
+#[path = "../gaussian/stress/scenes.rs"]
 mod scenes;
 #[allow(dead_code, unused_imports, reason = "the tests use all of it")]
-#[path = "../stress/verdicts.rs"]
+#[path = "../gaussian/stress/verdicts.rs"]
 mod verdicts;
 
 use scenes::{Stress, all};
@@ -124,7 +124,7 @@ impl Distances {
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args()
         .nth(1)
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("stress/TABLE.md"), PathBuf::from);
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("gaussian/stress/TABLE.md"), PathBuf::from);
     let levels = levels();
     let gpu =
         |simd: &&'static str| Gpu::embedded(&Settings { simd: Some(simd), ..Settings::default() }).expect("a device");

@@ -1,7 +1,8 @@
-//! The conformance cases of the program `gaurast-conformance` on this driver, one test for each chapter.
+//! The conformance cases of the program `gaurast-conformance`: on this driver, one test for each chapter; and on oracles that
+//! make mistakes, one test for each mistake.
 
-use gaurast_conformance::{Outcome, all, cases, open, run};
-use gaurast_runner::{Case, Variant};
+use gaurast_conformance::{Expectation, MISTAKES, Oracle, Outcome, all, cases, mistakes, open, run};
+use gaurast_runner::{Case, Variant, is_long};
 
 fn chapters() -> Vec<Variant> {
     cases::chapters().map(Variant::new).collect()
@@ -26,4 +27,40 @@ fn every_case_passes(case: &Case) {
     }
     assert!(failures.is_empty(), "{failures:#?}");
     assert!(passed > 0, "nothing was drawn");
+}
+
+fn each_mistake() -> Vec<Variant> {
+    MISTAKES.iter().map(|mistake| Variant::new(mistake.name)).collect()
+}
+
+/// Runs the cases of the mistake's chapter up to the first that catches it.
+#[gaurast_runner::test(each = each_mistake())]
+fn a_case_catches_each_mistake(case: &Case) {
+    let mistake = MISTAKES.iter().find(|mistake| mistake.name == case.variant()).expect("a variant is a mistake");
+    let all = all();
+    let mut expectations =
+        all.iter().filter(|case| case.chapter == mistake.chapter).map(|case| Expectation::new(case.draw()));
+    let caught = expectations.find(|expectation| mistake.is_caught(expectation));
+    let caught = caught.unwrap_or_else(|| panic!("no case of {} catches it", mistake.chapter));
+    assert!(matches!(caught.judge(&Oracle::default()), Outcome::Pass(_)), "the case fails without the mistake");
+}
+
+/// The page has a row for each mistake, and each is caught. A long run compares the numbers.
+#[gaurast_runner::test]
+fn the_page_lists_the_mistakes_and_their_cases() {
+    const PAGE: &str = include_str!("../../docs/conformance.md");
+    let start = PAGE.find("| Pixel centres").expect("the table");
+    let table = &PAGE[start..][..PAGE[start..].find("\n\n").expect("its end") + 1];
+    if is_long() {
+        let catches = mistakes::catches(&all()).unwrap_or_else(|message| panic!("{message}"));
+        let expected = mistakes::table(&catches);
+        assert_eq!(table, expected, "`gaurast-conformance --mistakes` prints it");
+    }
+    assert_eq!(table.lines().count(), MISTAKES.len());
+    for (row, mistake) in table.lines().zip(&MISTAKES) {
+        let count = row.strip_prefix(&format!("| {} | ", mistake.text)).and_then(|rest| rest.split(' ').next());
+        let count: usize = count.unwrap_or_else(|| panic!("no row: {}", mistake.text)).parse().expect("a number");
+        assert!(count > 0, "{row}");
+        assert!(row.contains(&format!("{} ", mistake.chapter)) || row.contains("more"), "{row}");
+    }
 }

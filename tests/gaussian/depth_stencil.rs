@@ -6,6 +6,7 @@
 use ash::ext::{depth_clip_control, extended_dynamic_state3};
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
+use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{Attachments, GaussianOptions, GaussianPipeline, GaussianScene, Settings, over};
 use gaurast_testkit::{
     Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
@@ -14,8 +15,6 @@ use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, depth_format, held};
 use gaurast_tests::oracle::{OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested};
 use gaurast_tests::scenes::{self, SceneBuffers};
-
-use crate::GLSLANG;
 
 /// The picture's size; odd, so that tiles are cut.
 const SIZE: [u32; 2] = [107, 83];

@@ -8,6 +8,7 @@ use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Need, data};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::DEFAULT_FOV;
+use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
@@ -20,7 +21,6 @@ use gaurast_tests::triangles::models::Model;
 use glam::{DMat3, DVec3, Vec3};
 
 use super::PLAYBOT;
-use crate::GLSLANG;
 
 const SIZE: [u32; 2] = [320, 240];
 

@@ -1,10 +1,9 @@
 //! The document about skips as hardware is up to date with the device.
 
+use gaurast_testkit::shader::GLSLANG;
 use std::path::Path;
 
 use gaurast_tests::what_ifs::markdown;
-
-use crate::GLSLANG;
 
 const HOW: &str = "run `cargo run --release -p gaurast-tests --example what_ifs > simdevice/timing/studies/WHAT_IF.md`";
 

@@ -5,6 +5,7 @@ pub mod fuzzing;
 pub mod hybrid;
 pub mod kernels;
 pub mod long_run;
+pub mod many_gaussians;
 pub mod programs;
 pub mod recorded;
 pub mod triangles;

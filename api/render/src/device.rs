@@ -174,7 +174,7 @@ impl Device {
     }
 
     /// The functions of the Gaussian primitive topology, for a device created to draw Gaussians.
-    pub(super) fn gaussian_functions(&self) -> gaussian_primitive_topology::Device {
+    pub fn gaussian_functions(&self) -> gaussian_primitive_topology::Device {
         gaussian_primitive_topology::Device::new(&self.instance.raw, &self.raw)
     }
 

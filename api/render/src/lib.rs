@@ -49,4 +49,4 @@ pub use options::{DeviceOptions, Message};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};
 pub use settings::Settings;
-pub use target::{COLOR_FORMAT, Target, check_size, record_copy};
+pub use target::{COLOR_FORMAT, Target, check_size, copy_image, record_copy};

@@ -197,7 +197,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image of one level and one layer.
+    /// An image of one level, one layer and one sample.
     ///
     /// # Errors
     /// If there is no memory for it, or Vulkan fails.
@@ -207,13 +207,27 @@ impl Image {
         format: vk::Format,
         usage: vk::ImageUsageFlags,
     ) -> Result<Self, RenderError> {
+        Self::with_samples(device, extent, format, usage, vk::SampleCountFlags::TYPE_1)
+    }
+
+    /// An image of one level and one layer, with a number of samples for each pixel.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_samples(
+        device: &Arc<Device>,
+        extent: vk::Extent2D,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+        samples: vk::SampleCountFlags,
+    ) -> Result<Self, RenderError> {
         let create_info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
             .extent(extent.into())
             .mip_levels(1)
             .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
+            .samples(samples)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(usage);
         // SAFETY: the structure is valid.

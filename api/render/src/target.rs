@@ -92,7 +92,8 @@ pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target
     }
 }
 
-fn copy_image(device: &Device, commands: vk::CommandBuffer, image: &Image, readback: &Buffer) {
+/// Copies an image, which is in the layout of a colour attachment, to a buffer that the host reads.
+pub fn copy_image(device: &Device, commands: vk::CommandBuffer, image: &Image, readback: &Buffer) {
     let to_source = image
         .barrier(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL)
         .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)

@@ -1,10 +1,13 @@
-//! Vulkan code that draws one small picture at a time. The end of the process frees the objects.
+//! One small picture at a time, with pipelines of its own and the device, buffers and images of `gaurast-render`.
 
 use std::error::Error;
+use std::sync::Arc;
 
-use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage};
+use ash::vk::{self, PipelineStageFlags as Stage};
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::*;
+use gaurast_render::device::{Device, Purpose};
+use gaurast_render::resource::{Buffer, CommandBuffers, Image, Memory};
 use image::{Rgb, RgbImage};
 
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
@@ -64,254 +67,222 @@ pub enum Resolve {
     Median = 2,
 }
 
-/// A device with the extension, and the objects that all pictures share.
-pub struct Gpu {
-    device: ash::Device,
-    extension: gaussian_primitive_topology::Device,
-    types: vk::PhysicalDeviceMemoryProperties,
-    pool: vk::CommandPool,
-    layout: vk::PipelineLayout,
+/// The pipelines of a picture.
+struct Pipelines<'a> {
+    gaussians: vk::Pipeline,
+    triangle: vk::Pipeline,
+    device: &'a Device,
 }
 
-/// An image and its view.
-#[derive(Clone, Copy)]
-struct Image {
-    raw: vk::Image,
-    view: vk::ImageView,
-    pixels: *const u8,
+impl Drop for Pipelines<'_> {
+    fn drop(&mut self) {
+        // SAFETY: every submission was waited for.
+        unsafe {
+            self.device.raw().destroy_pipeline(self.gaussians, None);
+            self.device.raw().destroy_pipeline(self.triangle, None);
+        }
+    }
+}
+
+/// The attachments of a picture.
+struct Attachments {
+    /// The image that is read.
+    target: Image,
+    /// The colours of several samples, which are resolved to the target.
+    samples: Option<Image>,
+    depth: Image,
+}
+
+impl Attachments {
+    fn new(device: &Arc<Device>, picture: &Picture<'_>) -> Outcome<Self> {
+        let image = |format, usage, samples| Image::with_samples(device, extent(picture), format, usage, samples);
+        let (color, one) = (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::SampleCountFlags::TYPE_1);
+        let samples = picture.samples;
+        Ok(Self {
+            target: image(COLOR, color | vk::ImageUsageFlags::TRANSFER_SRC, one)?,
+            samples: if samples == one { None } else { Some(image(COLOR, color, samples)?) },
+            depth: image(DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, samples)?,
+        })
+    }
+
+    /// The colour attachment, which is cleared to a dark background.
+    fn color(&self) -> vk::RenderingAttachmentInfo<'static> {
+        let info = vk::RenderingAttachmentInfo::default()
+            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: [0.03, 0.035, 0.05, 1.0] } });
+        match &self.samples {
+            None => info.image_view(self.target.view()),
+            Some(samples) => info
+                .image_view(samples.view())
+                .resolve_mode(vk::ResolveModeFlags::AVERAGE)
+                .resolve_image_view(self.target.view())
+                .resolve_image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL),
+        }
+    }
+
+    fn depth(&self) -> vk::RenderingAttachmentInfo<'static> {
+        vk::RenderingAttachmentInfo::default()
+            .image_view(self.depth.view())
+            .image_layout(vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 } })
+    }
+
+    /// The transitions to the layouts of attachments.
+    fn barriers(&self) -> Vec<vk::ImageMemoryBarrier<'static>> {
+        let from = vk::ImageLayout::UNDEFINED;
+        let color = |image: &Image| {
+            image
+                .barrier(from, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+        };
+        let depth = self
+            .depth
+            .barrier(from, vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL)
+            .dst_access_mask(vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE);
+        [&self.target].into_iter().chain(&self.samples).map(color).chain([depth]).collect()
+    }
+}
+
+/// The vertex buffers of a picture.
+struct Vertices {
+    splats: Buffer,
+    instances: Buffer,
+    corners: Buffer,
+}
+
+impl Vertices {
+    fn new(device: &Arc<Device>, picture: &Picture<'_>) -> Outcome<Self> {
+        // A buffer is not empty.
+        let buffer = |bytes: &[u8]| -> Outcome<Buffer> {
+            let usage = vk::BufferUsageFlags::VERTEX_BUFFER;
+            let buffer = Buffer::new(device, bytes.len().max(64) as u64, usage, Memory::Host)?;
+            buffer.write(bytes)?;
+            Ok(buffer)
+        };
+        Ok(Self {
+            splats: buffer(bytemuck::cast_slice(picture.splats))?,
+            instances: buffer(bytemuck::cast_slice(picture.instances))?,
+            corners: buffer(picture.triangle.as_ref().map_or(&[][..], |it| bytemuck::cast_slice(&it.corners)))?,
+        })
+    }
+}
+
+/// A device with the extension, and the objects that all pictures share.
+pub struct Gpu {
+    extension: gaussian_primitive_topology::Device,
+    commands: CommandBuffers<1>,
+    layout: vk::PipelineLayout,
+    device: Arc<Device>,
 }
 
 // SAFETY of all `unsafe` here: handles are used while they are valid, structures are valid, commands are in order, and
-// the host touches memory only while the device is idle.
+// every submission is waited for.
 impl Gpu {
-    pub fn new(entry: &ash::Entry) -> Outcome<Self> {
-        let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        let info = vk::InstanceCreateInfo::default().application_info(&app);
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-        let names = [gaussian_primitive_topology::NAME.as_ptr()];
-        let mut gaussian = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
-        let mut rendering = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
-        // SAFETY: see above.
-        unsafe {
-            let instance = entry.create_instance(&info, None)?;
-            let physical = instance.enumerate_physical_devices()?[0];
-            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian);
-            instance.get_physical_device_features2(physical, &mut all);
-            // All modes that the device has.
-            gaussian.p_next = std::ptr::null_mut();
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&names)
-                .push_next(&mut gaussian)
-                .push_next(&mut rendering);
-            let device = instance.create_device(physical, &info, None)?;
-            let constants =
-                [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(CONSTANTS)];
-            let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
-            Ok(Self {
-                layout: device.create_pipeline_layout(&info, None)?,
-                extension: gaussian_primitive_topology::Device::new(&instance, &device),
-                types: instance.get_physical_device_memory_properties(physical),
-                pool: device.create_command_pool(&Default::default(), None)?,
-                device,
-            })
-        }
+    pub fn new(entry: ash::Entry) -> Outcome<Self> {
+        let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
+        let constants = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(CONSTANTS)];
+        let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
+        Ok(Self {
+            extension: device.gaussian_functions(),
+            commands: CommandBuffers::new(&device)?,
+            // SAFETY: see above.
+            layout: unsafe { device.raw().create_pipeline_layout(&info, None)? },
+            device,
+        })
     }
 
     /// Draws a picture over a dark background.
-    pub fn draw(&self, picture: &Picture<'_>) -> Outcome<RgbImage> {
-        let target = self.image(picture, COLOR, vk::SampleCountFlags::TYPE_1)?;
-        let color = match picture.samples {
-            vk::SampleCountFlags::TYPE_1 => target,
-            samples => self.image(picture, COLOR, samples)?,
+    pub fn draw(&mut self, picture: &Picture<'_>) -> Outcome<RgbImage> {
+        let attachments = Attachments::new(&self.device, picture)?;
+        let vertices = Vertices::new(&self.device, picture)?;
+        let [width, height] = picture.size;
+        let bytes = u64::from(4 * width * height);
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        let readback = Buffer::new(&self.device, bytes, usage, Memory::HostCached)?;
+        let device = Arc::clone(&self.device);
+        let pipelines = Pipelines {
+            gaussians: self.gaussian_pipeline(picture)?,
+            triangle: self.triangle_pipeline(picture)?,
+            device: &device,
         };
-        let depth = self.image(picture, DEPTH, picture.samples)?;
-        let splats = self.buffer(bytemuck::cast_slice(picture.splats))?;
-        let instances = self.buffer(bytemuck::cast_slice(picture.instances))?;
-        let gaussians = self.gaussian_pipeline(picture)?;
-        let triangles = self.triangle_pipeline(picture)?;
-        let extent = extent(picture);
-        let mut color_info = vk::RenderingAttachmentInfo::default()
-            .image_view(color.view)
-            .image_layout(vk::ImageLayout::GENERAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: [0.03, 0.035, 0.05, 1.0] } });
-        if picture.samples != vk::SampleCountFlags::TYPE_1 {
-            color_info = color_info
-                .resolve_mode(vk::ResolveModeFlags::AVERAGE)
-                .resolve_image_view(target.view)
-                .resolve_image_layout(vk::ImageLayout::GENERAL);
-        }
-        let colors = [color_info];
-        let depth_info = vk::RenderingAttachmentInfo::default()
-            .image_view(depth.view)
-            .image_layout(vk::ImageLayout::GENERAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 1.0, stencil: 0 } });
-        let info = vk::RenderingInfo::default()
-            .render_area(extent.into())
-            .layer_count(1)
-            .color_attachments(&colors)
-            .depth_attachment(&depth_info);
-        let point = vk::PipelineBindPoint::GRAPHICS;
-        self.run(&[(target, COLOR), (color, COLOR), (depth, DEPTH)], |c| {
-            let device = &self.device;
+        self.commands.record(0, |raw, c| {
+            let (colors, depth) = ([attachments.color()], attachments.depth());
+            let info = vk::RenderingInfo::default()
+                .render_area(extent(picture).into())
+                .layer_count(1)
+                .color_attachments(&colors)
+                .depth_attachment(&depth);
+            let to = Stage::COLOR_ATTACHMENT_OUTPUT | Stage::EARLY_FRAGMENT_TESTS;
+            let none = vk::DependencyFlags::empty();
             // SAFETY: see above.
             unsafe {
-                device.cmd_begin_rendering(c, &info);
-                if let Some(triangle) = &picture.triangle {
-                    let corners = self.buffer(bytemuck::cast_slice(&triangle.corners))?;
-                    let depths = [triangle.depth; 2];
-                    device.cmd_bind_pipeline(c, point, triangles);
-                    device.cmd_set_viewport(c, 0, &[viewport(picture, depths)]);
-                    device.cmd_bind_vertex_buffers(c, 0, &[corners], &[0]);
-                    device.cmd_draw(c, 3, 1, 0, 0);
-                }
-                device.cmd_bind_pipeline(c, point, gaussians);
-                device.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
-                device.cmd_bind_vertex_buffers(c, 0, &[splats, instances], &[0; 2]);
-                self.extension.cmd_set_gaussian_cameras(c, &[picture.camera]);
-                let [fx, fy] = picture.camera.focal_length;
-                let [width, height] = picture.size.map(|side| side as f32);
-                let (vertex, constants) = (vk::ShaderStageFlags::VERTEX, [width, height, fx, fy]);
-                let constants = bytemuck::bytes_of(&constants);
-                device.cmd_push_constants(c, self.layout, vertex, 0, constants);
-                let all = [picture.splats.len() as u32];
-                let draws = if picture.draws.is_empty() { &all } else { picture.draws };
-                let (mut first, instances) = (0, picture.instances.len().max(1) as u32);
-                if picture.share_a_set {
-                    self.extension.cmd_begin_gaussian_set(c);
-                }
-                for &count in draws {
-                    device.cmd_draw(c, count, instances, first, 0);
-                    first += count;
-                }
-                if picture.share_a_set {
-                    self.extension.cmd_end_gaussian_set(c);
-                }
-                device.cmd_end_rendering(c);
+                raw.cmd_pipeline_barrier(c, Stage::TOP_OF_PIPE, to, none, &[], &[], &attachments.barriers());
+                raw.cmd_begin_rendering(c, &info);
+                self.record_draws(raw, c, picture, &pipelines, &vertices);
+                raw.cmd_end_rendering(c);
             }
-            Ok(())
+            gaurast_render::copy_image(&device, c, &attachments.target, &readback);
         })?;
-        let plane = vk::ImageSubresource::default().aspect_mask(vk::ImageAspectFlags::COLOR);
-        // SAFETY: see above; the rows of a linear image are in its memory as its layout says.
-        unsafe {
-            let layout = (self.device).get_image_subresource_layout(target.raw, plane);
-            let [width, height] = picture.size;
-            Ok(RgbImage::from_fn(width, height, |x, y| {
-                let offset = layout.offset + u64::from(y) * layout.row_pitch + u64::from(x) * 4;
-                Rgb(target.pixels.add(offset as usize).cast::<[u8; 3]>().read())
-            }))
-        }
+        self.commands.submit_and_wait(&[0])?;
+        let pixels: Vec<[u8; 4]> = readback.read_new((width * height) as usize)?;
+        Ok(RgbImage::from_fn(width, height, |x, y| {
+            let [red, green, blue, _] = pixels[(y * width + x) as usize];
+            Rgb([red, green, blue])
+        }))
     }
 
-    /// Records transitions of images and then commands, and waits until they have run.
-    fn run(
+    /// Records the draws of a picture: the triangle, if there is one, and the Gaussians.
+    fn record_draws(
         &self,
-        images: &[(Image, vk::Format)],
-        record: impl FnOnce(vk::CommandBuffer) -> Outcome<()>,
-    ) -> Outcome<()> {
-        let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
-        let barriers: Vec<_> = (images.iter())
-            .map(|&(image, format)| {
-                vk::ImageMemoryBarrier::default()
-                    .image(image.raw)
-                    .subresource_range(range(format))
-                    .new_layout(vk::ImageLayout::GENERAL)
-                    .dst_access_mask(vk::AccessFlags::MEMORY_WRITE)
-            })
-            .collect();
-        let to_host = vk::MemoryBarrier::default()
-            .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
-            .dst_access_mask(vk::AccessFlags::HOST_READ);
-        let (device, no) = (&self.device, vk::DependencyFlags::empty());
-        let all = Stage::ALL_COMMANDS;
+        raw: &ash::Device,
+        c: vk::CommandBuffer,
+        picture: &Picture<'_>,
+        pipelines: &Pipelines<'_>,
+        vertices: &Vertices,
+    ) {
+        let point = vk::PipelineBindPoint::GRAPHICS;
         // SAFETY: see above.
         unsafe {
-            let commands = device.allocate_command_buffers(&info)?;
-            let c = commands[0];
-            device.begin_command_buffer(c, &Default::default())?;
-            device.cmd_pipeline_barrier(c, Stage::TOP_OF_PIPE, all, no, &[], &[], &barriers);
-            record(c)?;
-            device.cmd_pipeline_barrier(c, all, Stage::HOST, no, &[to_host], &[], &[]);
-            device.end_command_buffer(c)?;
-            let submits = [vk::SubmitInfo::default().command_buffers(&commands)];
-            let queue = device.get_device_queue(0, 0);
-            device.queue_submit(queue, &submits, vk::Fence::null())?;
-            Ok(device.device_wait_idle()?)
+            if let Some(triangle) = &picture.triangle {
+                raw.cmd_bind_pipeline(c, point, pipelines.triangle);
+                raw.cmd_set_viewport(c, 0, &[viewport(picture, [triangle.depth; 2])]);
+                raw.cmd_bind_vertex_buffers(c, 0, &[vertices.corners.handle()], &[0]);
+                raw.cmd_draw(c, 3, 1, 0, 0);
+            }
+            raw.cmd_bind_pipeline(c, point, pipelines.gaussians);
+            raw.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
+            let buffers = [vertices.splats.handle(), vertices.instances.handle()];
+            raw.cmd_bind_vertex_buffers(c, 0, &buffers, &[0; 2]);
+            self.extension.cmd_set_gaussian_cameras(c, &[picture.camera]);
+            let [fx, fy] = picture.camera.focal_length;
+            let [width, height] = picture.size.map(|side| side as f32);
+            let constants = [width, height, fx, fy];
+            let bytes = bytemuck::bytes_of(&constants);
+            raw.cmd_push_constants(c, self.layout, vk::ShaderStageFlags::VERTEX, 0, bytes);
+            let all = [picture.splats.len() as u32];
+            let draws = if picture.draws.is_empty() { &all } else { picture.draws };
+            let (mut first, instances) = (0, picture.instances.len().max(1) as u32);
+            if picture.share_a_set {
+                self.extension.cmd_begin_gaussian_set(c);
+            }
+            for &count in draws {
+                raw.cmd_draw(c, count, instances, first, 0);
+                first += count;
+            }
+            if picture.share_a_set {
+                self.extension.cmd_end_gaussian_set(c);
+            }
         }
     }
 
-    /// Mapped memory for an object.
-    fn allocate(&self, needs: vk::MemoryRequirements) -> Outcome<(vk::DeviceMemory, *mut u8)> {
-        let types = &self.types;
-        let index = (0..types.memory_type_count).find(|index| {
-            let flags = types.memory_types[*index as usize].property_flags;
-            needs.memory_type_bits & (1 << index) != 0 && flags.contains(Memory::HOST_VISIBLE | Memory::HOST_COHERENT)
-        });
-        let info = vk::MemoryAllocateInfo::default()
-            .allocation_size(needs.size)
-            .memory_type_index(index.ok_or("no memory that the host sees")?);
-        // SAFETY: see above.
-        unsafe {
-            let memory = self.device.allocate_memory(&info, None)?;
-            let (whole, no) = (vk::WHOLE_SIZE, Default::default());
-            Ok((memory, self.device.map_memory(memory, 0, whole, no)?.cast()))
-        }
-    }
-
-    /// A vertex buffer with `bytes`; it has a minimum size if they are empty.
-    fn buffer(&self, bytes: &[u8]) -> Outcome<vk::Buffer> {
-        let info =
-            vk::BufferCreateInfo::default().size(bytes.len().max(64) as u64).usage(vk::BufferUsageFlags::VERTEX_BUFFER);
-        // SAFETY: see above.
-        unsafe {
-            let buffer = self.device.create_buffer(&info, None)?;
-            let needs = self.device.get_buffer_memory_requirements(buffer);
-            let (memory, mapped) = self.allocate(needs)?;
-            self.device.bind_buffer_memory(buffer, memory, 0)?;
-            mapped.copy_from(bytes.as_ptr(), bytes.len());
-            Ok(buffer)
-        }
-    }
-
-    /// An attachment of a picture's size. A colour attachment with one sample can be read.
-    fn image(&self, picture: &Picture<'_>, format: vk::Format, samples: vk::SampleCountFlags) -> Outcome<Image> {
-        let (usage, tiling) = match (format, samples) {
-            (DEPTH, _) => (vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, vk::ImageTiling::OPTIMAL),
-            (_, vk::SampleCountFlags::TYPE_1) => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageTiling::LINEAR),
-            _ => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageTiling::OPTIMAL),
-        };
-        let info = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format)
-            .extent(extent(picture).into())
-            .mip_levels(1)
-            .array_layers(1)
-            .samples(samples)
-            .tiling(tiling)
-            .usage(usage);
-        // SAFETY: see above.
-        unsafe {
-            let raw = self.device.create_image(&info, None)?;
-            let needs = self.device.get_image_memory_requirements(raw);
-            let (memory, pixels) = self.allocate(needs)?;
-            self.device.bind_image_memory(raw, memory, 0)?;
-            let info = vk::ImageViewCreateInfo::default()
-                .image(raw)
-                .view_type(vk::ImageViewType::TYPE_2D)
-                .format(format)
-                .subresource_range(range(format));
-            Ok(Image { raw, view: self.device.create_image_view(&info, None)?, pixels })
-        }
-    }
-
-    /// A shader's stage.
+    /// A shader's stage. Its module is destroyed with the pipeline's creation.
     fn stage(&self, spirv: &[u8], kind: vk::ShaderStageFlags) -> Outcome<vk::PipelineShaderStageCreateInfo<'static>> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))?;
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: see above.
-        let module = unsafe { self.device.create_shader_module(&info, None)? };
+        let module = unsafe { self.device.raw().create_shader_module(&info, None)? };
         Ok(vk::PipelineShaderStageCreateInfo::default().stage(kind).module(module).name(c"main"))
     }
 
@@ -451,9 +422,19 @@ impl Gpu {
                 info = info.push_next(gaussian);
             }
             let cache = vk::PipelineCache::null();
-            let created = self.device.create_graphics_pipelines(cache, &[info], None);
+            let created = self.device.raw().create_graphics_pipelines(cache, &[info], None);
+            for stage in stages {
+                self.device.raw().destroy_shader_module(stage.module, None);
+            }
             Ok(created.map_err(|(_, error)| error)?[0])
         }
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // SAFETY: the pipelines of the layout are destroyed.
+        unsafe { self.device.raw().destroy_pipeline_layout(self.layout, None) };
     }
 }
 
@@ -465,12 +446,4 @@ fn extent(picture: &Picture<'_>) -> vk::Extent2D {
 fn viewport(picture: &Picture<'_>, [min_depth, max_depth]: [f32; 2]) -> vk::Viewport {
     let [width, height] = picture.size.map(|side| side as f32);
     vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth, max_depth }
-}
-
-fn range(format: vk::Format) -> vk::ImageSubresourceRange {
-    let aspect = match format {
-        DEPTH => vk::ImageAspectFlags::DEPTH,
-        _ => vk::ImageAspectFlags::COLOR,
-    };
-    vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1)
 }

@@ -1,4 +1,4 @@
-//! Draws a picture of each mode of Gaussian draws, in plain `ash`, and writes the page that shows them:
+//! Draws a picture of each mode of Gaussian draws, and writes the page that shows them:
 //! `gallery [FOLDER]` writes FOLDER/GALLERY.md and FOLDER/pictures/gallery/*.png; FOLDER is `samples` by default.
 
 mod gpu;
@@ -26,7 +26,7 @@ fn difference(a: &RgbImage, b: &RgbImage, times: f32) -> RgbImage {
     picture
 }
 
-fn picture(gpu: &Gpu, content: &Content<'_>) -> Result<RgbImage, Box<dyn Error>> {
+fn picture(gpu: &mut Gpu, content: &Content<'_>) -> Result<RgbImage, Box<dyn Error>> {
     match content {
         Content::Drawn(picture) => gpu.draw(picture),
         Content::Difference([a, b], times) => Ok(difference(&gpu.draw(a)?, &gpu.draw(b)?, *times)),
@@ -45,14 +45,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pictures = folder.join("pictures/gallery");
     std::fs::create_dir_all(&pictures)?;
     let scenes = scenes::Scenes::new();
-    let gpu = Gpu::new(&entry)?;
+    let mut gpu = Gpu::new(entry)?;
     let mut page = "# Gallery\n\nA picture of each mode. `cargo run --release -p gaurast-examples --example gallery` draws them and writes this page.\n".to_owned();
     for room in rooms::all(&scenes) {
         let (mut images, mut captions) = (String::new(), String::new());
         for Exhibit { name, caption, content } in &room.exhibits {
             let file = BufWriter::new(File::create(pictures.join(format!("{name}.png")))?);
             let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
-            picture(&gpu, content)?.write_with_encoder(encoder)?;
+            picture(&mut gpu, content)?.write_with_encoder(encoder)?;
             write!(images, "| ![{name}](pictures/gallery/{name}.png) ")?;
             write!(captions, "| {caption} ")?;
         }

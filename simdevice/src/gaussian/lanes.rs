@@ -3,29 +3,29 @@
 use fearless_simd::{Simd, prelude::*};
 
 /// The Gaussians of a group. The working set of preprocessing one group fits into the processor's caches.
-pub(super) const GROUP: usize = 256;
+pub(crate) const GROUP: usize = 256;
 
 /// A binary64 number for each Gaussian of a group.
 ///
 /// Some thirty of these arrays are read in parallel. With a cache line more than a power of two they do not compete for
 /// the same sets of the first-level cache.
-pub(super) type GroupF64 = [f64; GROUP + 8];
+pub(crate) type GroupF64 = [f64; GROUP + 8];
 
 /// A zero for each Gaussian of a group.
-pub(super) const NO_GROUP_F64: GroupF64 = [0.0; GROUP + 8];
+pub(crate) const NO_GROUP_F64: GroupF64 = [0.0; GROUP + 8];
 
 /// The length of arrays of binary32 attributes. They are read one after the other, so they need no padding.
-pub(super) const F32_LANES: usize = GROUP;
+pub(crate) const F32_LANES: usize = GROUP;
 
 const WORDS: usize = GROUP / 64;
 
 /// A set of lanes of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Bits([u64; WORDS]);
+pub(crate) struct Bits([u64; WORDS]);
 
 impl Bits {
     /// The lanes `0..len`.
-    pub(super) fn first(len: usize) -> Self {
+    pub(crate) fn first(len: usize) -> Self {
         let mut bits = Self::default();
         for (number, word) in bits.0.iter_mut().enumerate() {
             let from = len.saturating_sub(64 * number);
@@ -36,30 +36,30 @@ impl Bits {
 
     /// Adds the lanes of `mask`. The first of them is lane `at`, a multiple of the mask's width.
     #[inline(always)]
-    pub(super) fn set<S: Simd, M: SimdMask<S>>(&mut self, at: usize, mask: M) {
+    pub(crate) fn set<S: Simd, M: SimdMask<S>>(&mut self, at: usize, mask: M) {
         self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
     }
 
     /// True if the set contains `lane`.
     #[inline(always)]
-    pub(super) fn has(&self, lane: usize) -> bool {
+    pub(crate) fn has(&self, lane: usize) -> bool {
         self.0[lane / 64 % WORDS] >> (lane % 64) & 1 == 1
     }
 
     /// The bits of `len` lanes from `at` on. `len` divides 64, and `at` is a multiple of it.
     #[inline(always)]
-    pub(super) fn group(&self, at: usize, len: usize) -> u64 {
+    pub(crate) fn group(&self, at: usize, len: usize) -> u64 {
         self.0[at / 64 % WORDS] >> (at % 64) & (u64::MAX >> (64 - len))
     }
 
     /// Adds `lane` if `member`.
     #[inline(always)]
-    pub(super) fn set_one(&mut self, lane: usize, member: bool) {
+    pub(crate) fn set_one(&mut self, lane: usize, member: bool) {
         self.0[lane / 64 % WORDS] |= u64::from(member) << (lane % 64);
     }
 
     /// The intersection of both sets.
-    pub(super) fn and(mut self, other: &Self) -> Self {
+    pub(crate) fn and(mut self, other: &Self) -> Self {
         for (word, other) in self.0.iter_mut().zip(other.0) {
             *word &= other;
         }
@@ -67,7 +67,7 @@ impl Bits {
     }
 
     /// The lanes of this set that are not in `other`.
-    pub(super) fn without(mut self, other: &Self) -> Self {
+    pub(crate) fn without(mut self, other: &Self) -> Self {
         for (word, other) in self.0.iter_mut().zip(other.0) {
             *word &= !other;
         }
@@ -75,13 +75,13 @@ impl Bits {
     }
 
     /// The number of lanes.
-    pub(super) fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.0.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
     /// Calls `f` with each lane, in order.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut f: impl FnMut(usize)) {
+    pub(crate) fn for_each(&self, mut f: impl FnMut(usize)) {
         for (number, &word) in self.0.iter().enumerate() {
             let mut rest = word;
             while rest != 0 {
@@ -94,7 +94,7 @@ impl Bits {
 
 /// The base-2 logarithm of positive normal numbers below 2^1000, to 1e-13; negative infinity for other numbers.
 #[inline(always)]
-pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
+pub(crate) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
     let number = |value: f64| S::f64s::splat(simd, value);
     let bits: S::u64s = x.bitcast();
     // The mantissa is taken in [sqrt(1/2), sqrt(2)): subtracting the bits of sqrt(1/2) makes the exponent field match.

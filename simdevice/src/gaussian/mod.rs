@@ -1,43 +1,35 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
-//! [`sort_and_bin`] runs the stages in turn, each in a module: [`reuse`] (an unchanged set is not made again),
-//! [`cluster_cache`] and [`clusters`] (neighbours in space with common bounds), [`occlusion`] (clusters that others
-//! hide), [`group_tasks`] (the groups that remain), [`preprocess`] (projection to the rasterizer's nine numbers, tiles,
-//! colours and keys; [`vertex_projection`] where a vertex program projects), [`depth_order`], [`tile_lists`],
-//! [`sorted_set`] (the result).
+//! [`sort_and_bin`] runs the stages in turn, each a folder:
+//!
+//! | stage | task |
+//! |---|---|
+//! | [`read`] | reads attributes from memory, and keeps clusters of neighbours of what is drawn again |
+//! | [`cull`] | leaves out the clusters and lanes that are not in the picture, or that others hide |
+//! | [`project`] | projects groups to splats: the rasterizer's nine numbers, with tiles, colours and keys |
+//! | [`sort`] | sorts the splats by depth |
+//! | [`bin`] | lists the splats of each tile, in that order |
+//!
+//! [`preprocess`] runs the first three, group by group. All stages share the constants of the view ([`view`]), and hand on splats
+//! ([`splats`]). The result is a [`sorted_set`]; [`reuse`] keeps it while nothing changes.
 
-mod attributes;
+pub(crate) mod bin;
 pub mod caches;
-mod camera;
-pub(crate) mod cluster_cache;
-mod clusters;
-pub(crate) mod cut_off;
-pub(crate) mod depth;
-mod depth_order;
-pub(crate) mod footprint;
-mod frustum;
-mod group_tasks;
-pub(crate) mod identity;
-mod instances;
+mod cull;
 mod lanes;
-mod occlusion;
-mod panorama;
+mod linear_algebra;
 mod preprocess;
-pub(crate) mod ray_depth;
+mod project;
+mod read;
 mod recording;
-pub(crate) mod reuse;
-mod scratch;
+mod reuse;
 mod set;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 mod sorted_set;
 pub mod spherical_harmonics;
-pub(crate) mod splat;
-pub(crate) mod surfel;
-pub(crate) mod tile_lists;
-mod tiles;
-mod unscented;
-mod vertex_projection;
+pub(crate) mod splats;
+pub(crate) mod view;
 
 pub use set::{GaussianSet, SortError};
 pub use sorted_set::BinnedDraw;
@@ -46,23 +38,18 @@ use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder::DrawRecord;
+use bin::tile_lists::TileLists;
 use caches::Caches;
-use camera::ViewConstants;
-use clusters::Clusters;
-use devmem::host;
-use footprint::Visible;
-use preprocess::Preprocessor;
-use rayon::prelude::*;
+use preprocess::preprocess;
+use project::vertex_projection;
+use read::cluster_cache;
+use read::clusters::Clusters;
 use reuse::Key;
-use sort::SortBuffers;
+use sort::depth_order;
+use sort::radix::SortBuffers;
 use sorted_set::SortedSet;
-use splat::ProjectedGroup;
 use std::sync::Arc;
 use std::time::Instant;
-use tile_lists::TileLists;
-
-/// The least number of groups per task, where little is done for each group.
-const LEAST_GROUPS: usize = 64;
 
 /// Preprocesses, sorts and bins a set, unless the cache still has the result of an equal one.
 ///
@@ -98,17 +85,6 @@ pub fn sort_and_bin(
     Ok(BinnedDraw::new(set, sorted, record, runtime))
 }
 
-/// The result of preprocessing a set.
-struct Preprocessed {
-    /// The groups that the device projected, then those of vertex programs.
-    groups: Vec<ProjectedGroup>,
-    /// The number of groups that the device projected.
-    fixed: usize,
-    /// The counts of the groups that the device projected. `by_programs` has those of vertex programs.
-    by_device: Counters,
-    by_programs: Counters,
-}
-
 /// Preprocesses, sorts and bins a set. If a recorder is present, it also returns a record of the work.
 fn sort(
     set: &GaussianSet,
@@ -118,7 +94,7 @@ fn sort(
     counters: &mut Counters,
 ) -> Result<(SortedSet, Option<Arc<DrawRecord>>), SortError> {
     let started = Instant::now();
-    let mut preprocessed = preprocess_set(set, clusters, runtime)?;
+    let mut preprocessed = preprocess(set, clusters, runtime)?;
     let projected = Instant::now();
     let threads = runtime.threads();
     let pairs = depth_order::sorted(&preprocessed.groups, threads, buffers);
@@ -150,55 +126,4 @@ fn sort(
     counters.add(Counter::SortTime, nanoseconds(projected, sorted));
     counters.add(Counter::BinningTime, nanoseconds(sorted, binned));
     Ok((sorted_set, record))
-}
-
-/// Preprocesses the Gaussians that have attributes, except those culled with their clusters, and those that vertex
-/// programs project.
-fn preprocess_set(
-    set: &GaussianSet,
-    clusters: &[Option<Arc<Clusters>>],
-    runtime: &Runtime,
-) -> Result<Preprocessed, SortError> {
-    let begin = &set.begin;
-    let optimizations = runtime.config().optimizations;
-    let constants = ViewConstants {
-        is_tracked: set.is_tracked(),
-        ..ViewConstants::new(
-            &begin.state,
-            &begin.camera,
-            &begin.viewport,
-            Visible::from(set.bounds),
-            set.depth,
-            optimizations,
-        )
-    };
-    let preprocessor = Preprocessor { runtime, constants: &constants, is_flat: set.is_flat() };
-    let mut by_device = Counters::default();
-    let map = occlusion::find(set, &preprocessor, clusters);
-    let tasks = group_tasks::group_tasks(set, clusters, &constants, map.as_ref(), &mut by_device)?;
-    if optimizations.has(Optimization::Harmonics) {
-        let unread = by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
-        by_device.add(Counter::HarmonicsUnread, unread);
-    }
-    let mut groups = preprocessor.run(&tasks);
-    panorama::append_copies(&mut groups);
-    let fixed = groups.len();
-    let shaded = vertex_projection::project_all(set, runtime)?;
-    host::reserve(&mut groups, shaded.len());
-    groups.extend(shaded);
-    by_device.add_all(&counted(&groups[..fixed]));
-    Ok(Preprocessed { by_programs: counted(&groups[fixed..]), groups, fixed, by_device })
-}
-
-/// The sum of all groups' counters.
-fn counted(groups: &[ProjectedGroup]) -> Counters {
-    let add = |mut sum: Counters, more: &Counters| {
-        sum.add_all(more);
-        sum
-    };
-    groups
-        .par_iter()
-        .with_min_len(LEAST_GROUPS)
-        .fold(Counters::default, |sum, group| add(sum, &group.counters))
-        .reduce(Counters::default, |sum, more| add(sum, &more))
 }

@@ -1,6 +1,6 @@
 //! The record of a Gaussian draw's work before its tiles are rendered.
 
-use crate::gaussian::splat::Splat;
+use super::splats::splat::Splat;
 use crate::limits::TILE_SIZE;
 use crate::state::Rect;
 use crate::stats::counters::{Counter, Counters};

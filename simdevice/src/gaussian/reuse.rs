@@ -5,8 +5,8 @@
 //! or written. A buffer has at most one set for each view, that of its last picture. It is freed before another is
 //! made, so that there are never two at once.
 
-use super::attributes::{SourceFingerprint, is_device_local};
-use super::clusters::Clusters;
+use super::read::clusters::Clusters;
+use super::read::fingerprint::{SourceFingerprint, is_device_local};
 use super::set::GaussianSet;
 use super::sorted_set::SortedSet;
 use crate::format::Format;
@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// Everything that a sorted set depends on.
 #[derive(Debug)]
-pub(super) struct Key {
+pub(crate) struct Key {
     /// The fingerprints of all attributes of all appends, beginning with the positions of the first.
     streams: Vec<SourceFingerprint>,
     /// First vertex, vertex count, first instance and instance count of each append.
@@ -53,7 +53,7 @@ pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
 
 impl Key {
     /// The key of `set`; `None` if the driver does not see all writes to its inputs.
-    pub(super) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
+    pub(crate) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
         let seen = |append: &GaussianAppend| append.indices.is_none() && attributes(append).all(is_device_local);
         if set.appends.is_empty() || !set.draws.is_empty() || !set.appends.iter().all(seen) {
             return None;
@@ -128,7 +128,7 @@ impl ReuseCache {
     }
 
     /// The set with this key. If there is none, the last set of the same buffer is freed.
-    pub(super) fn find(&self, key: &Key) -> Option<Arc<SortedSet>> {
+    pub(crate) fn find(&self, key: &Key) -> Option<Arc<SortedSet>> {
         let mut entries = self.lock();
         let is_old = |entry: &mut Entry| {
             let is_other = || entry.key.is_of_same_buffer(key) && !entry.key.is_same(key);
@@ -142,7 +142,7 @@ impl ReuseCache {
     }
 
     /// Stores a set that takes `bytes`. The oldest sets are freed while all together would exceed `budget`.
-    pub(super) fn keep(&self, key: Key, set: &Arc<SortedSet>, bytes: u64, budget: u64) {
+    pub(crate) fn keep(&self, key: Key, set: &Arc<SortedSet>, bytes: u64, budget: u64) {
         if bytes > budget {
             return;
         }

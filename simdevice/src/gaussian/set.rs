@@ -1,7 +1,7 @@
 //! A set of Gaussians that are sorted and drawn together, as packets describe it.
 
-use super::depth::CenterDepth;
 use super::lanes::GROUP;
+use super::view::center_depth::CenterDepth;
 use crate::format::Format;
 use crate::packet::{Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage};
 use crate::state::gaussian::GaussianGeometry;
@@ -10,22 +10,22 @@ use devmem::host;
 use isa::machine::Stopped;
 
 /// The most groups of a set: a splat's index, which is its group and its place there, has 32 bits.
-pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
+pub(crate) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
 pub struct GaussianSet {
-    pub(super) begin: GaussianBegin,
+    pub(crate) begin: GaussianBegin,
     /// The layer to which the set is drawn. It selects the view.
-    pub(super) layer: u32,
-    pub(super) bounds: Rect,
-    pub(super) depth: Option<CenterDepth>,
+    pub(crate) layer: u32,
+    pub(crate) bounds: Rect,
+    pub(crate) depth: Option<CenterDepth>,
     /// The format to which depths are rounded.
-    pub(super) depth_format: Format,
-    pub(super) resolve: Option<GaussianFragmentStage>,
-    pub(super) appends: Vec<GaussianAppend>,
+    pub(crate) depth_format: Format,
+    pub(crate) resolve: Option<GaussianFragmentStage>,
+    pub(crate) appends: Vec<GaussianAppend>,
     /// The draws that a vertex program projects. They come after the appends.
-    pub(super) draws: Vec<Draw>,
+    pub(crate) draws: Vec<Draw>,
 }
 
 /// The reasons why a set cannot be drawn.
@@ -65,8 +65,6 @@ impl GaussianSet {
     /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport. `depth` is the
     /// depth attachment's format, if there is one.
     pub fn begin(begin: &GaussianBegin, area: Rect, depth: Option<Format>) -> Self {
-        #[cfg(feature = "mistakes")]
-        let begin = &crate::mistakes::begin(begin);
         let visible = area.intersect(begin.scissor).intersect(viewport_pixels(&begin.viewport));
         Self {
             begin: begin.clone(),
@@ -116,14 +114,25 @@ impl GaussianSet {
         }
     }
 
+    /// The number of groups of the set's Gaussians, where each instance of a draw has groups of its own.
+    pub(crate) fn groups(&self) -> u64 {
+        let of_draw = |count: u32, instance_count: u32| {
+            let per_instance = count.div_ceil(GROUP as u32);
+            u64::from(per_instance) * u64::from(instance_count)
+        };
+        let appends = self.appends.iter().map(|append| of_draw(append.count, append.instance_count));
+        let draws = self.draws.iter().map(|draw| of_draw(draw.count, draw.instance_count));
+        appends.chain(draws).fold(0, u64::saturating_add)
+    }
+
     /// True if a fragment program reads indices of Gaussians, or depth variables.
-    pub(super) fn is_tracked(&self) -> bool {
+    pub(crate) fn is_tracked(&self) -> bool {
         let shader = self.resolve.as_ref();
         shader.is_some_and(|shader| shader.program.is_tracking())
     }
 
     /// True if the set is of 2D Gaussians.
-    pub(super) fn is_flat(&self) -> bool {
+    pub(crate) fn is_flat(&self) -> bool {
         self.begin.state.geometry == GaussianGeometry::Surfel
     }
 }

@@ -1,13 +1,15 @@
 //! Sorted sets: the result of preprocessing, sorting and binning Gaussians, and the input of the tile engine.
 
-use super::camera::{list_cut_off, period};
-use super::depth::DepthTrend;
-use super::identity::{Identity, Origins};
-use super::ray_depth::{PixelRays, RayDepth, RayDepths};
+use super::bin::tile_lists::TileLists;
 use super::set::GaussianSet;
-use super::splat::{ProjectedGroup, Splat};
-use super::surfel::Surfel;
-use super::tile_lists::TileLists;
+use super::splats::group::ProjectedGroup;
+use super::splats::identity::{Identity, Origins};
+use super::splats::ray_depth::{PixelRays, RayDepth, RayDepths};
+use super::splats::splat::Splat;
+use super::splats::surfel::Surfel;
+use super::view::camera::period;
+use super::view::center_depth::DepthTrend;
+use super::view::cut_off::list_cut_off;
 use crate::format::depth::DepthEncoding;
 use crate::packet::GaussianFragmentStage;
 use crate::runtime::Runtime;
@@ -30,13 +32,13 @@ pub(crate) struct SortedSet {
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
     /// The 2D Gaussians by group, in the order of the splats, if the set has them.
-    pub(super) surfels: Option<Vec<Vec<Surfel>>>,
+    pub(crate) surfels: Option<Vec<Vec<Surfel>>>,
     /// The coefficients of depths along rays by group, in the order of the splats, if the order is per pixel.
-    pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
+    pub(crate) ray_depths: Option<Vec<Vec<RayDepth>>>,
     /// By group, as the splats, if a fragment program reads which they are.
-    pub(super) identities: Option<Vec<Vec<Identity>>>,
+    pub(crate) identities: Option<Vec<Vec<Identity>>>,
     /// The counts of the set's Gaussians, by their fate.
-    pub(super) counters: Counters,
+    pub(crate) counters: Counters,
 }
 
 /// A set that is sorted, binned and immutable, with the state to draw it.
@@ -75,7 +77,7 @@ pub struct BinnedDraw {
 
 impl SortedSet {
     /// The sorted set of the groups of `set`, whose lists are `tiles`. Its counters are zero.
-    pub(super) fn new(set: &GaussianSet, groups: Vec<ProjectedGroup>, tiles: TileLists) -> Self {
+    pub(crate) fn new(set: &GaussianSet, groups: Vec<ProjectedGroup>, tiles: TileLists) -> Self {
         let mut splats = host::with_capacity(groups.len());
         let mut others = host::with_capacity(groups.len());
         // The groups' other data are freed here. With many groups that takes time.
@@ -98,7 +100,7 @@ impl SortedSet {
     }
 
     /// Bytes of host memory that it holds.
-    pub(super) fn memory_bytes(&self) -> u64 {
+    pub(crate) fn memory_bytes(&self) -> u64 {
         let splats = self.splats.iter().map(|group| size_of_val(&**group) as u64);
         let depths = self.ray_depths.iter().flatten();
         let depths = depths.map(|group| size_of_val(&**group) as u64);
@@ -114,7 +116,7 @@ impl SortedSet {
 
 impl BinnedDraw {
     /// The draw of `set`, which was sorted to `sorted`.
-    pub(super) fn new(
+    pub(crate) fn new(
         set: GaussianSet,
         sorted: Arc<SortedSet>,
         record: Option<Arc<DrawRecord>>,

@@ -3,14 +3,17 @@
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 
 /// The number of coefficients of degrees 0 to 4.
-pub(super) const MAX_COEFFICIENTS: usize = 25;
+pub(crate) const MAX_COEFFICIENTS: usize = 25;
 
 /// Three floats for each of them, padded to whole vectors.
-pub(super) const COEFFICIENT_FLOATS: usize = 80;
+pub(crate) const COEFFICIENT_FLOATS: usize = 80;
 
 const C0: f32 = 0.282_094_79;
+
 const C1: f32 = 0.488_602_51;
+
 const C2: [f32; 5] = [1.092_548_4, -1.092_548_4, 0.315_391_57, -1.092_548_4, 0.546_274_2];
+
 const C3: [f32; 7] = [-0.590_043_6, 2.890_611_4, -0.457_045_8, 0.373_176_34, -0.457_045_8, 1.445_305_7, -0.590_043_6];
 
 const C4: [f32; 9] = [
@@ -31,10 +34,10 @@ pub fn coefficient_count(degree: u32) -> usize {
 }
 
 /// The number of directions whose basis functions are evaluated together.
-pub(super) const DIRECTIONS: usize = 16;
+pub(crate) const DIRECTIONS: usize = 16;
 
 /// The basis functions of degrees 0 to 4 in some directions: by function, then by direction.
-pub(super) struct Bases([[f32; DIRECTIONS]; MAX_COEFFICIENTS]);
+pub(crate) struct Bases([[f32; DIRECTIONS]; MAX_COEFFICIENTS]);
 
 impl Default for Bases {
     fn default() -> Self {
@@ -46,7 +49,7 @@ impl Bases {
     /// Evaluates the functions of degrees 0 to `degree` (at most 4) in unit directions from the eye, given as arrays of
     /// x, y and z.
     #[inline(always)]
-    pub(super) fn find<S: Simd>(&mut self, simd: S, degree: u32, [x, y, z]: &[[f32; DIRECTIONS]; 3]) {
+    pub(crate) fn find<S: Simd>(&mut self, simd: S, degree: u32, [x, y, z]: &[[f32; DIRECTIONS]; 3]) {
         let load = |lanes: &[f32; DIRECTIONS]| f32x16::from_slice(simd, lanes);
         let (x, y, z) = (load(x), load(y), load(z));
         let mut set = |k: usize, value: f32x16<S>| value.store_slice(&mut self.0[k]);
@@ -92,7 +95,7 @@ impl Bases {
     /// `coefficients` holds red, green and blue of each coefficient in turn, and at least one more number. Numbers
     /// after the coefficients are ignored. The fourth number of the colour is undefined.
     #[inline(always)]
-    pub(super) fn color<S: Simd>(
+    pub(crate) fn color<S: Simd>(
         &self,
         simd: S,
         degree: u32,
@@ -111,7 +114,7 @@ impl Bases {
 
     /// The colour that [`Bases::color`] returns, for `COUNT` coefficients.
     #[inline(always)]
-    pub(super) fn color_of<S: Simd, const COUNT: usize>(
+    pub(crate) fn color_of<S: Simd, const COUNT: usize>(
         &self,
         simd: S,
         direction: usize,

@@ -5,7 +5,7 @@ use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff, PipelineGaussianFootprintStateCreateInfoGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
-use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance};
+use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance, Rules};
 use gaurast_oracle::scenes::{self, SceneBuffers};
 
 /// The Gaussian state of a pipeline.
@@ -71,6 +71,8 @@ pub struct Draw {
     pub samples: u32,
     /// Mask of the samples that are written.
     pub sample_mask: u32,
+    /// The rules that the oracle follows: the text's, but for mistakes.
+    pub rules: Rules,
 }
 
 /// Inputs of a resolve shader, which it writes as a colour.
@@ -234,6 +236,7 @@ impl Draw {
             depth: None,
             samples: 1,
             sample_mask: u32::MAX,
+            rules: Rules::default(),
         }
     }
 

@@ -42,7 +42,7 @@ pub fn stored_before(draw: &Draw) -> Stored {
     let pixels = (draw.size[0] * draw.size[1]) as usize;
     let width = draw.size[0] as usize;
     let code = |at: usize| match draw.samples {
-        1 => tests.code(model, depth.stripes[(at % width / 5 + at / width / 9) % 6]),
+        1 => tests.code(model, &draw.rules, depth.stripes[(at % width / 5 + at / width / 9) % 6]),
         _ => tests.format.code(1.0),
     };
     let stencils = if depth.has_stencil() { pixels } else { 0 };
@@ -148,7 +148,8 @@ impl Covered {
 
 /// The state of a draw.
 pub(crate) fn oracle_state(draw: &Draw) -> OracleState {
-    OracleState::from(&draw.state).with_footprint(&draw.footprint.unwrap_or_default())
+    let state = OracleState::from(&draw.state).with_footprint(&draw.footprint.unwrap_or_default());
+    OracleState { rules: draw.rules, ..state }
 }
 
 /// The camera of the pixels of the viewport. Where the viewport has fractions of pixels, that is another one unless it
@@ -303,6 +304,20 @@ fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
 }
 
 impl Expected {
+    /// The picture of the binary64 decisions.
+    pub(crate) fn picture(&self) -> Picture {
+        // Every pixel has a depth and a stencil, unless a mistake leaves it without a median.
+        let depth = self.depth.iter().map(|allowed| allowed.as_ref().and_then(|allowed| allowed.first()));
+        let stencil = self.stencil.iter().map(|allowed| allowed[0]);
+        Picture {
+            color: self.color.to_f32(),
+            stored: Stored {
+                depth: depth.map(|code| code.copied().unwrap_or(0)).collect(),
+                stencil: stencil.collect(),
+            },
+        }
+    }
+
     /// The verdict on a picture's colours.
     pub fn verdict(&self, picture: &Picture) -> Verdict {
         let limits = Limits { distance: self.distance, ..Limits::ENVELOPE_ONLY };

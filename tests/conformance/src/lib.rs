@@ -11,8 +11,8 @@ pub mod device;
 pub mod draw;
 pub mod implementation;
 pub mod judge;
-#[cfg(feature = "mistakes")]
 pub mod mistakes;
+pub mod oracle;
 mod record;
 pub mod report;
 mod resolved;
@@ -23,16 +23,19 @@ pub use cases::{Case, all};
 pub use device::Device;
 pub use draw::Draw;
 pub use implementation::{Error, Implementation, Picture};
-pub use run::{Failure, Outcome, run};
+pub use mistakes::{MISTAKES, Mistake};
+pub use oracle::Oracle;
+pub use run::{Expectation, Failure, Outcome, run};
 pub use second::Second;
 
-/// Opens the implementation with this name: `second`, or a driver as [`Device::open`] accepts it.
+/// Opens the implementation with this name: `second`, `oracle`, or a driver as [`Device::open`] accepts it.
 ///
 /// # Errors
 /// If there is no such implementation.
 pub fn open(name: &str) -> Result<Box<dyn Implementation>, Error> {
     match name {
         "second" => Ok(Box::new(Second)),
+        "oracle" => Ok(Box::new(Oracle::default())),
         driver => Ok(Box::new(Device::open(driver)?)),
     }
 }

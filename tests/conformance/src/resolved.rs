@@ -3,55 +3,96 @@
 use gaurast_oracle::oracle::resolve::{Resolved, resolve_scene};
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleScene, OracleTests};
 
-use crate::draw::{Draw, Shown};
+use crate::draw::{Camera, Draw, Shown};
 use crate::implementation::Picture;
 use crate::judge::{CONTRACT, gathered, oracle_camera, oracle_state, sets};
 
-/// The distance from its envelope of the farthest number that a picture shows.
-///
-/// # Errors
-/// A sentence about the first pixel that shows something wrong.
-pub(crate) fn distance(draw: &Draw, shown: Shown, picture: &Picture) -> Result<f64, String> {
-    let all = sets(draw);
-    let [members] = all.as_slice() else {
-        return Err("a case with a resolve shader has one set".to_owned());
-    };
-    let (scene, instances) = gathered(draw, members);
-    let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
-    let (camera, viewport) = (oracle_camera(draw), draw.viewport());
-    let tests = OracleTests {
-        depth_coefficients: draw.camera.depth_coefficients,
-        depth_range: [viewport.min_depth, viewport.max_depth],
-        format: OracleDepthFormat::Float,
-        negative_one_to_one: false,
-        depth: None,
-        bounds: None,
-        stencil: None,
-    };
-    let pixels = resolve_scene(&scene, &camera, &oracle_state(draw), &tests);
-    let judge = Judge { draw, shown, members };
-    let mut farthest = 0.0_f64;
-    for (at, (ways, color)) in pixels.iter().zip(&picture.color).enumerate() {
-        let far = judge.pixel(ways, *color);
-        farthest = farthest.max(far.map_err(|message| {
-            let place = [at as u32 % draw.size[0], at as u32 / draw.size[0]];
-            format!("{shown:?} is {color:?} at {place:?}: {message}")
-        })?);
-    }
-    Ok(farthest)
-}
-
-struct Judge<'a> {
-    draw: &'a Draw,
+/// The inputs of a draw's resolve shader, and those that it shows.
+#[derive(Clone, Debug)]
+pub(crate) struct Inputs {
     shown: Shown,
+    camera: Camera,
+    /// The colour where there is no fragment.
+    behind: [f32; 4],
+    /// Width of the picture in pixels.
+    width: u32,
     /// Vertex and instance of each Gaussian, in primitive order.
-    members: &'a [[u32; 2]],
+    members: Vec<[u32; 2]>,
+    /// The possible inputs at each pixel, those of the binary64 decisions first.
+    pixels: Vec<Vec<Resolved>>,
 }
 
-impl Judge<'_> {
+impl Inputs {
+    /// Computes the inputs of a draw, which has one set, whose shader shows some of them.
+    pub(crate) fn of(draw: &Draw, shown: Shown) -> Self {
+        let members = sets(draw).swap_remove(0);
+        let (scene, instances) = gathered(draw, &members);
+        let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
+        let (camera, viewport) = (oracle_camera(draw), draw.viewport());
+        let tests = OracleTests {
+            depth_coefficients: draw.camera.depth_coefficients,
+            depth_range: [viewport.min_depth, viewport.max_depth],
+            format: OracleDepthFormat::Float,
+            negative_one_to_one: false,
+            depth: None,
+            bounds: None,
+            stencil: None,
+        };
+        let pixels = resolve_scene(&scene, &camera, &oracle_state(draw), &tests);
+        Self { shown, camera: draw.camera, behind: draw.behind, width: draw.size[0], members, pixels }
+    }
+
+    /// The distance from its envelope of the farthest number that a picture shows.
+    ///
+    /// # Errors
+    /// A sentence about the first pixel that shows something wrong.
+    pub(crate) fn distance(&self, picture: &Picture) -> Result<f64, String> {
+        let (width, shown) = (self.width, self.shown);
+        let mut farthest = 0.0_f64;
+        for (at, (ways, color)) in self.pixels.iter().zip(&picture.color).enumerate() {
+            let far = self.pixel(ways, *color);
+            farthest = farthest.max(far.map_err(|message| {
+                let place = [at as u32 % width, at as u32 / width];
+                format!("{shown:?} is {color:?} at {place:?}: {message}")
+            })?);
+        }
+        Ok(farthest)
+    }
+
+    /// The picture of the binary64 decisions.
+    pub(crate) fn picture(&self) -> Picture {
+        let color = |ways: &Vec<Resolved>| if ways[0].covered { self.color(&ways[0]) } else { self.behind };
+        Picture { color: self.pixels.iter().map(color).collect(), ..Picture::default() }
+    }
+
+    /// The colour that the shader makes of its inputs.
+    fn color(&self, inputs: &Resolved) -> [f32; 4] {
+        // Every covered pixel has a median, unless a mistake leaves it without one.
+        let (median, distance) = inputs.median_gaussians.first().copied().unwrap_or_default();
+        match self.shown {
+            Shown::Accumulated => inputs.accumulated.map(|c| c as f32),
+            Shown::Depths => {
+                let median = inputs.median_depths.first().copied().unwrap_or_default();
+                [inputs.expected_depth as f32, median as f32, 0.0, 1.0]
+            }
+            Shown::LinearDepths => [inputs.expected_distance as f32, distance, 0.0, 1.0],
+            Shown::Gaussians => {
+                let nearest = inputs.nearest.unwrap_or_default();
+                let [[median, of_median], [nearest, of_nearest]] = [median, nearest].map(|index| self.named(index));
+                [median, of_median, nearest, of_nearest]
+            }
+            Shown::Camera(location) => self.camera(location).map(|c| c as f32),
+        }
+    }
+
+    /// Vertex and instance of a Gaussian, as the shader shows them.
+    fn named(&self, index: usize) -> [f32; 2] {
+        self.members[index].map(|number| number as f32)
+    }
+
     /// The distance from their envelope of the numbers of a pixel.
     fn pixel(&self, ways: &[Resolved], color: [f32; 4]) -> Result<f64, String> {
-        let is_there = color != self.draw.behind;
+        let is_there = color != self.behind;
         let ways: Vec<&Resolved> = ways.iter().filter(|way| way.covered == is_there).collect();
         if ways.is_empty() {
             return Err("a fragment, or none, is expected".to_owned());
@@ -83,14 +124,13 @@ impl Judge<'_> {
                 within(expected, color[0], CONTRACT * greatest.max(1.0))
             }
             Shown::Gaussians => {
-                let named = |index: usize| self.members[index].map(|number| number as f32);
                 let (median, nearest) = ([color[0], color[1]], [color[2], color[3]]);
                 let mut firsts = ways.iter().filter_map(|way| way.nearest);
-                if !firsts.any(|index| named(index) == nearest) {
+                if !firsts.any(|index| self.named(index) == nearest) {
                     return Err("the nearest Gaussian is another one".to_owned());
                 }
                 let mut medians = ways.iter().flat_map(|way| &way.median_gaussians);
-                let is_one = medians.any(|(index, _)| named(*index) == median);
+                let is_one = medians.any(|(index, _)| self.named(*index) == median);
                 let is_unknown = ways.iter().any(|way| way.medians_exhausted);
                 if !is_one && !is_unknown {
                     return Err("the median Gaussian is another one".to_owned());
@@ -127,7 +167,7 @@ impl Judge<'_> {
 
     /// The camera's vector at a location.
     fn camera(&self, location: u32) -> [f64; 4] {
-        let camera = &self.draw.camera;
+        let camera = &self.camera;
         let rotation = camera.rotation.map(f64::from);
         let [fx, fy] = camera.focal_length.map(f64::from);
         let [cx, cy] = camera.principal_point.map(f64::from);

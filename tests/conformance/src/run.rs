@@ -4,11 +4,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use gaurast_oracle::compare::write_difference;
+use gaurast_oracle::oracle::Stored;
 
 use crate::cases::Case;
+use crate::draw::Draw;
 use crate::implementation::Implementation;
 use crate::judge::{Expected, expected, stored_before};
-use crate::resolved;
+use crate::resolved::Inputs;
 
 /// The outcome of a case.
 #[derive(Clone, Debug)]
@@ -46,29 +48,58 @@ fn message(panic: &(dyn std::any::Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it panics")
 }
 
+/// A draw and the contents that its attachments may have afterwards, with which the pictures of any number of implementations
+/// are compared.
+pub struct Expectation {
+    draw: Draw,
+    before: Stored,
+    after: After,
+}
+
+/// The contents that the attachments may have.
+enum After {
+    Attachments(Box<Expected>),
+    Shown(Box<Inputs>),
+}
+
+impl Expectation {
+    /// The oracle's answer to a draw.
+    pub fn new(draw: Draw) -> Self {
+        let before = stored_before(&draw);
+        let after = match draw.shown {
+            Some(shown) => After::Shown(Box::new(Inputs::of(&draw, shown))),
+            None => After::Attachments(Box::new(expected(&draw, &before))),
+        };
+        Self { draw, before, after }
+    }
+
+    /// Lets an implementation draw, and judges the picture.
+    pub fn judge(&self, implementation: &dyn Implementation) -> Outcome {
+        let nothing = |message: String| Outcome::Fail(Failure { message, picture: None });
+        let drawn = catch_unwind(AssertUnwindSafe(|| implementation.draw(&self.draw, &self.before)));
+        let picture = match drawn {
+            Ok(Ok(picture)) => picture,
+            Ok(Err(error)) => return nothing(error.0),
+            Err(panic) => return nothing(format!("the driver refuses: {}", message(&*panic))),
+        };
+        match &self.after {
+            After::Shown(inputs) => match inputs.distance(&picture) {
+                Ok(distance) => Outcome::Pass(distance),
+                Err(message) => nothing(message),
+            },
+            After::Attachments(expected) => match expected.fault(&picture) {
+                None => Outcome::Pass(expected.verdict(&picture).max_distance),
+                Some(message) => Outcome::Fail(Failure { message, picture: Some((expected.clone(), picture.color)) }),
+            },
+        }
+    }
+}
+
 /// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
 pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     let draw = case.draw();
-    if let Some(feature) = implementation.missing(&draw) {
-        return Outcome::NotSupported(feature);
-    }
-    let before = stored_before(&draw);
-    let nothing = |message: String| Outcome::Fail(Failure { message, picture: None });
-    let drawn = catch_unwind(AssertUnwindSafe(|| implementation.draw(&draw, &before)));
-    let picture = match drawn {
-        Ok(Ok(picture)) => picture,
-        Ok(Err(error)) => return nothing(error.0),
-        Err(panic) => return nothing(format!("the driver refuses: {}", message(&*panic))),
-    };
-    if let Some(shown) = draw.shown {
-        return match resolved::distance(&draw, shown, &picture) {
-            Ok(distance) => Outcome::Pass(distance),
-            Err(message) => nothing(message),
-        };
-    }
-    let expected = expected(&draw, &before);
-    match expected.fault(&picture) {
-        None => Outcome::Pass(expected.verdict(&picture).max_distance),
-        Some(message) => Outcome::Fail(Failure { message, picture: Some((Box::new(expected), picture.color)) }),
+    match implementation.missing(&draw) {
+        Some(feature) => Outcome::NotSupported(feature),
+        None => Expectation::new(draw).judge(implementation),
     }
 }

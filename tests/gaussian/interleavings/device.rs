@@ -1,8 +1,8 @@
 //! Execution of an interleaving as packets.
 
 use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
-use crate::gaussian::packets::{attributes, buffer, image, stream, texels};
 use ash::vk;
+use gaurast_testkit::packets::{attributes, buffer, image, stream, texels};
 use gaurast_tests::triangles::edges::to_clip;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::isa::builder::Builder;

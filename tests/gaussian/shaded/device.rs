@@ -1,6 +1,6 @@
 //! A device that packets control. Its vertex program writes its inputs.
 
-use crate::gaussian::packets::{attributes, buffer, image, texels};
+use gaurast_testkit::packets::{attributes, buffer, image, texels};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState};

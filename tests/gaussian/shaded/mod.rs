@@ -5,10 +5,10 @@ mod cloud;
 mod device;
 mod resolved;
 
-use super::packets::buffer;
 use cloud::{cloud, level};
 use device::{Case, SIZE, UPRIGHT, device, draw, whole};
 use gaurast_runner::simd_levels;
+use gaurast_testkit::packets::buffer;
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, project, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState, SkipReason};
 use simdevice::packet::{Draw, IndexStream};

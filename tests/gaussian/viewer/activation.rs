@@ -1,7 +1,7 @@
 //! Attributes in the form of trained files: logarithms of scales and logits of opacities.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
-use crate::gaussian::SKULL;
+use crate::SKULL;
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianGeometryGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags};
 use gaurast_runner::{Need, data};

@@ -2,13 +2,13 @@
 //!
 //! The safety of `unsafe` is explained in `gaurast_testkit`.
 
-use crate::triangles::devices::own;
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_testkit::devices::own;
 use gaurast_testkit::shader::{Stage, compile};
 use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Shader};
 use gaurast_tests::scenes::SceneBuffers;

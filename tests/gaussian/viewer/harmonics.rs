@@ -1,9 +1,9 @@
 //! Spherical harmonics in a buffer that is given by its address.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
-use crate::triangles::devices::own;
 use ash::vk;
 use gaurast::vk::{GaussianSphericalHarmonicsBufferGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags};
+use gaurast_testkit::devices::own;
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleInstance, OracleScene, OracleState, render_bounded};
 use gaurast_tests::scenes;

@@ -1,12 +1,12 @@
 //! Multiview: one pass draws every view through its own camera.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
-use crate::GLSLANG;
-use crate::triangles::devices::own;
 use gaurast::vk::{
     GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianLinearizationGAURAST,
     GaussianOrderGAURAST,
 };
+use gaurast_testkit::devices::own;
+use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{Bindings, Buffer, Commands, Resource};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};

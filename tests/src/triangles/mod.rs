@@ -8,11 +8,7 @@ pub mod clipped;
 pub mod edges;
 mod expected;
 pub mod models;
-mod outcome;
-pub mod scenes;
 pub mod shapes;
 pub mod workloads;
 
 pub use expected::{Exception, Expected};
-pub use outcome::{Drawn, Missing};
-pub use scenes::Scene;

@@ -9,7 +9,7 @@ use image::RgbaImage;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 
-use super::Missing;
+use gaurast_testkit::drawn::Missing;
 use gaurast_testkit::{
     Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Sampler, Target,
     attribute, binding, depth_test,

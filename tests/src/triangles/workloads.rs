@@ -5,7 +5,8 @@ use glam::Vec3;
 use rand::Rng;
 
 use super::models::{Model, Ready};
-use super::{Missing, shapes};
+use super::shapes;
+use gaurast_testkit::drawn::Missing;
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded, Resource, Sampler, Target,

@@ -11,13 +11,25 @@
 //! | [`transform_feedback`] | the commands of transform feedback |
 //! | [`gaussians`] | Gaussians in vertex buffers, and pipelines that draw them |
 //! | [`difference`] | comparison of the pictures of two devices |
+//! | [`devices`], [`context`] | devices that tests share, or open with some features; instances without a device |
+//! | [`scene`], [`canvas`] | small pictures of Gaussians, and of points, lines and triangles |
+//! | [`drawn`] | scenes that this driver and lavapipe draw |
+//! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
+//! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
+//! | [`presenter`] | a device that presents to a surface |
+//! | [`texels`], [`exact_lavapipe`] | random texels, and a lavapipe that samples them as accurately as it can |
 //!
 //! The reason for all `unsafe` is the same. These are Vulkan calls on objects of one [`Gpu`], which every resource
 //! keeps alive, and every submission is waited for before a resource is destroyed. Tests record only valid usage of
 //! Vulkan, except tests of invalid usage. `VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation` reports violations.
 
+pub mod canvas;
+pub mod context;
 pub mod descriptors;
+pub mod devices;
 pub mod difference;
+pub mod drawn;
+pub mod exact_lavapipe;
 pub mod for_levels;
 pub mod gaussians;
 pub mod gpu;
@@ -25,12 +37,17 @@ pub mod loader;
 pub mod messages;
 mod open;
 pub mod output;
+pub mod packets;
 pub mod pass;
 pub mod pipeline;
+pub mod presenter;
 pub mod resource;
+pub mod scene;
 pub mod settings;
 pub mod shader;
+pub mod stage_program;
 pub mod target;
+pub mod texels;
 pub mod transform_feedback;
 
 pub use descriptors::{Binding, Bindings, Resource, Sets};

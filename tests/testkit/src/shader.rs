@@ -1,11 +1,32 @@
 //! Shaders in GLSL. `glslangValidator` compiles them when a test needs them, and the result is kept for later runs.
 
 use ash::vk;
+use gaurast_runner::Need;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, Mutex, PoisonError};
+
+/// The compiler of the shaders that are written in GLSL, which tests need.
+pub const GLSLANG: Need = Need::Program("glslangValidator");
+
+/// The folder of the shaders of the compiler's tests.
+const TRANSLATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../driver/spirv/tests/shaders");
+
+/// The SPIR-V of a shader of the compiler's tests, such as `colored.vert`.
+///
+/// # Panics
+/// If there is no such shader.
+pub fn spirv(name: &str) -> Vec<u32> {
+    let path = Path::new(TRANSLATED).join(format!("{name}.spv"));
+    words(&std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
+}
+
+/// Bytes as SPIR-V's words.
+pub fn words(bytes: &[u8]) -> Vec<u32> {
+    bytemuck::pod_collect_to_vec(bytes)
+}
 
 /// A shader stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

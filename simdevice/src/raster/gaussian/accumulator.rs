@@ -1,8 +1,7 @@
-//! The accumulators of Gaussian mode for a tile's pixels, or for one sample of each, and the samples' tests.
+//! The accumulators of Gaussian mode for a tile's pixels, or for one sample of each.
 
 use super::grid::{ALL_LANES, BLOCK_PIXELS, BLOCKS, PixelMask, TILE, block_and_lane};
 use crate::format::depth::DepthEncoding;
-use crate::limits::MAX_SAMPLES;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
@@ -10,18 +9,18 @@ use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 /// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`block_and_lane`].
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Accumulator {
-    pub(super) color: [[[f32; BLOCK_PIXELS]; BLOCKS]; 3],
+pub(crate) struct Accumulator {
+    pub(crate) color: [[[f32; BLOCK_PIXELS]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
-    pub(super) transmittance: [[f32; BLOCK_PIXELS]; BLOCKS],
+    pub(crate) transmittance: [[f32; BLOCK_PIXELS]; BLOCKS],
     /// In the fast kernel, how far alphas may fall at each pixel; where it is finished, none falls so little.
-    pub(super) most_fall: [[f32; BLOCK_PIXELS]; BLOCKS],
+    pub(crate) most_fall: [[f32; BLOCK_PIXELS]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
-    pub(super) covered: [u32; BLOCKS],
+    pub(crate) covered: [u32; BLOCKS],
     /// The median depth as the attachment holds it, where covered, if the draw writes depth.
-    pub(super) median: [[u32; BLOCK_PIXELS]; BLOCKS],
+    pub(crate) median: [[u32; BLOCK_PIXELS]; BLOCKS],
     /// The sums of weighted depths and of weights, if a fragment program reads their ratio.
-    pub(super) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
+    pub(crate) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
 }
 
 /// The transmittance of a pixel that is not to be touched: nothing is left of it, and it is below every floor.
@@ -30,14 +29,14 @@ const UNTOUCHED: f32 = f32::NEG_INFINITY;
 /// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for,
 /// and less than zero where a pixel is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TransmittanceBits(i32);
+pub(crate) struct TransmittanceBits(i32);
 
 /// Every pixel that is not finished has more.
-pub(super) const NOT_TERMINATED: TransmittanceBits = TransmittanceBits(-1);
+pub(crate) const NOT_TERMINATED: TransmittanceBits = TransmittanceBits(-1);
 
 impl TransmittanceBits {
     /// A transmittance; with none at all, a pixel whose own is zero is not finished yet.
-    pub(super) fn of(transmittance: f32) -> Self {
+    pub(crate) fn of(transmittance: f32) -> Self {
         if transmittance > 0.0 { Self(transmittance.to_bits() as i32) } else { NOT_TERMINATED }
     }
 }
@@ -49,7 +48,7 @@ fn clear_sums(sums: &mut [[f32; BLOCK_PIXELS]; BLOCKS]) {
 }
 
 impl Accumulator {
-    pub(super) const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         color: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3],
         transmittance: [[1.0; BLOCK_PIXELS]; BLOCKS],
         most_fall: [[0.0; BLOCK_PIXELS]; BLOCKS],
@@ -59,7 +58,7 @@ impl Accumulator {
     };
 
     /// Makes the pixels in `lanes` fresh, and the others finished.
-    pub(super) fn clear(&mut self, lanes: &PixelMask) {
+    pub(crate) fn clear(&mut self, lanes: &PixelMask) {
         self.color.iter_mut().for_each(clear_sums);
         self.covered = [0; BLOCKS];
         for (block, &lanes) in self.transmittance.iter_mut().zip(lanes) {
@@ -74,12 +73,12 @@ impl Accumulator {
     }
 
     /// Makes the sums of depths fresh.
-    pub(super) fn clear_means(&mut self) {
+    pub(crate) fn clear_means(&mut self) {
         self.means = [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2];
     }
 
     /// The expected and the median depth of a block's lanes; zero where nothing is covered.
-    pub(super) fn depths(&self, block: usize, unit: DepthEncoding) -> [[f32; BLOCK_PIXELS]; 2] {
+    pub(crate) fn depths(&self, block: usize, unit: DepthEncoding) -> [[f32; BLOCK_PIXELS]; 2] {
         let mut out = [[0.0; BLOCK_PIXELS]; 2];
         let [depths, weights] = &self.means;
         for lane in 0..BLOCK_PIXELS {
@@ -98,7 +97,7 @@ impl Accumulator {
 
     /// The premultiplied colour and coverage (C, 1 - T) of a block's lanes.
     #[inline(always)]
-    pub(super) fn fragments<S: Simd>(&self, simd: S, block: usize) -> [f32x16<S>; 4] {
+    pub(crate) fn fragments<S: Simd>(&self, simd: S, block: usize) -> [f32x16<S>; 4] {
         let [r, g, b] = &self.color;
         let load = |lanes: &[f32; BLOCK_PIXELS]| f32x16::from_slice(simd, lanes);
         let rest = load(&self.transmittance[block]).abs();
@@ -107,7 +106,7 @@ impl Accumulator {
 
     /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
+    pub(crate) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
         let light = i32x16::splat(simd, light);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {
@@ -120,7 +119,7 @@ impl Accumulator {
     /// Finds the pixels that some Gaussian contributed to, from what it left of their transmittance: no alpha is so
     /// small that it leaves that as it was, since low floors are for wider sums.
     #[inline(always)]
-    pub(super) fn find_covered<S: Simd>(&mut self, simd: S) {
+    pub(crate) fn find_covered<S: Simd>(&mut self, simd: S) {
         for (covered, lanes) in self.covered.iter_mut().zip(&self.transmittance) {
             let seen = f32x16::from_slice(simd, lanes).abs().simd_lt(1.0);
             *covered |= seen.to_bitmask() as u32;
@@ -128,7 +127,7 @@ impl Accumulator {
     }
 
     /// The number of rows with a pixel that is not finished.
-    pub(super) fn open_rows(&self) -> u8 {
+    pub(crate) fn open_rows(&self) -> u8 {
         let open = |&y: &usize| {
             (0..TILE).any(|x| {
                 let (block, lane) = block_and_lane(x, y);
@@ -139,7 +138,7 @@ impl Accumulator {
     }
 
     /// Pixels that are finished or were not to be touched.
-    pub(super) fn finished(&self) -> PixelMask {
+    pub(crate) fn finished(&self) -> PixelMask {
         let mut finished = [0; BLOCKS];
         for (finished, lanes) in finished.iter_mut().zip(&self.transmittance) {
             for (lane, t) in lanes.iter().enumerate() {
@@ -152,7 +151,7 @@ impl Accumulator {
     /// Finds how far alphas may fall at a block's pixels: no farther than `most_fall`, and where they are finished, not
     /// at all.
     #[inline(always)]
-    pub(super) fn find_most_fall<S: Simd>(&mut self, simd: S, block: usize, most_fall: f32) {
+    pub(crate) fn find_most_fall<S: Simd>(&mut self, simd: S, block: usize, most_fall: f32) {
         let t = f32x16::from_slice(simd, &self.transmittance[block]);
         let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
         let most_fall = f32x16::splat(simd, most_fall);
@@ -161,33 +160,8 @@ impl Accumulator {
     }
 
     /// The pixels of a block that are not finished.
-    pub(super) fn open_lanes(&self, block: usize) -> u32 {
+    pub(crate) fn open_lanes(&self, block: usize) -> u32 {
         let lanes = self.transmittance[block].iter().enumerate();
         lanes.fold(0, |open, (lane, t)| open | u32::from(t.is_sign_positive()) << lane)
-    }
-}
-
-pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
-
-/// A tile's samples and their tests: lanes by sample and block.
-#[derive(Debug, Default)]
-pub(super) struct Samples {
-    /// Samples that the draw may touch, and whose stored depth lies within bounds.
-    pub(super) candidates: [PixelMask; SAMPLES],
-    /// Candidates that pass the stencil test.
-    pub(super) tested: [PixelMask; SAMPLES],
-    /// The accumulator that a sample's block is composited in.
-    pub(super) accumulators: [[usize; BLOCKS]; SAMPLES],
-}
-
-impl Samples {
-    /// Leaves alone what was covered and then discarded, as if nothing had reached it.
-    pub(super) fn leave(&mut self, covered: &[PixelMask; SAMPLES], kept: &[PixelMask; SAMPLES]) {
-        let lanes = covered.iter().zip(kept);
-        for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
-            for (block, candidates) in candidates.iter_mut().enumerate() {
-                *candidates &= !(covered[block] & !kept[block]);
-            }
-        }
     }
 }

@@ -21,22 +21,24 @@
 //! [`depth_ranges`]: super::depth_ranges
 
 use super::accumulator::Accumulator;
-use super::binary16::Half;
-use super::block_lists::{BlockLists, composite_by_block};
+use super::approximation::Approximation;
+use super::by_block::binary16::Half;
+use super::by_block::block_kernel::composite_by_block;
+use super::by_block::block_lists::BlockLists;
+use super::by_block::in_order::InOrder;
+use super::by_block::per_pixel::{PerPixel, composite_per_pixel};
+use super::by_block::tracking::{Tracked, Tracking};
+use super::by_block::wide_sums::WideSums;
 use super::depth_ranges::DepthRanges;
-use super::exact::{InOrder, WideSums};
 use super::fast;
 use super::fast::FastScratch;
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
-use super::inputs::{
-    Approximation, DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, Kernel, NO_DEPTH, Thresholds,
-    TileCounts, TileInputs,
-};
-use super::per_pixel::{PerPixel, composite_per_pixel};
-use super::tracking::{Tracked, Tracking};
+use super::inputs::{Thresholds, TileCounts, TileInputs};
+use super::kernel::Kernel;
+use super::mode::{DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH};
 use crate::gaussian::BinnedDraw;
-use crate::gaussian::depth::DepthTrend;
-use crate::gaussian::tile_lists::SortedWalk;
+use crate::gaussian::bin::sorted_walk::SortedWalk;
+use crate::gaussian::view::center_depth::DepthTrend;
 use crate::limits::{MAX_SAMPLES, TILE_SIZE};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::{Optimization, Optimizations};
@@ -53,14 +55,14 @@ const ACCUMULATORS: usize = MAX_SAMPLES as usize + 1;
 /// The part of tile buffer B that Gaussian mode uses.
 #[derive(Debug)]
 pub struct GaussianTile {
-    pub(super) accumulators: [Accumulator; ACCUMULATORS],
-    pub(super) ranges: DepthRanges,
+    pub(crate) accumulators: [Accumulator; ACCUMULATORS],
+    pub(crate) ranges: DepthRanges,
     fast: FastScratch,
     /// The lists of the kernels that part lists by blocks.
     lists: BlockLists,
     per_pixel: PerPixel,
     /// By accumulator, what a fragment program reads of Gaussians, if it does.
-    pub(super) tracked: Vec<Tracked>,
+    pub(crate) tracked: Vec<Tracked>,
     /// A piece of a tile's list, where the draw has none.
     piece: Vec<u32>,
 }
@@ -97,7 +99,7 @@ impl GaussianTile {
     }
 
     /// Composites `draw`'s Gaussians in `lanes` of a tile, into a accumulator.
-    pub(super) fn run<const DEPTH: DepthMode>(
+    pub(crate) fn run<const DEPTH: DepthMode>(
         &mut self,
         draw: &BinnedDraw,
         level: Level,
@@ -170,7 +172,7 @@ impl GaussianTile {
 
     /// The pixels of `lanes` that some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its
     /// depth.
-    pub(super) fn reached(
+    pub(crate) fn reached(
         &mut self,
         draw: &BinnedDraw,
         level: Level,

@@ -2,13 +2,13 @@
 
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::gaussian::BinnedDraw;
-use crate::gaussian::cut_off::TileCutOff;
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splats::splat::Splat;
+use crate::gaussian::view::cut_off::TileCutOff;
 use crate::state::gaussian::GaussianCutOff;
 
 /// The cut-off of a draw.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum CutOff {
+pub(crate) enum CutOff {
     /// An ellipse, of so much of `u^2 + v^2`.
     Ellipse(f64),
     Tiles(TileCutOff),
@@ -16,7 +16,7 @@ pub(super) enum CutOff {
 
 impl CutOff {
     /// The cut-off of a draw, if it has one.
-    pub(super) fn of(draw: &BinnedDraw) -> Option<Self> {
+    pub(crate) fn of(draw: &BinnedDraw) -> Option<Self> {
         let footprint = &draw.state.footprint;
         if footprint.cut_off == GaussianCutOff::Ellipse {
             let deviations = f64::from(footprint.deviations);
@@ -27,7 +27,7 @@ impl CutOff {
     }
 
     /// The lanes of a block, in the tile at `corner`, whose pixels' centres lie within the cut-off of a Gaussian, a bit each.
-    pub(super) fn lanes(&self, splat: &Splat, corner: [u32; 2], block: usize) -> u32 {
+    pub(crate) fn lanes(&self, splat: &Splat, corner: [u32; 2], block: usize) -> u32 {
         let middle = [f64::from(corner[0]) + BLOCK_X[block], f64::from(corner[1]) + BLOCK_Y[block]];
         let bits = |is_within: &dyn Fn([f64; 2]) -> bool| {
             (0..BLOCK_PIXELS).fold(0, |bits, lane| {

@@ -5,7 +5,7 @@
 //! nothing in the kernel depends on which it is.
 
 use super::grid::{BLOCK_PIXELS, BLOCKS, PixelMask, ROUND};
-use crate::gaussian::depth::DepthTrend;
+use crate::gaussian::view::center_depth::DepthTrend;
 use crate::state::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
 
@@ -15,7 +15,7 @@ const NO_DEPTH: u32 = u32::MAX;
 /// The depths that pass in a tile.
 #[derive(Debug)]
 #[repr(align(64))]
-pub(super) struct DepthRanges {
+pub(crate) struct DepthRanges {
     /// A depth passes at a pixel if it is `first` or at most `span` more.
     first: [[u32; BLOCK_PIXELS]; BLOCKS],
     span: [[u32; BLOCK_PIXELS]; BLOCKS],
@@ -42,10 +42,6 @@ impl Default for DepthRanges {
 fn range(op: CompareOp, stored: u32) -> Option<(u32, u32)> {
     const LAST: u32 = NO_DEPTH - 1;
     let between = |first: u32, last: u32| last.checked_sub(first).map(|span| (first, span));
-    #[cfg(feature = "mistakes")]
-    if op == CompareOp::Less && crate::mistakes::Mistake::LessOrEqualForLess.is_made() {
-        return between(0, stored);
-    }
     match op {
         CompareOp::Never => None,
         CompareOp::Less => between(0, stored.checked_sub(1)?),
@@ -61,7 +57,7 @@ fn range(op: CompareOp, stored: u32) -> Option<(u32, u32)> {
 
 impl DepthRanges {
     /// Makes this what passes against the depths stored at `lanes` of a tile, which are in the order of its blocks.
-    pub(super) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &PixelMask) {
+    pub(crate) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &PixelMask) {
         self.tile = [NO_DEPTH, 0];
         for (block, stored) in stored.as_chunks::<BLOCK_PIXELS>().0.iter().enumerate().take(BLOCKS) {
             let (mut least, mut greatest) = (NO_DEPTH, 0);
@@ -88,13 +84,13 @@ impl DepthRanges {
 
     /// True if a depth fails in all of the tile.
     #[inline(always)]
-    pub(super) fn hides(&self, depth: u32) -> bool {
+    pub(crate) fn hides(&self, depth: u32) -> bool {
         depth < self.tile[0] || depth > self.tile[1]
     }
 
     /// True if a depth and all that follow it fail in all of the tile.
     #[inline(always)]
-    pub(super) fn rejects_rest(&self, depth: u32, trend: DepthTrend) -> bool {
+    pub(crate) fn rejects_rest(&self, depth: u32, trend: DepthTrend) -> bool {
         match trend {
             DepthTrend::Rising => depth > self.tile[1],
             DepthTrend::Falling => depth < self.tile[0],
@@ -104,7 +100,7 @@ impl DepthRanges {
 
     /// The blocks where a depth may pass.
     #[inline(always)]
-    pub(super) fn blocks<S: Simd>(&self, simd: S, depth: u32) -> mask32x16<S> {
+    pub(crate) fn blocks<S: Simd>(&self, simd: S, depth: u32) -> mask32x16<S> {
         let depth = u32x16::splat(simd, depth);
         let least = u32x16::simd_from(simd, self.least);
         let greatest = u32x16::simd_from(simd, self.greatest);
@@ -113,7 +109,7 @@ impl DepthRanges {
 
     /// Depths of a round that may pass in a block: a bit for each.
     #[inline(always)]
-    pub(super) fn shown<S: Simd>(&self, simd: S, block: usize, depths: &[u32; ROUND]) -> u32 {
+    pub(crate) fn shown<S: Simd>(&self, simd: S, block: usize, depths: &[u32; ROUND]) -> u32 {
         let least = S::u32s::splat(simd, self.least[block]);
         let greatest = S::u32s::splat(simd, self.greatest[block]);
         let mut shown = 0;
@@ -127,7 +123,7 @@ impl DepthRanges {
 
     /// The pixels of a block where a depth passes.
     #[inline(always)]
-    pub(super) fn pixels<S: Simd>(&self, simd: S, block: usize, depth: u32) -> mask32x16<S> {
+    pub(crate) fn pixels<S: Simd>(&self, simd: S, block: usize, depth: u32) -> mask32x16<S> {
         let first = u32x16::from_slice(simd, &self.first[block]);
         let span = u32x16::from_slice(simd, &self.span[block]);
         (u32x16::splat(simd, depth) - first).simd_le(span)

@@ -4,10 +4,10 @@
 //! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not
 //! covered help with derivatives: they hold what their own pixels accumulated.
 
-use super::accumulator::{SAMPLES, Samples};
+use super::by_block::tracking::Tracked;
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
-use super::tracking::Tracked;
+use super::samples::{SAMPLES, Samples};
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
 use crate::packet::GaussianFragmentStage;
@@ -29,7 +29,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// A resolve shader made ready for tiles, which all workers share.
-pub(super) struct FragmentStageDraw<'a> {
+pub(crate) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
     shader: &'a GaussianFragmentStage,
     stage: &'a FragmentStage,
@@ -44,11 +44,11 @@ pub(super) struct FragmentStageDraw<'a> {
 }
 
 /// The tools with which a worker shades a tile.
-pub(super) struct Tools<'a> {
-    pub(super) buffers: &'a mut Buffers,
-    pub(super) fragments: &'a GaussianTile,
-    pub(super) counters: &'a mut Counters,
-    pub(super) cancel: &'a AtomicBool,
+pub(crate) struct Tools<'a> {
+    pub(crate) buffers: &'a mut Buffers,
+    pub(crate) fragments: &'a GaussianTile,
+    pub(crate) counters: &'a mut Counters,
+    pub(crate) cancel: &'a AtomicBool,
 }
 
 /// Fragments of a tile that are shaded together: of samples that accumulated as sample `leader` did.
@@ -59,7 +59,7 @@ struct SampleGroup {
 }
 
 impl<'a> FragmentStageDraw<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         draw: &'a BinnedDraw,
         shader: &'a GaussianFragmentStage,
         targets: Targets<'a>,
@@ -85,22 +85,22 @@ impl<'a> FragmentStageDraw<'a> {
     }
 
     /// True if the program reads depths.
-    pub(super) fn reads_depth(&self) -> bool {
+    pub(crate) fn reads_depth(&self) -> bool {
         self.shader.program.reads_depth
     }
 
     /// True if the program reads indices of Gaussians, or depth variables.
-    pub(super) fn is_tracking(&self) -> bool {
+    pub(crate) fn is_tracking(&self) -> bool {
         self.shader.program.is_tracking
     }
 
     /// True if samples that it discards were tested and counted already.
-    pub(super) fn tests_early(&self) -> bool {
+    pub(crate) fn tests_early(&self) -> bool {
         self.stage.interface.early_tests
     }
 
     /// Marks what the program may have written to as changed.
-    pub(super) fn finish(&self) {
+    pub(crate) fn finish(&self) {
         self.shader.bindings.bump_generations();
     }
 
@@ -108,7 +108,7 @@ impl<'a> FragmentStageDraw<'a> {
     ///
     /// # Errors
     /// [`Stopped`] if the program ran for too long, or was cancelled.
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         tile: &Tile,
         samples: &Samples,

@@ -5,41 +5,53 @@ use crate::raster::tile::place;
 use crate::state::Rect;
 
 /// Pixels along a tile's side.
-pub(super) const TILE: usize = TILE_SIZE as usize;
+pub(crate) const TILE: usize = TILE_SIZE as usize;
+
 /// Pixels of a block, which are the lanes of a vector.
-pub(super) const BLOCK_PIXELS: usize = 16;
+pub(crate) const BLOCK_PIXELS: usize = 16;
+
 /// The side of a block in pixels.
-pub(super) const BLOCK: usize = 4;
+pub(crate) const BLOCK: usize = 4;
+
 /// Blocks of a tile.
-pub(super) const BLOCKS: usize = 16;
+pub(crate) const BLOCKS: usize = 16;
+
 /// A bit for each of them.
-pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
+pub(crate) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
+
 /// Gaussians of a round: as many as phases pass on through the first-level cache, and a word has bits.
-pub(super) const ROUND: usize = 32;
+pub(crate) const ROUND: usize = 32;
+
 /// The places of arrays that are indexed by a Gaussian's number in its round. They are more than [`ROUND`], so that the
 /// number of a word's lowest bit, which is [`ROUND`] for zero, is a place without a check.
-pub(super) const PLACES: usize = ROUND + 8;
+pub(crate) const PLACES: usize = ROUND + 8;
 
 /// Half of the distance between a block's first and last pixel centres.
-pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
+pub(crate) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
+
 /// The offset of each lane's pixel from the middle of its block.
-pub(super) const LANE_X: [f32; BLOCK_PIXELS] = grid(true);
-pub(super) const LANE_Y: [f32; BLOCK_PIXELS] = grid(false);
-pub(super) const LANE_X_64: [f64; BLOCK_PIXELS] = widened(LANE_X);
-pub(super) const LANE_Y_64: [f64; BLOCK_PIXELS] = widened(LANE_Y);
+pub(crate) const LANE_X: [f32; BLOCK_PIXELS] = grid(true);
+
+pub(crate) const LANE_Y: [f32; BLOCK_PIXELS] = grid(false);
+
+pub(crate) const LANE_X_64: [f64; BLOCK_PIXELS] = widened(LANE_X);
+
+pub(crate) const LANE_Y_64: [f64; BLOCK_PIXELS] = widened(LANE_Y);
+
 /// Blocks in a row of them, and rows.
-pub(super) const BLOCKS_ACROSS: usize = 4;
+pub(crate) const BLOCKS_ACROSS: usize = 4;
+
 /// The middles of a tile's columns of blocks, and of its rows of blocks, in pixels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BlockMiddles {
-    pub(super) x: [f64; BLOCKS_ACROSS],
-    pub(super) y: [f64; BLOCKS_ACROSS],
+pub(crate) struct BlockMiddles {
+    pub(crate) x: [f64; BLOCKS_ACROSS],
+    pub(crate) y: [f64; BLOCKS_ACROSS],
 }
 
 impl BlockMiddles {
     /// The middles of the blocks of the tile at `corner`.
     #[inline(always)]
-    pub(super) fn new([x, y]: [u32; 2]) -> Self {
+    pub(crate) fn new([x, y]: [u32; 2]) -> Self {
         let [x, y] = [f64::from(x), f64::from(y)];
         let [first, second, third, fourth] = [BLOCK_X[0], BLOCK_X[1], BLOCK_X[2], BLOCK_X[3]];
         Self { x: [x + first, x + second, x + third, x + fourth], y: [y + first, y + second, y + third, y + fourth] }
@@ -47,8 +59,9 @@ impl BlockMiddles {
 }
 
 /// The offset of the middle of each block from its tile's corner.
-pub(super) const BLOCK_X: [f64; BLOCKS] = middles(true);
-pub(super) const BLOCK_Y: [f64; BLOCKS] = middles(false);
+pub(crate) const BLOCK_X: [f64; BLOCKS] = middles(true);
+
+pub(crate) const BLOCK_Y: [f64; BLOCKS] = middles(false);
 
 /// The column or row of each lane's pixel, from the block's middle.
 const fn grid(column: bool) -> [f32; BLOCK_PIXELS] {
@@ -86,24 +99,24 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
 }
 
 /// PixelMask by block.
-pub(super) type PixelMask = [u32; BLOCKS];
+pub(crate) type PixelMask = [u32; BLOCKS];
 
 /// Every lane of a block.
-pub(super) const ALL_LANES: u32 = (1 << BLOCK_PIXELS) - 1;
+pub(crate) const ALL_LANES: u32 = (1 << BLOCK_PIXELS) - 1;
 
 /// The block of a pixel of a tile, and the lane in it.
-pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
+pub(crate) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
     let place = place(x, y);
     (place / BLOCK_PIXELS % BLOCKS, place % BLOCK_PIXELS)
 }
 
 /// The number of pixels in `lanes`.
-pub(super) fn count(lanes: &PixelMask) -> u32 {
+pub(crate) fn count(lanes: &PixelMask) -> u32 {
     lanes.iter().map(|lanes| lanes.count_ones()).sum()
 }
 
 /// The pixels of `bounds` in the tile at `corner`.
-pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> PixelMask {
+pub(crate) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> PixelMask {
     let tile = Rect { x: corner[0] as i32, y: corner[1] as i32, width: TILE_SIZE, height: TILE_SIZE };
     let inside = bounds.intersect(tile);
     if [inside.width, inside.height] == [TILE_SIZE; 2] {

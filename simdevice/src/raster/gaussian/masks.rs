@@ -10,7 +10,7 @@ fn are_bits<S: Simd>() -> bool {
 
 /// The floats in the lanes of a mask, and zero in the others.
 #[inline(always)]
-pub(super) fn only<S: Simd>(simd: S, mask: mask32x16<S>, floats: f32x16<S>) -> f32x16<S> {
+pub(crate) fn only<S: Simd>(simd: S, mask: mask32x16<S>, floats: f32x16<S>) -> f32x16<S> {
     if are_bits::<S>() {
         mask.select(floats, f32x16::splat(simd, 0.0))
     } else {
@@ -20,20 +20,20 @@ pub(super) fn only<S: Simd>(simd: S, mask: mask32x16<S>, floats: f32x16<S>) -> f
 
 /// The number of set lanes of masks.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tally<S: Simd> {
+pub(crate) struct Tally<S: Simd> {
     lanes: i32x16<S>,
     bits: u64,
 }
 
 impl<S: Simd> Tally<S> {
     #[inline(always)]
-    pub(super) fn new(simd: S) -> Self {
+    pub(crate) fn new(simd: S) -> Self {
         Self { lanes: i32x16::splat(simd, 0), bits: 0 }
     }
 
     /// Counts the lanes of a mask.
     #[inline(always)]
-    pub(super) fn add(&mut self, mask: mask32x16<S>) {
+    pub(crate) fn add(&mut self, mask: mask32x16<S>) {
         if are_bits::<S>() {
             self.bits += u64::from(mask.to_bitmask().count_ones());
         } else {
@@ -43,7 +43,7 @@ impl<S: Simd> Tally<S> {
 
     /// Counts the lanes of a mask that `others` lacks.
     #[inline(always)]
-    pub(super) fn add_without(&mut self, mask: mask32x16<S>, others: mask32x16<S>) {
+    pub(crate) fn add_without(&mut self, mask: mask32x16<S>, others: mask32x16<S>) {
         if are_bits::<S>() {
             self.bits += u64::from((mask.to_bitmask() & !others.to_bitmask()).count_ones());
         } else {
@@ -54,7 +54,7 @@ impl<S: Simd> Tally<S> {
 
     /// The number of lanes counted; no lane may be counted 2^31 times.
     #[inline(always)]
-    pub(super) fn total(self) -> u64 {
+    pub(crate) fn total(self) -> u64 {
         if are_bits::<S>() {
             return self.bits;
         }

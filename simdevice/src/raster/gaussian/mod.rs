@@ -5,28 +5,27 @@
 //! once for all samples that agree in all of a block, and again only in the blocks of a tile where some differ.
 
 mod accumulator;
-mod binary16;
-mod block_lists;
+mod approximation;
+mod by_block;
 mod compositor;
 mod cut_off;
 mod depth_ranges;
-mod exact;
+mod exponent;
 mod fast;
 mod fragment_stage;
 mod grid;
 mod inputs;
+mod kernel;
 mod masks;
-mod per_pixel;
+mod mode;
 mod pixels;
-mod staging;
-mod tracking;
+mod reached_blocks;
+mod samples;
 
 pub use compositor::GaussianTile;
 
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
-#[cfg(feature = "mistakes")]
-use crate::mistakes::Mistake;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth_stencil::{Tests, apply};
 use crate::raster::output::{Buffers, Targets};
@@ -35,14 +34,14 @@ use crate::raster::tile_buffer::{QuadAddresses, Target};
 use crate::runtime::Runtime;
 use crate::state::{BlendState, StencilFace, StencilOp};
 use crate::stats::counters::{Counter, Counters};
-use accumulator::{SAMPLES, Samples};
 use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
-use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::machine::Stopped;
+use mode::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
+use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 
 /// A Gaussian draw made ready for tiles, which all workers share.
@@ -182,10 +181,7 @@ impl<'a> GaussianTileDraw<'a> {
         let touched = lanes_within(self.draw.bounds.intersect(tile.pixels), corner);
         let mut samples = Samples::default();
         for sample in 0..self.samples {
-            let is_masked = self.draw.state.sample_mask >> sample & 1 == 0;
-            #[cfg(feature = "mistakes")]
-            let is_masked = is_masked && !Mistake::NoSampleMask.is_made();
-            if is_masked {
+            if self.draw.state.sample_mask >> sample & 1 == 0 {
                 continue;
             }
             let mut lanes = touched;
@@ -324,10 +320,6 @@ impl<'a> GaussianTileDraw<'a> {
                 }
             }
             reached = fragments.reached(self.draw, self.level, tile.at, &reached);
-            #[cfg(feature = "mistakes")]
-            if Mistake::DepthFailAnywhere.is_made() {
-                reached = [u32::MAX; BLOCKS];
-            }
         }
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.stencil.start(tile.index, sample);
@@ -345,8 +337,6 @@ impl<'a> GaussianTileDraw<'a> {
                     face.fail
                 };
                 let value = apply(op, *stored, face.reference);
-                #[cfg(feature = "mistakes")]
-                let value = if Mistake::StencilTwice.is_made() { apply(op, value, face.reference) } else { value };
                 *stored = *stored & !face.write_mask | value & face.write_mask;
             }
         }

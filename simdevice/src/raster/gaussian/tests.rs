@@ -5,11 +5,11 @@ mod streamed;
 mod whole_draws;
 
 use super::grid::TILE;
-use super::inputs::needs_f64_sums;
+use super::kernel::needs_f64_sums;
 use super::*;
 use crate::device::Device;
 use crate::format::Format;
-use crate::gaussian::splat::{Splat, locate};
+use crate::gaussian::splats::splat::{Splat, locate};
 use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
 use crate::runtime::Config;

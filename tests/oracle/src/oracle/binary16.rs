@@ -10,9 +10,9 @@ use half::f16;
 use rayon::prelude::*;
 
 use super::panorama;
-use super::project::project;
+use super::render::Projected;
 use super::splat::Splat;
-use super::{OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference, SkipCounts};
+use super::{OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference};
 
 /// The error that binary64 may have in an input of a pixel, relative to the terms of the input.
 const SLACK: f64 = 1e-10;
@@ -297,16 +297,9 @@ impl Pixel {
 pub fn render_binary16(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Reference {
     assert_eq!(state.geometry, OracleGeometry::Volume);
     assert_ne!(state.order, OracleOrder::PerPixel);
-    let (mut drawn, mut skips) = (Vec::new(), SkipCounts::default());
-    for index in 0..scene.len() {
-        match project(scene, camera, state, index) {
-            Ok(splat) => drawn.push((splat, magnitude(scene.coefficients(index)))),
-            Err(reason) => skips.count(reason),
-        }
-    }
-    // Stable, so that ties stay in primitive order.
-    drawn.sort_by(|(a, _), (b, _)| a.key.total_cmp(&b.key));
-    let splats: Vec<_> = drawn.iter().map(|(splat, magnitude)| Rounded::new(splat, *magnitude)).collect();
+    let projected = Projected::new(scene, camera, state);
+    let rounded = |splat| Rounded::new(splat, magnitude(scene.coefficients(splat.index)));
+    let splats: Vec<Rounded> = projected.splats.iter().map(rounded).collect();
     let thresholds = Thresholds {
         alpha_floor: round(state.alpha_floor.into()),
         alpha_ceiling: round(state.alpha_ceiling.into()),
@@ -333,7 +326,7 @@ pub fn render_binary16(scene: &OracleScene, camera: &OracleCamera, state: &Oracl
         nominal: pixels.iter().map(|pixel| pixel.nominal.rgba()[0]).collect(),
         alternatives: with_alternatives.filter_map(|(index, alternatives)| Some((index, alternatives?))).collect(),
         exhausted: pixels.iter().filter(|pixel| pixel.exhausted).count(),
-        skips,
+        skips: projected.skips,
         undecidable_keys: 0,
     }
 }

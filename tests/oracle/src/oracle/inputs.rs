@@ -6,7 +6,7 @@ use gaurast::vk::{
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
-use super::spherical_harmonics;
+use super::{Rules, spherical_harmonics};
 
 /// The Gaussians of a draw, in primitive order (by draw, instance, position in the draw).
 ///
@@ -120,6 +120,13 @@ pub enum OracleOrder {
     PerPixel,
 }
 
+impl OracleOrder {
+    /// True if Gaussians are sorted by a depth or a distance.
+    pub(super) fn has_keys(self) -> bool {
+        matches!(self, Self::ViewDepth | Self::RadialDistance)
+    }
+}
+
 /// The shape outside which a Gaussian does not contribute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleCutOff {
@@ -182,6 +189,8 @@ pub struct OracleState {
     pub cut_off_deviations: f32,
     /// The least ratio of determinants that compensation takes the root of.
     pub compensation_floor: f32,
+    /// The rules that the steps follow; the text's by default.
+    pub rules: Rules,
 }
 
 impl OracleState {
@@ -224,6 +233,7 @@ impl Default for OracleState {
             cut_off: OracleCutOff::None,
             cut_off_deviations: 0.0,
             compensation_floor: 0.0,
+            rules: Rules::default(),
         }
     }
 }
@@ -293,6 +303,7 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             cut_off: OracleCutOff::None,
             cut_off_deviations: 0.0,
             compensation_floor: 0.0,
+            rules: Rules::default(),
         }
     }
 }

@@ -18,6 +18,9 @@
 //! | then | the inputs of a resolve shader | [`resolve`] |
 //! | then | depth and stencil tests, sample by sample | [`sample_tests`] |
 //!
+//! What the text rules in a word or a number is data ([`Rules`]), so that the conformance cases can be held against an oracle
+//! that follows other rules.
+//!
 //! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), as the device gets them.
 //! Each of them converts exactly to `f64`. Nothing is rounded again but the depth key, which the specification rounds.
 //!
@@ -58,6 +61,7 @@ mod projection;
 pub mod rays;
 mod render;
 pub mod resolve;
+pub mod rules;
 pub mod sample_tests;
 pub mod shaded;
 mod skips;
@@ -76,5 +80,6 @@ pub use inputs::{
 };
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
+pub use rules::Rules;
 pub use sample_tests::{OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested};
 pub use skips::{SkipCounts, SkipReason};

@@ -1,6 +1,6 @@
 //! The equirectangular projection: longitude and latitude, and pictures that repeat.
 
-use super::{OracleCamera, OracleModel};
+use super::{OracleCamera, OracleModel, Rules};
 use std::f64::consts::TAU;
 
 /// The cosine of the latitude beyond which the Jacobian no longer grows.
@@ -25,9 +25,9 @@ pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 
 }
 
 /// The number of pixels after which a camera's picture repeats to the right and to the left; infinity if it does not.
-pub fn period(camera: &OracleCamera) -> f64 {
+pub fn period(camera: &OracleCamera, rules: &Rules) -> f64 {
     match camera.model {
-        OracleModel::Equirectangular => TAU * f64::from(camera.focal[0]),
+        OracleModel::Equirectangular if rules.panorama_repeats => TAU * f64::from(camera.focal[0]),
         _ => f64::INFINITY,
     }
 }

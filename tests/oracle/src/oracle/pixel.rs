@@ -2,6 +2,7 @@
 
 use super::OracleState;
 use super::error_model::{Transmittance, UNIT_ROUNDOFF};
+use super::rules::{MedianHalf, WeighedBy};
 use super::splat::{Alpha, Splat};
 
 /// The number of undecidable decisions that are followed both ways along one path. Later ones follow binary64.
@@ -30,11 +31,16 @@ const MAX_MEDIANS: usize = 4;
 
 impl Medians {
     /// A Gaussian contributes where `before` is left; it is the median unless less than one half is.
-    fn add(&mut self, median: Median, before: Transmittance) {
-        if before.value + before.error < 0.5 {
+    fn add(&mut self, median: Median, before: Transmittance, half: MedianHalf) {
+        let (certainly_less, certainly_not) = (before.value + before.error < 0.5, before.value - before.error >= 0.5);
+        let (certainly, certainly_another) = match half {
+            MedianHalf::Upper => (certainly_not, certainly_less),
+            MedianHalf::Lower => (certainly_less, certainly_not),
+        };
+        if certainly_another {
             return;
         }
-        if before.value - before.error >= 0.5 {
+        if certainly {
             self.count = 0;
         }
         match self.of.get_mut(self.count) {
@@ -242,19 +248,30 @@ impl Step<'_> {
             if finishes {
                 self.blend(&mut other, behind);
             } else {
-                other.finished = true;
+                self.finish(&mut other, behind);
             }
             self.forks.push(other);
         }
         if finishes {
-            path.finished = true;
+            self.finish(path, behind);
         } else {
             self.blend(path, behind);
         }
     }
 
+    fn finish(&self, path: &mut Path, behind: Transmittance) {
+        if self.state.rules.last_contributes {
+            self.blend(path, behind);
+        }
+        path.finished = true;
+    }
+
     fn blend(&self, path: &mut Path, behind: Transmittance) {
-        let weight = path.transmittance.value * self.alpha.value;
+        let transmittance = match self.state.rules.weighed_by {
+            WeighedBy::TransmittanceBefore => path.transmittance.value,
+            WeighedBy::TransmittanceBehind => behind.value,
+        };
+        let weight = transmittance * self.alpha.value;
         for (sum, color) in path.color.iter_mut().zip(self.color) {
             *sum += weight * color;
         }
@@ -263,7 +280,7 @@ impl Step<'_> {
         path.distances += weight * f64::from(self.median.distance);
         path.nearest = path.nearest.or(Some(self.median.index));
         path.covered = true;
-        path.medians.add(self.median, path.transmittance);
+        path.medians.add(self.median, path.transmittance, self.state.rules.median_half);
         path.transmittance = behind;
     }
 

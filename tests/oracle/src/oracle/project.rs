@@ -5,6 +5,7 @@ use super::instance::Model;
 use super::own_axes::OwnAxes;
 use super::panorama;
 use super::projection::{depth_variable, mean_and_jacobian};
+use super::rules::ColorDirection;
 use super::spherical_harmonics;
 use super::splat::{Cholesky, Splat};
 use super::surfel::Surfel;
@@ -20,6 +21,7 @@ pub fn project(
     index: usize,
 ) -> Result<Splat, SkipReason> {
     check_attributes(scene, state, index)?;
+    let rules = &state.rules;
 
     // Step 2. Camera space, and the depth key.
     let rotation = camera.rotation.map(f64::from);
@@ -44,7 +46,7 @@ pub fn project(
     };
 
     // Step 3. The mean and the Jacobian of the projection.
-    let (mut mean, jacobian) = mean_and_jacobian(camera, t);
+    let (mut mean, jacobian) = mean_and_jacobian(camera, rules, t);
     let scale = scales(scene, state, index).map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
     let m = jacobian.map(|row| {
@@ -65,7 +67,7 @@ pub fn project(
             let axis = [axes[k], axes[3 + k], axes[6 + k]].map(|c| c * scale[k]);
             transform(&rotation, model.vector(axis))
         });
-        if let Some((sigma_mean, deviations)) = unscented::transform(camera, t, &axes) {
+        if let Some((sigma_mean, deviations)) = unscented::transform(camera, rules, t, &axes) {
             spread = [0, 1].map(|i| deviations.iter().map(|d| d[i].abs()).sum());
             (mean, columns) = (sigma_mean, deviations);
         }
@@ -91,7 +93,11 @@ pub fn project(
     }
 
     // Step 5. Colour.
-    let toward = model.solve(offset);
+    let toward = match rules.color_direction {
+        ColorDirection::FromEye => model.solve(offset),
+        ColorDirection::ToEye => model.solve(offset).map(|c| -c),
+        ColorDirection::FromEyeInWorld => offset,
+    };
     let direction = toward.map(|c| c / length(toward));
     let color = spherical_harmonics::color(scene.degree(), direction, scene.coefficients(index));
 
@@ -110,11 +116,11 @@ pub fn project(
         mean,
         covariance,
         determinant,
-        period: panorama::period(camera),
+        period: panorama::period(camera, rules),
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color,
-        key: sort_by as f32,
+        key: rules.key_rounding.key(sort_by),
         z,
         distance: z,
         depth: 0.0,
@@ -127,11 +133,11 @@ pub fn project(
             centre: t,
             mean,
             low_pass,
+            beyond: if rules.discs_begin_at_near { camera.near.into() } else { f64::NEG_INFINITY },
             fixed: error_model::FIXED + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
         }),
         own_axes: OwnAxes::new(&axes, scale, offset),
-        key_undecidable: !matches!(state.order, OracleOrder::Primitive | OracleOrder::PerPixel)
-            && key_is_undecidable(&rotation, offset, lost, sort_by),
+        key_undecidable: state.order.has_keys() && key_is_undecidable(&rotation, offset, lost, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
 }

@@ -2,12 +2,12 @@
 
 use super::panorama;
 use super::vectors::{dot, length};
-use super::{OracleCamera, OracleModel};
+use super::{OracleCamera, OracleModel, Rules};
 
 /// The image position of a point in camera axes, and the Jacobian of the projection there.
-pub(super) fn mean_and_jacobian(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+pub(super) fn mean_and_jacobian(camera: &OracleCamera, rules: &Rules, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     match camera.model {
-        OracleModel::Pinhole => pinhole(camera, t),
+        OracleModel::Pinhole => pinhole(camera, rules.slope_margin, t),
         OracleModel::Orthographic => orthographic(camera, t),
         OracleModel::Fisheye => fisheye(camera, t),
         OracleModel::Equirectangular => panorama::equirectangular(camera, t),
@@ -22,14 +22,15 @@ pub(super) fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
     }
 }
 
-/// The mean and the Jacobian of perspective. The point is clamped to the viewport and a margin.
-fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+/// The mean and the Jacobian of perspective. The point is clamped to the viewport and a margin, which is given as a share of
+/// the viewport's side.
+fn pinhole(camera: &OracleCamera, margin: f64, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let [fx, fy] = camera.focal.map(f64::from);
     let [cx, cy] = camera.principal.map(f64::from);
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
-    let u = tan_x.max(-(cx / fx + 0.15 * width / fx)).min((width - cx) / fx + 0.15 * width / fx);
-    let v = tan_y.max(-(cy / fy + 0.15 * height / fy)).min((height - cy) / fy + 0.15 * height / fy);
+    let u = tan_x.max(-(cx / fx + margin * width / fx)).min((width - cx) / fx + margin * width / fx);
+    let v = tan_y.max(-(cy / fy + margin * height / fy)).min((height - cy) / fy + margin * height / fy);
     let jacobian = [[fx / t[2], 0.0, -fx * u / t[2]], [0.0, fy / t[2], -fy * v / t[2]]];
     ([fx * tan_x + cx, fy * tan_y + cy], jacobian)
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::pixel::Pixel;
 use super::project::project;
 use super::rays;
+use super::rules::FrontOfTies;
 use super::splat::Splat;
 use super::{OracleCamera, OracleOrder, OracleScene, OracleState, SkipCounts, SkipReason};
 
@@ -179,16 +180,16 @@ fn render_per_pixel(
 /// The Gaussians that are drawn, nearest first, and the counts of the others.
 pub(super) struct Projected {
     pub(super) splats: Vec<Splat>,
-    skips: SkipCounts,
+    pub(super) skips: SkipCounts,
 }
 
 impl Projected {
     pub(super) fn new(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Self {
-        Self::sort((0..scene.len()).map(|index| project(scene, camera, state, index)))
+        Self::sort((0..scene.len()).map(|index| project(scene, camera, state, index)), state)
     }
 
     /// The drawable Gaussians of `all`, sorted. `all` is in primitive order.
-    pub(super) fn sort(all: impl Iterator<Item = Result<Splat, SkipReason>>) -> Self {
+    pub(super) fn sort(all: impl Iterator<Item = Result<Splat, SkipReason>>, state: &OracleState) -> Self {
         let mut skips = SkipCounts::default();
         let mut splats = Vec::new();
         for (index, one) in all.enumerate() {
@@ -196,6 +197,9 @@ impl Projected {
                 Ok(splat) => splats.push(Splat { index, ..splat }),
                 Err(reason) => skips.count(reason),
             }
+        }
+        if state.rules.front_of_ties == FrontOfTies::Last && state.order.has_keys() {
+            splats.reverse();
         }
         // Stable, so that ties stay in primitive order.
         splats.sort_by(|a, b| a.key.total_cmp(&b.key));

@@ -73,7 +73,7 @@ pub fn resolve_scene(
     tests: &OracleTests,
 ) -> Vec<Vec<Resolved>> {
     let projected = Projected::new(scene, camera, state);
-    let depth = |z| tests.format.depth(tests.code(camera.model, z));
+    let depth = |z| tests.format.depth(tests.code(camera.model, &state.rules, z));
     resolve(projected, [camera.width, camera.height], state, depth)
 }
 
@@ -86,5 +86,5 @@ pub fn resolve_shaded(
     state: &OracleState,
 ) -> Vec<Vec<Resolved>> {
     let all = outputs.iter().map(|one| project(one, viewport, state));
-    resolve(Projected::sort(all), size, state, f64::from)
+    resolve(Projected::sort(all, state), size, state, f64::from)
 }

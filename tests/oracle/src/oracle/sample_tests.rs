@@ -11,7 +11,7 @@ use super::pixel::{Outcome, Pixel};
 use super::rays;
 use super::render::{Bound, Projected, Reference, collect};
 use super::splat::{Alpha, Splat};
-use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState};
+use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState, Rules};
 
 /// The format of a depth attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +25,15 @@ pub enum OracleDepthFormat {
 impl OracleDepthFormat {
     /// The nearest number to a depth, which is clamped to 0 to 1.
     pub fn code(self, depth: f64) -> u32 {
+        self.code_by(f64::round_ties_even, depth)
+    }
+
+    /// The number of a depth, which is clamped to 0 to 1. Integers are rounded by `round`.
+    fn code_by(self, round: fn(f64) -> f64, depth: f64) -> u32 {
         let depth = depth.clamp(0.0, 1.0);
         match self {
             Self::Float => (depth as f32).to_bits(),
-            Self::Unorm(bits) => (depth * ((1u64 << bits) - 1) as f64).round_ties_even() as u32,
+            Self::Unorm(bits) => round(depth * ((1u64 << bits) - 1) as f64) as u32,
         }
     }
 
@@ -93,16 +98,17 @@ pub struct OracleTests {
 
 impl OracleTests {
     /// The depth of a centre with depth variable `z`, as the attachment holds it.
-    pub fn code(&self, model: OracleModel, z: f32) -> u32 {
+    pub fn code(&self, model: OracleModel, rules: &Rules, z: f32) -> u32 {
         let [c0, c1] = self.depth_coefficients.map(f64::from);
         let [near, far] = self.depth_range.map(f64::from);
         let z = f64::from(z);
         let depth = match model {
-            OracleModel::Orthographic => c0 + c1 * z,
-            OracleModel::Pinhole | OracleModel::Fisheye | OracleModel::Equirectangular => c0 + c1 / z,
+            OracleModel::Orthographic if rules.orthographic_depth_is_linear => c0 + c1 * z,
+            _ => c0 + c1 / z,
         };
         let depth = if self.negative_one_to_one { depth / 2.0 + 0.5 } else { depth };
-        self.format.code(near + depth.clamp(0.0, 1.0) * (far - near))
+        let round = if rules.depths_round_down { f64::floor } else { f64::round_ties_even };
+        self.format.code_by(round, near + depth.clamp(0.0, 1.0) * (far - near))
     }
 }
 
@@ -157,7 +163,7 @@ struct Sample<'a> {
 }
 
 impl Sample<'_> {
-    fn new(tests: &OracleTests, stored: (u32, u8)) -> Self {
+    fn new(tests: &OracleTests, rules: &Rules, stored: (u32, u8)) -> Self {
         let depth = tests.format.depth(stored.0);
         let within = |[least, greatest]: [f32; 2]| {
             let [least, greatest] = [least, greatest].map(|bound| {
@@ -172,7 +178,7 @@ impl Sample<'_> {
             stored,
             candidate: tests.bounds.is_none_or(within),
             stencil_passes: tests.stencil.is_none_or(|stencil| stencil.passes(stored.1)),
-            reached: [false; 2],
+            reached: [!rules.failures_need_gaussian; 2],
         }
     }
 
@@ -185,7 +191,7 @@ impl Sample<'_> {
     }
 
     /// The values that it may store afterwards: depths, if known, and stencils.
-    fn after(&self, tests: &OracleTests, code: impl Fn(f32) -> u32) -> (Option<Vec<u32>>, Vec<u8>) {
+    fn after(&self, tests: &OracleTests, rules: &Rules, code: impl Fn(f32) -> u32) -> (Option<Vec<u32>>, Vec<u8>) {
         let writes = tests.depth.is_some_and(|(_, write)| write);
         let (mut depths, mut stencils) = (Some(Vec::new()), Vec::new());
         for outcome in self.pixel.outcomes() {
@@ -200,22 +206,23 @@ impl Sample<'_> {
             if *covered && writes && outcome.medians_exhausted {
                 depths = None;
             }
-            stencils.extend(self.stencils(tests, *covered));
+            stencils.extend(self.stencils(tests, rules, *covered));
         }
         (depths, stencils)
     }
 
-    fn stencils(&self, tests: &OracleTests, covered: bool) -> Vec<u8> {
+    fn stencils(&self, tests: &OracleTests, rules: &Rules, covered: bool) -> Vec<u8> {
         let old = self.stored.1;
         let Some(stencil) = tests.stencil.filter(|_| self.candidate) else {
             return vec![old];
         };
         let state = &stencil.state;
+        let apply = |op| (0..rules.stencil_repetitions).fold(old, |value, _| stencil.apply(op, value));
         if covered {
-            return vec![stencil.apply(state.pass_op, old)];
+            return vec![apply(state.pass_op)];
         }
         let failed = if self.stencil_passes { state.depth_fail_op } else { state.fail_op };
-        let failed = stencil.apply(failed, old);
+        let failed = apply(failed);
         match self.reached {
             [true, _] => vec![failed],
             [false, true] => vec![failed, old],
@@ -233,7 +240,8 @@ pub fn render_tested(
     stored: &Stored,
 ) -> TestedReference {
     let projected = Projected::new(scene, camera, state);
-    let codes: Vec<u32> = projected.splats.iter().map(|splat| tests.code(camera.model, splat.z)).collect();
+    let rules = &state.rules;
+    let codes: Vec<u32> = projected.splats.iter().map(|splat| tests.code(camera.model, rules, splat.z)).collect();
     let bounds: Vec<Bound> = projected.splats.iter().map(|splat| Bound::new(splat, state)).collect();
     let per_pixel = state.order == OracleOrder::PerPixel;
     let row = |y: u32| {
@@ -241,7 +249,7 @@ pub fn render_tested(
         let mut row: Vec<Sample> = (first..first + camera.width as usize)
             .map(|at| {
                 let stencil = stored.stencil.get(at).copied().unwrap_or(0);
-                Sample::new(tests, (stored.depth[at], stencil))
+                Sample::new(tests, &state.rules, (stored.depth[at], stencil))
             })
             .collect();
         for ((splat, bound), &code) in projected.splats.iter().zip(&bounds).zip(&codes) {
@@ -275,7 +283,8 @@ pub fn render_tested(
         row
     };
     let samples: Vec<Sample> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
-    let (depth, stencil) = samples.iter().map(|sample| sample.after(tests, |z| tests.code(camera.model, z))).unzip();
+    let (depth, stencil) =
+        samples.iter().map(|sample| sample.after(tests, rules, |z| tests.code(camera.model, rules, z))).unzip();
     let covered = |sample: &Sample| -> Vec<bool> {
         let outcomes = sample.pixel.outcomes();
         outcomes.map(|outcome| outcome.covered).collect()

@@ -89,7 +89,7 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         key: match state.order {
             OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
             // Adding 0 makes a negative zero positive.
-            OracleOrder::ViewDepth | OracleOrder::RadialDistance => key + 0.0,
+            OracleOrder::ViewDepth | OracleOrder::RadialDistance => f64::from(key) + 0.0,
         },
         z: (z / w) as f32,
         depth: 0.0,
@@ -106,5 +106,5 @@ pub fn render_shaded(
     state: &OracleState,
 ) -> Reference {
     let all = outputs.iter().map(|one| project(one, viewport, state));
-    bounded(&Projected::sort(all), size, state)
+    bounded(&Projected::sort(all, state), size, state)
 }

@@ -26,8 +26,8 @@ pub struct Splat {
     pub opacity: f64,
     /// Colour, at least 0.
     pub color: [f64; 3],
-    /// The value by which it is sorted, rounded to binary32.
-    pub key: f32,
+    /// The value by which it is sorted, rounded to binary32 unless the rules are others.
+    pub key: f64,
     /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
     pub z: f32,
     /// The depth variable, rounded to binary32: with vertex-shader projection w.

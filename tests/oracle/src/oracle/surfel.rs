@@ -23,6 +23,8 @@ pub struct Surfel {
     pub(super) mean: [f64; 2],
     /// The filter's variance.
     pub(super) low_pass: f64,
+    /// The depth beyond which a pinhole's rays meet it.
+    pub(super) beyond: f64,
     /// Relative error of alpha that is allowed for every disc.
     pub(super) fixed: f64,
 }
@@ -44,7 +46,7 @@ impl Surfel {
         let depth = dot(cross(a, b), t) / w;
         let is_met = match camera.model {
             OracleModel::Orthographic => w != 0.0,
-            _ => w != 0.0 && depth > f64::from(camera.near),
+            _ => w != 0.0 && depth > self.beyond,
         };
         let unit = 0.5 * f64::EPSILON * ROUNDINGS;
         let (size_a, size_b) = (length(a), length(b));

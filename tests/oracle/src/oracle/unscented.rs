@@ -2,14 +2,13 @@
 
 use super::projection::mean_and_jacobian;
 use super::vectors::{cross, dot, length};
-use super::{OracleCamera, OracleModel, panorama};
+use super::{OracleCamera, OracleModel, Rules, panorama};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Number of dimensions of the space that is projected.
 const N: f64 = 3.0;
-/// The transform's parameters.
+/// The transform's parameters; the third, beta, is one of the [`Rules`].
 const ALPHA: f64 = 1.0;
-const BETA: f64 = 2.0;
 const KAPPA: f64 = 0.0;
 
 /// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their
@@ -18,7 +17,12 @@ pub type Deviations = Vec<[f64; 2]>;
 
 /// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera
 /// axes, and its deviations. `None` if a sigma point is not visible together with the mean.
-pub fn transform(camera: &OracleCamera, t: [f64; 3], axes: &[[f64; 3]; 3]) -> Option<([f64; 2], Deviations)> {
+pub fn transform(
+    camera: &OracleCamera,
+    rules: &Rules,
+    t: [f64; 3],
+    axes: &[[f64; 3]; 3],
+) -> Option<([f64; 2], Deviations)> {
     let lambda = ALPHA * ALPHA * (N + KAPPA) - N;
     let mut points = vec![t];
     for axis in axes {
@@ -29,12 +33,12 @@ pub fn transform(camera: &OracleCamera, t: [f64; 3], axes: &[[f64; 3]; 3]) -> Op
     if !points[1..].iter().all(|&point| is_seen(camera, t, point)) {
         return None;
     }
-    let center = mean_and_jacobian(camera, t).0;
-    let period = panorama::period(camera);
+    let center = mean_and_jacobian(camera, rules, t).0;
+    let period = panorama::period(camera, rules);
     let places: Vec<[f64; 2]> = points
         .iter()
         .map(|&point| {
-            let [x, y] = mean_and_jacobian(camera, point).0;
+            let [x, y] = mean_and_jacobian(camera, rules, point).0;
             let dx = panorama::nearest(x - center[0], period).unwrap_or(x - center[0]);
             [center[0] + dx, y]
         })
@@ -44,7 +48,7 @@ pub fn transform(camera: &OracleCamera, t: [f64; 3], axes: &[[f64; 3]; 3]) -> Op
         if index == 0 { lambda / (N + lambda) } else { other }
     };
     let in_covariance = |index: usize| match index {
-        0 => lambda / (N + lambda) + 1.0 - ALPHA * ALPHA + BETA,
+        0 => lambda / (N + lambda) + 1.0 - ALPHA * ALPHA + rules.unscented_beta,
         _ => other,
     };
     let mean = [0, 1].map(|axis| {

@@ -1,8 +1,8 @@
 //! binary16 rasterization against its definition, one number at a time.
 
 use super::*;
-use crate::raster::gaussian::binary16::scalar;
-use crate::raster::gaussian::binary16::scalar::Splat16;
+use crate::raster::gaussian::by_block::binary16::scalar;
+use crate::raster::gaussian::by_block::binary16::scalar::Splat16;
 
 /// As [`naive_sample`](super::naive_sample), in binary16.
 pub(super) fn naive_sample(

@@ -1,0 +1,253 @@
+//! Attributes: vertex fetch for Gaussians, from streams to structures of arrays.
+
+use crate::format::Format;
+use crate::gaussian::lanes::F32_LANES;
+use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
+
+/// The attributes of a group's Gaussians as they are read from the streams: an array per component, an element per
+/// lane.
+#[derive(Clone, Debug)]
+pub(crate) struct Attributes {
+    pub(crate) position: [[f32; F32_LANES]; 3],
+    pub(crate) scale: [[f32; F32_LANES]; 3],
+    pub(crate) rotation: [[f32; F32_LANES]; 4],
+    pub(crate) opacity: [f32; F32_LANES],
+}
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
+            position: [[0.0; F32_LANES]; 3],
+            scale: [[0.0; F32_LANES]; 3],
+            rotation: [[0.0; F32_LANES]; 4],
+            opacity: [0.0; F32_LANES],
+        }
+    }
+}
+
+impl Attributes {
+    /// The second largest of a lane's three scales.
+    pub(crate) fn second_scale(&self, lane: usize) -> f32 {
+        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
+        a.max(b).min(a.max(c)).min(b.max(c))
+    }
+
+    /// Overwrites lane `to` with lane `from` of `others`.
+    pub(crate) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
+        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
+        for (own, other) in self.position.iter_mut().zip(&others.position) {
+            copy(own, other);
+        }
+        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
+            copy(own, other);
+        }
+        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
+            copy(own, other);
+        }
+        copy(&mut self.opacity, &others.opacity);
+    }
+}
+
+/// The largest stride in bytes for which consecutive vertices are read with one copy, gaps included. With a larger
+/// stride each element is read by itself.
+const WHOLE_SPAN_STRIDE: u32 = 64;
+
+/// The vertices of one group of one instance.
+pub(crate) struct GroupVertices<'a> {
+    /// The vertices, as many as the group has lanes in use.
+    vertices: VertexNumbers<'a>,
+    pub(crate) instance: u32,
+    pub(crate) first_instance: u32,
+    pub(crate) len: usize,
+}
+
+enum VertexNumbers<'a> {
+    /// Consecutive vertices, from this one on.
+    From(u64),
+    /// Vertex numbers read from an index buffer.
+    Listed(Vec<u64>),
+    /// The draw's first vertex, and the numbers of a cluster's vertices relative to it.
+    Cluster(u64, &'a [u32]),
+}
+
+impl<'a> GroupVertices<'a> {
+    /// The `len` vertices of `append` from number `start` on, for `instance`.
+    pub(crate) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
+        let first = u64::from(append.first) + u64::from(start);
+        let vertices = match &append.indices {
+            None => VertexNumbers::From(first),
+            Some(stream) => VertexNumbers::Listed(read_indices(stream, first, len)),
+        };
+        Self { vertices, instance, first_instance: append.first_instance, len }
+    }
+
+    /// The vertices of `append` with these numbers, relative to its first vertex, for `instance`.
+    pub(crate) fn of_cluster(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
+        Self {
+            vertices: VertexNumbers::Cluster(append.first.into(), numbers),
+            instance,
+            first_instance: append.first_instance,
+            len: numbers.len(),
+        }
+    }
+
+    /// The element of `stream` that lane `lane` reads.
+    pub(super) fn element(&self, stream: &AttributeStream, lane: usize) -> u64 {
+        match stream.instance_divisor {
+            Some(0) => u64::from(self.first_instance),
+            Some(divisor) => {
+                u64::from(self.first_instance) + u64::from((self.instance - self.first_instance) / divisor)
+            }
+            None => match &self.vertices {
+                VertexNumbers::From(first) => first + lane as u64,
+                VertexNumbers::Listed(list) => list[lane],
+                VertexNumbers::Cluster(first, numbers) => first + u64::from(numbers[lane]),
+            },
+        }
+    }
+
+    /// True if consecutive lanes read consecutive elements of `stream`.
+    fn is_consecutive(&self, stream: &AttributeStream) -> bool {
+        stream.instance_divisor.is_none() && matches!(self.vertices, VertexNumbers::From(_))
+    }
+}
+
+/// Reads `len` vertex numbers from the index buffer, from its element `first` on, and adds the vertex offset.
+fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
+    let mut indices = Vec::new();
+    stream.read(first, len as u32, &mut indices);
+    let vertex = |index: u32| {
+        let vertex = i64::from(index) + i64::from(stream.vertex_offset);
+        // A negative sum names no vertex. The largest number lies outside every buffer, which reads as zero.
+        u64::try_from(vertex).unwrap_or(u64::from(u32::MAX))
+    };
+    indices.into_iter().map(vertex).collect()
+}
+
+/// The bytes of an attribute of this format, and true if its components are 32-bit floats.
+pub(super) fn layout(format: Format) -> (usize, bool) {
+    let floats = matches!(
+        format,
+        Format::R32Sfloat | Format::R32G32Sfloat | Format::R32G32B32Sfloat | Format::R32G32B32A32Sfloat
+    );
+    (format.texel_size(), floats)
+}
+
+/// Reads attributes. It owns the bytes that a read needs in between.
+#[derive(Default)]
+pub(crate) struct Fetcher {
+    bytes: Vec<u8>,
+}
+
+impl Fetcher {
+    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`.
+    pub(crate) fn read<const COMPONENTS: usize>(
+        &mut self,
+        stream: &AttributeStream,
+        group: &GroupVertices<'_>,
+        mut out: [&mut [f32; F32_LANES]; COMPONENTS],
+    ) {
+        let (size, floats) = layout(stream.format);
+        if stream.instance_divisor.is_some() && group.len > 0 {
+            let element = self.read_element(stream, group.element(stream, 0), size);
+            let value = stream.format.decode(element);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[..group.len].fill(value[component]);
+            }
+            return;
+        }
+        let step = self.read_bytes(stream, group, size);
+        let elements = self.bytes.chunks(step).take(group.len).enumerate();
+        if floats && size >= 4 * COMPONENTS {
+            for (lane, bytes) in elements {
+                let words = bytes.as_chunks::<4>().0;
+                for (out, &word) in out.iter_mut().zip(words) {
+                    out[lane] = f32::from_le_bytes(word);
+                }
+            }
+            return;
+        }
+        for (lane, bytes) in elements {
+            let value = stream.format.decode(&bytes[..size]);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[lane] = value[component];
+            }
+        }
+    }
+
+    /// Reads a group's positions, scales, rotations and opacities, without the model's transform, and applies the
+    /// activations.
+    pub(crate) fn read_own(&mut self, streams: &GaussianAttributes, group: &GroupVertices<'_>, out: &mut Attributes) {
+        self.read(&streams.position, group, out.position.each_mut());
+        self.read(&streams.scale, group, out.scale.each_mut());
+        self.read(&streams.rotation, group, out.rotation.each_mut());
+        self.read(&streams.opacity, group, [&mut out.opacity]);
+        if streams.activations != Activations::default() {
+            activate(streams.activations, group.len, out);
+        }
+    }
+
+    /// Multiplies a group's opacities by the model's opacities, if the model has any.
+    pub(crate) fn fade(&mut self, streams: &GaussianAttributes, group: &GroupVertices<'_>, out: &mut Attributes) {
+        if let Some(stream) = &streams.model.opacity {
+            let mut factor = [0.0; F32_LANES];
+            self.read(stream, group, [&mut factor]);
+            for (opacity, factor) in out.opacity.iter_mut().zip(factor) {
+                *opacity *= factor;
+            }
+        }
+    }
+
+    /// Reads an element of `size` bytes.
+    fn read_element(&mut self, stream: &AttributeStream, element: u64, size: usize) -> &[u8] {
+        self.grow(size);
+        let bytes = &mut self.bytes[..size];
+        stream.read(element, bytes);
+        bytes
+    }
+
+    /// Copies the group's elements into `bytes` and returns the distance in bytes from one to the next.
+    fn read_bytes(&mut self, stream: &AttributeStream, group: &GroupVertices<'_>, size: usize) -> usize {
+        let stride = stream.stride as usize;
+        if group.is_consecutive(stream) && stream.stride <= WHOLE_SPAN_STRIDE && stride >= size && group.len > 0 {
+            let span = stride * (group.len - 1) + size;
+            self.grow(span);
+            let first = group.element(stream, 0);
+            if stream.place(first, span as u64).is_some() {
+                stream.read(first, &mut self.bytes[..span]);
+                return stride;
+            }
+        }
+        self.grow(size * group.len);
+        let elements = self.bytes.chunks_exact_mut(size).take(group.len);
+        for (lane, element) in elements.enumerate() {
+            stream.read(group.element(stream, lane), element);
+        }
+        size
+    }
+
+    /// Makes `bytes` at least so long.
+    fn grow(&mut self, bytes: usize) {
+        if self.bytes.len() < bytes {
+            self.bytes.resize(bytes, 0);
+        }
+    }
+}
+
+/// Applies the activations to the first `len` lanes: `exp` to logarithms of scales, the logistic function to logits of
+/// opacities.
+#[cold]
+fn activate(activations: Activations, len: usize, out: &mut Attributes) {
+    let apply = |lanes: &mut [f32; F32_LANES], function: fn(f64) -> f64| {
+        for value in lanes.iter_mut().take(len) {
+            *value = function(f64::from(*value)) as f32;
+        }
+    };
+    if activations.log_scale {
+        let scales = out.scale.iter_mut();
+        scales.for_each(|lanes| apply(lanes, f64::exp));
+    }
+    if activations.logit_opacity {
+        apply(&mut out.opacity, |logit| 1.0 / (1.0 + (-logit).exp()));
+    }
+}

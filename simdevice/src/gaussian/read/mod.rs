@@ -1,0 +1,10 @@
+//! Reading: the attributes of Gaussians and of their models, from streams in memory to arrays of a number per lane.
+
+pub(crate) mod attributes;
+pub(crate) mod cluster_cache;
+pub(crate) mod clusters;
+pub(crate) mod fingerprint;
+pub(crate) mod group;
+pub(crate) mod harmonics;
+pub(crate) mod models;
+mod morton;

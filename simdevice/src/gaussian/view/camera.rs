@@ -1,0 +1,160 @@
+//! Camera models: the projection of a point to the picture, the projection's Jacobian, and the depth variable.
+
+use crate::state::gaussian::{Camera, CameraModel};
+
+/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
+pub(crate) fn period(camera: &Camera) -> Option<f64> {
+    let focal = f64::from(camera.focal_length[0]);
+    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
+}
+
+/// A point's position in the picture relative to the principal point, and the two rows of the projection's Jacobian,
+/// both for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
+/// least and the greatest of `slopes`. Points that have no position give NaN.
+pub(crate) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    match model {
+        CameraModel::Pinhole => pinhole(slopes, t),
+        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        CameraModel::Fisheye => fisheye(t),
+        CameraModel::Equirectangular => equirectangular(t),
+    }
+}
+
+fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let place = [x / z, y / z];
+    let [u, v] = [0, 1].map(|axis| place[axis].max(least[axis]).min(greatest[axis]));
+    (place, [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
+}
+
+/// The equidistant projection: the distance from the principal point is the angle from the axis.
+fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(y);
+    if r == 0.0 {
+        // A point straight behind the camera projects to a whole circle, so it has no position.
+        let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
+        return ([0.0; 2], [[scale, 0.0, 0.0], [0.0, scale, 0.0]]);
+    }
+    // Along the radius a point moves by z / |t|^2, across it by angle / r, and along the axis by -r / |t|^2.
+    let (cos, sin) = (x / r, y / r);
+    let length = r.hypot(z);
+    let (along, across, axial) = (z / length / length, r.atan2(z) / r, -(r / length / length));
+    let mixed = (along - across) * cos * sin;
+    (
+        [across * x, across * y],
+        [
+            [along * cos * cos + across * sin * sin, mixed, axial * cos],
+            [mixed, along * sin * sin + across * cos * cos, axial * sin],
+        ],
+    )
+}
+
+/// The least cosine of the latitude for which a panorama's Jacobian is taken. At a pole itself it would be infinite,
+/// because the meridians meet.
+const POLE: f64 = 1.0 / 1024.0;
+
+/// The equirectangular projection: longitude, from straight ahead to the right, and latitude, downwards.
+fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(z);
+    let length = r.hypot(y);
+    // At a pole the longitude is undefined; that of straight ahead is taken.
+    let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
+    let across = 1.0 / r.max(POLE * length);
+    let (rise, run) = (y / length, r / length);
+    (
+        [x.atan2(z), y.atan2(r)],
+        [[cos * across, 0.0, -sin * across], [-sin * rise / length, run / length, -cos * rise / length]],
+    )
+}
+
+/// The depth variable, by which near and far plane, fragment depth and the view-depth order go: `t.z` for pinhole and
+/// orthographic cameras, the distance from the eye for the others.
+pub(crate) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
+    match model {
+        CameraModel::Pinhole | CameraModel::Orthographic => z,
+        CameraModel::Fisheye | CameraModel::Equirectangular => (x * x + y * y + z * z).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Bounds beyond every slope in these tests.
+    const SLOPES: [[f64; 2]; 2] = [[-1e3; 2], [1e3; 2]];
+
+    const MODELS: [CameraModel; 4] =
+        [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye, CameraModel::Equirectangular];
+
+    /// The Jacobian by central differences.
+    fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
+        let step = 1e-5 * (t[0].abs() + t[1].abs() + t[2].abs());
+        let mut rows = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            let moved = |by: f64| {
+                let mut t = t;
+                t[axis] += by;
+                linearize(model, SLOPES, t).0
+            };
+            let (ahead, behind) = (moved(step), moved(-step));
+            for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                row[axis] = (a - b) / (2.0 * step);
+            }
+        }
+        rows
+    }
+
+    proptest! {
+        #[gaurast_runner::test]
+        fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
+            for model in MODELS {
+                // Fisheyes and panoramas see to the sides and behind. A fisheye has no position for what is straight
+                // behind.
+                let t = match model {
+                    CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
+                    _ => [x, y, z],
+                };
+                let (_, rows) = linearize(model, SLOPES, t);
+                for (row, expected) in rows.iter().zip(jacobian(model, t)) {
+                    for (a, b) in row.iter().zip(expected) {
+                        prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[gaurast_runner::test]
+    fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
+        let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
+        assert_eq!((place, rows), linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0]));
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
+        assert!((rows[1][1] - 0.25).abs() < 1e-12);
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
+        assert!(rows[0][0].is_nan());
+    }
+
+    #[gaurast_runner::test]
+    fn a_panorama_sees_all_directions() {
+        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).0;
+        let right = std::f64::consts::FRAC_PI_2;
+        assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
+        assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
+        assert_eq!(place([0.0, 0.0, -1.0]), [2.0 * right, 0.0]);
+        assert_eq!(place([0.0, 5.0, 0.0]), [0.0, right]);
+        assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
+        // At a pole, and a little away from it, a point moves no faster than the stated limit.
+        for x in [0.0, 1e-9] {
+            let (_, rows) = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
+            assert_eq!(rows[0], [512.0, 0.0, 0.0]);
+            assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
+        }
+    }
+
+    #[gaurast_runner::test]
+    fn the_depth_of_what_sees_all_around_is_the_distance() {
+        assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Equirectangular, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Orthographic, [2.0, 3.0, -6.0]), -6.0);
+    }
+}

@@ -1,0 +1,117 @@
+//! Cut-offs in whole tiles: which tiles of 16x16 pixels a Gaussian is drawn in, whatever its alpha. Where they are the device's
+//! own tiles, its lists leave the others out, and pixels need no test.
+
+use super::camera::period;
+use crate::limits::TILE_SIZE;
+use crate::state::Viewport;
+use crate::state::gaussian::{Camera, GaussianCutOff, GaussianState};
+
+/// Pixels along a side of the tiles that cut-offs are rounded to.
+pub(crate) const CUT_TILE: f64 = 16.0;
+
+/// The least square of half the difference of a covariance's eigenvalues, in px^4, that a square is found of.
+const LEAST_SPREAD: f64 = 0.1;
+
+/// A cut-off in tiles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileCutOff {
+    /// Tiles of a square, not of a rectangle.
+    is_square: bool,
+    /// Standard deviations.
+    deviations: f64,
+    /// The upper left corner of the viewport's area, from which tiles count.
+    corner: [f64; 2],
+}
+
+impl TileCutOff {
+    /// The cut-off of a state, if it is one in tiles.
+    pub(crate) fn of(state: &GaussianState, viewport_corner: [f64; 2]) -> Option<Self> {
+        let footprint = &state.footprint;
+        let is_square = match footprint.cut_off {
+            GaussianCutOff::TileSquare => true,
+            GaussianCutOff::TileRectangle => false,
+            GaussianCutOff::None | GaussianCutOff::Ellipse => return None,
+        };
+        Some(Self { is_square, deviations: footprint.deviations.into(), corner: viewport_corner })
+    }
+
+    /// True if its tiles are the device's.
+    pub(crate) fn is_in_device_tiles(&self) -> bool {
+        let whole = |corner: f64| corner % CUT_TILE == 0.0;
+        f64::from(TILE_SIZE) == CUT_TILE && self.corner.into_iter().all(whole)
+    }
+
+    /// The tile of a pixel's centre along an axis.
+    pub(crate) fn tile_of(&self, axis: usize, centre: f64) -> f64 {
+        ((centre - self.corner[axis]) / CUT_TILE).floor()
+    }
+
+    /// The first tile, and the one after the last, along x and y, of a Gaussian with a mean, in framebuffer pixels, and the
+    /// scaled Cholesky factor of its conic.
+    pub(crate) fn tiles(&self, mean: [f64; 2], factor: [f64; 3]) -> [[f64; 2]; 2] {
+        let [xx, xy, yy] = covariance(factor);
+        let from_corner = [0, 1].map(|axis| mean[axis] - self.corner[axis]);
+        if self.is_square {
+            // Pixel centres are whole numbers there, and a side that ends within a pixel has all of it.
+            let half_difference = 0.5 * (xx - yy);
+            let spread = half_difference * half_difference + xy * xy;
+            let greatest = 0.5 * (xx + yy) + spread.max(LEAST_SPREAD).sqrt();
+            let radius = (self.deviations * greatest.sqrt()).ceil();
+            return from_corner.map(|mean| {
+                let mean = mean - 0.5;
+                [((mean - radius) / CUT_TILE).floor(), ((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE).floor()]
+            });
+        }
+        let radii = [xx, yy].map(|variance| (self.deviations * variance.sqrt()).ceil());
+        [0, 1].map(|axis| {
+            let (mean, radius) = (from_corner[axis], radii[axis]);
+            [((mean - radius) / CUT_TILE).floor(), ((mean + radius) / CUT_TILE).ceil()]
+        })
+    }
+
+    /// The same as [`TileCutOff::tiles`], numbered as the device's tiles, which the cut-off's own must be.
+    pub(crate) fn device_tiles(&self, mean: [f64; 2], factor: [f64; 3]) -> [[f64; 2]; 2] {
+        let tiles = self.tiles(mean, factor);
+        [0, 1].map(|axis| {
+            let first = self.corner[axis] / CUT_TILE;
+            tiles[axis].map(|tile| tile + first)
+        })
+    }
+}
+
+/// The cut-off that lists of tiles see to alone: one in the device's own tiles, of pictures that do not repeat.
+pub(crate) fn list_cut_off(state: &GaussianState, camera: &Camera, viewport: &Viewport) -> Option<TileCutOff> {
+    let corner = [viewport.x, viewport.y].map(f64::from);
+    TileCutOff::of(state, corner).filter(|cut_off| cut_off.is_in_device_tiles() && period(camera).is_none())
+}
+
+/// The covariance xx, xy, yy in px^2 whose conic has this scaled Cholesky factor.
+fn covariance([a, b, c]: [f64; 3]) -> [f64; 3] {
+    let unit2 = 0.5 / std::f64::consts::LN_2;
+    let xx = unit2 / (a * a);
+    let slope = -b / c;
+    // The determinant is xx unit^2 / c^2.
+    [xx, slope * xx, unit2 / (c * c) + slope * slope * xx]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[gaurast_runner::test]
+        fn a_covariance_comes_back_from_its_factor(
+            xx in 0.3..400.0f64, yy in 0.3..400.0f64, correlation in -0.999..0.999f64,
+        ) {
+            let xy = correlation * (xx * yy).sqrt();
+            let determinant = xx * yy - xy * xy;
+            let unit = (0.5 / std::f64::consts::LN_2).sqrt();
+            let vertical = (xx / determinant).sqrt() * unit;
+            let back = covariance([unit / xx.sqrt(), -(xy / xx) * vertical, vertical]);
+            for (back, given) in back.into_iter().zip([xx, xy, yy]) {
+                prop_assert!((back - given).abs() <= 1e-9 * (xx + yy), "{back} {given}");
+            }
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Phase 3 of the fast kernel: the alphas of a round through the pixels of each block, which stay in registers.
+
+use super::alphas::Alphas;
+use super::staging::{Reaching, StagedRound};
+use crate::gaussian::splats::splat::Splat;
+use crate::raster::gaussian::accumulator::Accumulator;
+use crate::raster::gaussian::depth_ranges::DepthRanges;
+use crate::raster::gaussian::exponent::falls_64;
+use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS};
+use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
+use crate::raster::gaussian::masks::Tally;
+use crate::raster::gaussian::mode::{DepthMode, FIND_MEDIAN, FIND_REACHED, NO_DEPTH};
+use crate::raster::gaussian::pixels::{accumulate, composite_one, keep, pixels};
+use crate::simd::bits_of;
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+
+/// No pixel of more transmittance than this, in units of the floor, is looked out for while a round's Gaussians are
+/// composited: it is seldom finished by one round, and where it is, that round is composited again.
+const FAR_FROM_FLOOR: f32 = 8.0;
+
+/// The account of a round's composition.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Evaluated {
+    /// Pairs of a Gaussian and a block whose pixels were evaluated.
+    pub(crate) items: u64,
+    /// Pairs of a Gaussian and a pixel that accepted it.
+    pub(crate) contributions: u64,
+    /// True if pixels may have been finished.
+    pub(crate) may_have_finished: bool,
+}
+
+/// Composites those of `round` that reach a block in it, for each block. Unless `is_capped`, no opacity is above the
+/// ceiling.
+#[inline(always)]
+pub(crate) fn evaluate<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (reaching, is_capped): (&Reaching, bool),
+    (round, alphas): (&StagedRound, &mut Alphas),
+    ranges: &DepthRanges,
+    thresholds: Thresholds,
+) -> Evaluated {
+    let to = (round, &accumulator.most_fall);
+    // Opacities are seldom above the ceiling. Less exact powers may be, whatever the opacity.
+    let (reached, items) = if DEPTH < NO_DEPTH || is_capped {
+        alphas.find::<_, DEPTH, true>(simd, reaching, to, ranges, thresholds)
+    } else {
+        alphas.find::<_, DEPTH, false>(simd, reaching, to, ranges, thresholds)
+    };
+    let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
+    Evaluated {
+        items,
+        contributions: reached.saturating_sub(refused.unwrap_or(0)),
+        may_have_finished: refused.is_some(),
+    }
+}
+
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no
+/// pixel was finished in the round. A function of its own, as [`Alphas::find`].
+#[inline(never)]
+fn composite_all<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    reaching: &Reaching,
+    (round, alphas): (&StagedRound, &Alphas),
+    thresholds: Thresholds,
+) -> Option<u64> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut refused = None;
+            let mut rest = &alphas.alphas[..];
+            for (block, &reaching) in reaching.iter().enumerate() {
+                let count = reaching.count_ones() as usize;
+                let Some((alphas, others)) = rest.split_at_checked(count) else {
+                    break;
+                };
+                rest = others;
+                if reaching == 0 {
+                    continue;
+                }
+                let of_block = (block, reaching, alphas);
+                if DEPTH == FIND_REACHED
+                    || DEPTH >= FIND_MEDIAN
+                    || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
+                {
+                    let more = composite_near_floor::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+                    if let Some(more) = more {
+                        refused = Some(refused.unwrap_or(0) + more);
+                    }
+                }
+            }
+            refused
+        },
+    )
+}
+
+/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing.
+/// Returns whether it did.
+#[inline(always)]
+fn composite_far_from_floor<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> bool {
+    let floor = thresholds.transmittance_floor;
+    let mut pixels = pixels(accumulator, simd, block);
+    let before = pixels.transmittance;
+    // As whole numbers, transmittances are in the order of what they stand for, and greater than all where a pixel is
+    // finished. (Masks are not combined here: that would be calls, before which the pixels leave their registers.)
+    let near = f32x16::splat(simd, FAR_FROM_FLOOR * floor);
+    if bits_of(before).simd_lt(bits_of(near)).any_true() {
+        return false;
+    }
+    // What is finished has alphas of zero.
+    pixels.transmittance = before.max(0.0);
+    for alpha in alphas {
+        let look = &round.looks[reaching.trailing_zeros() as usize];
+        reaching &= reaching.wrapping_sub(1);
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, look.color);
+    }
+    let signs: i32x16<S> = before.bitcast();
+    let below = pixels.transmittance.simd_lt(floor).to_vector();
+    // What is finished has a sign, and is none of those.
+    if (below & (signs ^ -1)).simd_lt(0).any_true() {
+        return false;
+    }
+    pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
+    keep(accumulator, block, pixels);
+    true
+}
+
+/// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of
+/// its own, so that what goes the quick way has the registers for itself.
+#[inline(never)]
+fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> Option<u64> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (mut reaching, mut alphas) = (reaching, alphas);
+            if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
+                let of_block = (block, reaching, alphas);
+                (reaching, alphas) = composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                if alphas.is_empty() {
+                    return None;
+                }
+            }
+            let of_block = (block, reaching, alphas);
+            let refused = composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+            Some(refused)
+        },
+    )
+}
+
+/// Alphas of a block, in order, and bits for the numbers of their Gaussians.
+type BlockAlphas<'a> = (u32, &'a [[f32; BLOCK_PIXELS]]);
+
+/// Composites the first of a block's alphas, up to one that finishes a pixel, and returns the others.
+#[inline(always)]
+fn composite_until_finished<'a, S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, mut alphas): (usize, u32, &'a [[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> BlockAlphas<'a> {
+    let floor = f32x16::splat(simd, thresholds.transmittance_floor);
+    let mut pixels = pixels(accumulator, simd, block);
+    let before = pixels.transmittance;
+    let signs: i32x16<S> = before.bitcast();
+    // What is finished has alphas of zero: here it has light that stays.
+    let light = f32x16::splat(simd, f32::MAX);
+    pixels.transmittance = signs.simd_lt(0).select(light, before);
+    while let [alpha, rest @ ..] = alphas {
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        if passed.rest.simd_lt(floor).any_true() {
+            break;
+        }
+        let look = &round.looks[reaching.trailing_zeros() as usize];
+        reaching &= reaching.wrapping_sub(1);
+        alphas = rest;
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, look.color);
+    }
+    pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
+    keep(accumulator, block, pixels);
+    (reaching, alphas)
+}
+
+/// Composites a block's alphas; returns the number of pixels that refused one.
+#[inline(always)]
+fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> u64 {
+    let thresholds = Thresholds { depth_mode: DEPTH, ..thresholds };
+    let mut pixels = pixels(accumulator, simd, block);
+    let mut refused = Tally::new(simd);
+    for alpha in alphas {
+        let look = &round.looks[reaching.trailing_zeros() as usize];
+        reaching &= reaching.wrapping_sub(1);
+        let alpha = f32x16::from_slice(simd, alpha);
+        let to = (block, &mut pixels);
+        let goes_on = composite_one(accumulator, simd, to, alpha, *look, thresholds);
+        refused.add_without(alpha.simd_gt(0.0), goes_on);
+    }
+    keep(accumulator, block, pixels);
+    accumulator.find_most_fall(simd, block, thresholds.most_fall);
+    refused.total()
+}
+
+/// Composites one steep Gaussian in `blocks`, its exponents formed in binary64; returns the number of pixels that
+/// accepted it.
+#[inline(always)]
+pub(crate) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    splat: &Splat,
+    blocks: u64,
+    ranges: &DepthRanges,
+    task: &TileInputs<'_>,
+) -> u64 {
+    let thresholds = Thresholds { depth_mode: DEPTH, ..task.thresholds };
+    let mut contributions = 0;
+    for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
+        let fall = falls_64(simd, splat, task, block);
+        let look = splat.look;
+        contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
+        accumulator.find_most_fall(simd, block, thresholds.most_fall);
+    }
+    contributions
+}

@@ -1,0 +1,87 @@
+//! The kernel that composites a tile's Gaussians, chosen once for a draw.
+
+use super::cut_off::CutOff;
+use crate::gaussian::BinnedDraw;
+use crate::gaussian::splats::identity::Identity;
+use crate::gaussian::splats::ray_depth::RayDepths;
+use crate::gaussian::splats::surfel::Surfel;
+use crate::state::gaussian::{GaussianPrecision, GaussianState};
+
+/// The kernel that composites a tile, chosen once for a draw.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Kernel<'a> {
+    /// Volumes in the order of the list, in binary32.
+    Fast,
+    /// Volumes in the order of the list, in binary16.
+    Half,
+    /// Any shapes, in the order of the list or each pixel's own.
+    Exact {
+        /// By batch, as the splats, if those are 2D Gaussians.
+        surfels: Option<&'a [Vec<Surfel>]>,
+        /// The inverse variance of 2D Gaussians' filter, if there is one.
+        inverse_low_pass: Option<f64>,
+        /// The depths that pixels sort by, if each does so for itself.
+        depths: Option<RayDepths<'a>>,
+        /// True if sums are kept in binary64 where the order is the list's; each pixel's own order always does so.
+        wide_sums: bool,
+        /// The shape outside which nothing contributes, if there is one.
+        cut_off: Option<CutOff>,
+        /// By batch, as the splats, if which they are is tracked. They are in the order of the list then.
+        identities: Option<&'a [Vec<Identity>]>,
+    },
+}
+
+impl<'a> Kernel<'a> {
+    pub(crate) fn of(draw: &'a BinnedDraw) -> Self {
+        let (surfels, depths) = (draw.surfels(), draw.ray_depths());
+        let cut_off = CutOff::of(draw).filter(|_| !draw.are_lists_cut);
+        let identities = draw.identities();
+        let is_plain = cut_off.is_none() && identities.is_none();
+        if draw.state.precision == GaussianPrecision::Float16 {
+            Self::Half
+        } else if surfels.is_none() && depths.is_none() && is_plain && !needs_f64_sums(&draw.state) {
+            Self::Fast
+        } else {
+            let variance = f64::from(draw.state.low_pass_variance);
+            Self::Exact {
+                surfels,
+                inverse_low_pass: (variance > 0.0).then(|| 1.0 / variance),
+                depths,
+                wide_sums: needs_f64_sums(&draw.state),
+                cut_off,
+                identities,
+            }
+        }
+    }
+
+    /// The same kernel, except that pixels take the list's order and nothing is tracked.
+    pub(crate) fn in_list_order(self) -> Self {
+        match self {
+            Self::Exact { surfels, inverse_low_pass, wide_sums, cut_off, .. } => {
+                Self::Exact { surfels, inverse_low_pass, depths: None, wide_sums, cut_off, identities: None }
+            }
+            other => other,
+        }
+    }
+
+    /// The shape outside which nothing contributes, if there is one.
+    pub(crate) fn cut_off(&self) -> Option<&CutOff> {
+        match self {
+            Self::Exact { cut_off, .. } => cut_off.as_ref(),
+            Self::Fast | Self::Half => None,
+        }
+    }
+
+    pub(crate) fn surfel(self, (batch, place): (usize, usize)) -> Option<&'a Surfel> {
+        match self {
+            Self::Exact { surfels, .. } => Some(&surfels?[batch][place]),
+            _ => None,
+        }
+    }
+}
+
+/// True if a draw's floors let more layers be seen through each other than the usual ones.
+pub(crate) fn needs_f64_sums(state: &GaussianState) -> bool {
+    let usual = GaussianState::default();
+    state.transmittance_floor < usual.transmittance_floor || state.alpha_floor < usual.alpha_floor
+}

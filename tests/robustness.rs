@@ -1,9 +1,0 @@
-//! Robustness tests: invalid input, failing allocations, and long runs.
-
-mod faults;
-mod fuzzing;
-mod long_run;
-
-fn main() -> std::process::ExitCode {
-    gaurast_runner::main()
-}

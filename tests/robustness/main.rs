@@ -1,0 +1,9 @@
+//! Robustness tests: invalid input, failing allocations, and long runs.
+
+mod abort;
+mod fuzzing;
+mod long_run;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -1,0 +1,3 @@
+//! The chapter *Dispatching Commands*.
+
+mod dispatches;

@@ -1,0 +1,7 @@
+//! The chapters *Drawing Commands* and *Fixed-Function Vertex Processing*.
+//!
+//! Unit tests: `driver/src/command/replay`.
+
+mod conditional_rendering;
+mod draws;
+pub mod topology;

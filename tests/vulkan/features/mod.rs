@@ -1,0 +1,6 @@
+//! The chapters *Features*, *Limits* and *Formats*.
+//!
+//! Unit tests: `driver/src/physical_device`, `driver/src/registry`.
+
+mod limits;
+mod robust_access;

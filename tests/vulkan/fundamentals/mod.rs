@@ -1,0 +1,5 @@
+//! The chapter *Fundamentals*.
+//!
+//! Unit tests: `driver/src/abi`.
+
+mod out_of_memory;

@@ -1,0 +1,5 @@
+//! The chapter *Image Operations*.
+
+mod kernels;
+mod storage;
+mod storing;

@@ -1,0 +1,10 @@
+//! The chapter *Initialization*.
+//!
+//! Unit tests: `driver/src/dispatch`.
+
+mod driver_options;
+mod embedded;
+mod leaks;
+mod loaded_draws;
+mod loader;
+mod validation_layer;

@@ -1,0 +1,9 @@
+//! The chapter *Resource Descriptors*.
+//!
+//! Unit tests: `driver/src/descriptor`, `driver/src/device_addresses.rs`.
+
+mod addresses;
+pub mod buffers;
+mod draw_resources;
+mod indexing;
+mod sets;

@@ -1,0 +1,5 @@
+//! The chapter *Samplers*.
+
+mod modes;
+mod sampling;
+pub mod textures;

@@ -1,0 +1,3 @@
+//! The chapter *Shader Interfaces*.
+
+mod wide_values;

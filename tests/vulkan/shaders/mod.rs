@@ -1,0 +1,18 @@
+//! The chapter *Shaders*.
+//!
+//! Unit tests: `driver/src/shader_module.rs`.
+
+mod clock;
+mod features;
+mod instructions;
+mod kernels;
+pub mod shading;
+mod structured;
+
+use gaurast_tests::kernels::Context;
+
+/// The context of lavapipe, if `Need::Lavapipe` is met.
+fn lavapipe() -> Context {
+    let found = Context::lavapipe().expect("lavapipe is opened");
+    found.expect("the loader knows lavapipe")
+}
