@@ -592,6 +592,7 @@ pub(crate) fn cmd_execute_commands(
 mod tests {
     use super::*;
     use crate::instance::Instance;
+    use crate::options::Options;
     use crate::registry::features::Features;
 
     fn record(flags: BeginFlags) -> Recorder {
@@ -648,7 +649,7 @@ mod tests {
 
     #[test]
     fn a_panic_while_recording_fails_the_recording() {
-        let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
+        let instance = Instance::new(vk::API_VERSION_1_3, &[], Options::default()).unwrap();
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
         let features = Features::NONE;
         let device = Device::new(instance, Vec::new(), features, simulated, &[]).unwrap();

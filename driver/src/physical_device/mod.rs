@@ -1,7 +1,6 @@
 //! The physical device's properties, features, formats, memory, queues and counters, each defined once.
 
 pub(crate) mod counters;
-pub(crate) mod environment;
 pub(crate) mod formats;
 pub(crate) mod limits;
 pub(crate) mod memory;
