@@ -139,7 +139,7 @@ pub(crate) fn refuse<C: Caller, R: ReturnCode>(caller: C, command: &str) -> R {
 }
 
 /// Logs an error and reports it to the listener.
-fn report(reporter: Option<&dyn Reporter>, command: &str, error: &Error) {
+pub(crate) fn report(reporter: Option<&dyn Reporter>, command: &str, error: &Error) {
     let (text, id) = (error.to_string(), error.message_id());
     if text.contains(id) {
         log::error!("{command}: {text}");
