@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_an_error() {
-        let result: vk::Result = guard(std::ptr::null::<u8>(), "test", || panic!("caught"));
+        let result: vk::Result = guard(std::ptr::null::<u8>(), "test", || -> Result<(), Error> { panic!("caught") });
         assert_eq!(result, vk::Result::ERROR_UNKNOWN);
     }
 
