@@ -3,7 +3,7 @@
 use crate::abi::error::Error;
 use crate::abi::valid;
 use crate::device::Device;
-use crate::physical_device::environment;
+use crate::instance::PhysicalDevice;
 use ash::vk;
 use simdevice::stats::query::host_time;
 
@@ -25,9 +25,12 @@ const HOST: [(vk::TimeDomainKHR, fn() -> u64); 0] = [];
 
 /// Lists the host's clocks, and the device's unless it counts the simulated hardware's time.
 #[doc(alias = "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT")]
-pub(crate) fn get_physical_device_calibrateable_time_domains() -> Result<Vec<vk::TimeDomainKHR>, Error> {
+pub(crate) fn get_physical_device_calibrateable_time_domains(
+    physical_device: &PhysicalDevice,
+) -> Result<Vec<vk::TimeDomainKHR>, Error> {
     let host = HOST.map(|(domain, _)| domain);
-    let device = (!environment::has_simulated_timestamps()?).then_some(vk::TimeDomainKHR::DEVICE);
+    let instance = physical_device.require_instance()?;
+    let device = (!instance.options().has_simulated_timestamps()?).then_some(vk::TimeDomainKHR::DEVICE);
     Ok(device.into_iter().chain(host).collect())
 }
 

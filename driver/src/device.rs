@@ -6,7 +6,7 @@ use crate::abi::valid;
 use crate::device_addresses::Addresses;
 use crate::device_sync::DeviceSync;
 use crate::instance::{EnabledExtensions, Instance, PhysicalDevice, resolve_extensions};
-use crate::physical_device::environment::{self, Dump};
+use crate::options::Dump;
 use crate::physical_device::memory::{self, Heap};
 use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILIES};
 use crate::queue::Queue;
@@ -19,6 +19,9 @@ use simdevice::CommandProcessor;
 use std::collections::HashMap;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// The ratio of the heap's size to the budget of host memory for chunks of Gaussians.
+const HEAP_PER_CLUSTER_BUDGET: u64 = 8;
 
 /// A logical device with a simulated device of its own.
 pub(crate) struct Device {
@@ -60,7 +63,7 @@ impl Device {
             extensions,
             features,
             simulated: Arc::new(simulated),
-            dump: environment::dump()?,
+            dump: Dump::of_environment()?,
             sync: Arc::default(),
             heap: Arc::new(Heap::new(memory::heap_size())),
             addresses: Arc::default(),
@@ -192,8 +195,7 @@ unsafe fn requested_features(info: &vk::DeviceCreateInfo<'_>, extensions: &[&CSt
 
 /// Refuses features that are not supported.
 fn require_supported(requested: &Features) -> Result<(), Error> {
-    let supported = SUPPORTED.list();
-    match requested.list().into_iter().zip(supported).find(|((_, is_requested), (_, works))| *is_requested && !works) {
+    match requested.list().zip(SUPPORTED.list()).find(|((_, is_requested), (_, works))| *is_requested && !works) {
         None => Ok(()),
         Some(((name, _), _)) => Err(Error::FeatureNotPresent(format!("the feature {name}"))),
     }
@@ -206,7 +208,7 @@ fn require_extension(structure: &vk::BaseInStructure<'_>, extensions: &[&CStr]) 
     };
     let mut requested = Features::NONE;
     requested.add(structure);
-    match requested.list().into_iter().find(|(_, is_on)| *is_on) {
+    match requested.list().find(|(_, is_on)| *is_on) {
         None => Ok(()),
         Some((feature, _)) => Err(Error::usage(
             "VUID-VkDeviceCreateInfo-pNext-pNext",
@@ -279,8 +281,20 @@ pub(crate) unsafe fn create_device(
         {
             warn_of_lost_features(&instance);
         }
-        Device::new(instance, extensions, features, environment::open_device()?, &queue_families(info)?)
+        let simulated = open_simulated(&instance)?;
+        Device::new(instance, extensions, features, simulated, &queue_families(info)?)
     }
+}
+
+/// Opens a simulated device with the options of the instance and of the environment.
+///
+/// # Errors
+/// As [`Options::device_config`](crate::options::Options::device_config), and [`Error::InitializationFailed`] for an
+/// option that this machine can't satisfy.
+fn open_simulated(instance: &Arc<Instance>) -> Result<simdevice::Device, Error> {
+    let mut config = instance.options().device_config(Arc::clone(instance) as _)?;
+    config.cluster_budget_bytes = memory::heap_size() / HEAP_PER_CLUSTER_BUDGET;
+    simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
 }
 
 /// Says that the extension is enabled and nothing of it can be used, as where a layer drops the structure of its features.
@@ -402,7 +416,7 @@ mod tests {
     }
 
     fn count_of(features: &Features) -> usize {
-        features.list().iter().filter(|(_, is_on)| *is_on).count()
+        features.list().filter(|(_, is_on)| *is_on).count()
     }
 
     #[test]
@@ -460,9 +474,8 @@ mod tests {
 
     #[test]
     fn missing_features_are_listed_truly() {
-        let supported: HashMap<_, _> = SUPPORTED.list().into_iter().collect();
-        let mut missing: Vec<_> =
-            MANDATORY.iter().flat_map(|(_, names)| names.iter().copied()).filter(|name| !supported[name]).collect();
+        let supported: HashMap<_, _> = SUPPORTED.list().collect();
+        let mut missing: Vec<_> = MANDATORY.iter().map(|(name, _)| *name).filter(|name| !supported[name]).collect();
         missing.sort_unstable();
         assert_eq!(missing, REQUIRED_BUT_MISSING);
     }

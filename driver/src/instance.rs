@@ -10,6 +10,7 @@ use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid::{self, Structures};
 use crate::convert;
 use crate::listeners::{DebugMessenger, DebugReportCallback, Listeners, Message, ReportOrigin};
+use crate::options::Options;
 use crate::registry::extensions::{DEVICE, Extension, INSTANCE};
 use crate::window;
 use ash::vk;
@@ -65,6 +66,7 @@ pub(crate) struct Instance {
     this: Weak<Self>,
     api_version: u32,
     extensions: Vec<&'static CStr>,
+    options: Options,
     physical_device: vk::PhysicalDevice,
     messengers: Listeners<DebugMessenger>,
     report_callbacks: Listeners<DebugReportCallback>,
@@ -96,11 +98,12 @@ pub(crate) struct EnabledExtensions<'a> {
 }
 
 impl Instance {
-    /// An instance for an application that requests `api_version` (0 means 1.0) and `extensions`.
+    /// An instance for an application that requests `api_version` (0 means 1.0), `extensions` and, for its devices,
+    /// `options`.
     ///
     /// # Errors
     /// [`Error::ExtensionNotPresent`].
-    pub(crate) fn new(api_version: u32, extensions: &[&CStr]) -> Result<Arc<Self>, Error> {
+    pub(crate) fn new(api_version: u32, extensions: &[&CStr], options: Options) -> Result<Arc<Self>, Error> {
         let extensions = resolve_extensions(&instance_extensions(), extensions)?;
         let api_version = match api_version {
             0 => vk::API_VERSION_1_0,
@@ -110,6 +113,7 @@ impl Instance {
             this: this.clone(),
             api_version,
             extensions,
+            options,
             physical_device: handle::create(Arc::new(PhysicalDevice::new(this.clone()))),
             messengers: Listeners::default(),
             report_callbacks: Listeners::default(),
@@ -119,6 +123,11 @@ impl Instance {
     /// Its only physical device.
     pub(crate) fn physical_device(&self) -> vk::PhysicalDevice {
         self.physical_device
+    }
+
+    /// The options of its devices.
+    pub(crate) fn options(&self) -> &Options {
+        &self.options
     }
 
     /// The version and extensions that decide which commands are found through this instance.
@@ -199,8 +208,8 @@ unsafe fn new_instance(info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance
         return Err(Error::LayerNotPresent("in the driver".to_owned()));
     }
     // SAFETY: as above.
-    let application = unsafe { valid::optional(info.p_application_info) };
-    Instance::new(application.map_or(0, |application| application.api_version), &names)
+    let (application, options) = unsafe { (valid::optional(info.p_application_info), Options::of_chain(info.p_next)) };
+    Instance::new(application.map_or(0, |application| application.api_version), &names, options)
 }
 
 #[doc(alias = "vkEnumerateInstanceVersion")]

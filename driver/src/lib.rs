@@ -18,6 +18,7 @@ mod dispatch;
 mod instance;
 mod listeners;
 pub mod loader;
+mod options;
 mod physical_device;
 mod pipeline;
 mod query_pool;

@@ -4,6 +4,7 @@ use crate::abi::error::Error;
 use crate::abi::guard::guard;
 use crate::abi::{handle, valid};
 use crate::dispatch;
+pub use crate::options::log_filter;
 use ash::vk;
 use std::ffi::c_char;
 

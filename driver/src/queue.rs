@@ -135,12 +135,17 @@ pub(crate) fn queue_wait_idle(queue: &Queue) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Options;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn queue() -> Arc<Queue> {
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        Queue::start(Instance::new(0, &[]).unwrap(), Arc::default(), CommandProcessor::new(Arc::new(simulated)))
-            .unwrap()
+        Queue::start(
+            Instance::new(0, &[], Options::default()).unwrap(),
+            Arc::default(),
+            CommandProcessor::new(Arc::new(simulated)),
+        )
+        .unwrap()
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //! geometric mean, and the peak memory of a process on each device.
 //!
 //! Both use one thread for each processor, unless `GAURAST_THREADS` and `LP_NUM_THREADS` are set; they should be set to
-//! the same number. `--simd LEVEL` selects this driver's SIMD level (as `GAURAST_SIMD` does), `--scene NAME` selects
-//! one workload, and `--no-memory` omits the measurement of memory.
+//! the same number. `GAURAST_SIMD` selects this driver's SIMD level, `--scene NAME` selects one workload, and
+//! `--no-memory` omits the measurement of memory.
 //!
 //! `--runs-of DEVICE NAME TIMES BY` runs a workload TIMES times and prints nothing, with width, height and numbers of
 //! triangles divided by `BY`. It is for counting instructions: the difference of two counts with different TIMES is the
@@ -114,10 +114,6 @@ fn main() -> Result<(), Failure> {
         let position = arguments.iter().position(|argument| argument == flag)?;
         arguments.get(position + 1).cloned()
     };
-    if let Some(level) = value_of("--simd") {
-        // SAFETY: there are no other threads yet.
-        unsafe { std::env::set_var("GAURAST_SIMD", level) };
-    }
     let with_memory = !arguments.iter().any(|argument| argument == "--no-memory");
     let only = value_of("--scene");
     let own = open("own")?;

@@ -3,7 +3,6 @@
 
 use gaurast_conformance::{Expectation, MISTAKES, Oracle, Outcome, all, cases, mistakes, open, run};
 use gaurast_runner::{Case, Variant, is_long};
-use gaurast_testkit::{Settings, with_settings};
 
 fn chapters() -> Vec<Variant> {
     cases::chapters().map(Variant::new).collect()
@@ -11,8 +10,7 @@ fn chapters() -> Vec<Variant> {
 
 #[gaurast_runner::test(each = chapters())]
 fn every_case_passes(case: &Case) {
-    let device = with_settings(&Settings::default(), || open("embedded"));
-    let device = device.expect("a device");
+    let device = open("embedded").expect("a device");
     let (mut failures, mut passed) = (Vec::new(), 0);
     for one in all() {
         if one.chapter != case.variant() {

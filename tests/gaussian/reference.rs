@@ -5,7 +5,6 @@ use std::path::Path;
 use gaurast_render::Renderer;
 use gaurast_runner::{Need, data};
 use gaurast_scene::camera::Camera;
-use gaurast_testkit::{Settings, with_settings};
 use gaurast_tests::compare::Statistics;
 
 /// A scene, and another renderer's picture of it.
@@ -62,8 +61,7 @@ fn pixels(path: &Path) -> Vec<[f32; 4]> {
 /// Checks the PSNR of the PNG that the `gaurast` command would write.
 fn assert_psnr(given: &Given, least: f64) {
     let scene = gaurast_scene::open(data(given.scene)).expect("a scene");
-    let renderer = with_settings(&Settings::default(), || Renderer::new(vulkan_gaurast::entry()));
-    let mut renderer = renderer.expect("a device");
+    let mut renderer = Renderer::new(vulkan_gaurast::entry()).expect("a device");
     let uploaded = renderer.upload(&scene, None).expect("uploaded");
     let frame = renderer.render(&uploaded, &given.camera());
 

@@ -1,8 +1,7 @@
 //! Compares the fast timing model of the rasterizer with the model that steps every cycle, on work that devices
 //! recorded.
 
-use std::path::Path;
-
+use gaurast::WorkTrace;
 use simdevice::timing::config::Config;
 use simdevice::timing::fast;
 use simdevice::timing::work::Trace;
@@ -18,13 +17,13 @@ const MACHINES: [(&str, &[&str]); 6] = [
     ("fp16", &["saturation=reached", "port_bytes_per_cycle=4"]),
 ];
 
-/// Reads the trace in a file that a device wrote.
+/// The trace of a device that was destroyed.
 ///
 /// # Panics
-/// If the file is missing or invalid.
-pub fn read(path: &Path) -> Trace {
-    let text = std::fs::read(path).expect("the device wrote its trace");
-    serde_json::from_slice(&text).expect("a trace")
+/// If there is none, or it is invalid.
+pub fn recorded(trace: &WorkTrace) -> Trace {
+    let json = trace.take().expect("the device gave its trace");
+    serde_json::from_slice(&json).expect("a trace")
 }
 
 /// The differences between the fast model and the stepped model.

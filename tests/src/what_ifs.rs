@@ -2,6 +2,7 @@
 //! for `simdevice/timing`.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use ash::vk;
 use glam::DVec3;
@@ -10,7 +11,7 @@ use simdevice::timing::work::FrameWork;
 use timing_studies::what_if::{WhatIf, each_alone, what_ifs};
 
 use crate::hybrid::ToClip;
-use crate::recorded::read;
+use crate::recorded::recorded;
 use crate::scenes::SceneBuffers;
 use gaurast_testkit::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
@@ -120,19 +121,16 @@ fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
 /// The recorded work of drawing one of the scenes, and the picture. It uses the simplest SIMD level, whose rounding is
 /// the same on every processor.
 fn work(with_colonnade: bool) -> (FrameWork, Output) {
-    let folder = std::env::temp_dir();
-    let path = folder.join(format!("what_ifs-{}-{with_colonnade}.json", std::process::id()));
+    let trace = Arc::default();
     let gpu = Gpu::embedded(&Settings {
         simd: Some(gaurast_runner::SIMD_LEVELS[0]),
-        trace: Some(&path),
+        trace: Some(&trace),
         ..Settings::default()
     });
     let gpu = gpu.expect("a device");
     let output = draw(&gpu, with_colonnade);
     drop(gpu);
-    let mut trace = read(&path);
-    // A file that cannot be removed does no harm, since no later run uses its name.
-    let _ = std::fs::remove_file(&path);
+    let mut trace = recorded(&trace);
     (trace.frames.pop().expect("a frame"), output)
 }
 

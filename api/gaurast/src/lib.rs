@@ -48,10 +48,17 @@
 //! # }
 //! ```
 //!
+//! `VK_GAURAST_driver_options` is beside it: [`DriverOptionsGAURAST`](vk::DriverOptionsGAURAST) in the `pNext` chain of
+//! `VkInstanceCreateInfo` sets the driver's threads, its instruction set, and a receiver of traces of work.
+//!
 //! [`NAME`]: gaussian_primitive_topology::NAME
 //! [`Device`]: gaussian_primitive_topology::Device
 
 mod ash_compat;
 pub mod camera;
+pub mod driver_options;
 pub mod gaussian_primitive_topology;
+mod options;
 pub mod vk;
+
+pub use options::WorkTrace;

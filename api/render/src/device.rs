@@ -10,29 +10,66 @@ use gaurast::vk::{
 };
 
 use crate::error::{During, RenderError};
+use crate::options::DeviceOptions;
 
 /// An instance, which outlives everything made from it.
 struct Instance {
     raw: ash::Instance,
+    /// The functions of debug messengers and the messenger, if the driver has them.
+    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    /// The receivers of messages and of the device's work, which have an address of their own.
+    _options: Box<DeviceOptions>,
     /// The last field, so that it is dropped last: it may own the library that `raw` calls.
     _entry: ash::Entry,
 }
 
 impl Instance {
-    fn new(entry: ash::Entry) -> Result<Self, RenderError> {
+    fn new(entry: ash::Entry, options: &DeviceOptions) -> Result<Self, RenderError> {
+        let options = Box::new(options.clone());
         let application = vk::ApplicationInfo::default().application_name(c"gaurast").api_version(vk::API_VERSION_1_3);
-        let create_info = vk::InstanceCreateInfo::default().application_info(&application);
-        // SAFETY: the structures are valid, and `_entry` outlives the instance.
+        let (mut of_driver, mut of_messenger) = (options.of_driver(), options.messenger());
+        let mut create_info = vk::InstanceCreateInfo::default().application_info(&application);
+        if let Some(of_driver) = &mut of_driver {
+            create_info = create_info.push_next(of_driver);
+        }
+        let debug_utils = [ash::ext::debug_utils::NAME.as_ptr()];
+        let has_messages = has_messages(&entry)?;
+        if has_messages {
+            create_info = create_info.enabled_extension_names(&debug_utils).push_next(&mut of_messenger);
+        }
+        // SAFETY: the structures are valid; `_entry` and `_options` outlive the instance.
         let raw = unsafe { entry.create_instance(&create_info, None) }.during("vkCreateInstance")?;
-        Ok(Self { raw, _entry: entry })
+        let mut instance = Self { raw, messenger: None, _options: options, _entry: entry };
+        if has_messages {
+            let functions = ash::ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
+            // SAFETY: the extension is enabled, and the options outlive the messenger.
+            let messenger = unsafe { functions.create_debug_utils_messenger(&instance._options.messenger(), None) };
+            instance.messenger = Some((functions, messenger.during("vkCreateDebugUtilsMessengerEXT")?));
+        }
+        Ok(instance)
     }
 }
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: the device, the only child, has been destroyed before.
-        unsafe { self.raw.destroy_instance(None) };
+        // SAFETY: the device, the only other child, has been destroyed before.
+        unsafe {
+            if let Some((functions, messenger)) = &self.messenger {
+                functions.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
     }
+}
+
+/// Returns true if the entry's drivers or layers report messages.
+fn has_messages(entry: &ash::Entry) -> Result<bool, RenderError> {
+    // SAFETY: the entry is valid.
+    let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
+        .during("vkEnumerateInstanceExtensionProperties")?;
+    let is_it =
+        |extension: &vk::ExtensionProperties| extension.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME);
+    Ok(extensions.iter().any(is_it))
 }
 
 /// The purpose of a device.
@@ -55,6 +92,22 @@ pub struct Device {
     instance: Instance,
 }
 
+/// The properties of a memory type that serves a resource.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryPreference {
+    /// The properties that it must have.
+    pub required: vk::MemoryPropertyFlags,
+    /// The properties that it must not have.
+    pub excluded: vk::MemoryPropertyFlags,
+}
+
+impl MemoryPreference {
+    /// Types that have these properties, whatever else they have.
+    pub const fn having(required: vk::MemoryPropertyFlags) -> Self {
+        Self { required, excluded: vk::MemoryPropertyFlags::empty() }
+    }
+}
+
 /// A physical device and its queue family.
 struct PhysicalDevice {
     handle: vk::PhysicalDevice,
@@ -72,8 +125,8 @@ impl Device {
     ///
     /// # Errors
     /// Returns an error if there is none, or Vulkan fails.
-    pub fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
-        let instance = Instance::new(entry)?;
+    pub fn new(entry: ash::Entry, purpose: Purpose<'_>, options: &DeviceOptions) -> Result<Self, RenderError> {
+        let instance = Instance::new(entry, options)?;
         let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
 
         let priorities = [1.0];
@@ -164,18 +217,14 @@ impl Device {
         self.physical.max_sh_degree
     }
 
-    /// The first memory type allowed by `type_bits` that satisfies one of `wishes`, tried in order. A wish is the
-    /// properties that the type must have and those that it must not have.
-    pub fn memory_type(
-        &self,
-        type_bits: u32,
-        wishes: &[(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)],
-    ) -> Option<u32> {
+    /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
+    pub fn memory_type(&self, type_bits: u32, preferences: &[MemoryPreference]) -> Option<u32> {
         let types = self.physical.memory.memory_types_as_slice();
-        wishes.iter().find_map(|(wanted, unwanted)| {
+        preferences.iter().find_map(|preference| {
             (0..types.len() as u32).find(|index| {
                 let flags = types[*index as usize].property_flags;
-                type_bits & (1 << index) != 0 && flags.contains(*wanted) && !flags.intersects(*unwanted)
+                let fits = flags.contains(preference.required) && !flags.intersects(preference.excluded);
+                type_bits & (1 << index) != 0 && fits
             })
         })
     }

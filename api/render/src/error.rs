@@ -4,16 +4,20 @@ use ash::vk;
 use gaurast_scene::camera::CameraError;
 use thiserror::Error;
 
+use crate::options::take_error;
+
 /// The reason that rendering failed.
 #[derive(Debug, Error)]
 pub enum RenderError {
     /// A Vulkan call failed.
-    #[error("{call} failed: {result}")]
+    #[error("{}", message.clone().unwrap_or_else(|| format!("{call} failed: {result}")))]
     Vulkan {
         /// The call.
         call: &'static str,
         /// Its result.
         result: vk::Result,
+        /// The driver's reason, if it gave one.
+        message: Option<String>,
     },
     /// No device draws Gaussians.
     #[error("no Vulkan device draws Gaussians (there is {found})")]
@@ -69,6 +73,8 @@ pub trait During<T> {
 
 impl<T> During<T> for ash::prelude::VkResult<T> {
     fn during(self, call: &'static str) -> Result<T, RenderError> {
-        self.map_err(|result| RenderError::Vulkan { call, result })
+        // A message about an earlier call isn't this call's.
+        let message = take_error();
+        self.map_err(|result| RenderError::Vulkan { call, result, message })
     }
 }

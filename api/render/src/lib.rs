@@ -32,6 +32,7 @@ mod draw;
 mod error;
 mod mesh;
 mod modes;
+mod options;
 mod pipeline;
 pub mod process_stats;
 mod query;
@@ -42,7 +43,9 @@ mod target;
 
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
+pub use gaurast::WorkTrace;
 pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
+pub use options::{DeviceOptions, Message};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};
 pub use settings::Settings;

@@ -13,6 +13,7 @@ use crate::device_scene::DeviceScene;
 use crate::draw::{DepthScale, Recorder};
 use crate::error::RenderError;
 use crate::mesh::{self, DeviceMesh, MeshPipeline};
+use crate::options::DeviceOptions;
 use crate::pipeline::{BINDINGS, GaussianPipeline};
 use crate::process_stats::processor_time;
 use crate::query::{Counter, CounterQuery};
@@ -57,7 +58,15 @@ impl Renderer {
     /// # Errors
     /// If there is none, or Vulkan fails.
     pub fn new(entry: ash::Entry) -> Result<Self, RenderError> {
-        let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
+        Self::with_options(entry, &DeviceOptions::default())
+    }
+
+    /// As [`Renderer::new`], with options of the device.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`]; also for an option that the driver refuses.
+    pub fn with_options(entry: ash::Entry, options: &DeviceOptions) -> Result<Self, RenderError> {
+        let device = Arc::new(Device::new(entry, Purpose::Gaussians, options)?);
         Ok(Self {
             query: CounterQuery::new(&device, false)?,
             target: None,

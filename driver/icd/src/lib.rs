@@ -17,8 +17,7 @@ use driver::loader;
 #[allow(non_snake_case, reason = "the loader's name")]
 pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(version: *mut u32) -> vk::Result {
     // A process usually has no other logger; if it has one, that one stays.
-    let environment = env_logger::Env::new().filter_or("GAURAST_LOG", "warn");
-    let _ = env_logger::Builder::from_env(environment).try_init();
+    let _ = env_logger::Builder::new().parse_filters(&loader::log_filter()).try_init();
     // The loader negotiates before it asks for any extension.
     window::register();
     // SAFETY: the caller's promise.

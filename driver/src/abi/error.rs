@@ -55,6 +55,9 @@ pub(crate) enum Error {
     /// Memory that can't be mapped.
     #[error("memory cannot be mapped: {0}")]
     MemoryMapFailed(String),
+    /// A trace of work that could not be written.
+    #[error("{0}")]
+    TraceNotWritten(String),
     /// An unknown layer.
     #[error("there is no layer {0}")]
     LayerNotPresent(String),
@@ -97,7 +100,7 @@ impl Error {
     /// The result that the application receives.
     pub(crate) fn result(&self) -> vk::Result {
         match self {
-            Self::InvalidHandle { .. } | Self::Panic(_) => vk::Result::ERROR_UNKNOWN,
+            Self::InvalidHandle { .. } | Self::TraceNotWritten(_) | Self::Panic(_) => vk::Result::ERROR_UNKNOWN,
             Self::Unsupported { .. } | Self::FeatureNotPresent(_) | Self::FeatureNotEnabled { .. } => {
                 vk::Result::ERROR_FEATURE_NOT_PRESENT
             }

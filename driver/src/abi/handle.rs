@@ -244,6 +244,7 @@ mod tests {
     use super::*;
     use crate::instance::Instance;
     use crate::listeners::DebugMessenger;
+    use crate::options::Options;
 
     fn messenger() -> Arc<DebugMessenger> {
         Arc::new(DebugMessenger::new(&vk::DebugUtilsMessengerCreateInfoEXT::default()))
@@ -255,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_dispatchable_handle_begins_with_the_loaders_word() {
-        let instance = create(Instance::new(0, &[]).unwrap());
+        let instance = create(Instance::new(0, &[], Options::default()).unwrap());
         let pointer = vk::Handle::as_raw(instance) as usize as *const usize;
         // SAFETY: the handle is live and points at a `HandleAllocation`, whose first word this is.
         assert_eq!(unsafe { pointer.read() }, 0x01CD_C0DE);

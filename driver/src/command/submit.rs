@@ -213,11 +213,12 @@ pub(crate) unsafe fn queue_submit2(
 mod tests {
     use super::*;
     use crate::device_sync::WaitResult;
+    use crate::options::Options;
     use crate::queue::Queue;
     use simdevice::Allocation;
+    use simdevice::BufferRange;
     use simdevice::Device;
     use simdevice::Packet;
-    use simdevice::packet::BufferRange;
 
     struct Fixture {
         sync: Arc<DeviceSync>,
@@ -227,7 +228,7 @@ mod tests {
 
     impl Fixture {
         fn new() -> Self {
-            let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
+            let instance = Instance::new(vk::API_VERSION_1_3, &[], Options::default()).unwrap();
             let simulated = Arc::new(Device::new(&simdevice::Config::default()).unwrap());
             let sync = Arc::<DeviceSync>::default();
             let processor = CommandProcessor::new(simulated);

@@ -1,7 +1,6 @@
 //! The physical device's properties, features, formats, memory, queues and counters, each defined once.
 
 pub(crate) mod counters;
-pub(crate) mod environment;
 pub(crate) mod formats;
 pub(crate) mod limits;
 pub(crate) mod memory;
@@ -264,8 +263,8 @@ pub(crate) unsafe fn enumerate_performance_query_counters(
     // SAFETY: the caller's promise.
     unsafe {
         if !counters.is_null() {
-            let mut room = *valid::input(counter_count)?;
-            Structures::new(&raw mut room, counter_descriptions)?.fill(available, counters::describe).map(drop)?;
+            let mut capacity = *valid::input(counter_count)?;
+            Structures::new(&raw mut capacity, counter_descriptions)?.fill(available, counters::describe).map(drop)?;
         }
         Structures::new(counter_count, counters)?.fill(available, counters::fill)
     }

@@ -10,6 +10,7 @@ pub(crate) type Extension = (&'static CStr, u32);
 
 /// The instance extensions.
 pub(crate) const INSTANCE: &[Extension] = &[
+    (c"VK_GAURAST_driver_options", 1),
     (c"VK_EXT_debug_report", 10),
     (c"VK_EXT_debug_utils", 2),
     (c"VK_EXT_headless_surface", 1),

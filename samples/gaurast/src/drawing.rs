@@ -1,15 +1,16 @@
 //! Draws many views of one scene on one device. A picture is written while the next one is drawn.
 
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
-use gaurast_render::{Frame, RenderError, Renderer, Settings};
+use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, WorkTrace};
 use gaurast_scene::{MAX_SH_DEGREE, Scene, SortOrder};
 use thiserror::Error;
 
 use crate::args::{Antialiasing, Geometry, ModeArguments, Order};
 use crate::cameras::{View, short};
-use crate::limits;
+use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
 use crate::renderers::OtherRenderer;
@@ -23,8 +24,6 @@ pub enum DrawError {
     Write(#[from] WriteError),
     #[error("the thread that writes pictures cannot start: {0}")]
     Thread(std::io::Error),
-    #[error("{0}")]
-    Limit(String),
     #[error("{0}")]
     Nothing(String),
 }
@@ -116,13 +115,20 @@ pub struct Drawn {
 }
 
 impl Drawing {
-    /// Creates a device for `scene` and `settings`. The scene's copy in host memory is freed.
+    /// Creates a device for `scene` and `settings`. The scene's copy in host memory is freed. `work_trace` receives the
+    /// device's work when the drawing is dropped.
     ///
     /// # Errors
-    /// If there is no device, not enough memory, or too many threads are requested.
-    pub fn new(scene: Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
-        limits::check_threads().map_err(DrawError::Limit)?;
-        let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+    /// If there is no device, or not enough memory.
+    pub fn new(
+        scene: Scene,
+        settings: Settings,
+        counters: bool,
+        work_trace: Option<Arc<WorkTrace>>,
+    ) -> Result<Self, DrawError> {
+        let options =
+            DeviceOptions { work_trace, on_message: Some(Arc::new(messages::receive)), ..DeviceOptions::default() };
+        let mut renderer = Renderer::with_options(vulkan_gaurast::entry(), &options)?;
         if counters {
             renderer.count_everything()?;
         }

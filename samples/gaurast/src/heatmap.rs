@@ -1,6 +1,6 @@
 //! A picture of the work in each tile: the Gaussians that contribute to a pixel, or the cycles of a rasterizer module.
 //!
-//! The numbers come from the device's trace of work (`GAURAST_TRACE`), which has them by tile, so a tile has one colour.
+//! The numbers come from the device's trace of work, which has them by tile, so a tile has one colour.
 //! The time that this processor needs for a tile is not shown: it changes from run to run. The modelled hardware's
 //! cycles are the same each time.
 
@@ -9,14 +9,10 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use gaurast_picture::{OutputError, Picture};
 use gaurast_scene::Camera;
-use tempfile::TempDir;
 use thiserror::Error;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::fast;
 use timing::work::{FrameWork, TILE_SIDE, Trace};
-
-/// The variable that makes the device write a trace.
-const TRACE: &str = "GAURAST_TRACE";
 
 /// The quantity that is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -49,10 +45,8 @@ impl Quantity {
 /// A failure to make the picture of the work. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum HeatmapError {
-    #[error("{}: {source}", path.display())]
-    Trace { path: PathBuf, source: std::io::Error },
     #[error("{}: the device left no trace of its work, which --heatmap is made of", path.display())]
-    NoTrace { path: PathBuf },
+    NoWork { path: PathBuf },
     #[error("{}: it is there already: --force replaces it", path.display())]
     There { path: PathBuf },
     #[error(transparent)]
@@ -61,32 +55,15 @@ pub enum HeatmapError {
     Output(#[from] OutputError),
 }
 
-/// Makes devices write their traces to a file from now on, unless the environment requests a trace already. The
-/// returned folder, if there is one, must exist until the trace is read.
-pub fn trace_from_now_on() -> std::io::Result<Option<TempDir>> {
-    if std::env::var_os(TRACE).is_some_and(|file| !file.is_empty()) {
-        return Ok(None);
-    }
-    let folder = tempfile::tempdir()?;
-    // SAFETY: this is called before another thread is started.
-    unsafe { std::env::set_var(TRACE, folder.path().join("work.json")) };
-    Ok(Some(folder))
-}
-
-/// Writes the picture of a `quantity` of the last frame that the device drew, after the device is destroyed; returns the
-/// greatest value of a tile.
+/// Writes the picture of a `quantity` of the last frame in the device's `work`; returns the greatest value of a tile.
 ///
 /// # Errors
 /// See [`HeatmapError`].
-pub fn write(path: &Path, quantity: Quantity, camera: &Camera, force: bool) -> Result<f64, HeatmapError> {
+pub fn write(path: &Path, quantity: Quantity, work: &Trace, camera: &Camera, force: bool) -> Result<f64, HeatmapError> {
     if path.is_file() && !force {
         return Err(HeatmapError::There { path: path.to_owned() });
     }
-    let file = PathBuf::from(std::env::var_os(TRACE).unwrap_or_default());
-    let failed = |source| HeatmapError::Trace { path: file.clone(), source };
-    let text = std::fs::read_to_string(&file).map_err(failed)?;
-    let trace: Trace = serde_json::from_str(&text).map_err(|error| failed(error.into()))?;
-    let frame = trace.frames.last().ok_or_else(|| HeatmapError::NoTrace { path: file.clone() })?;
+    let frame = work.frames.last().ok_or_else(|| HeatmapError::NoWork { path: path.to_owned() })?;
     let size = [camera.width, camera.height];
     let (picture, greatest) = match quantity {
         Quantity::Gaussians => picture(size, true, contributions(frame)),

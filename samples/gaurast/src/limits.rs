@@ -1,29 +1,8 @@
-//! Checks of requests that would take too much memory or time.
+//! Checks of requests that would take too much memory.
 
 use std::fs;
 
 use gaurast_scene::Camera;
-
-/// The number of threads that a device may always have; beyond it, four for each processor are allowed.
-const THREADS: usize = 64;
-
-/// Checks that `GAURAST_THREADS` is not larger than useful, since each thread costs time to start.
-///
-/// # Errors
-/// A sentence about the limit.
-pub fn check_threads() -> Result<(), String> {
-    let Some(wanted) = std::env::var("GAURAST_THREADS").ok().and_then(|value| value.parse::<usize>().ok()) else {
-        return Ok(());
-    };
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let most = THREADS.max(4 * processors);
-    if wanted > most {
-        return Err(format!(
-            "GAURAST_THREADS={wanted}: there are {processors} processors, and at most {most} threads are started"
-        ));
-    }
-    Ok(())
-}
 
 /// Checks that there is memory for pictures of this camera's size: on the device, on the host, and for the file.
 ///

@@ -9,7 +9,7 @@ mod drawing;
 mod heatmap;
 mod info;
 mod limits;
-mod logger;
+mod messages;
 mod outputs;
 mod progress;
 mod render;
@@ -44,16 +44,14 @@ fn main() -> ExitCode {
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
     }
-    logger::start();
+    // Messages of the driver do not come by the log, which `RUST_LOG` turns on for people who look for a defect.
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("off")).init();
     let arguments = Arguments::read();
     let result = run(arguments.command.unwrap_or_default());
     // Some errors of the driver have no result, such as a trace that does not fit on the disk.
-    let logged = logger::last_error();
-    let failure = match (result, logged) {
+    let failure = match (result, messages::last_error()) {
         (Ok(()), None) => return ExitCode::SUCCESS,
         (Ok(()), Some(sentence)) => Failure { sentence, code: FAILED },
-        // The driver's message has more information than the name of a call and its result.
-        (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure { sentence, ..failure },
         (Err(failure), _) => failure,
     };
     eprintln!("gaurast: {}", failure.sentence);
@@ -65,13 +63,7 @@ fn run(command: Command) -> Result<(), Failure> {
         |sentence: String, is_misuse: bool| Failure { sentence, code: if is_misuse { MISUSE } else { FAILED } };
     match command {
         Command::Render(arguments) => {
-            let traced = (arguments.output.heatmap.is_some())
-                .then(heatmap::trace_from_now_on)
-                .transpose()
-                .map_err(|error| failure(format!("--heatmap: {error}"), false))?;
-            let result = render::run(&arguments);
-            drop(traced);
-            result.map_err(|error| failure(error.to_string(), error.is_misuse()))
+            render::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
         }
         Command::Views(arguments) => sheet::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         Command::Compare(arguments) => {

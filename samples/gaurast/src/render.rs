@@ -1,13 +1,16 @@
 //! `gaurast render`.
 
 use std::io::{Write, stdout};
+use std::sync::Arc;
 use std::time::Instant;
 
 use gaurast_picture::OutputError;
+use gaurast_render::WorkTrace;
 use gaurast_scene::camera_path::Keyframe;
 use thiserror::Error;
+use timing::work::Trace;
 
-use crate::args::RenderArguments;
+use crate::args::{OutputArguments, RenderArguments};
 use crate::cameras::{self, View, ViewError, Views};
 use crate::drawing::{self, DrawError, Drawing};
 use crate::heatmap::{self, HeatmapError};
@@ -36,6 +39,8 @@ pub enum Error {
     HeatmapViews(usize),
     #[error("{0}")]
     Limit(String),
+    #[error("the device's trace of its work: {0}")]
+    Trace(serde_json::Error),
     #[error("the pictures are written, but not the report: {0}")]
     Report(std::io::Error),
 }
@@ -49,6 +54,25 @@ impl Error {
 
 /// Draws a scene and writes the pictures.
 pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
+    let trace = arguments.output.heatmap.is_some().then(Arc::default);
+    draw(arguments, trace.as_ref())
+}
+
+/// Draws a scene, writes the pictures, and returns the device's work.
+pub fn work(arguments: &RenderArguments) -> Result<Trace, Error> {
+    let trace = Arc::default();
+    draw(arguments, Some(&trace))?;
+    parse(&trace)
+}
+
+/// The work that the device has left; none if it has drawn nothing.
+fn parse(trace: &WorkTrace) -> Result<Trace, Error> {
+    let json = trace.take().unwrap_or_default();
+    serde_json::from_slice(&json).map_err(Error::Trace)
+}
+
+/// Draws a scene and writes the pictures. `trace` receives the device's work.
+fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(), Error> {
     let source = Source::of(&arguments.scene)?;
     let outputs = Outputs::new(&arguments.output, &source.name, source.background)?;
     if let Some(path) = &arguments.output.heatmap {
@@ -97,13 +121,15 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         Vec::new()
     } else {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(scene, settings, arguments.report.counters)?;
+        let mut drawing = Drawing::new(scene, settings, arguments.report.counters, trace.cloned())?;
         step.finish_and_clear();
         drawing.all(&views, &indices, &outputs, arguments.report.strict, progress)?
     };
-    let heat = match (&arguments.output.heatmap, indices.first()) {
-        (Some(path), Some(index)) => {
-            Some(heatmap::write(path, arguments.output.heatmap_of, &views[*index].camera, arguments.output.force)?)
+    let OutputArguments { heatmap, heatmap_of, force, .. } = &arguments.output;
+    let heat = match (heatmap, trace, indices.first()) {
+        (Some(path), Some(trace), Some(index)) => {
+            let camera = &views[*index].camera;
+            Some(heatmap::write(path, *heatmap_of, &parse(trace)?, camera, *force)?)
         }
         _ => None,
     };
@@ -127,7 +153,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     }
     for drawn in &drawn {
         if let Some(reason) = drawn.nothing.as_deref().filter(|_| !quiet) {
-            let files = outputs.told((drawn.index, &views[drawn.index]), (drawn.index, &views[drawn.index]));
+            let files = outputs.describe(&views, drawn.index, drawn.index);
             eprintln!("gaurast: {files}: {reason}");
         }
     }

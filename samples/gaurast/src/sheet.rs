@@ -100,7 +100,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
         framing.camera(&extent)
     };
     let settings = drawing::settings(&arguments.modes, &scene);
-    let mut drawing = Drawing::new(scene, settings, false)?;
+    let mut drawing = Drawing::new(scene, settings, false, None)?;
     let background = arguments.background.or(source.background);
     let behind = background.map_or([0.0; 3], Background::color);
     let bar = progress.pictures(8);

@@ -1,11 +1,10 @@
 //! `gaurast simulate`: the estimated cost of a scene on the simulated hardware.
 //!
-//! The work is that of a real run. This program draws the scene in a process of its own with `GAURAST_TRACE` set, which
-//! works with any Vulkan program.
+//! The work is that of a real run: of the scene, which this program draws, or of any Vulkan program that ran with
+//! `GAURAST_TRACE` set.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
@@ -21,6 +20,8 @@ use timing::work::{Trace, TraceError};
 use timing_studies::what_if::{WhatIf, what_ifs};
 use timing_studies::{area, paper, rtl, stepped};
 
+use crate::args::RenderArguments;
+use crate::render;
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 
@@ -42,7 +43,7 @@ pub enum Error {
     #[error("--stepped takes at most {MAX_STEPPED_PAIRS} pairs of a tile and a primitive, and the trace has {0}")]
     TooLong(u64),
     #[error("drawing the scene: {0}")]
-    Draw(String),
+    Draw(#[from] render::Error),
     #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
     Sweep(String),
     #[error("--sweep: {0} machines, and at most {MAX_GRID}")]
@@ -373,28 +374,18 @@ fn load(path: &Path) -> Result<Trace, Error> {
     Ok(trace)
 }
 
-/// Draws the scene in a process of its own, which writes the trace.
+/// Draws the scene, and returns the work. The picture goes to `folder`.
 fn draw(arguments: &SimulateArguments, folder: &Path) -> Result<Trace, Error> {
-    let (trace, picture) = (folder.join("work.json"), folder.join("picture.png"));
-    let mut command = Command::new(std::env::current_exe()?);
-    command.arg("render").arg("--quiet").arg("--output").arg(picture);
-    command.env("GAURAST_TRACE", &trace);
-    if let Some(cameras) = &arguments.cameras {
-        command.arg("--cameras").arg(cameras).arg("--view").arg(arguments.view.to_string());
+    let mut render = RenderArguments::default();
+    render.scene.scenes.extend(arguments.scene.clone());
+    render.camera.cameras.clone_from(&arguments.cameras);
+    if arguments.cameras.is_some() {
+        render.camera.view.push(arguments.view.to_string());
     }
-    if let Some(Size([width, height])) = arguments.size {
-        command.arg("--size").arg(format!("{width}x{height}"));
-    }
-    if let Some(scene) = &arguments.scene {
-        command.arg("--").arg(scene);
-    }
-    let output = command.output()?;
-    if !output.status.success() {
-        let message = String::from_utf8_lossy(&output.stderr);
-        let message = message.trim().trim_start_matches("gaurast: ");
-        return Err(Error::Draw(message.lines().next().unwrap_or_default().to_owned()));
-    }
-    load(&trace)
+    render.camera.size = arguments.size;
+    render.output.output.push(folder.join("picture.png"));
+    render.report.quiet = true;
+    Ok(render::work(&render)?)
 }
 
 /// Writes the timeline of the trace's frames, repeated until it has `count` frames.
@@ -404,7 +395,7 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     let frames: Vec<_> = once.into_iter().cycle().take(count.into()).collect();
     let spans = simulate::timeline(&frames, config);
     let modules = module_spans(trace, &frames, &spans, config);
-    let json = schedule::chrome_trace_of_modules(&spans, &modules, config);
+    let json = schedule::chrome_trace(&spans, &modules, config);
     replace(path, &serde_json::to_vec(&json)?)
 }
 

@@ -11,10 +11,8 @@ thread_local! {
     static HARNESS: RefCell<Option<Harness>> = const { RefCell::new(None) };
 }
 
-/// Opens the device, with a short time limit, and makes every panic end the process.
+/// Opens the device, and makes every panic end the process.
 fn open() -> Harness {
-    // SAFETY: no other thread runs yet that reads the environment.
-    unsafe { std::env::set_var("GAURAST_TIMEOUT_MS", "20") };
     std::panic::set_hook(Box::new(|info| {
         eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
         std::process::abort();

@@ -1,21 +1,21 @@
 //! Compares both models of the rasterizer's timing on the stress scenes.
 
 use gaurast_testkit::{Gpu, Settings};
-use gaurast_tests::recorded::{Agreement, read};
+use gaurast_tests::recorded::{Agreement, recorded};
+use std::sync::Arc;
 
+use super::accuracy::draw;
 use super::scenes::all;
-use super::verdicts::draw;
 
 #[gaurast_runner::test]
 fn models_of_the_rasterizer_agree_on_stress_scenes() {
-    let folder = tempfile::tempdir().expect("a folder");
     let mut agreement = Agreement::default();
-    for (number, stress) in all().iter().enumerate() {
-        let path = folder.path().join(format!("{number}.json"));
-        let gpu = Gpu::embedded(&Settings { trace: Some(&path), ..Settings::default() }).expect("a device");
+    for stress in &all() {
+        let trace = Arc::default();
+        let gpu = Gpu::embedded(&Settings { trace: Some(&trace), ..Settings::default() }).expect("a device");
         draw(&gpu, stress);
         drop(gpu);
-        agreement.add(stress.name, &read(&path));
+        agreement.add(stress.name, &recorded(&trace));
     }
     agreement.judge(100);
 }

@@ -46,14 +46,8 @@ fn found() -> Vec<(String, Vec<u32>)> {
     paths.iter().map(read).collect()
 }
 
-#[gaurast_runner::test(each = shards(4))]
+#[gaurast_runner::test(each = shards(4), alone)]
 fn mutated_modules_never_panic_and_never_write_elsewhere(case: &Case) {
-    if !case.is_alone() {
-        // Many modules have infinite loops, so the time limit is short.
-        return case.run_alone(|command| {
-            command.env("GAURAST_TIMEOUT_MS", "20");
-        });
-    }
     watch_panics();
     let seeds = seeds();
     assert!(seeds.len() > 20, "there should be shaders to begin with");

@@ -3,7 +3,8 @@
 use ash::vk;
 use gaurast_spirv::{DescriptorKind, Module, Options, Specialization, Stage, translate};
 use gaurast_testkit::descriptors::write;
-use gaurast_testkit::{Binding, Buffer, Driver, Gpu, Kernel, Opening, Sets, whole};
+use gaurast_testkit::{Binding, Buffer, Driver, Gpu, Kernel, Opening, Sets, Settings, whole};
+use std::time::Duration;
 
 /// Bytes of each bound range, and of the guards before and after it.
 const RANGE: u64 = 1024;
@@ -58,7 +59,7 @@ pub struct Harness {
 }
 
 impl Harness {
-    /// Opens this driver's device. The time limit of a dispatch comes from the environment, as for any application.
+    /// Opens this driver's device.
     pub fn new() -> Self {
         Self::default()
     }
@@ -81,6 +82,9 @@ impl Harness {
 /// Bytes of all ranges with their guards.
 const BYTES: usize = (2 * MOST_BINDINGS + 1) * RANGE as usize;
 
+/// The longest time of a workgroup. It is short, because many modules have infinite loops.
+const TIMEOUT: Duration = Duration::from_millis(20);
+
 struct Open {
     gpu: Gpu,
     buffer: Buffer,
@@ -88,7 +92,8 @@ struct Open {
 
 impl Open {
     fn new() -> Self {
-        let opening = Opening { robust: true, ..Opening::of(Driver::Embedded) };
+        let settings = Settings { timeout: Some(TIMEOUT), ..Settings::default() };
+        let opening = Opening { settings, robust: true, ..Opening::of(Driver::Embedded) };
         let gpu = Gpu::open(&opening).expect("a device");
         Self { buffer: Buffer::new(&gpu, BYTES as u64), gpu }
     }

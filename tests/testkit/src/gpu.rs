@@ -12,7 +12,7 @@ use gaurast::vk::GaussianCameraGAURAST;
 use crate::messages::Message;
 use crate::open::Opened;
 use crate::pass::{Attachments, Bindable, Pass};
-use crate::settings::{Settings, with_settings};
+use crate::settings::Settings;
 
 pub use crate::open::{Driver, OpenError, Opening};
 
@@ -37,7 +37,7 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`] names the step that failed.
     pub fn embedded(settings: &Settings) -> Result<Self, OpenError> {
-        with_settings(settings, || Self::open(&Opening::of(Driver::Embedded)))
+        Self::open(&Opening { settings: *settings, ..Opening::of(Driver::Embedded) })
     }
 
     /// Opens this driver, linked into the process, with extensions and their features in addition to those of the core
@@ -47,7 +47,7 @@ impl Gpu {
     /// [`OpenError`] names the step that failed.
     pub fn extended<T: vk::ExtendsDeviceCreateInfo>(extensions: &[&CStr], features: &mut T) -> Result<Self, OpenError> {
         let opening = Opening { extensions, ..Opening::of(Driver::Embedded) };
-        with_settings(&Settings::default(), || Self::open_with(&opening, features))
+        Self::open_with(&opening, features)
     }
 
     /// Opens a driver's device with the options in `opening`, and with features of its extensions.
@@ -67,7 +67,7 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`], for example if there is no loader.
     pub fn loaded() -> Result<Self, OpenError> {
-        with_settings(&Settings::default(), || Self::open(&Opening::of(Driver::Loaded)))
+        Self::open(&Opening::of(Driver::Loaded))
     }
 
     /// Opens lavapipe through the loader. It samples textures as accurately as it can if the process requests that (see
@@ -76,7 +76,7 @@ impl Gpu {
     /// # Errors
     /// [`OpenError`], for example if there is no loader, or it does not find lavapipe.
     pub fn lavapipe() -> Result<Self, OpenError> {
-        with_settings(&Settings::default(), || Self::open(&Opening::of(Driver::Lavapipe)))
+        Self::open(&Opening::of(Driver::Lavapipe))
     }
 
     /// Opens a driver's device with the options in `opening`.

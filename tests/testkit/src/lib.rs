@@ -63,6 +63,6 @@ pub use pipeline::{
     depth_test, opaque, whole,
 };
 pub use resource::{Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size};
-pub use settings::{Settings, with_settings};
+pub use settings::Settings;
 pub use target::{PassObject, Target, TargetOptions, fetch_sample};
 pub use transform_feedback::TransformFeedback;

@@ -1,12 +1,15 @@
 //! Opening devices: instance, messenger, physical device, and a device with one queue.
 
 use std::ffi::CStr;
+use std::sync::Arc;
 
 use ash::vk;
+use gaurast::WorkTrace;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
 
 use crate::messages::Messages;
+use crate::settings::Settings;
 
 /// A driver that tests use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +58,8 @@ impl Driver {
 pub struct Opening<'a> {
     /// The driver.
     pub driver: Driver,
+    /// The settings of the embedded driver.
+    pub settings: Settings<'a>,
     /// A part of the device's name; empty for any device.
     pub device: &'a str,
     /// Layers of the instance.
@@ -72,7 +77,16 @@ pub struct Opening<'a> {
 impl Opening<'_> {
     /// The default options for a driver: Gaussian draws if it has them, and no robust access.
     pub const fn of(driver: Driver) -> Self {
-        Self { driver, device: "", layers: &[], extensions: &[], all_extensions: false, gaussian: None, robust: false }
+        Self {
+            driver,
+            settings: Settings::DEFAULT,
+            device: "",
+            layers: &[],
+            extensions: &[],
+            all_extensions: false,
+            gaussian: None,
+            robust: false,
+        }
     }
 }
 
@@ -118,6 +132,8 @@ pub(crate) struct Opened {
     pub(crate) gaussian: Option<gaussian_primitive_topology::Device>,
     pub(crate) messages: Box<Messages>,
     messenger: vk::DebugUtilsMessengerEXT,
+    /// The receiver of the device's work.
+    _trace: Option<Arc<WorkTrace>>,
     debug_utils: ash::ext::debug_utils::Instance,
     /// Dropped last, because it may own the library of all functions above.
     pub(crate) entry: ash::Entry,
@@ -137,13 +153,17 @@ impl Opened {
         let layers: Vec<_> = opening.layers.iter().map(|layer| layer.as_ptr()).collect();
         let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
         let mut messenger_info = messages.messenger();
-        let info = vk::InstanceCreateInfo::default()
+        let mut options = opening.settings.options();
+        let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layers)
             .enabled_extension_names(&extensions)
             .push_next(&mut messenger_info);
-        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive
-        // the messenger that writes to them.
+        if driver == Driver::Embedded {
+            info = info.push_next(&mut options);
+        }
+        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages and the
+        // trace outlive the messenger and the device that write to them.
         unsafe {
             let instance = entry.create_instance(&info, None).map_err(refused("create an instance"))?;
             let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
@@ -179,6 +199,7 @@ impl Opened {
                 instance,
                 messages,
                 messenger,
+                _trace: opening.settings.trace.cloned(),
                 debug_utils,
                 entry,
             })

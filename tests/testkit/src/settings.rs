@@ -1,57 +1,48 @@
-//! Settings of a device of the embedded driver: the environment variables that it reads when it is created.
+//! Settings of a device of the embedded driver.
 
-use std::ffi::{OsStr, OsString};
-use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::ffi::CStr;
+use std::sync::Arc;
+use std::time::Duration;
 
-/// The settings of a device.
+use gaurast::WorkTrace;
+use gaurast::vk::{DriverOptionsGAURAST, SimdLevelGAURAST};
+
+/// The settings of a device: the options of this driver, `VkDriverOptionsGAURAST`. `None` is an option's default.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settings<'a> {
-    /// The name of the SIMD level, `GAURAST_SIMD`, or `None` for the default.
+    /// The name of the SIMD level.
     pub simd: Option<&'a str>,
-    /// The number of worker threads, `GAURAST_THREADS`, or `None` for the default.
+    /// The number of worker threads.
     pub threads: Option<usize>,
-    /// The file to which the device's work is written when the device is destroyed, `GAURAST_TRACE`.
-    pub trace: Option<&'a Path>,
+    /// The longest time of a batch of shader invocations.
+    pub timeout: Option<Duration>,
+    /// The names of the optimizations.
+    pub optimizations: Option<&'a CStr>,
+    /// The receiver of the device's work when the device is destroyed.
+    pub trace: Option<&'a Arc<WorkTrace>>,
 }
 
-/// Calls `create`, which creates devices, with `settings` in the environment.
-///
-/// Calls wait for each other, so that no device gets the settings of another call.
-pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
-    static LOCK: Mutex<()> = Mutex::new(());
-    let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
-    let _simd = settings.simd.map(|simd| Variable::set("GAURAST_SIMD", simd.as_ref()));
-    let _threads = settings.threads.map(|threads| Variable::set("GAURAST_THREADS", threads.to_string().as_ref()));
-    let _trace = settings.trace.map(|trace| Variable::set("GAURAST_TRACE", trace.as_os_str()));
-    create()
-}
+impl Settings<'_> {
+    /// The default settings.
+    pub const DEFAULT: Settings<'static> =
+        Settings { simd: None, threads: None, timeout: None, optimizations: None, trace: None };
 
-/// An environment variable whose old value is restored on drop.
-struct Variable {
-    name: &'static str,
-    before: Option<OsString>,
-}
-
-impl Variable {
-    fn set(name: &'static str, value: &OsStr) -> Self {
-        let before = std::env::var_os(name);
-        // SAFETY: the standard library guards the environment against its own readers and writers, of which the
-        // embedded driver is one. The Vulkan loader and lavapipe are not; they read it when they are opened, and that
-        // waits for `with_settings`.
-        unsafe { std::env::set_var(name, value) };
-        Self { name, before }
-    }
-}
-
-impl Drop for Variable {
-    fn drop(&mut self) {
-        // SAFETY: as above.
-        unsafe {
-            match &self.before {
-                Some(value) => std::env::set_var(self.name, value),
-                None => std::env::remove_var(self.name),
-            }
+    /// The settings as the driver receives them.
+    ///
+    /// # Panics
+    /// If there is no SIMD level of that name.
+    pub(crate) fn options(&self) -> DriverOptionsGAURAST<'_> {
+        let simd = self.simd.map(|name| SimdLevelGAURAST::from_name(name).expect("the name of a SIMD level"));
+        let mut options = DriverOptionsGAURAST::default()
+            .thread_count(self.threads.unwrap_or_default() as u32)
+            .simd_level(simd.unwrap_or_default())
+            .shader_timeout(self.timeout.unwrap_or_default().as_nanos() as u64);
+        if let Some(names) = self.optimizations {
+            options = options.p_optimizations(names.as_ptr());
         }
+        if let Some(trace) = self.trace {
+            options = options.work_trace(trace);
+        }
+        options
     }
 }

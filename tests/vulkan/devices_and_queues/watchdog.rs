@@ -1,22 +1,21 @@
-//! The watchdog: a kernel with an infinite loop loses its device, and no other one. The time limit comes from the
-//! environment, so the test has a process of its own.
+//! The watchdog: a kernel with an infinite loop loses its device, and no other one.
 
 use ash::vk;
-use gaurast_runner::Case;
-use gaurast_testkit::devices::open;
+use gaurast_testkit::devices::everything_of;
 use gaurast_testkit::shader::spirv;
-use gaurast_testkit::{Binding, Buffer, Compute, Gpu};
+use gaurast_testkit::{Binding, Buffer, Compute, Driver, Gpu, Opening, Settings};
 use std::time::{Duration, Instant};
 
 const BINDINGS: &[Binding] = &[(0, vk::DescriptorType::STORAGE_BUFFER, 1)];
 
+/// Opens this driver's device with a short time limit.
+fn open() -> Gpu {
+    let settings = Settings { timeout: Some(Duration::from_millis(200)), ..Settings::default() };
+    Gpu::open(&Opening { settings, ..everything_of(Driver::Embedded) }).expect("a device")
+}
+
 #[gaurast_runner::test]
-fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
-    if !case.is_alone() {
-        return case.run_alone(|command| {
-            command.env("GAURAST_TIMEOUT_MS", "200");
-        });
-    }
+fn a_kernel_without_end_loses_its_device_alone() {
     let doomed = open();
     let survivor = open();
     let fence = lose(&doomed);

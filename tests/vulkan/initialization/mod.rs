@@ -2,6 +2,7 @@
 //!
 //! Unit tests: `driver/src/dispatch`.
 
+mod driver_options;
 mod embedded;
 mod leaks;
 mod loaded_draws;

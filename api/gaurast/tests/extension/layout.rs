@@ -63,6 +63,21 @@ fn properties() {
 }
 
 #[gaurast_runner::test]
+fn driver_options() {
+    assert_layout!(DriverOptionsGAURAST<'_>, 64, 8, {
+        s_type: 0,
+        p_next: 8,
+        thread_count: 16,
+        simd_level: 20,
+        shader_timeout: 24,
+        p_optimizations: 32,
+        simulated_timestamps: 40,
+        pfn_work_trace: 48,
+        p_user_data: 56,
+    });
+}
+
+#[gaurast_runner::test]
 fn pipeline_state() {
     assert_layout!(GaussianAttributeLocationsGAURAST, 28, 4, {
         position: 0,

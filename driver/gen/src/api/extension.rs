@@ -1,8 +1,9 @@
-//! The extension, as its fragment of the registry describes it.
+//! The driver's extensions, as their fragment of the registry describes them.
 
 use crate::error::Error;
 use crate::registry;
 use crate::rust::{file_of, snake_case};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use vk_parse::{
     EnumSpec, EnumsChild, ExtensionChild, InterfaceItem, RegistryChild, TypeMember, TypeMemberMarkup, TypeSpec,
@@ -12,8 +13,8 @@ use vk_parse::{
 /// The tag that ends the names of the extension's own things.
 pub(super) const TAG: &str = "GAURAST";
 
-/// The extension.
-#[derive(Debug)]
+/// An extension.
+#[derive(Debug, Default)]
 pub(super) struct Extension {
     pub(super) name: String,
     pub(super) number: u32,
@@ -24,6 +25,7 @@ pub(super) struct Extension {
     pub(super) added: Vec<Added>,
     /// Its enums and flags.
     pub(super) enums: Vec<Enum>,
+    pub(super) callbacks: Vec<Callback>,
     pub(super) structures: Vec<Structure>,
     pub(super) commands: Vec<Command>,
 }
@@ -61,6 +63,14 @@ pub(super) struct Enum {
 pub(super) struct Value {
     pub(super) name: String,
     pub(super) value: i64,
+    pub(super) comment: String,
+}
+
+/// The type of a function of the application's that the driver calls.
+#[derive(Debug)]
+pub(super) struct Callback {
+    pub(super) name: String,
+    pub(super) parameters: Vec<Member>,
     pub(super) comment: String,
 }
 
@@ -142,40 +152,44 @@ pub(super) fn rust_file(documentation: &str, code: &str) -> Result<String, Error
 }
 
 impl Extension {
-    pub(super) fn read(path: &Path) -> Result<Self, Error> {
-        let mut read = Self {
-            name: String::new(),
-            number: 0,
-            revision: String::new(),
-            constants: Vec::new(),
-            added: Vec::new(),
-            enums: Vec::new(),
-            structures: Vec::new(),
-            commands: Vec::new(),
-        };
-        let mut extension = None;
+    /// Reads the extensions of a fragment, each with the definitions that it requires.
+    pub(super) fn read_all(path: &Path) -> Result<Vec<Self>, Error> {
+        // The definitions of all extensions, as if they were one's.
+        let mut defined = Self::default();
+        let mut extensions = Vec::new();
         for child in registry::parse(path)? {
             match child {
                 RegistryChild::Types(types) => {
-                    let types = types.children.into_iter();
-                    read.structures.extend(types.filter_map(structure));
+                    for child in types.children {
+                        let TypesChild::Type(ty) = child else {
+                            continue;
+                        };
+                        match ty.spec {
+                            TypeSpec::Members(_) => defined.structures.extend(structure(ty)),
+                            TypeSpec::Funcpointer(code) => {
+                                defined.callbacks.push(callback(&code, ty.comment.unwrap_or_default()))
+                            }
+                            _ => {}
+                        }
+                    }
                 }
-                RegistryChild::Enums(enums) => read.add_enums(enums),
+                RegistryChild::Enums(enums) => defined.add_enums(enums),
                 RegistryChild::Commands(commands) => {
                     let commands = commands.children.into_iter();
-                    read.commands.extend(commands.filter_map(command));
+                    defined.commands.extend(commands.filter_map(command));
                 }
-                RegistryChild::Extensions(extensions) => {
-                    extension = extensions.children.into_iter().next();
-                }
+                RegistryChild::Extensions(found) => extensions.extend(found.children),
                 _ => {}
             }
         }
-        read.add_extension(extension).ok_or_else(|| Error::Registry {
-            path: PathBuf::from(path),
-            reason: "it has no extension with a number and a revision".to_owned(),
-        })?;
-        Ok(read)
+        let take = |extension: vk_parse::Extension| {
+            let name = extension.name.clone();
+            Self::take(extension, &mut defined).ok_or_else(|| Error::Registry {
+                path: PathBuf::from(path),
+                reason: format!("{name} has no number or no revision"),
+            })
+        };
+        extensions.into_iter().map(take).collect()
     }
 
     fn add_enums(&mut self, enums: vk_parse::Enums) {
@@ -217,34 +231,53 @@ impl Extension {
         }
     }
 
-    fn add_extension(&mut self, extension: Option<vk_parse::Extension>) -> Option<()> {
-        let extension = extension?;
-        self.number = u32::try_from(extension.number?).ok()?;
-        let first = 1_000_000_000 + (i64::from(self.number) - 1) * 1000;
+    /// An extension with what it requires, which is taken from the definitions; `None` if it has no number or revision.
+    fn take(extension: vk_parse::Extension, defined: &mut Self) -> Option<Self> {
+        let mut taken =
+            Self { name: extension.name, number: u32::try_from(extension.number?).ok()?, ..Self::default() };
+        let mut required = BTreeSet::new();
         for child in extension.children {
             let ExtensionChild::Require { items, .. } = child else {
                 continue;
             };
             for item in items {
-                let InterfaceItem::Enum(value) = item else {
-                    continue;
-                };
-                match value.spec {
-                    EnumSpec::Offset { offset, extends, .. } => self.added.push(Added {
-                        name: value.name,
-                        of: extends,
-                        value: first + offset,
-                        comment: value.comment.unwrap_or_default(),
-                    }),
-                    EnumSpec::Value { value: text, .. } if value.name.ends_with("_SPEC_VERSION") => {
-                        self.revision = text;
+                match item {
+                    InterfaceItem::Enum(value) => {
+                        required.insert(value.name.clone());
+                        taken.add_value(value);
+                    }
+                    InterfaceItem::Type { name, .. } | InterfaceItem::Command { name, .. } => {
+                        required.insert(name);
                     }
                     _ => {}
                 }
             }
         }
-        self.name = extension.name;
-        (!self.revision.is_empty()).then_some(())
+        taken.constants = extract(&mut defined.constants, |constant| required.contains(&constant.name));
+        taken.enums = extract(&mut defined.enums, |of| required.contains(&of.name));
+        taken.callbacks = extract(&mut defined.callbacks, |callback| required.contains(&callback.name));
+        taken.structures = extract(&mut defined.structures, |structure| required.contains(&structure.name));
+        taken.commands = extract(&mut defined.commands, |command| required.contains(&command.name));
+        (!taken.revision.is_empty()).then_some(taken)
+    }
+
+    /// Adds a value of the extension's own list: its revision, or one that it adds to an enum of Vulkan.
+    fn add_value(&mut self, value: vk_parse::Enum) {
+        match value.spec {
+            EnumSpec::Offset { offset, extends, .. } => self.added.push(Added {
+                name: value.name,
+                of: extends,
+                value: self.first_value() + offset,
+                comment: value.comment.unwrap_or_default(),
+            }),
+            EnumSpec::Value { value: text, .. } if value.name.ends_with("_SPEC_VERSION") => self.revision = text,
+            _ => {}
+        }
+    }
+
+    /// The first of the values that it may add to enums of Vulkan.
+    pub(super) fn first_value(&self) -> i64 {
+        1_000_000_000 + (i64::from(self.number) - 1) * 1000
     }
 
     /// The prefix of the names of its C macros.
@@ -253,10 +286,20 @@ impl Extension {
     }
 }
 
-fn structure(ty: TypesChild) -> Option<Structure> {
-    let TypesChild::Type(ty) = ty else {
-        return None;
-    };
+/// Removes the elements that are wanted, and returns them in order.
+fn extract<T>(from: &mut Vec<T>, is_wanted: impl Fn(&T) -> bool) -> Vec<T> {
+    from.extract_if(.., |element| is_wanted(element)).collect()
+}
+
+fn callback(code: &vk_parse::FuncpointerCode, comment: String) -> Callback {
+    Callback {
+        name: code.proto.name.clone(),
+        parameters: code.params.iter().map(|parameter| Member::declared(&parameter.code)).collect(),
+        comment,
+    }
+}
+
+fn structure(ty: vk_parse::Type) -> Option<Structure> {
     let TypeSpec::Members(children) = ty.spec else {
         return None;
     };

@@ -107,6 +107,12 @@ fn value(extension: &Extension, member: &Member) -> Option<String> {
     if ty == "VkBool32" {
         return Some(format!("`{name}` must be `VK_TRUE` or `VK_FALSE`."));
     }
+    if ty == "char" {
+        return Some(format!("If `{name}` is not `NULL`, `{name}` must be a null-terminated UTF-8 string."));
+    }
+    if extension.callbacks.iter().any(|callback| callback.name == *ty) {
+        return Some(format!("If `{name}` is not `NULL`, `{name}` must be a valid `{ty}` value."));
+    }
     if ENUMS.contains(&ty.as_str()) {
         return Some(format!("`{name}` must be a valid `{ty}` value."));
     }

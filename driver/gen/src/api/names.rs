@@ -4,12 +4,29 @@ use super::extension::{Extension, Structure, rust_constant, rust_file, rust_name
 use crate::error::Error;
 use std::fmt::Write;
 
-pub(super) fn write(extension: &Extension) -> Result<String, Error> {
-    let mut layout = String::new();
-    for structure in &extension.structures {
-        add_structure(&mut layout, structure);
+pub(super) fn write(extensions: &[Extension]) -> Result<String, Error> {
+    let (mut layout, mut values) = (String::new(), String::new());
+    for extension in extensions {
+        extension.structures.iter().for_each(|structure| add_structure(&mut layout, structure));
+        add_values(&mut values, extension);
     }
-    let mut values = String::new();
+    rust_file(
+        "//! The extensions' names in C, with what they are in Rust.",
+        &format!(
+            "use core::mem::offset_of;
+            use gaurast::vk::*;
+
+            /// Sizes of structures and offsets of members.
+            pub const LAYOUT: &[(&str, usize)] = &[{layout}];
+
+            /// Values of enums, flags and constants.
+            pub const VALUES: &[(&str, i64)] = &[{values}];
+            "
+        ),
+    )
+}
+
+fn add_values(values: &mut String, extension: &Extension) {
     let mut add = |name: &str, value: &str| {
         let _ = writeln!(values, "(\"{name}\", {value} as i64),");
     };
@@ -27,20 +44,6 @@ pub(super) fn write(extension: &Extension) -> Result<String, Error> {
             add(&value.name, &path);
         }
     }
-    rust_file(
-        "//! The extension's names in C, with what they are in Rust.",
-        &format!(
-            "use core::mem::offset_of;
-            use gaurast::vk::*;
-
-            /// Sizes of structures and offsets of members.
-            pub const LAYOUT: &[(&str, usize)] = &[{layout}];
-
-            /// Values of enums, flags and constants.
-            pub const VALUES: &[(&str, i64)] = &[{values}];
-            "
-        ),
-    )
 }
 
 fn add_structure(layout: &mut String, structure: &Structure) {

@@ -1,4 +1,4 @@
-//! Writes the extension in Rust, in the form of the extensions that ash contains.
+//! Writes the extensions in Rust, in the form of the extensions that ash contains.
 
 use super::comment::Comments;
 use super::extension::{Command, Enum, Extension, Member, Structure, TAG, rust_constant, rust_file, rust_name};
@@ -24,6 +24,8 @@ fn grouped(number: i64) -> String {
 fn base_type(name: &str) -> String {
     match name {
         "void" => "c_void".to_owned(),
+        "char" => "c_char".to_owned(),
+        "size_t" => "usize".to_owned(),
         "float" => "f32".to_owned(),
         "double" => "f64".to_owned(),
         "uint32_t" => "u32".to_owned(),
@@ -46,9 +48,26 @@ fn rust_type(member: &Member) -> String {
 }
 
 /// The module of structures, enums, constants and function types.
-pub(super) fn definitions(extension: &Extension, defaults: &BTreeSet<String>) -> Result<String, Error> {
-    let comments = Comments { extension, path: "" };
+pub(super) fn definitions(extensions: &[Extension], defaults: &BTreeSet<String>) -> Result<String, Error> {
     let mut code = String::new();
+    extensions.iter().for_each(|extension| add_definitions(&mut code, extension, defaults));
+    rust_file(
+        "//! The extensions' structures, enums, flags, constants and function types.",
+        &format!(
+            "use core::ffi::{{c_char, c_void}};
+            use core::marker::PhantomData;
+
+            use ash::vk;
+
+            use crate::ash_compat::{{bool_setters, setters, tagged_structure, vk_enum, vk_flags}};
+
+            {code}"
+        ),
+    )
+}
+
+fn add_definitions(code: &mut String, extension: &Extension, defaults: &BTreeSet<String>) {
+    let comments = Comments { extension, path: "" };
     for constant in &extension.constants {
         let _ = writeln!(
             code,
@@ -69,10 +88,20 @@ pub(super) fn definitions(extension: &Extension, defaults: &BTreeSet<String>) ->
         );
     }
     for of in &extension.enums {
-        add_enum(&mut code, comments, of);
+        add_enum(code, comments, of);
+    }
+    for callback in &extension.callbacks {
+        let parameters: String = callback.parameters.iter().map(declaration).collect();
+        let _ = writeln!(
+            code,
+            "{}#[allow(non_camel_case_types, reason = \"the name is Vulkan's\")]
+            pub type {} = Option<unsafe extern \"system\" fn({parameters})>;\n",
+            comments.text(&callback.comment, None),
+            callback.name
+        );
     }
     for structure in &extension.structures {
-        add_structure(&mut code, comments, structure, defaults);
+        add_structure(code, comments, structure, defaults);
     }
     for command in &extension.commands {
         let parameters: String = command.parameters.iter().map(declaration).collect();
@@ -84,19 +113,6 @@ pub(super) fn definitions(extension: &Extension, defaults: &BTreeSet<String>) ->
             command.name
         );
     }
-    rust_file(
-        "//! The extension's structures, enums, flags, constants and function types.",
-        &format!(
-            "use core::ffi::c_void;
-            use core::marker::PhantomData;
-
-            use ash::vk;
-
-            use crate::ash_compat::{{bool_setters, setters, tagged_structure, vk_enum, vk_flags}};
-
-            {code}"
-        ),
-    )
 }
 
 fn declaration(member: &Member) -> String {
@@ -217,6 +233,30 @@ fn setters(structure: &Structure) -> String {
     call("bool_setters", bools) + &call("setters", others)
 }
 
+/// The module of an extension that has no functions.
+pub(super) fn names(extension: &Extension) -> Result<String, Error> {
+    let documentation = format!("//! `{}`: name and version.", extension.name);
+    rust_file(&documentation, &format!("use core::ffi::CStr;\n\n{}", name_constants(extension)))
+}
+
+/// The constants with the extension's name, revision and number.
+fn name_constants(extension: &Extension) -> String {
+    let Extension { name, number, revision, .. } = extension;
+    format!(
+        "/// The extension's name, for `ppEnabledExtensionNames`.
+        pub const NAME: &CStr = c\"{name}\";
+
+        /// The revision of the extension that this crate describes.
+        pub const SPEC_VERSION: u32 = {revision};
+
+        /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
+        ///
+        /// It is not registered with Khronos. It is far above the numbers that are.
+        pub const EXTENSION_NUMBER: u32 = {number};
+        "
+    )
+}
+
 /// The module of the extension's name and functions.
 pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
     let comments = Comments { extension, path: "crate::vk::" };
@@ -253,7 +293,8 @@ pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
         })
         .collect();
     let types: Vec<String> = types.into_iter().collect();
-    let Extension { name, number, revision, .. } = extension;
+    let Extension { name, .. } = extension;
+    let constants = name_constants(extension);
     rust_file(
         &format!(
             "//! `{name}`: names, version and device-level functions.
@@ -268,17 +309,7 @@ pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
             use crate::ash_compat;
             use crate::vk::{{{types}}};
 
-            /// The extension's name, for `ppEnabledExtensionNames`.
-            pub const NAME: &CStr = c\"{name}\";
-
-            /// The revision of the extension that this crate describes.
-            pub const SPEC_VERSION: u32 = {revision};
-
-            /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
-            ///
-            /// It is not registered with Khronos. It is far above the numbers that are.
-            pub const EXTENSION_NUMBER: u32 = {number};
-
+            {constants}
             /// {name} device-level functions.
             #[derive(Clone)]
             pub struct Device {{

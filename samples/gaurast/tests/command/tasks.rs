@@ -140,7 +140,7 @@ fn what_the_device_does_not_draw_together_is_one_sentence() {
     let output = command.env("GAURAST_THREADS", "1000").output().expect("it starts");
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(stderr.starts_with("gaurast: GAURAST_THREADS=1000: "), "{stderr}");
+    assert!(stderr.starts_with("gaurast: vkCreateDevice: GAURAST_THREADS=1000: "), "{stderr}");
     assert_eq!(files(&folder), ["two.ply"]);
 }
 
@@ -160,7 +160,7 @@ fn the_drivers_errors_are_told_once_and_count() {
     let stderr = run("GAURAST_TRACE", "/dev/full");
     assert!(stderr.contains("GAURAST_TRACE=/dev/full: No space left"), "{stderr}");
     let stderr = run("GAURAST_SIMD", "mmx");
-    assert!(stderr.contains("GAURAST_SIMD=mmx is none of"), "{stderr}");
+    assert!(stderr.contains("GAURAST_SIMD=mmx: it is none of"), "{stderr}");
 }
 
 #[gaurast_runner::test]

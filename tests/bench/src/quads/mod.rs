@@ -19,7 +19,7 @@ use gaurast_picture::Picture;
 use gaurast_render::device::{Device, Purpose};
 use gaurast_render::process_stats::processor_time;
 use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
-use gaurast_render::{Counter, Frame, RenderError, Target, check_size, record_copy};
+use gaurast_render::{Counter, DeviceOptions, Frame, RenderError, Target, check_size, record_copy};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 use thiserror::Error;
@@ -72,7 +72,20 @@ impl QuadRenderer {
     /// # Errors
     /// If there is no such device, or Vulkan fails.
     pub fn new(entry: ash::Entry, device_name: &str, threads: usize) -> Result<Self, QuadError> {
-        let device = Arc::new(Device::new(entry, Purpose::Triangles(device_name))?);
+        Self::with_options(entry, device_name, threads, &DeviceOptions::default())
+    }
+
+    /// A renderer as [`QuadRenderer::new`] makes it, with options of the device.
+    ///
+    /// # Errors
+    /// As [`QuadRenderer::new`]; also for an option that the driver refuses.
+    pub fn with_options(
+        entry: ash::Entry,
+        device_name: &str,
+        threads: usize,
+        options: &DeviceOptions,
+    ) -> Result<Self, QuadError> {
+        let device = Arc::new(Device::new(entry, Purpose::Triangles(device_name), options)?);
         Ok(Self {
             pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build()?,
             pairs: [Vec::new(), Vec::new()],

@@ -29,7 +29,7 @@ pub struct Scenario {
     pub open: Box<dyn Fn() -> Use>,
 }
 
-const SETTINGS: Settings = Settings { simd: None, threads: Some(2), trace: None };
+const SETTINGS: Settings = Settings { threads: Some(2), ..Settings::DEFAULT };
 
 /// Scenes of triangles whose commands, descriptors and transfers differ.
 const TRIANGLES: [&str; 14] = [

@@ -1,6 +1,7 @@
 //! Worker processes. A contender draws in a process of its own, so that it has its own threads, environment and memory,
 //! and so that several can take turns. Parent and child exchange lines of JSON.
 
+use std::ffi::CString;
 use std::io::{BufRead, BufReader, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_render::process_stats as usage;
-use gaurast_render::{DeviceScene, Frame, Renderer, Settings};
+use gaurast_render::{DeviceOptions, DeviceScene, Frame, Renderer, Settings};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,21 @@ struct Setup {
     contender: Contender,
     workload: Workload,
     threads: usize,
+    /// The driver's optimizations.
+    optimizations: String,
+}
+
+impl Setup {
+    /// The options of this driver's device.
+    fn device_options(&self) -> Result<DeviceOptions, BenchError> {
+        let optimizations = CString::new(self.optimizations.as_str());
+        let optimizations = optimizations.map_err(|error| BenchError::Worker(error.to_string()))?;
+        Ok(DeviceOptions {
+            threads: self.threads as u32,
+            optimizations: Some(optimizations),
+            ..DeviceOptions::default()
+        })
+    }
 }
 
 /// Each further message to a worker.
@@ -107,13 +123,18 @@ impl Drawn {
     }
 }
 
-/// The whole input of a worker that draws `views` one after the other and exits.
+/// The whole input of a worker that draws `views` one after the other, with the driver's `optimizations`, and exits.
 ///
 /// # Errors
 /// If it cannot be written as JSON.
-pub fn input(workload: &Workload, views: &[Camera]) -> Result<Vec<u8>, BenchError> {
+pub fn input(workload: &Workload, optimizations: &str, views: &[Camera]) -> Result<Vec<u8>, BenchError> {
     let mut input = Vec::new();
-    let setup = Setup { contender: Contender::Gaurast, workload: workload.clone(), threads: 1 };
+    let setup = Setup {
+        contender: Contender::Gaurast,
+        workload: workload.clone(),
+        threads: 1,
+        optimizations: optimizations.to_owned(),
+    };
     say(&mut input, &setup)?;
     for camera in views {
         let request =
@@ -157,9 +178,7 @@ pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 impl Worker {
     /// Starts a worker that uses `threads` threads; `None` if its device is not available.
     pub fn start(contender: Contender, workload: &Workload, threads: usize) -> Result<Option<Self>, BenchError> {
-        let optimizations = std::env::var("GAURAST_OPTIMIZATIONS");
-        let optimizations = optimizations.unwrap_or_else(|_| OPTIMIZATIONS.to_owned());
-        Self::with_optimizations(contender, workload, threads, &optimizations)
+        Self::with_optimizations(contender, workload, threads, OPTIMIZATIONS)
     }
 
     /// Starts a worker as [`Worker::start`] does, with the driver's `optimizations`.
@@ -172,8 +191,6 @@ impl Worker {
         let mut command = Command::new(std::env::current_exe()?);
         command
             .arg(COMMAND)
-            .env("GAURAST_OPTIMIZATIONS", optimizations)
-            .env("GAURAST_THREADS", threads.to_string())
             // The number of rasterizer threads; the queue has one more, for vertices.
             .env("LP_NUM_THREADS", threads.to_string())
             .stdin(Stdio::piped())
@@ -195,7 +212,7 @@ impl Worker {
             replies: BufReader::new(replies),
             ready: Ready { device: String::new(), upload: 0.0 },
         };
-        let setup = Setup { contender, workload: workload.clone(), threads };
+        let setup = Setup { contender, workload: workload.clone(), threads, optimizations: optimizations.to_owned() };
         match worker.ask(&setup)? {
             Reply::Ready(ready) => worker.ready = ready,
             reply => return Err(reply.unexpected(contender)),
@@ -335,7 +352,7 @@ impl Artist {
         let start = Instant::now();
         let (artist, device) = match setup.contender {
             Contender::Gaurast => {
-                let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+                let mut renderer = Renderer::with_options(vulkan_gaurast::entry(), &setup.device_options()?)?;
                 let uploaded = renderer.upload(&scene, None)?;
                 let device = renderer.device_name().to_owned();
                 let parts = (renderer, uploaded, Settings::default());
@@ -347,7 +364,8 @@ impl Artist {
                 (Self::Quads(Box::new((renderer, scene))), device)
             }
             Contender::QuadsOnGaurast => {
-                let renderer = QuadRenderer::new(vulkan_gaurast::entry(), "", setup.threads)?;
+                let options = setup.device_options()?;
+                let renderer = QuadRenderer::with_options(vulkan_gaurast::entry(), "", setup.threads, &options)?;
                 let device = renderer.device_name().to_owned();
                 (Self::Quads(Box::new((renderer, scene))), device)
             }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast_render::RenderError;
 use gaurast_render::device::{Device, Purpose};
 use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_render::{DeviceOptions, RenderError};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -31,7 +31,7 @@ pub(super) struct Bodies {
 impl Bodies {
     /// Creates the bodies on the first device of `entry`.
     pub(super) fn new(entry: ash::Entry) -> Result<Self, RenderError> {
-        let device = Arc::new(Device::new(entry, Purpose::Triangles(""))?);
+        let device = Arc::new(Device::new(entry, Purpose::Triangles(""), &DeviceOptions::default())?);
         let mut objects = Objects::new(&device);
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let bodies: Vec<[f32; 4]> = (0..BODIES).map(|_| rng.random()).collect();

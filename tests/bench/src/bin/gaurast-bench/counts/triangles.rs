@@ -6,7 +6,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use gaurast_render::device::{Device, Purpose};
 use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
-use gaurast_render::{COLOR_FORMAT, RenderError, Target, record_copy};
+use gaurast_render::{COLOR_FORMAT, DeviceOptions, RenderError, Target, record_copy};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -70,7 +70,7 @@ impl Triangles {
         vertices: &[Vertex],
         fragment: &[u8],
     ) -> Result<Self, RenderError> {
-        let device = Arc::new(Device::new(entry, Purpose::Triangles(""))?);
+        let device = Arc::new(Device::new(entry, Purpose::Triangles(""), &DeviceOptions::default())?);
         let mut objects = Objects::new(&device);
         let mut commands = CommandBuffers::new(&device)?;
         let target = Target::new(&device, width, height)?;

@@ -57,19 +57,18 @@ impl Scene {
 
     /// The instructions of a process that draws `frames` frames.
     fn process(&self, optimizations: &str, frames: usize) -> Result<u64, BenchError> {
-        let environment = [("GAURAST_OPTIMIZATIONS", optimizations)];
         let counted = match &self.work {
             Work::Gaussians(workload, path) => {
                 let views = path.views(workload, self.frame)?;
-                let input = worker::input(workload, &views[..frames])?;
-                let counted = callgrind::count(&[worker::COMMAND], &environment, &input)?;
+                let input = worker::input(workload, optimizations, &views[..frames])?;
+                let counted = callgrind::count(&[worker::COMMAND], &[], &input)?;
                 worker::check(&counted.output)?;
                 counted
             }
             Work::Counted(name) => {
                 let frames = frames.to_string();
                 let arguments = [counts::WORKER, "--frames", &frames, name];
-                callgrind::count(&arguments, &environment, &[])?
+                callgrind::count(&arguments, &[("GAURAST_OPTIMIZATIONS", optimizations)], &[])?
             }
         };
         Ok(counted.instructions)
