@@ -79,6 +79,7 @@ pub struct Canvas {
 
 impl Canvas {
     /// A canvas of floats without depth.
+    #[expect(clippy::new_without_default, reason = "it opens a device")]
     pub fn new() -> Self {
         Self::of(FORMAT)
     }

@@ -1,6 +1,6 @@
 //! The chapter *Initialization*.
 //!
-//! Unit tests: `driver/src/dispatch`.
+//! Unit tests: `driver/src/dispatch`, `driver/src/options.rs`.
 
 mod driver_options;
 mod embedded;
