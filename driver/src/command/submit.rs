@@ -216,9 +216,9 @@ mod tests {
     use crate::options::Options;
     use crate::queue::Queue;
     use simdevice::Allocation;
+    use simdevice::BufferRange;
     use simdevice::Device;
     use simdevice::Packet;
-    use simdevice::packet::BufferRange;
 
     struct Fixture {
         sync: Arc<DeviceSync>,

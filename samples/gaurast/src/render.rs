@@ -153,7 +153,7 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
     }
     for drawn in &drawn {
         if let Some(reason) = drawn.nothing.as_deref().filter(|_| !quiet) {
-            let files = outputs.told((drawn.index, &views[drawn.index]), (drawn.index, &views[drawn.index]));
+            let files = outputs.describe(&views, drawn.index, drawn.index);
             eprintln!("gaurast: {files}: {reason}");
         }
     }

@@ -4,8 +4,8 @@ use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::recorded::{Agreement, recorded};
 use std::sync::Arc;
 
+use super::accuracy::draw;
 use super::scenes::all;
-use super::verdicts::draw;
 
 #[gaurast_runner::test]
 fn models_of_the_rasterizer_agree_on_stress_scenes() {
