@@ -3472,7 +3472,8 @@ unsafe extern "system" fn vkGetPhysicalDeviceCalibrateableTimeDomainsEXT(
 ) -> vk::Result {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(physical_device, "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT", || unsafe {
-        let time_domains = calibrated_timestamps::get_physical_device_calibrateable_time_domains()?;
+        let time_domains =
+            calibrated_timestamps::get_physical_device_calibrateable_time_domains(handle::get(physical_device)?)?;
         valid::enumerate(p_time_domain_count, p_time_domains, &time_domains)
     })
 }
