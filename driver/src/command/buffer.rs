@@ -436,7 +436,7 @@ pub(crate) unsafe fn record(
     guard(command_buffer, command, || {
         // SAFETY: the caller's promise.
         unsafe { handle::get(command_buffer)? }.record(command, record)
-    })
+    });
 }
 
 /// The colour formats of the pass that a secondary command buffer continues.
