@@ -250,7 +250,8 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_an_error() {
-        let result: vk::Result = guard(std::ptr::null::<u8>(), "test", || panic!("caught"));
+        let result: vk::Result =
+            guard(std::ptr::null::<u8>(), "test", || -> Result<vk::Result, Error> { panic!("caught") });
         assert_eq!(result, vk::Result::ERROR_UNKNOWN);
     }
 
