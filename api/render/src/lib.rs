@@ -45,7 +45,7 @@ pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
 pub use gaurast::WorkTrace;
 pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
-pub use options::{DeviceOptions, Message};
+pub use options::{DeviceOptions, Message, MessageFunction};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};
 pub use settings::Settings;

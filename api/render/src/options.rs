@@ -9,6 +9,9 @@ use ash::vk::{self, DebugUtilsMessageSeverityFlagsEXT as Severity};
 use gaurast::WorkTrace;
 use gaurast::vk::{DriverOptionsGAURAST, SimdLevelGAURAST};
 
+/// A function that receives messages, on any thread.
+pub type MessageFunction = Arc<dyn Fn(&Message) + Send + Sync>;
+
 /// The options of a device. Those of GauRast's driver (`VkDriverOptionsGAURAST`) are ignored by other drivers.
 #[derive(Clone, Default)]
 pub struct DeviceOptions {
@@ -21,7 +24,7 @@ pub struct DeviceOptions {
     /// The receiver of the device's work, which GauRast fills when the device is destroyed.
     pub work_trace: Option<Arc<WorkTrace>>,
     /// The function that receives the driver's warnings and errors.
-    pub on_message: Option<Arc<dyn Fn(&Message) + Send + Sync>>,
+    pub on_message: Option<MessageFunction>,
 }
 
 impl fmt::Debug for DeviceOptions {

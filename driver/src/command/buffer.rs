@@ -433,7 +433,7 @@ pub(crate) unsafe fn record(
     command: &'static str,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
 ) {
-    guard(command_buffer, command, || {
+    let () = guard(command_buffer, command, || {
         // SAFETY: the caller's promise.
         unsafe { handle::get(command_buffer)? }.record(command, record)
     });

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk::{self, PipelineStageFlags as Stage};
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::*;
+use gaurast_render::DeviceOptions;
 use gaurast_render::device::{Device, Purpose};
 use gaurast_render::resource::{Buffer, CommandBuffers, Image, Memory};
 use image::{Rgb, RgbImage};
@@ -181,7 +182,7 @@ pub struct Gpu {
 // every submission is waited for.
 impl Gpu {
     pub fn new(entry: ash::Entry) -> Outcome<Self> {
-        let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
+        let device = Arc::new(Device::new(entry, Purpose::Gaussians, &DeviceOptions::default())?);
         let constants = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(CONSTANTS)];
         let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
         Ok(Self {

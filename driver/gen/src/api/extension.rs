@@ -167,7 +167,7 @@ impl Extension {
                         match ty.spec {
                             TypeSpec::Members(_) => defined.structures.extend(structure(ty)),
                             TypeSpec::Funcpointer(code) => {
-                                defined.callbacks.push(callback(&code, ty.comment.unwrap_or_default()))
+                                defined.callbacks.push(callback(&code, ty.comment.unwrap_or_default()));
                             }
                             _ => {}
                         }
