@@ -6,6 +6,8 @@
 //! The driver has Vulkan's objects, a file for each chapter of the specification, and replays recorded commands as
 //! [`simdevice`] packets. It never computes a pixel.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod abi;
 mod calibrated_timestamps;
 mod command;

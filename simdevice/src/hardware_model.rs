@@ -125,6 +125,6 @@ fn add(counters: &mut Counters, frame: &FrameWork, config: &Config) {
     let millis = nanoseconds.into_iter().chain(nanojoules);
     let scaled = millis.map(|(counter, value)| (counter, value * 1e6));
     for (counter, value) in scaled.chain(counts) {
-        counters.add(counter, value.max(0.0).round() as u64);
+        counters.add(counter, libm::round(value.max(0.0)) as u64);
     }
 }

@@ -11,11 +11,13 @@
 //! [`packet`];
 //! [`geometry`], [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod command_processor;
 pub mod compute;
 pub mod device;
 pub mod format;
+#[allow(clippy::disallowed_methods, reason = "the Gaussian path has an arithmetic of its own")]
 pub mod gaussian;
 pub mod geometry;
 mod hardware_model;

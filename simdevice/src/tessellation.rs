@@ -206,9 +206,9 @@ impl Spacing {
         };
         let level = f64::from(level.max(least).min(most));
         let segments = match self {
-            Self::Equal => level.ceil(),
-            Self::FractionalEven => 2.0 * (level / 2.0).ceil(),
-            Self::FractionalOdd => 2.0 * ((level - 1.0) / 2.0).ceil() + 1.0,
+            Self::Equal => libm::ceil(level),
+            Self::FractionalEven => 2.0 * libm::ceil(level / 2.0),
+            Self::FractionalOdd => 2.0 * libm::ceil((level - 1.0) / 2.0) + 1.0,
         };
         let level = match self {
             Self::Equal => segments,
@@ -222,7 +222,7 @@ impl Spacing {
         for number in 0..segments.div_ceil(2) {
             let position =
                 if number <= short_at { number as f64 * length } else { (number - 1) as f64 * length + short };
-            edge.at[number] = (position * f64::from(ONE)).round() as u32;
+            edge.at[number] = libm::round(position * f64::from(ONE)) as u32;
             edge.at[segments - number] = ONE - edge.at[number];
         }
         if segments.is_multiple_of(2) {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use half::f16;
+use isa::op::Op as Ir;
 use spirv::{Decoration, Dim, ImageFormat, Op, StorageClass};
 
 use super::error::{Error, Result, malformed, unsupported};
@@ -414,19 +415,37 @@ fn path(globals: &Globals, mut ty: u32, indices: &[u32]) -> Result<(u32, usize)>
     Ok((ty, start))
 }
 
+/// Converts a float as the shader cores do, with their own operations.
 fn float(op: Op, from: Scalar, result: Scalar, bits: u64) -> Result<u64> {
-    let value = match from {
-        Scalar::Float { width: 64 } => f64::from_bits(bits),
-        _ => f64::from(f32::from_bits(bits as u32)),
-    };
+    let is_half = result == Scalar::Float { width: 16 };
+    let apply = |op: Ir, operand: u64| isa::evaluate(op, &[operand]);
     match (op, result) {
-        (Op::FConvert, Scalar::Float { width: 64 }) => Ok(value.to_bits()),
-        (Op::FConvert, Scalar::Float { width: 16 }) | (Op::QuantizeToF16, _) => {
-            Ok(u64::from(f16::from_f64(value).to_f32().to_bits()))
-        }
-        (Op::FConvert, Scalar::Float { .. }) => Ok(u64::from((value as f32).to_bits())),
+        (Op::QuantizeToF16, _) => Ok(quantized(bits)),
+        (Op::FConvert, Scalar::Float { .. }) => Ok(match (from.is_wide(), result.is_wide()) {
+            (true, true) => bits,
+            (false, true) => apply(Ir::FToF64, bits),
+            (true, false) if is_half => apply(Ir::RoundToF16, rounded_to_odd(bits)),
+            (true, false) => apply(Ir::F64ToF, bits),
+            (false, false) if is_half => apply(Ir::RoundToF16, bits),
+            (false, false) => bits,
+        }),
         _ => unsupported(format!("Op{op:?} on constant floats")),
     }
+}
+
+/// The bits of a binary64 rounded to odd in binary32, as `elementwise::round_to_odd` computes them.
+fn rounded_to_odd(bits: u64) -> u64 {
+    let near = isa::evaluate(Ir::F64ToF, &[bits]);
+    let (back, exact) = (f64::from_bits(isa::evaluate(Ir::FToF64, &[near])), f64::from_bits(bits));
+    if back == exact || exact.is_nan() { near } else { (near - u64::from(exact.abs() < back.abs())) | 1 }
+}
+
+/// The bits of a binary32 rounded to binary16, with denormals flushed to zero of the same sign, as
+/// `elementwise::quantize` computes them.
+fn quantized(bits: u64) -> u64 {
+    let rounded = isa::evaluate(Ir::RoundToF16, &[bits]);
+    let is_denormal = f32::from_bits(rounded as u32).abs() < f16::MIN_POSITIVE.to_f32_const();
+    if is_denormal { rounded & 0x8000_0000 } else { rounded }
 }
 
 fn logical(op: Op, a: bool, b: bool) -> Result<bool> {

@@ -7,6 +7,8 @@
 //! A module may have any words: a malformed or unsupported one gives an [`Error`] that names the instruction, in
 //! bounded time and memory, never a panic.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod decoder;
 mod error;
 mod globals;

@@ -424,8 +424,8 @@ impl FixedFunctionState {
         draw.samples = count;
         draw.sample_mask = graphics.fragment_output.sample_mask;
         // The device shades a pixel once or at every sample, and the requested number is a minimum.
-        let shaded = (multisample.min_sample_shading * count as f32).ceil();
-        draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
+        let shades_more = multisample.min_sample_shading * count as f32 > 1.0;
+        draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shades_more;
         draw.alpha_to_coverage = multisample.alpha_to_coverage_enable != vk::FALSE;
         draw.alpha_to_one = multisample.alpha_to_one_enable != vk::FALSE;
         Ok(())

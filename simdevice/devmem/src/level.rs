@@ -2,7 +2,8 @@
 
 use fearless_simd::{Level, Simd};
 
-/// A SIMD level by name. Pictures of all levels have the same error bound.
+/// A SIMD level by name. Pictures without Gaussians are the same at all levels, and those with Gaussians have the same
+/// error bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SimdLevel {
     /// The best level of this processor.

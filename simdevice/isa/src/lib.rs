@@ -56,6 +56,7 @@
 //! the traits through which a program reaches buffers, images and global memory; the caller implements them.
 
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod builder;
 pub mod clock;
@@ -68,8 +69,8 @@ pub mod resources;
 pub use compiler::Options;
 pub use devmem::level;
 pub use ir::{op, validate};
-pub use kernels::combine;
 pub use kernels::registers::Vector;
+pub use kernels::{combine, evaluate, float};
 
 #[cfg(test)]
 mod tests;

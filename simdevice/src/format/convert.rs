@@ -75,6 +75,11 @@ fn round_ties_even(value: f64) -> f64 {
     (value + NO_FRACTION) - NO_FRACTION
 }
 
+/// 2 to a power from -1022 to 1023.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
 /// Clamps to 0 to 1. NaN becomes 0.
 fn clamp_unorm(value: f32) -> f64 {
     f64::from(if value > 0.0 { value.min(1.0) } else { 0.0 })
@@ -153,7 +158,7 @@ fn to_ufloat(value: f32, mantissa: u32) -> u32 {
         return 0;
     }
     // Scaling by a power of two is exact. Rounding up to the next power of two carries into the exponent.
-    let scaled = f64::from(value) * 2f64.powi(mantissa as i32 - exponent);
+    let scaled = f64::from(value) * power_of_two(mantissa as i32 - exponent);
     let code = (((exponent + 14) as u32) << mantissa) + round_ties_even(scaled) as u32;
     code.min(infinity - 1)
 }
@@ -163,7 +168,7 @@ const SHARED_BIAS: i32 = 15;
 const SHARED_MANTISSA: i32 = 9;
 
 pub(super) fn from_shared_exponent(code: u32) -> [f32; 4] {
-    let scale = 2f32.powi((code >> 27) as i32 - SHARED_BIAS - SHARED_MANTISSA);
+    let scale = power_of_two((code >> 27) as i32 - SHARED_BIAS - SHARED_MANTISSA) as f32;
     let component = |shift: u32| (code >> shift & 0x1FF) as f32 * scale;
     [component(0), component(9), component(18), 1.0]
 }
@@ -176,8 +181,8 @@ pub(super) fn to_shared_exponent(texel: &[f32; 4]) -> u32 {
     let floor_log2 = (greatest.to_bits() >> 23) as i32 - 127;
     let preliminary = floor_log2.max(-SHARED_BIAS - 1) + 1 + SHARED_BIAS;
     let mantissa = |component: f32, exponent: i32| {
-        let scaled = f64::from(component) * 2f64.powi(SHARED_BIAS + SHARED_MANTISSA - exponent);
-        (scaled + 0.5).floor() as u32
+        let scaled = f64::from(component) * power_of_two(SHARED_BIAS + SHARED_MANTISSA - exponent);
+        (scaled + 0.5) as u32
     };
     let carries = mantissa(greatest, preliminary) == 1 << SHARED_MANTISSA;
     let exponent = preliminary + i32::from(carries);
@@ -198,17 +203,17 @@ static SRGB: LazyLock<Srgb> = LazyLock::new(Srgb::new);
 
 /// The sRGB transfer function from linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.2).
 pub(super) fn srgb_from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 /// The sRGB transfer function to linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.1).
 pub(super) fn linear_from_srgb(encoded: f64) -> f64 {
-    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+    if encoded <= 0.040_45 { encoded / 12.92 } else { libm::pow((encoded + 0.055) / 1.055, 2.4) }
 }
 
 impl Srgb {
     fn new() -> Self {
-        let nearest = |bits: u32| (srgb_from_linear(f64::from(f32::from_bits(bits))) * 255.0).round_ties_even() as u8;
+        let nearest = |bits: u32| round_ties_even(srgb_from_linear(f64::from(f32::from_bits(bits))) * 255.0) as u8;
         let one = 1f32.to_bits();
         // Positive floats have the same order as their bits, and so have their codes.
         let threshold = std::array::from_fn(|code| {

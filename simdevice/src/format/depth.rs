@@ -3,6 +3,7 @@
 use crate::format::Format;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16, u32x16};
+use isa::float;
 
 /// The encoding of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,11 +40,11 @@ impl DepthEncoding {
         }
     }
 
-    /// Encodes depths, clamped to `range`. NaN becomes the least depth.
+    /// Encodes depths, clamped to `range`. NaN becomes the least depth, as in [`clamp`](super::unorm8::clamp).
     #[inline(always)]
     pub fn encode<S: Simd>(self, simd: S, depth: f32x16<S>, range: (f32, f32)) -> u32x16<S> {
         let (low, high) = (f32x16::splat(simd, range.0), f32x16::splat(simd, range.1));
-        let depth = depth.max_precise(low).min(high);
+        let depth = depth.max(low).min(high);
         match self {
             Self::Float => {
                 // Negative zero becomes zero.
@@ -55,7 +56,7 @@ impl DepthEncoding {
                 let scaled = depth * (1u32 << bits) as f32;
                 // (2^n - 1) d = 2^n d - d. The first term is exact, so that its nearest integer is the result or one
                 // more.
-                let nearest = scaled.round_ties_even();
+                let nearest = float::round_ties_even(scaled);
                 let excess = (scaled - nearest + 0.5) - depth;
                 let one = excess.simd_lt(0.0).select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
                 (nearest - one).to_int::<u32x16<S>>()
@@ -80,7 +81,7 @@ impl DepthEncoding {
             Self::Unorm(bits) => {
                 let depth = if depth > 0.0 { depth.min(1.0) } else { 0.0 };
                 let max = f64::from((1u32 << bits) - 1);
-                (f64::from(depth) * max).round_ties_even() as u32
+                libm::rint(f64::from(depth) * max) as u32
             }
         }
     }

@@ -3,6 +3,7 @@
 use crate::simd::bits_of;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, mask32x16, u32x8, u32x16};
+use isa::float;
 
 /// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest. The sum of the two
 /// products rounds as the quotient does.
@@ -31,24 +32,11 @@ unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
 /// The colours of 16 fragments, by component.
 pub type Colors<S> = [f32x16<S>; 4];
 
-/// Clamps numbers. NaN becomes `low`.
+/// Clamps numbers. NaN becomes `low`: x86's maximum gives its second operand if the first is NaN, also a signalling one.
 #[inline(always)]
 pub(crate) fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
     let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
-    value.max_precise(low).min(high)
-}
-
-/// True if a multiplication and addition of this level round only once.
-#[inline(always)]
-fn is_fused<S: Simd>(simd: S) -> bool {
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    let fused = {
-        use fearless_simd::Level::{Avx2, Avx512};
-        matches!(simd.level(), Avx2(_) | Avx512(_))
-    };
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    let fused = false;
-    fused
+    value.max(low).min(high)
 }
 
 /// The nearest 8-bit codes of numbers from 0 to 1, in the low bits. The bits above are undefined. Numbers may be too
@@ -57,9 +45,9 @@ fn is_fused<S: Simd>(simd: S) -> bool {
 fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     // At this magnitude binary32 has no bits for a fraction.
     const NO_FRACTION: f32 = 8_388_608.0;
-    if is_fused(simd) {
+    if float::has_instructions(simd) {
         // This rounds once, to the nearest integer. 127.5 is the only tie.
-        let scaled = value.mul_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
+        let scaled = value.mul_add_precise(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
         return bits_of(scaled);
     }
     // 255 v = 256 v - v. The first term is exact, so that its nearest integer is the result or one more.

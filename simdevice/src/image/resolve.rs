@@ -2,6 +2,7 @@
 
 use crate::format::{Format, Numeric};
 use crate::state::ResolveMode;
+use isa::float::{greatest, least};
 
 /// Resolves a row. `samples` has the registers of each sample's texels, of an aspect of this format, as many as
 /// `resolved`. The average of integers is their first sample.
@@ -40,8 +41,8 @@ pub fn resolve_row<'a>(
         (ResolveMode::Max, Numeric::Uint) => each(|a, b| unsigned(a, b, u32::max)),
         (ResolveMode::Min, Numeric::Sint) => each(|a, b| signed(a, b, i32::min)),
         (ResolveMode::Max, Numeric::Sint) => each(|a, b| signed(a, b, i32::max)),
-        (ResolveMode::Min, _) => each(f32::min),
-        (ResolveMode::Max, _) => each(f32::max),
+        (ResolveMode::Min, _) => each(least),
+        (ResolveMode::Max, _) => each(greatest),
     }
 }
 

@@ -49,11 +49,11 @@ pub(super) fn texel_coordinate(mode: AddressMode, s: f32, normalized: bool, size
         _ if !normalized => s.clamp(-FAR, FAR),
         AddressMode::Repeat => {
             let s = s.clamp(-WHOLE, WHOLE);
-            (s - s.floor()) * size
+            (s - libm::floorf(s)) * size
         }
         AddressMode::MirroredRepeat => {
             let half = s.clamp(-WHOLE, WHOLE) * 0.5;
-            (half - half.floor()) * 2.0 * size
+            (half - libm::floorf(half)) * 2.0 * size
         }
         _ => (s * size).clamp(-FAR, FAR),
     }
@@ -62,10 +62,10 @@ pub(super) fn texel_coordinate(mode: AddressMode, s: f32, normalized: bool, size
 /// The first texel of a filter, before wrapping, and the weight of the next texel.
 pub(super) fn first_texel(filter: Filter, u: f32) -> (i32, f32) {
     match filter {
-        Filter::Nearest => (u.floor() as i32, 0.0),
+        Filter::Nearest => (libm::floorf(u) as i32, 0.0),
         Filter::Linear => {
             let shifted = u - 0.5;
-            let first = shifted.floor();
+            let first = libm::floorf(shifted);
             (first as i32, shifted - first)
         }
     }
@@ -92,7 +92,7 @@ pub(super) fn wrap(mode: AddressMode, i: i32, size: u32) -> Option<u32> {
 /// The array layer of a coordinate: rounded to nearest, ties to even, and clamped. NaN counts as 0.
 #[inline(always)]
 pub(super) fn layer(coordinate: f32, layers: u32) -> u32 {
-    (coordinate.round_ties_even() as u32).min(layers.saturating_sub(1))
+    (libm::rintf(coordinate) as u32).min(layers.saturating_sub(1))
 }
 
 /// The texels of 16 coordinates along one axis.

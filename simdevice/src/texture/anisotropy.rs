@@ -105,7 +105,7 @@ fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> 
             false => 1.0,
         };
         // A ratio slightly above an integer takes no further sample.
-        footprints.counts[lane] = ((ratio - 1e-3).ceil() as u32).max(1);
+        footprints.counts[lane] = (libm::ceilf(ratio - 1e-3) as u32).max(1);
         let width = longest / ratio;
         let (bias, least) = match &request.lod {
             LodRequest::Implicit { bias, minimum } => (bias[lane], minimum[lane]),

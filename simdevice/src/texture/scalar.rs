@@ -9,6 +9,7 @@ use super::sampler::{AddressMode, BorderColor, Filter, Reduction, Sampler};
 use super::surface::{Surface, Texel};
 use crate::format::{Channel, MAX_TEXEL_SIZE, Numeric};
 use isa::combine;
+use isa::float::{greatest, least};
 use isa::ir::{AtomicOp, Dimension, Format as Word, ImageShape, VECTOR_LANES};
 use isa::resources::{LaneWords, SampleRequest, TexelRequest};
 
@@ -182,8 +183,8 @@ impl Reader<'_> {
         let [a, b, c] = texels.map(|place| texel(place).map(f32::from_bits));
         let reduce: fn([f32; 3]) -> f32 = match self.sampler.reduction {
             Reduction::WeightedAverage => |[a, b, c]| (a + b + c) / 3.0,
-            Reduction::Min => |[a, b, c]| a.min(b).min(c),
-            Reduction::Max => |[a, b, c]| a.max(b).max(c),
+            Reduction::Min => |[a, b, c]| least(least(a, b), c),
+            Reduction::Max => |[a, b, c]| greatest(greatest(a, b), c),
         };
         std::array::from_fn(|component| reduce([a[component], b[component], c[component]]).to_bits())
     }
@@ -255,8 +256,8 @@ fn mix(reduction: Reduction, a: [u32; 4], b: [u32; 4], weight: f32) -> [u32; 4] 
             (a + weight * (b - a)).to_bits()
         }),
         _ if weight == 0.0 => a,
-        Reduction::Min => pairs(f32::min),
-        Reduction::Max => pairs(f32::max),
+        Reduction::Min => pairs(least),
+        Reduction::Max => pairs(greatest),
     }
 }
 

@@ -164,43 +164,7 @@ fn colors_beyond_every_number_leave_numbers() {
 #[cfg(target_arch = "x86_64")]
 #[gaurast_runner::test]
 fn flushing_to_zero_changes_nothing() {
-    /// The control bits that flush denormal results, and denormal operands, to zero.
-    const FLUSH: u32 = 1 << 15 | 1 << 6;
-
-    /// Sets bits of the thread's control register until it is dropped.
-    struct Control(u32);
-
-    impl Control {
-        fn with(bits: u32) -> Self {
-            let before = Self::read();
-            Self::write(before | bits);
-            Self(before)
-        }
-
-        fn read() -> u32 {
-            let mut control = 0u32;
-            // SAFETY: the instruction stores the register to a variable of its size.
-            unsafe {
-                std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut control, options(nostack, preserves_flags));
-            }
-            control
-        }
-
-        fn write(control: u32) {
-            // SAFETY: only two bits change, and no exception is unmasked. Nothing in this test but the device computes
-            // with denormals.
-            unsafe {
-                std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const control, options(nostack, preserves_flags));
-            }
-        }
-    }
-
-    impl Drop for Control {
-        fn drop(&mut self) {
-            Self::write(self.0);
-        }
-    }
-
+    use gaurast_testkit::control::{Control, FLUSH};
     let size = [40, 36];
     let black = [-4.0; 3];
     let scene = SceneBuffers::new(0, [gaussian(2.0, 0.2, 0.7, black)]);

@@ -10,6 +10,7 @@
 //! | [`target`] | attachments, and [pictures](output) of their contents |
 //! | [`transform_feedback`] | the commands of transform feedback |
 //! | [`gaussians`] | Gaussians in vertex buffers, and pipelines that draw them |
+//! | `control` | the floating-point modes of the application's thread |
 //! | [`difference`] | comparison of the pictures of two devices |
 //! | [`devices`], [`context`] | devices that tests share, or open with some features; instances without a device |
 //! | [`scene`], [`canvas`] | small pictures of Gaussians, and of points, lines and triangles |
@@ -25,6 +26,8 @@
 
 pub mod canvas;
 pub mod context;
+#[cfg(target_arch = "x86_64")]
+pub mod control;
 pub mod descriptors;
 pub mod devices;
 pub mod difference;

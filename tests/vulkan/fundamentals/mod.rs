@@ -2,4 +2,6 @@
 //!
 //! Unit tests: `driver/src/abi`.
 
+mod arithmetic;
+mod library;
 mod out_of_memory;

@@ -2,20 +2,17 @@
 
 use std::collections::HashMap;
 
-use fearless_simd::Level;
-
 use crate::ir::op::Op;
 use crate::ir::{Block, Constant, Program, Reg, Register, Role, Statement, Type};
 use crate::kernels::evaluate;
 
 /// Folds constants, takes branches on constants, and shares equal computations.
-pub fn fold(program: &mut Program, level: Level) {
+pub fn fold(program: &mut Program) {
     let mut folding = Folding {
         known: program.constants.iter().map(|constant| (constant.reg, constant.bits)).collect(),
         constants: HashMap::new(),
         alias: HashMap::new(),
         seen: vec![HashMap::new()],
-        level,
         registers: std::mem::take(&mut program.registers),
         new_constants: Vec::new(),
     };
@@ -36,7 +33,6 @@ struct Folding {
     alias: HashMap<Reg, Reg>,
     /// Computations on values, by the block that they are in, innermost last.
     seen: Vec<HashMap<(Op, Vec<Reg>), Reg>>,
-    level: Level,
     registers: Vec<Register>,
     new_constants: Vec<Constant>,
 }
@@ -79,7 +75,7 @@ impl Folding {
     fn replacement(&mut self, op: Op, dst: Reg, src: &[Reg]) -> Option<Reg> {
         let known: Option<Vec<u64>> = src.iter().map(|reg| self.known.get(reg).copied()).collect();
         if let Some(operands) = known {
-            return Some(self.constant(op.signature().result_type, evaluate(self.level, op, &operands)));
+            return Some(self.constant(op.signature().result_type, evaluate(op, &operands)));
         }
         if let Some(same) = self.identity(op, src) {
             return Some(same);

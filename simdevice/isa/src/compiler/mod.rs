@@ -91,7 +91,7 @@ impl CompiledProgram {
     /// If the program isn't valid, needs too many registers, or the options are out of range.
     pub fn new(mut program: Program, options: &Options) -> Result<Self, InvalidProgram> {
         let structure = |problem| Err(InvalidProgram::Structure { problem });
-        let Options { lanes, subgroup_size, count_work, level } = *options;
+        let Options { lanes, subgroup_size, count_work, .. } = *options;
         if lanes == 0 || !lanes.is_multiple_of(VECTOR_LANES) || lanes > MAX_LANES {
             return structure("the lanes of a batch aren't a multiple of 16 within bounds");
         }
@@ -99,7 +99,7 @@ impl CompiledProgram {
             return structure("the subgroup size isn't a power of two within bounds");
         }
         validate(&program)?;
-        fold::fold(&mut program, level);
+        fold::fold(&mut program);
         dead_code::remove_dead(&mut program);
         if_conversion::convert_branches(&mut program);
         licm::move_invariants(&mut program);

@@ -213,11 +213,11 @@ operations! {
     FSub(w w) -> w, Float;
     /// `a * b`.
     FMul(w w) -> w, Float;
-    /// `a * b + c`, fused where the host fuses.
+    /// `a * b + c`, rounded once.
     FFma(w w w) -> w, Float;
-    /// `a * b - c`, fused where the host fuses.
+    /// `a * b - c`, rounded once.
     FMulSub(w w w) -> w, Float;
-    /// `c - a * b`, fused where the host fuses.
+    /// `c - a * b`, rounded once.
     FNegMulAdd(w w w) -> w, Float;
     /// `a / b`.
     FDiv(w w) -> w, Special;
@@ -241,9 +241,9 @@ operations! {
     FRoundEven(w) -> w, Float;
     /// `a - floor(a)`.
     FFract(w) -> w, Float;
-    /// The smaller; if one is NaN, the other.
+    /// The smaller; `b` if they are equal, and if one is NaN, the other.
     FMin(w w) -> w, Float;
-    /// The larger; if one is NaN, the other.
+    /// The larger; `b` if they are equal, and if one is NaN, the other.
     FMax(w w) -> w, Float;
     /// Square root.
     FSqrt(w) -> w, Special;
@@ -371,7 +371,7 @@ operations! {
     FMul64(d d) -> d, Wide;
     /// `a / b`.
     FDiv64(d d) -> d, Wide;
-    /// `a * b + c`, fused.
+    /// `a * b + c`, rounded once.
     FFma64(d d d) -> d, Wide;
     /// Remainder with the sign of `a`.
     FRem64(d d) -> d, Wide;
@@ -393,9 +393,9 @@ operations! {
     FRoundEven64(d) -> d, Wide;
     /// `a - floor(a)`.
     FFract64(d) -> d, Wide;
-    /// The smaller; if one is NaN, the other.
+    /// The smaller; `b` if they are equal, and if one is NaN, the other.
     FMin64(d d) -> d, Wide;
-    /// The larger; if one is NaN, the other.
+    /// The larger; `b` if they are equal, and if one is NaN, the other.
     FMax64(d d) -> d, Wide;
     /// Square root.
     FSqrt64(d) -> d, Wide;

@@ -7,10 +7,10 @@ use std::cmp::Ordering;
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
-use super::elementary;
 use super::registers::{
     Kernel, RegisterFile, RegisterSlot, from_mask, map1, map2, map3, to_mask, vector1, vector2, vector3,
 };
+use super::{elementary, float};
 use crate::ir::op::{Kind, Op};
 
 type U<S> = u32x16<S>;
@@ -76,8 +76,19 @@ macro_rules! lanes {
         }
     };
 }
-/// `a` where it is `chosen` and `b` elsewhere. Where one of the two is NaN, the other one. That holds for a signalling
-/// NaN too, which AVX-512's minimum and maximum would make quiet and return.
+/// Defines a kernel that runs lane by lane, with a function whose first argument is the SIMD level.
+macro_rules! lanes_of_level {
+    ($map:ident, $f:path, $($a:ident),+) => {
+        |simd, file, dst, src| {
+            simd.vectorize(
+                #[inline(always)]
+                move || $map(*file, dst, src, |$($a),+| $f(simd, $($a),+)),
+            )
+        }
+    };
+}
+/// `a` where it is `chosen` and `b` elsewhere, as [`float::least`] and [`float::greatest`]. Where one of the two is NaN,
+/// the other one. That holds for a signalling NaN too, which AVX-512's minimum and maximum would make quiet and return.
 #[inline(always)]
 fn number_or_other<S: Simd>(chosen: mask32x16<S>, a: F<S>, b: F<S>) -> F<S> {
     b.simd_eq(b).select(chosen.select(a, b), a)
@@ -108,9 +119,9 @@ pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
         Op::FAdd => float!(|a, b| a + b),
         Op::FSub => float!(|a, b| a - b),
         Op::FMul => float!(|a, b| a * b),
-        Op::FFma => float!(|a, b, c| a.mul_add(b, c)),
-        Op::FMulSub => float!(|a, b, c| a.mul_sub(b, c)),
-        Op::FNegMulAdd => float!(|a, b, c| (-a).mul_add(b, c)),
+        Op::FFma => float!(|a, b, c| a.mul_add_precise(b, c)),
+        Op::FMulSub => float!(|a, b, c| a.mul_sub_precise(b, c)),
+        Op::FNegMulAdd => float!(|a, b, c| (-a).mul_add_precise(b, c)),
         Op::FDiv => float!(|a, b| a / b),
         Op::FNeg => float!(|a| -a),
         Op::FAbs => float!(|a| a.abs()),
@@ -139,11 +150,11 @@ fn less_common<S: Simd>(op: Op) -> Kernel<S> {
             let one = a.simd_gt(zero).select(F::splat(a.simd, 1.0), zero);
             a.simd_lt(zero).select(F::splat(a.simd, -1.0), one)
         }),
-        Op::FFloor => float!(|a| a.floor()),
-        Op::FCeil => float!(|a| a.ceil()),
-        Op::FTrunc => float!(|a| a.trunc()),
-        Op::FRoundEven => float!(|a| a.round_ties_even()),
-        Op::FFract => float!(|a| a - a.floor()),
+        Op::FFloor => float!(|a| float::floor(a)),
+        Op::FCeil => float!(|a| float::ceil(a)),
+        Op::FTrunc => float!(|a| float::trunc(a)),
+        Op::FRoundEven => float!(|a| float::round_ties_even(a)),
+        Op::FFract => float!(|a| a - float::floor(a)),
         Op::FInverseSqrt => float!(|a| F::splat(a.simd, 1.0) / a.sqrt()),
         Op::FLtGt => float_test!(|a, b| a.simd_lt(b) | b.simd_lt(a)),
         Op::FIsNan => float_test!(|a| a.is_nan()),
@@ -184,9 +195,9 @@ fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
         Op::BitfieldUExtract => lanes!(map3, unsigned_bitfield),
         Op::SExt8 => lanes!(map1, |a: u32| i32::from(a as u8 as i8)),
         Op::SExt16 => lanes!(map1, |a: u32| i32::from(a as u16 as i16)),
-        Op::FRem => lanes!(map2, |a: f32, b: f32| a % b),
+        Op::FRem => lanes!(map2, |a: f32, b: f32| libm::fmodf(a, b)),
         Op::FMod => lanes!(map2, |a: f32, b: f32| {
-            let r = a % b;
+            let r = libm::fmodf(a, b);
             if r != 0.0 && (r < 0.0) != (b < 0.0) { r + b } else { r }
         }),
         Op::FLdexp => lanes!(map2, elementary::ldexp),
@@ -232,22 +243,22 @@ fn wide<S: Simd>(op: Op) -> Kernel<S> {
         Op::FSub64 => lanes!(map2, |a: f64, b: f64| a - b),
         Op::FMul64 => lanes!(map2, |a: f64, b: f64| a * b),
         Op::FDiv64 => lanes!(map2, |a: f64, b: f64| a / b),
-        Op::FFma64 => lanes!(map3, |a: f64, b: f64, c: f64| a.mul_add(b, c)),
-        Op::FRem64 => lanes!(map2, |a: f64, b: f64| a % b),
+        Op::FFma64 => lanes_of_level!(map3, float::mul_add64, a, b, c),
+        Op::FRem64 => lanes!(map2, |a: f64, b: f64| libm::fmod(a, b)),
         Op::FMod64 => lanes!(map2, |a: f64, b: f64| {
-            let r = a % b;
+            let r = libm::fmod(a, b);
             if r != 0.0 && (r < 0.0) != (b < 0.0) { r + b } else { r }
         }),
         Op::FNeg64 => lanes!(map1, |a: f64| -a),
         Op::FAbs64 => lanes!(map1, f64::abs),
         Op::FSign64 => lanes!(map1, |a: f64| { f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)) }),
-        Op::FFloor64 => lanes!(map1, f64::floor),
-        Op::FCeil64 => lanes!(map1, f64::ceil),
-        Op::FTrunc64 => lanes!(map1, f64::trunc),
-        Op::FRoundEven64 => lanes!(map1, f64::round_ties_even),
-        Op::FFract64 => lanes!(map1, |a: f64| a - a.floor()),
-        Op::FMin64 => lanes!(map2, f64::min),
-        Op::FMax64 => lanes!(map2, f64::max),
+        Op::FFloor64 => lanes_of_level!(map1, float::floor64, a),
+        Op::FCeil64 => lanes_of_level!(map1, float::ceil64, a),
+        Op::FTrunc64 => lanes_of_level!(map1, float::trunc64, a),
+        Op::FRoundEven64 => lanes_of_level!(map1, float::round_ties_even64, a),
+        Op::FFract64 => lanes_of_level!(map1, float::fract64, a),
+        Op::FMin64 => lanes!(map2, float::least::<f64>),
+        Op::FMax64 => lanes!(map2, float::greatest::<f64>),
         Op::FSqrt64 => lanes!(map1, f64::sqrt),
         Op::FEq64 => lanes!(map2, |a: f64, b: f64| a == b),
         Op::FNe64 => lanes!(map2, |a: f64, b: f64| a != b),
@@ -302,7 +313,7 @@ fn frexp64(a: f64) -> (f64, i32) {
         return (a, 0);
     }
     // Denormals are scaled to normal numbers first.
-    let (scaled, bias) = if a.abs() < f64::MIN_POSITIVE { (a * 2f64.powi(64), -64) } else { (a, 0) };
+    let (scaled, bias) = if a.abs() < f64::MIN_POSITIVE { (a * power_of_two(64), -64) } else { (a, 0) };
     let bits = scaled.to_bits();
     let exponent = (bits >> 52 & 0x7ff) as i32 - 1022;
     (f64::from_bits(bits & !(0x7ff << 52) | 1022 << 52), exponent + bias)

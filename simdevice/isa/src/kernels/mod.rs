@@ -2,6 +2,7 @@
 
 pub mod arithmetic;
 mod elementary;
+pub mod float;
 pub mod registers;
 
 use std::cell::Cell;
@@ -11,10 +12,13 @@ use fearless_simd::Level;
 
 use crate::ir::op::Op;
 use crate::ir::{AtomicOp, Format, Type};
+use float::{greatest, least};
 use registers::{RegisterFile, RegisterSlot, Vector};
 
-/// The result of an operation on constants, computed with the kernels that programs run.
-pub fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
+/// The result of an operation on constants, computed with the kernels that programs run: those of the least level, since
+/// all give the same bits. A bool is 0 or 1.
+pub fn evaluate(op: Op, operands: &[u64]) -> u64 {
+    let level = Level::baseline();
     let signature = op.signature();
     let place = |index: usize| RegisterSlot::uniform(2 * index);
     let vectors: [Cell<Vector>; 10] = Default::default();
@@ -55,8 +59,8 @@ pub fn combine(op: AtomicOp, format: Format, old: u64, value: u64, comparator: u
                 }
             }
             AtomicOp::FAdd => (float_old + float).to_bits(),
-            AtomicOp::FMin => float_old.min(float).to_bits(),
-            AtomicOp::FMax => float_old.max(float).to_bits(),
+            AtomicOp::FMin => least(float_old, float).to_bits(),
+            AtomicOp::FMax => greatest(float_old, float).to_bits(),
         };
     }
     let (old, value) = (old as u32, value as u32);
@@ -80,7 +84,7 @@ pub fn combine(op: AtomicOp, format: Format, old: u64, value: u64, comparator: u
             }
         }
         AtomicOp::FAdd => (float_old + float).to_bits(),
-        AtomicOp::FMin => float_old.min(float).to_bits(),
-        AtomicOp::FMax => float_old.max(float).to_bits(),
+        AtomicOp::FMin => least(float_old, float).to_bits(),
+        AtomicOp::FMax => greatest(float_old, float).to_bits(),
     })
 }

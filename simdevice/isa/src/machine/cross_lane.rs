@@ -4,6 +4,7 @@ use super::batch::Batch;
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{Axis, Reg, SubgroupOp, Type, VECTOR_LANES};
+use crate::kernels::float::{greatest, least};
 use crate::kernels::registers::{Lane, RegisterSlot};
 
 pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool) {
@@ -177,8 +178,8 @@ fn combine(op: Op, a: u64, b: u64) -> u64 {
         Op::UMax => u64::from(a32.max(b32)),
         Op::FAdd => u64::from((fa + fb).to_bits()),
         Op::FMul => u64::from((fa * fb).to_bits()),
-        Op::FMin => u64::from(fa.min(fb).to_bits()),
-        Op::FMax => u64::from(fa.max(fb).to_bits()),
+        Op::FMin => u64::from(least(fa, fb).to_bits()),
+        Op::FMax => u64::from(greatest(fa, fb).to_bits()),
         Op::IAdd64 => a.wrapping_add(b),
         Op::IMul64 => a.wrapping_mul(b),
         Op::SMin64 => a.cast_signed().min(b.cast_signed()).cast_unsigned(),
@@ -187,8 +188,8 @@ fn combine(op: Op, a: u64, b: u64) -> u64 {
         Op::UMax64 => a.max(b),
         Op::FAdd64 => (da + db).to_bits(),
         Op::FMul64 => (da * db).to_bits(),
-        Op::FMin64 => da.min(db).to_bits(),
-        Op::FMax64 => da.max(db).to_bits(),
+        Op::FMin64 => least(da, db).to_bits(),
+        Op::FMax64 => greatest(da, db).to_bits(),
         // Validation allows no other operation.
         _ => a,
     }

@@ -1,6 +1,8 @@
 //! Tests of the shader cores against a scalar interpreter and exact models, at every SIMD level.
 
+mod errors;
 mod fast_paths;
+mod levels;
 mod memory;
 mod operations;
 mod random;
@@ -25,11 +27,6 @@ fn level(case: &Case) -> (&str, Level) {
     let name = case.variant();
     let level = SimdLevel::from_name(name).and_then(SimdLevel::resolve);
     (name, level.expect("a level of this processor"))
-}
-
-/// True if a level's multiply-add rounds once.
-fn fuses(name: &str) -> bool {
-    name.starts_with("avx")
 }
 
 /// A machine for a program.

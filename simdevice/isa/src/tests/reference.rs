@@ -10,7 +10,6 @@ pub struct Lane<'a> {
     program: &'a Program,
     registers: Vec<u64>,
     private: HashMap<u64, u32>,
-    fused: bool,
     pub killed: bool,
 }
 
@@ -24,14 +23,9 @@ enum Flow {
 
 impl<'a> Lane<'a> {
     /// A lane that has these inputs, by slot.
-    pub fn new(program: &'a Program, inputs: &[u64], fused: bool) -> Self {
-        let mut lane = Self {
-            program,
-            registers: vec![0; program.registers.len()],
-            private: HashMap::new(),
-            fused,
-            killed: false,
-        };
+    pub fn new(program: &'a Program, inputs: &[u64]) -> Self {
+        let mut lane =
+            Self { program, registers: vec![0; program.registers.len()], private: HashMap::new(), killed: false };
         for constant in &program.constants {
             let is_bool = lane.type_of(constant.reg) == Type::Bool;
             lane.set(constant.reg, if is_bool { bool_bits(constant.bits != 0) } else { constant.bits });
@@ -75,7 +69,7 @@ impl<'a> Lane<'a> {
         match statement {
             Statement::Compute { op, dst, src } => {
                 let operands: Vec<u64> = src.iter().map(|reg| self.get(*reg)).collect();
-                self.set(*dst, apply(*op, &operands, self.fused));
+                self.set(*dst, apply(*op, &operands));
             }
             Statement::Assign { dst, src } => self.set(*dst, self.get(*src)),
             Statement::Load { dst, address, format: Format::B32 } => {
@@ -152,7 +146,7 @@ pub fn bool_bits(value: bool) -> u64 {
 }
 
 /// The result of an operation, as exact as the host's scalar arithmetic.
-pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
+pub fn apply(op: Op, operands: &[u64]) -> u64 {
     let at = |index: usize| operands.get(index).copied().unwrap_or(0);
     let (a, b, c) = (at(0), at(1), at(2));
     if op.name().ends_with("64") && op.signature().operands.first() == Some(&Type::B64) {
@@ -237,9 +231,9 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::FAdd => f(fa + fb),
         Op::FSub => f(fa - fb),
         Op::FMul => f(fa * fb),
-        Op::FFma => f(if fused { fa.mul_add(fb, fc) } else { fa * fb + fc }),
-        Op::FMulSub => f(if fused { fa.mul_add(fb, -fc) } else { fa * fb - fc }),
-        Op::FNegMulAdd => f(if fused { (-fa).mul_add(fb, fc) } else { -fa * fb + fc }),
+        Op::FFma => f(fa.mul_add(fb, fc)),
+        Op::FMulSub => f(fa.mul_add(fb, -fc)),
+        Op::FNegMulAdd => f((-fa).mul_add(fb, fc)),
         Op::FDiv => f(fa / fb),
         Op::FRem => f(fa % fb),
         Op::FMod => {
@@ -260,8 +254,8 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::FTrunc => f(fa.trunc()),
         Op::FRoundEven => f(fa.round_ties_even()),
         Op::FFract => f(fa - fa.floor()),
-        Op::FMin => f(fa.min(fb)),
-        Op::FMax => f(fa.max(fb)),
+        Op::FMin => f(if fb.is_nan() || fa < fb { fa } else { fb }),
+        Op::FMax => f(if fb.is_nan() || fa > fb { fa } else { fb }),
         Op::FSqrt => f(fa.sqrt()),
         Op::FInverseSqrt => wide(|a| 1.0 / a.sqrt()),
         Op::FEq => bool_bits(fa == fb),
@@ -352,8 +346,8 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
         Op::FTrunc64 => f(fa.trunc()),
         Op::FRoundEven64 => f(fa.round_ties_even()),
         Op::FFract64 => f(fa - fa.floor()),
-        Op::FMin64 => f(fa.min(fb)),
-        Op::FMax64 => f(fa.max(fb)),
+        Op::FMin64 => f(if fb.is_nan() || fa < fb { fa } else { fb }),
+        Op::FMax64 => f(if fb.is_nan() || fa > fb { fa } else { fb }),
         Op::FSqrt64 => f(fa.sqrt()),
         Op::FEq64 => bool_bits(fa == fb),
         Op::FNe64 => bool_bits(fa != fb),

@@ -10,9 +10,10 @@ use gaurast_runner::Case;
 use super::reference::by_exponential;
 use super::{Random, level, machine, run};
 
-const LANES: usize = 1024;
+pub const LANES: usize = 1024;
 
-fn program(op: Op) -> Program {
+/// A program of one operation.
+pub fn program(op: Op) -> Program {
     let mut b = Builder::new();
     let src: Vec<_> =
         (0..op.signature().operands.len() as u32).map(|slot| b.input(slot, Type::B32, Rate::Varying)).collect();
