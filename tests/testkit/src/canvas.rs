@@ -77,6 +77,12 @@ pub struct Canvas {
     depth: Option<Image>,
 }
 
+impl Default for Canvas {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Canvas {
     /// A canvas of floats without depth.
     pub fn new() -> Self {
