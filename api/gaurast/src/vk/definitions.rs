@@ -343,7 +343,7 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub attribute_activation: vk::Bool32,
     /// [`PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER`].
     pub spherical_harmonics_buffer: vk::Bool32,
-    /// The dynamic states [`DYNAMIC_STATE_GAUSSIAN_..._GAURAST`] in Gaussian pipelines.
+    /// The dynamic states `VK_DYNAMIC_STATE_GAUSSIAN_..._GAURAST` in Gaussian pipelines.
     pub gaussian_dynamic_state: vk::Bool32,
     /// The `medianGaussian` and `nearestGaussian` inputs of resolve shaders, by which a pixel
     /// tells the Gaussians that it shows.

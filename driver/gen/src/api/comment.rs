@@ -76,7 +76,7 @@ impl Comments<'_> {
             rust_name(name).to_owned()
         } else if let Some(value) = self.value(name) {
             value
-        } else if name.starts_with("VK_") {
+        } else if name.starts_with("VK_") && !name.contains("...") {
             rust_constant(name).to_owned()
         } else {
             return format!("`{name}`");

@@ -7,28 +7,13 @@ use toml::{Table, Value};
 
 use crate::workspace;
 
-/// The `.rs` files below a folder, without those of other packages and of `left_out`.
-fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            let is_other = path.join("Cargo.toml").exists() || path.ends_with("target");
-            if !is_other && !left_out.contains(&path) {
-                sources(&path, left_out, found);
-            }
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-}
-
 /// The source files of a package's targets that have no harness.
 fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
     let has_none = |target: &Value| target.get("harness").and_then(Value::as_bool) == Some(false);
     let library = folder.join("src");
     let mut found = Vec::new();
     if manifest.get("lib").is_some_and(has_none) {
-        sources(&library, &[], &mut found);
+        workspace::sources(&library, &[], &mut found);
     }
     let tests = manifest.get("test").and_then(Value::as_array);
     for test in tests.into_iter().flatten().filter(|test| has_none(test)) {
@@ -40,7 +25,7 @@ fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
         };
         let parent = root.parent().expect("a folder");
         if root.exists() {
-            sources(parent, std::slice::from_ref(&library), &mut found);
+            workspace::sources(parent, std::slice::from_ref(&library), &mut found);
         } else {
             found.push(folder.join("tests").join(format!("{name}.rs")));
         }

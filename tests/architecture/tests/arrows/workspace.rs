@@ -84,6 +84,21 @@ pub fn dependencies() -> Vec<Dependency> {
     found
 }
 
+/// The `.rs` files below a folder, without those of other packages and of `left_out`.
+pub fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            let is_other = path.join("Cargo.toml").exists() || path.ends_with("target");
+            if !is_other && !left_out.contains(&path) {
+                sources(&path, left_out, found);
+            }
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
 /// A crate that cargo builds: a library, a program, an example, a benchmark or a test executable.
 #[derive(Clone, Debug)]
 pub struct Target {
