@@ -110,7 +110,7 @@ impl GaussianSet {
     /// Adds Gaussians that a vertex program projects.
     pub fn append_draw(&mut self, draw: &Draw) {
         if draw.count > 0 && draw.instance_count > 0 {
-            self.draws.push(draw.clone());
+            host::push(&mut self.draws, draw.clone());
         }
     }
 
