@@ -85,6 +85,12 @@ step() { # step NAME COMMAND...
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
+# The documentation of the crates that applications use: no broken link.
+public=()
+for crate in gaurast gaurast-scene gaurast-picture gaurast-render gaurast-layer vulkan_gaurast; do
+    public+=(-p "$crate")
+done
+step documentation env RUSTDOCFLAGS="-D warnings" cargo doc --profile checked --no-deps --quiet "${public[@]}"
 # The extension's text: no broken reference, table or list.
 specification() {
     if command -v asciidoctor >/dev/null; then

@@ -6,8 +6,8 @@ use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode, StencilFace, StencilOp,
-    Topology, Viewport,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode,
+    StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
     AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
@@ -179,9 +179,7 @@ pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
 ///
 /// # Errors
 /// Returns an [`Error`] for unknown factors and operations.
-pub(crate) fn blend_equations(
-    state: &vk::PipelineColorBlendAttachmentState,
-) -> Result<(BlendEquation, BlendEquation), Error> {
+pub(crate) fn blend_equations(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendEquations, Error> {
     let color = equation(
         state.src_color_blend_factor,
         state.dst_color_blend_factor,
@@ -200,7 +198,7 @@ pub(crate) fn blend_equations(
             "VUID-VkPipelineColorBlendAttachmentState-dstAlphaBlendFactor-parameter",
         ],
     )?;
-    Ok((color, alpha))
+    Ok(BlendEquations { color, alpha })
 }
 
 /// The bits of a component mask: 0 to 3 are red, green, blue and alpha.

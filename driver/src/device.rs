@@ -192,8 +192,7 @@ unsafe fn requested_features(info: &vk::DeviceCreateInfo<'_>, extensions: &[&CSt
 
 /// Refuses features that are not supported.
 fn require_supported(requested: &Features) -> Result<(), Error> {
-    let supported = SUPPORTED.list();
-    match requested.list().into_iter().zip(supported).find(|((_, is_requested), (_, works))| *is_requested && !works) {
+    match requested.list().zip(SUPPORTED.list()).find(|((_, is_requested), (_, works))| *is_requested && !works) {
         None => Ok(()),
         Some(((name, _), _)) => Err(Error::FeatureNotPresent(format!("the feature {name}"))),
     }
@@ -206,7 +205,7 @@ fn require_extension(structure: &vk::BaseInStructure<'_>, extensions: &[&CStr]) 
     };
     let mut requested = Features::NONE;
     requested.add(structure);
-    match requested.list().into_iter().find(|(_, is_on)| *is_on) {
+    match requested.list().find(|(_, is_on)| *is_on) {
         None => Ok(()),
         Some((feature, _)) => Err(Error::usage(
             "VUID-VkDeviceCreateInfo-pNext-pNext",
@@ -402,7 +401,7 @@ mod tests {
     }
 
     fn count_of(features: &Features) -> usize {
-        features.list().iter().filter(|(_, is_on)| *is_on).count()
+        features.list().filter(|(_, is_on)| *is_on).count()
     }
 
     #[test]
@@ -460,9 +459,8 @@ mod tests {
 
     #[test]
     fn missing_features_are_listed_truly() {
-        let supported: HashMap<_, _> = SUPPORTED.list().into_iter().collect();
-        let mut missing: Vec<_> =
-            MANDATORY.iter().flat_map(|(_, names)| names.iter().copied()).filter(|name| !supported[name]).collect();
+        let supported: HashMap<_, _> = SUPPORTED.list().collect();
+        let mut missing: Vec<_> = MANDATORY.iter().map(|(name, _)| *name).filter(|name| !supported[name]).collect();
         missing.sort_unstable();
         assert_eq!(missing, REQUIRED_BUT_MISSING);
     }

@@ -1,7 +1,7 @@
 //! Device addresses of buffers: numbers that are unrelated to host pointers. An access by a program is looked up among
 //! the live buffers, and bounded by the buffer that it finds.
 
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use simdevice::program::bindings::AddressTable;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

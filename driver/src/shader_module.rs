@@ -79,7 +79,7 @@ fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr])
     let enables = enables(capability);
     enables.is_empty()
         || enables.iter().any(|enable| match enable {
-            Enable::Feature(_, is_enabled) => is_enabled(features),
+            Enable::Feature(name) => features.has(name),
             Enable::Property(_, is_there) => is_there(limits::properties()),
             Enable::Extension(name) => extensions.contains(name),
             Enable::Absent(_) => false,
@@ -91,7 +91,7 @@ fn not_enabled(capability: Capability) -> Error {
     let known: Vec<_> = enables(capability)
         .iter()
         .filter_map(|enable| match enable {
-            Enable::Feature(name, _) | Enable::Property(name, _) => Some(*name),
+            Enable::Feature(name) | Enable::Property(name, _) => Some(*name),
             Enable::Extension(_) | Enable::Absent(_) => None,
         })
         .collect();
@@ -302,6 +302,7 @@ pub(crate) unsafe fn create_shader_module(
 mod tests {
     use super::*;
     use crate::instance::device_extension_names;
+    use std::collections::HashSet;
 
     fn module(capabilities: &[Capability]) -> Vec<u32> {
         let mut words = vec![0x0723_0203, 0x0001_0500, 0, 1, 0];
@@ -328,6 +329,16 @@ mod tests {
             assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
             assert!(error.to_string().contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn capabilities_name_features_that_there_are() {
+        let names: HashSet<_> = SUPPORTED.list().map(|(name, _)| name).collect();
+        let enables = (0..0x2000).filter_map(Capability::from_u32).flat_map(enables);
+        let mut features =
+            enables.filter_map(|enable| if let Enable::Feature(name) = enable { Some(name) } else { None });
+        assert!(features.clone().count() > 100);
+        assert_eq!(features.find(|&&name| !names.contains(name)), None);
     }
 
     #[test]

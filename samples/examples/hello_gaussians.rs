@@ -1,5 +1,5 @@
 //! A minimal program that draws 3D Gaussians: plain `ash` in one file. It writes hello_gaussians.png. The end of the
-//! process frees the objects; the crate's `renderer` module shows proper cleanup.
+//! process frees the objects; the crate `gaurast-render` (`api/render`) destroys its own.
 
 use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage};
 use gaurast::{gaussian_primitive_topology, vk::*};

@@ -16,7 +16,7 @@ use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{Rect, Viewport};
 use simdevice::stats::counters::{Counter, Counters};
-use simdevice::{Allocation, Config, Device, Format};
+use simdevice::{Allocation, BufferRange, Config, Device, Format};
 use std::sync::Arc;
 
 const WIDTH: u32 = 1280;

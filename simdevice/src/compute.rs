@@ -23,12 +23,12 @@ pub(crate) fn dispatch(dispatch: &Dispatch, runtime: &Runtime, counters: &mut Co
     let Some(groups) = group_count(dispatch.count).filter(|&groups| groups > 0) else {
         return Ok(());
     };
-    let prepared = dispatch.bindings.bind(runtime.level());
+    let bound = dispatch.bindings.bind(runtime.level());
     let piece = groups / (runtime.threads() as u64 * PIECES_PER_WORKER);
     let cancel = AtomicBool::new(false);
     let run = DispatchRun {
         dispatch,
-        resources: prepared.resources(),
+        resources: bound.resources(),
         watchdog: Watchdog { limit: runtime.config().shader_timeout, cancel: Some(&cancel) },
     };
     let started = Instant::now();

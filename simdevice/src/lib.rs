@@ -1,8 +1,9 @@
 //! The simulated GauRast device.
 //!
-//! A device executes [`Packet`]s. Its [`CommandProcessor`] is the one place that tells a Gaussian draw from a triangle
-//! draw, a copy or a clear. It computes real pixels in [`devmem`] memory and does not depend on Vulkan; the driver
-//! lowers Vulkan state to packets.
+//! A device executes [`Packet`]s. Its [`CommandProcessor`] gives each to the module for it: Gaussian draws to
+//! [`gaussian`], other draws to [`geometry`], dispatches to [`compute`], copies and clears to [`transfer`]. A [`pass`]
+//! holds draws of both kinds, and renders them tile by tile in their order. The device computes real pixels in [`devmem`]
+//! memory and does not depend on Vulkan; the driver lowers Vulkan state to packets.
 //!
 //! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
 //! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and
@@ -35,7 +36,7 @@ pub mod transform_feedback;
 
 pub use command_processor::CommandProcessor;
 pub use device::Device;
-pub use devmem::{Allocation, host};
+pub use devmem::{Allocation, BufferRange, host};
 pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;

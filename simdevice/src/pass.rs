@@ -6,9 +6,8 @@
 use crate::format::{Aspect, ClearValue, Format};
 use crate::gaussian::BinnedDraw;
 use crate::geometry::PrimitiveDraw;
-use crate::image::ImageView;
 use crate::limits::{MAX_FRAMEBUFFER_LAYERS, MAX_FRAMEBUFFER_SIZE};
-use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
+use crate::packet::{Attachment, AttachmentClear, AttachmentResolve, ClearAttachments, LoadOp, Rendering, StoreOp};
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::GaussianTileDraw;
 use crate::raster::output::{Buffers, Targets};
@@ -54,8 +53,12 @@ struct Resolves {
     stencil: Option<Resolve>,
 }
 
-/// The target of a resolve, and its mode.
-type Resolve = (Target, ResolveMode);
+/// The resolve of an attachment's aspect.
+#[derive(Debug)]
+struct Resolve {
+    target: Target,
+    mode: ResolveMode,
+}
 
 /// A render pass between its beginning and its end.
 #[derive(Debug)]
@@ -217,7 +220,7 @@ impl Pass {
     fn resolve_targets(&self) -> impl Iterator<Item = &Target> {
         let rest = [&self.resolve.depth, &self.resolve.stencil];
         let all = self.resolve.color.iter().chain(rest).flatten();
-        all.map(|(target, _)| target)
+        all.map(|resolve| &resolve.target)
     }
 
     fn targets(&self) -> impl Iterator<Item = &Target> {
@@ -319,10 +322,11 @@ enum Ready<'a> {
 /// Prepares the target that an attachment's aspect is resolved to.
 fn bind_resolve(
     attachment: &Attachment,
-    (view, mode): &(ImageView, ResolveMode),
+    resolve: &AttachmentResolve,
     aspect: Aspect,
     rendering: &Rendering,
 ) -> Result<Resolve, AttachmentError> {
+    let view = &resolve.view;
     let target = Target::new(view, aspect, rendering.layer_count, StoreOp::Store)?;
     let of = attachment.view.format.plane(aspect);
     if of.map(Format::texel_size) != Some(target.format().texel_size()) {
@@ -331,7 +335,7 @@ fn bind_resolve(
     if target.samples() != 1 {
         return Err(AttachmentError::Samples(target.samples()));
     }
-    Ok((target, *mode))
+    Ok(Resolve { target, mode: resolve.mode })
 }
 
 /// Prepares an attachment's aspect.
@@ -448,10 +452,10 @@ impl Flush<'_> {
             let Some(target) = target else { continue };
             let untouched = !plane.is_touched(tile.index);
             worker.counters.add(Counter::TilesUntouched, untouched.into());
-            if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
+            if let Some(resolve) = resolve.filter(|_| self.last) {
                 plane.load_or_clear(target, layer, tile);
                 let level = self.runtime.level();
-                plane.resolve(level, target, (resolve, *mode), layer, tile);
+                plane.resolve(level, target, &resolve.target, resolve.mode, layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;
             plane.finish(target, layer, tile, keep);

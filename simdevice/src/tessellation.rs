@@ -82,11 +82,11 @@ impl Tessellation {
         }
     }
 
-    /// Divides a patch with outer and inner levels, of which it uses those of its domain. `out` becomes empty if one of
+    /// Divides a patch with outer and inner levels, of which it uses those of its domain. `patch` becomes empty if one of
     /// the outer levels is not positive.
-    pub fn tessellate(&self, outer: [f32; 4], inner: [f32; 2], out: &mut TessellatedPatch) {
-        out.points.clear();
-        out.indices.clear();
+    pub fn tessellate(&self, outer: [f32; 4], inner: [f32; 2], patch: &mut TessellatedPatch) {
+        patch.points.clear();
+        patch.indices.clear();
         let levels = match self.domain {
             Domain::Triangles => &outer[..3],
             Domain::Quads => &outer[..],
@@ -99,57 +99,57 @@ impl Tessellation {
         match self.domain {
             // Edges are walked clockwise with v down: from (1, 0) to (0, 1) in a triangle, from (0, 0) to (1, 0) in a
             // square.
-            Domain::Triangles => self.triangles([outer[2], outer[0], outer[1]], inner[0], out),
-            Domain::Quads => self.quads([outer[1], outer[2], outer[3], outer[0]], inner, out),
-            Domain::Isolines => self.isolines(outer[0], outer[1], out),
+            Domain::Triangles => self.triangles([outer[2], outer[0], outer[1]], inner[0], patch),
+            Domain::Quads => self.quads([outer[1], outer[2], outer[3], outer[0]], inner, patch),
+            Domain::Isolines => self.isolines(outer[0], outer[1], patch),
         }
         if self.point_mode {
-            out.indices.clear();
-            host::reserve(&mut out.indices, out.points.len());
-            out.indices.extend(0..out.points.len() as u32);
+            patch.indices.clear();
+            host::reserve(&mut patch.indices, patch.points.len());
+            patch.indices.extend(0..patch.points.len() as u32);
         } else if self.corners() == 3 && !self.clockwise {
-            for triangle in out.indices.chunks_exact_mut(3) {
+            for triangle in patch.indices.chunks_exact_mut(3) {
                 triangle.swap(1, 2);
             }
         }
     }
 
     /// Divides a triangle into concentric ones, of which each has two segments per edge less than the one around it.
-    fn triangles(&self, outer: [f32; 3], inner: f32, out: &mut TessellatedPatch) {
+    fn triangles(&self, outer: [f32; 3], inner: f32, patch: &mut TessellatedPatch) {
         let (edges, [inside]) = self.edges(outer, [inner]);
-        let mut around = triangle_ring(out, edges.each_ref().map(Edge::positions), 0);
+        let mut around = triangle_ring(patch, edges.each_ref().map(Edge::positions), 0);
         for ring in 1..=inside.segments / 2 {
-            let within = triangle_ring(out, [inside.ring(ring); 3], inside.at[ring]);
+            let within = triangle_ring(patch, [inside.ring(ring); 3], inside.at[ring]);
             for (outer, inner) in around.iter().zip(&within) {
-                out.stitch(outer, inner);
+                patch.stitch(outer, inner);
             }
             around = within;
         }
         if !inside.segments.is_multiple_of(2) {
-            out.triangle(around.map(|side| side.first));
+            patch.triangle(around.map(|side| side.first));
         }
     }
 
     /// Divides a square into a grid and a strip along each edge.
-    fn quads(&self, outer: [f32; 4], inner: [f32; 2], out: &mut TessellatedPatch) {
+    fn quads(&self, outer: [f32; 4], inner: [f32; 2], patch: &mut TessellatedPatch) {
         let (edges, [along_u, along_v]) = self.edges(outer, inner);
-        let around = square_ring(out, edges.each_ref().map(Edge::positions));
+        let around = square_ring(patch, edges.each_ref().map(Edge::positions));
         if along_u.segments == 1 {
             let [a, b, c, d] = around.map(|side| side.first);
-            out.triangle([a, b, c]);
-            out.triangle([a, c, d]);
+            patch.triangle([a, b, c]);
+            patch.triangle([a, c, d]);
             return;
         }
         let (columns, rows) = (along_u.ring(1), along_v.ring(1));
-        let first = out.points.len() as u32;
+        let first = patch.points.len() as u32;
         for &v in rows {
-            out.points(columns.iter().map(|&u| [u, v, 0]));
+            patch.points(columns.iter().map(|&u| [u, v, 0]));
         }
         let width = columns.len() as u32;
         let (right, top) = (width - 1, (rows.len() as u32 - 1) * width);
         for (row, start) in (first..first + top).step_by(columns.len()).enumerate() {
             let is_low = 2 * row + 2 < rows.len();
-            out.primitives((start..start + right).map(|a| {
+            patch.primitives((start..start + right).map(|a| {
                 let [b, c, d] = [a + 1, a + 1 + width, a + width];
                 // Diagonals point to the middle, so that the grid looks like rings.
                 let is_left = 2 * (a - start) + 2 < width;
@@ -164,17 +164,17 @@ impl Tessellation {
             Row::of_grid(rows, first + top, -step),
         ];
         for (outer, inner) in around.iter().zip(&within) {
-            out.stitch(outer, inner);
+            patch.stitch(outer, inner);
         }
     }
 
     /// Makes lines. None is at v = 1.
-    fn isolines(&self, lines: f32, segments: f32, out: &mut TessellatedPatch) {
+    fn isolines(&self, lines: f32, segments: f32, patch: &mut TessellatedPatch) {
         let (lines, line) = (Spacing::Equal.divide(lines), self.spacing.divide(segments));
         for &v in &lines.positions()[..lines.segments] {
-            let first = out.points.len() as u32;
-            out.points(line.positions().iter().map(|&u| [u, v, 0]));
-            out.primitives((first..first + line.segments as u32).map(|point| [point, point + 1]));
+            let first = patch.points.len() as u32;
+            patch.points(line.positions().iter().map(|&u| [u, v, 0]));
+            patch.primitives((first..first + line.segments as u32).map(|point| [point, point + 1]));
         }
     }
 
@@ -311,25 +311,25 @@ impl<'a> Row<'a> {
 /// Adds the points of a closed ring, of which `point` gives the one at a position of a side. A side ends where the next
 /// one begins.
 fn ring<'a, const SIDES: usize>(
-    out: &mut TessellatedPatch,
+    patch: &mut TessellatedPatch,
     sides: [&'a [u32]; SIDES],
     point: impl Fn(usize, u32) -> [u32; 3],
 ) -> [Row<'a>; SIDES] {
-    let ring = out.points.len() as u32;
+    let ring = patch.points.len() as u32;
     let mut side = 0;
     sides.map(|positions| {
-        let first = out.points.len() as u32;
+        let first = patch.points.len() as u32;
         let before_last = &positions[..positions.len() - 1];
-        out.points(before_last.iter().map(|&it| point(side, it)));
+        patch.points(before_last.iter().map(|&it| point(side, it)));
         side += 1;
-        let last = if side == SIDES { ring } else { out.points.len() as u32 };
+        let last = if side == SIDES { ring } else { patch.points.len() as u32 };
         Row { positions, first, step: 1, last }
     })
 }
 
 /// Adds the points of a square: the whole domain's edges.
-fn square_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 4]) -> [Row<'a>; 4] {
-    ring(out, sides, |side, position| match side {
+fn square_ring<'a>(patch: &mut TessellatedPatch, sides: [&'a [u32]; 4]) -> [Row<'a>; 4] {
+    ring(patch, sides, |side, position| match side {
         0 => [position, 0, 0],
         1 => [ONE, position, 0],
         2 => [ONE - position, ONE, 0],
@@ -340,18 +340,18 @@ fn square_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 4]) -> [Row<'a
 /// Adds the points of one of the concentric triangles. They are where perpendiculars to the domain's edges, at given
 /// positions, meet the triangle. `corner` is the position on both edges at a corner whose perpendiculars meet in the
 /// triangle's corner.
-fn triangle_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 3], corner: u32) -> [Row<'a>; 3] {
+fn triangle_ring<'a>(patch: &mut TessellatedPatch, sides: [&'a [u32]; 3], corner: u32) -> [Row<'a>; 3] {
     if corner == HALF {
         let third = ONE / 3;
-        out.points([[third, third, ONE - 2 * third]].into_iter());
-        return sides.map(|positions| Row::of_grid(positions, out.points.len() as u32 - 1, 1));
+        patch.points([[third, third, ONE - 2 * third]].into_iter());
+        return sides.map(|positions| Row::of_grid(positions, patch.points.len() as u32 - 1, 1));
     }
     // The distance from the edge of a side is two thirds of the position. It is even, so that the middle of a side is
     // exact.
     let distance = 2 * ((corner + 1) / 3);
     // The lesser of the other two coordinates is rounded, so that sides are symmetric.
     let lesser = |position: u32| position + distance - corner;
-    ring(out, sides, |side, position| {
+    ring(patch, sides, |side, position| {
         let (to, from) = if position < HALF {
             let to = lesser(position);
             (to, ONE - distance - to)

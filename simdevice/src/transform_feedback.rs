@@ -5,8 +5,8 @@ use crate::program::interface::{CapturedOutputs, CapturedVertex};
 use devmem::BufferRange;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// The words in memory that keep how many bytes of each buffer are written, where there are any.
-pub type CounterWords = [Option<BufferRange>; MAX_TRANSFORM_FEEDBACK_BUFFERS];
+/// The counter buffers: for each buffer that has one, the word in memory that keeps how many bytes of it are written.
+pub type CounterBuffers = [Option<BufferRange>; MAX_TRANSFORM_FEEDBACK_BUFFERS];
 
 /// The buffers of transform feedback, from its beginning to its end.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ impl TransformFeedback {
     }
 
     /// Reads how many bytes of each buffer are written already.
-    pub(crate) fn begin(&self, counters: &CounterWords) {
+    pub(crate) fn begin(&self, counters: &CounterBuffers) {
         for (written, counter) in self.written.iter().zip(counters) {
             let mut word = [0u32];
             if let Some(counter) = counter {
@@ -49,7 +49,7 @@ impl TransformFeedback {
     }
 
     /// Stores how many bytes of each buffer are written.
-    pub(crate) fn end(&self, counters: &CounterWords) {
+    pub(crate) fn end(&self, counters: &CounterBuffers) {
         for (written, counter) in self.written.iter().zip(counters) {
             if let Some(counter) = counter {
                 let word = [written.load(Relaxed) as u32];
@@ -61,7 +61,7 @@ impl TransformFeedback {
         }
     }
 
-    /// Appends primitives to the buffers of their stream, as many as all of these have room for. Returns their number.
+    /// Appends primitives to the buffers of their stream, as many as fit into all of these. Returns their number.
     pub(crate) fn append(&self, outputs: &CapturedOutputs, primitives: StreamPrimitives<'_>) -> u64 {
         let of_stream =
             |(_, vertex): &(usize, &CapturedVertex)| vertex.stride > 0 && vertex.stream == primitives.stream;
@@ -71,11 +71,11 @@ impl TransformFeedback {
             Some((number, vertex, buffer))
         });
         let bytes = |vertex: &CapturedVertex| u64::from(vertex.stride) * primitives.corners;
-        let room = targets.clone().map(|(number, vertex, buffer)| {
+        let fitting = targets.clone().map(|(number, vertex, buffer)| {
             let written = self.written[number].load(Relaxed);
             buffer.size.saturating_sub(written) / bytes(vertex)
         });
-        let count = room.min().unwrap_or(0).min(primitives.count);
+        let count = fitting.min().unwrap_or(0).min(primitives.count);
         for (number, vertex, buffer) in targets {
             let start = self.written[number].fetch_add(count * bytes(vertex), Relaxed);
             let words = vertex.values.len() * (count * primitives.corners) as usize;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_testkit::for_levels::levels;
 use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
-use gaurast_tests::compare::{Limits, verdict};
+use gaurast_tests::compare::{Accuracy, Limits};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use plotters::prelude::*;
@@ -159,7 +159,7 @@ fn errors(gpus: &[Gpu], view: &View) -> Vec<f64> {
                 commands.draw(0..on_device.count);
             });
         });
-        verdict(&target.read::<[f32; 4]>(), &reference, Limits::ENVELOPE_ONLY).max_distance
+        Accuracy::of(&target.read::<[f32; 4]>(), &reference, Limits::ENVELOPE_ONLY).max_distance
     };
     gpus.iter().map(of).collect()
 }

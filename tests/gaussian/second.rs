@@ -26,11 +26,11 @@ fn judge(gpu: &Gpu, name: &str, scene: &SceneBuffers, state: State, views: &[Vie
         let as_data = as_data.in_state(|_| state).seen_by(view.camera);
         assert_eq!(Second.missing(&as_data), None);
         let ours = Second.draw(&as_data, &Stored::default()).expect("it draws").color;
-        let verdict = assert_contract(&format!("{name}, second"), &ours, &reference, LIMITS);
+        let accuracy = assert_contract(&format!("{name}, second"), &ours, &reference, LIMITS);
         let device = assert_contract(&name, &drawn, &reference, view.limits);
         println!(
             "{name}: the second {:.1e} from the envelope, {} pixels in another branch; the device {:.1e}, {}",
-            verdict.max_distance, verdict.other_branch, device.max_distance, device.other_branch,
+            accuracy.max_distance, accuracy.other_branch, device.max_distance, device.other_branch,
         );
     }
 }

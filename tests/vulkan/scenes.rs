@@ -110,8 +110,8 @@ fn drivers_agree(case: &Case) {
     };
     assert!(theirs.shows_something(), "the scene is blank on lavapipe");
     show(scene.name, &ours, &theirs);
-    let verdict = judge(scene.name, ours, &theirs);
-    match (verdict, Expected::read().unsupported(scene.name)) {
+    let outcome = judge(scene.name, ours, &theirs);
+    match (outcome, Expected::read().unsupported(scene.name)) {
         (Ok(()), None) | (Err(_), Some(_)) => {}
         (Ok(()), Some(listed)) => {
             panic!("it is drawn right: take it off the list of what is not supported ({listed})")
@@ -131,7 +131,7 @@ fn assert_same(embedded: &Result<Output, String>, loaded: &Result<Output, String
     assert_eq!(embedded.pictures.len(), loaded.pictures.len());
     for (embedded, loaded) in embedded.pictures.iter().zip(&loaded.pictures) {
         let is_same = embedded.bytes == loaded.bytes;
-        assert!(is_same, "{} differs between the doors", embedded.name);
+        assert!(is_same, "{} differs through the loader", embedded.name);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Devices: the next layer's commands, what is known, and how the application is told.
+//! Devices: the next layer's commands, what is known, and messages to the application.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -42,7 +42,8 @@ pub(crate) struct Device {
     pub(crate) instance: Arc<Instance>,
     pub(crate) facts: Facts,
     state: Mutex<State>,
-    told: Mutex<HashMap<&'static str, u32>>,
+    /// The number of messages of each kind.
+    messages: Mutex<HashMap<&'static str, u32>>,
 }
 
 /// The devices that live, by the loader's key.
@@ -51,7 +52,8 @@ static DEVICES: RwLock<BTreeMap<usize, Arc<Device>>> = RwLock::new(BTreeMap::new
 impl Device {
     /// Makes what the layer knows of a device.
     pub(crate) fn new(
-        (handle, physical_device): (vk::Device, vk::PhysicalDevice),
+        handle: vk::Device,
+        physical_device: vk::PhysicalDevice,
         get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
         instance: Arc<Instance>,
         facts: Facts,
@@ -66,7 +68,7 @@ impl Device {
             instance,
             facts,
             state: Mutex::default(),
-            told: Mutex::default(),
+            messages: Mutex::default(),
         }
     }
 
@@ -123,8 +125,8 @@ impl Device {
     pub(crate) fn tell(&self, faults: &Faults) {
         for fault in &faults.0 {
             let times = {
-                let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-                let times = told.entry(fault.id).or_default();
+                let mut messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
+                let times = messages.entry(fault.id).or_default();
                 *times += 1;
                 *times
             };

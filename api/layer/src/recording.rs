@@ -38,10 +38,17 @@ pub(crate) struct BoundSet {
 #[derive(Clone, Debug)]
 pub(crate) struct Pass {
     pub(crate) subpass: Subpass,
-    /// The subpasses of a render pass object, and the number of the current one.
-    pub(crate) object: Option<(Arc<RenderPass>, usize)>,
+    /// The subpass of a render pass object; `None` in dynamic rendering.
+    pub(crate) index: Option<SubpassIndex>,
     /// The viewports of draws so far.
     pub(crate) drawn: Vec<Option<[f32; 4]>>,
+}
+
+/// A subpass of a render pass object, by its number.
+#[derive(Clone, Debug)]
+pub(crate) struct SubpassIndex {
+    pub(crate) render_pass: Arc<RenderPass>,
+    pub(crate) index: usize,
 }
 
 /// The state that all draws of a set have in common.
@@ -118,17 +125,18 @@ impl Recording {
     }
 
     /// Begins a subpass, in which nothing is drawn yet.
-    pub(crate) fn begin_pass(&mut self, subpass: Subpass, object: Option<(Arc<RenderPass>, usize)>) {
-        self.pass = Some(Pass { subpass, object, drawn: Vec::new() });
+    pub(crate) fn begin_pass(&mut self, subpass: Subpass, index: Option<SubpassIndex>) {
+        self.pass = Some(Pass { subpass, index, drawn: Vec::new() });
     }
 
     /// Goes on with the next subpass.
     pub(crate) fn next_subpass(&mut self) {
-        let Some((object, index)) = self.pass.take().and_then(|pass| pass.object) else {
+        let Some(SubpassIndex { render_pass, index }) = self.pass.take().and_then(|pass| pass.index) else {
             return;
         };
-        let subpass = object.get(index + 1).cloned().unwrap_or_default();
-        self.begin_pass(subpass, Some((object, index + 1)));
+        let index = index + 1;
+        let subpass = render_pass.get(index).cloned().unwrap_or_default();
+        self.begin_pass(subpass, Some(SubpassIndex { render_pass, index }));
     }
 
     /// The state that is undefined after other command buffers were executed.

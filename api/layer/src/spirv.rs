@@ -90,8 +90,8 @@ impl Module {
         }
     }
 
-    fn define(&mut self, id: u32, definition: Type) {
-        self.types.insert(id, definition);
+    fn define(&mut self, id: u32, ty: Type) {
+        self.types.insert(id, ty);
     }
 
     fn decoration(&self, id: u32, member: Option<u32>, decoration: u32) -> Option<u32> {

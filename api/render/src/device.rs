@@ -55,6 +55,22 @@ pub struct Device {
     instance: Instance,
 }
 
+/// The properties of a memory type that serves a resource.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryPreference {
+    /// The properties that it must have.
+    pub required: vk::MemoryPropertyFlags,
+    /// The properties that it must not have.
+    pub excluded: vk::MemoryPropertyFlags,
+}
+
+impl MemoryPreference {
+    /// Types that have these properties, whatever else they have.
+    pub const fn having(required: vk::MemoryPropertyFlags) -> Self {
+        Self { required, excluded: vk::MemoryPropertyFlags::empty() }
+    }
+}
+
 /// A physical device and its queue family.
 struct PhysicalDevice {
     handle: vk::PhysicalDevice,
@@ -164,18 +180,14 @@ impl Device {
         self.physical.max_sh_degree
     }
 
-    /// The first memory type allowed by `type_bits` that satisfies one of `wishes`, tried in order. A wish is the
-    /// properties that the type must have and those that it must not have.
-    pub fn memory_type(
-        &self,
-        type_bits: u32,
-        wishes: &[(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)],
-    ) -> Option<u32> {
+    /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
+    pub fn memory_type(&self, type_bits: u32, preferences: &[MemoryPreference]) -> Option<u32> {
         let types = self.physical.memory.memory_types_as_slice();
-        wishes.iter().find_map(|(wanted, unwanted)| {
+        preferences.iter().find_map(|preference| {
             (0..types.len() as u32).find(|index| {
                 let flags = types[*index as usize].property_flags;
-                type_bits & (1 << index) != 0 && flags.contains(*wanted) && !flags.intersects(*unwanted)
+                let fits = flags.contains(preference.required) && !flags.intersects(preference.excluded);
+                type_bits & (1 << index) != 0 && fits
             })
         })
     }

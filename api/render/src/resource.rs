@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::Pod;
 
-use crate::device::Device;
+use crate::device::{Device, MemoryPreference};
 use crate::error::{During, RenderError};
 
 /// The kind of memory of a resource.
@@ -21,16 +21,20 @@ pub enum Memory {
 }
 
 impl Memory {
-    /// The properties that a memory type must have and must not have, the best first.
-    fn wishes(self) -> &'static [(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)] {
+    /// The memory types that serve, the best first.
+    fn preferences(self) -> &'static [MemoryPreference] {
         use vk::MemoryPropertyFlags as Flags;
-        const NONE: Flags = Flags::empty();
         const COHERENT: Flags = Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
         const CACHED: Flags = Flags::from_raw(COHERENT.as_raw() | Flags::HOST_CACHED.as_raw());
+        const ANY: MemoryPreference = MemoryPreference::having(Flags::empty());
+        const LOCAL: MemoryPreference = MemoryPreference::having(Flags::DEVICE_LOCAL);
+        const INVISIBLE: MemoryPreference = MemoryPreference { excluded: Flags::HOST_VISIBLE, ..LOCAL };
+        const HOST: MemoryPreference = MemoryPreference::having(COHERENT);
+        const HOST_CACHED: MemoryPreference = MemoryPreference::having(CACHED);
         match self {
-            Self::Device => &[(Flags::DEVICE_LOCAL, Flags::HOST_VISIBLE), (Flags::DEVICE_LOCAL, NONE), (NONE, NONE)],
-            Self::Host => &[(COHERENT, NONE)],
-            Self::HostCached => &[(CACHED, NONE), (COHERENT, NONE)],
+            Self::Device => &[INVISIBLE, LOCAL, ANY],
+            Self::Host => &[HOST],
+            Self::HostCached => &[HOST_CACHED, HOST],
         }
     }
 
@@ -40,7 +44,7 @@ impl Memory {
             Self::Host | Self::HostCached => "host-visible",
         };
         let memory_type =
-            device.memory_type(requirements.memory_type_bits, self.wishes()).ok_or(RenderError::NoMemory(name))?;
+            device.memory_type(requirements.memory_type_bits, self.preferences()).ok_or(RenderError::NoMemory(name))?;
         let allocate_info =
             vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(memory_type);
         // SAFETY: the structure is valid.

@@ -18,6 +18,7 @@ use crate::error::Error;
 use crate::registry::{self, Registry};
 use crate::rust;
 use crate::support::Support;
+use crate::tables;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -43,13 +44,23 @@ impl Output {
         let mut text = "static ROWS: &[Command] = rows! {\n".to_owned();
         for (block, lines) in &self.blocks {
             let _ = writeln!(text, "    {block} => {{");
-            for line in lines {
-                let _ = writeln!(text, "        {line}");
-            }
+            lines.iter().for_each(|line| text.push_str(line));
             text.push_str("    }\n");
         }
         text + "};\n\n/// Every command of the driver.\npub(super) static COMMANDS: Commands = Commands::new(ROWS);\n"
     }
+}
+
+/// The body of a command's function.
+enum Body {
+    /// An expression of `recorder`, the recorder of the command buffer.
+    Recording(String),
+    /// Statements that are safe with valid usage.
+    Unsafe(String),
+    /// An expression that is always safe.
+    Safe(String),
+    /// The command is refused.
+    Refusal,
 }
 
 struct Writer<'a> {
@@ -80,8 +91,11 @@ pub(crate) fn write(
     for row in &rows {
         writer.add(&mut output, row)?;
     }
+    let modules: BTreeSet<&str> = entry_points.values().filter_map(|it| it.path.split("::").next()).collect();
+    let modules: Vec<&str> = modules.into_iter().collect();
     rust::file(
-        "//! The commands: the functions that Vulkan calls, and the table of them.",
+        "//! The commands: the functions that Vulkan calls, and the table of them. Each function is safe to call within
+//! Vulkan's valid usage: handles are live, or null where that is allowed, and pointers are null or valid.",
         &format!(
             "#![allow(non_snake_case, reason = \"Vulkan's names\")]
             #![allow(clippy::too_many_arguments, reason = \"Vulkan's signatures\")]
@@ -91,17 +105,20 @@ pub(crate) fn write(
             use super::lookup::Availability::{{Core, DeviceExtension, InstanceExtension}};
             use super::lookup::{{Command, Commands, Scope, rows}};
             use crate::abi::error::Error;
-            use crate::abi::guard::guard;
+            use crate::abi::guard::{{guard, refuse}};
             use crate::abi::handle;
             use crate::abi::valid::{{self, OutputChain, Structures}};
             use crate::command::buffer::record;
+            use crate::command::dynamic_state::{{set, set_faces}};
             use crate::pipeline::dynamic_state::DynamicState;
+            use crate::{{{modules}}};
             use ash::vk;
 
-{}
-            {}",
-            output.table(),
-            output.functions
+{table}
+            {functions}",
+            modules = modules.join(", "),
+            table = output.table(),
+            functions = output.functions
         ),
     )
 }
@@ -159,19 +176,16 @@ impl Writer<'_> {
             .ok_or_else(|| Error::Support(format!("the registry has no command {}", row.name)))?;
         let function = self.declarations.function(self.registry, row.name)?;
         let entry_point = names.iter().find_map(|name| self.entry_points.get(*name));
-        // The name of the command whose function has been written already, if any.
-        let known = output.defined.iter().find(|defined| names.contains(&defined.as_str())).cloned();
-        let implementation = match known {
-            Some(name) => name,
+        let line = match output.defined.iter().find(|defined| names.contains(&defined.as_str())) {
+            Some(known) => tables::line(row.name, " =", known),
             None => {
                 let text = self.function(row.name, definition, function, entry_point)?;
                 output.functions.push_str(&text);
                 output.defined.insert(row.name.to_owned());
-                row.name.to_owned()
+                tables::line(row.name, ":", &function.ty)
             }
         };
         let block = format!("{}, {}", scope(row.name, definition), row.gate);
-        let line = format!("{}: {} = {implementation};", row.name, function.ty);
         match output.blocks.iter_mut().find(|(known, _)| *known == block) {
             Some((_, lines)) => lines.push(line),
             None => output.blocks.push((block, vec![line])),
@@ -205,15 +219,16 @@ impl Writer<'_> {
             let _ = write!(parameters, "{shown}: {}, ", parameter.ty);
         }
         let output = function.output.as_ref().map_or_else(String::new, |output| format!("-> {output}"));
-        let first = &function.parameters[0].name;
         let visibility = if name == "vkGetInstanceProcAddr" { "pub(crate) " } else { "" };
-        Ok(format!(
-            "{visibility}unsafe extern \"system\" fn {name}({parameters}) {output} {{
-                guard({first}, \"{name}\", || {{ {body} }})
-            }}
-
-            "
-        ))
+        let safety = "// SAFETY: the application follows Vulkan's valid usage.";
+        let first = &function.parameters[0].name;
+        let body = match body {
+            Body::Recording(text) => format!("{safety}\nunsafe {{ record({first}, \"{name}\", |recorder| {text}) }}"),
+            Body::Unsafe(text) => format!("{safety}\nguard({first}, \"{name}\", || unsafe {{ {text} }})"),
+            Body::Safe(text) => format!("guard({first}, \"{name}\", || {text})"),
+            Body::Refusal => format!("refuse({first}, \"{name}\")"),
+        };
+        Ok(format!("{visibility}unsafe extern \"system\" fn {name}({parameters}) {output} {{ {body} }}\n\n"))
     }
 
     /// The body of a command whose parameters are the members of the structure that its second version takes.
@@ -223,7 +238,7 @@ impl Writer<'_> {
         definition: &registry::Command,
         function: &Function,
         used: &mut BTreeSet<String>,
-    ) -> Result<Option<String>, Error> {
+    ) -> Result<Option<Body>, Error> {
         let second = format!("{name}2");
         let (Some(entry_point), Some(taken)) = (self.entry_points.get(&second), self.registry.commands.get(&second))
         else {
@@ -282,28 +297,23 @@ impl Writer<'_> {
                 },
             });
         }
-        Ok(Some(format!(
-            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {{
-                record({first}, \"{name}\", |recorder| {{
-                    {lists}
-                    let info = {ty} {{ {members} ..Default::default() }};
-                    {path}({arguments})
-                }})
+        Ok(Some(Body::Recording(format!(
+            "{{
+                {lists}
+                let info = {ty} {{ {members} ..Default::default() }};
+                {call}({arguments})
             }}",
-            first = function.parameters[0].name,
-            ty = structure.ty.trim_end_matches("<'_>"),
-            path = entry_point.path,
+            ty = tables::path(&structure.ty),
+            call = entry_point.path,
             arguments = arguments.join(", "),
-        )))
+        ))))
     }
 
     /// The body of a command that sets a dynamic state whose value is its parameter.
-    fn dynamic_state(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Option<String> {
+    fn dynamic_state(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Option<Body> {
         let untagged = name.trim_end_matches(|letter: char| letter.is_ascii_uppercase());
         let row = self.dynamic_states.get(untagged)?;
-        let (first, parameters) = function.parameters.split_first()?;
-        let (set, value) = match parameters {
+        let (set, value) = match &function.parameters[1..] {
             [mask, value] if row.is_of_face => {
                 used.insert(mask.name.clone());
                 (format!("set_faces(recorder, {}, |face| ", mask.name), value)
@@ -312,53 +322,26 @@ impl Writer<'_> {
             _ => return None,
         };
         used.insert(value.name.clone());
-        let field = &row.value;
+        let dynamic_states::Row { variant, value: field, .. } = row;
         let converted = convert_value(&row.ty, value)?;
-        let face = if row.is_of_face { "face," } else { "" };
-        Some(format!(
-            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {{
-                record({first}, \"{name}\", |recorder| {{
-                    let {field} = {converted};
-                    crate::command::dynamic_state::{set}DynamicState::{variant} {{ {face} {field} }})
-                }})
-            }}",
-            first = first.name,
-            variant = row.variant,
-        ))
+        let value = if *field == converted { converted } else { format!("{field}: {converted}") };
+        let face = if row.is_of_face { "face, " } else { "" };
+        Some(Body::Recording(format!("{set}DynamicState::{variant} {{ {face}{value} }})")))
     }
 
     /// The body of a command for which the driver has no function.
-    fn without_function(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Result<String, Error> {
-        let output = function.output.as_deref().unwrap_or("()");
+    fn without_function(&self, name: &str, function: &Function, used: &mut BTreeSet<String>) -> Result<Body, Error> {
         if self.support.commands.no_op.contains_key(name) {
-            let value = match output {
-                "()" => "()",
-                _ => "vk::Result::SUCCESS",
-            };
-            return Ok(format!("Ok({value})"));
+            return Ok(Body::Safe("Ok(())".to_owned()));
         }
         if self.support.commands.refused.contains_key(name) {
-            let refusal = format!("Error::Unsupported {{ command: \"{name}\".to_owned() }}");
-            let first = &function.parameters[0];
-            return Ok(if first.ty == "vk :: CommandBuffer" {
-                format!(
-                    "// SAFETY: the application follows Vulkan's valid usage: the handle is live.
-                    unsafe {{ record({}, \"{name}\", |_| Err({refusal})) }}",
-                    first.name
-                )
-            } else {
-                format!("Err::<{output}, _>({refusal})")
-            });
+            let records = function.parameters[0].ty == "vk :: CommandBuffer";
+            return Ok(if records { Body::Recording("recorder.refuse()".to_owned()) } else { Body::Refusal });
         }
         let last = function.parameters.iter().rev().find(|parameter| !parameter.ty.contains("AllocationCallbacks"));
         if let (Some(handle), true) = (last, name.starts_with("vkDestroy") || name == "vkFreeMemory") {
             used.insert(handle.name.clone());
-            return Ok(format!(
-                "// SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
-                unsafe {{ handle::destroy({}) }}.map(drop)",
-                handle.name
-            ));
+            return Ok(Body::Unsafe(format!("handle::destroy({})", handle.name)));
         }
         Err(Error::EntryPoint(format!(
             "{name} has no function (with #[doc(alias = \"{name}\")]), and support.toml neither refuses it nor says that \
@@ -374,7 +357,7 @@ impl Writer<'_> {
         function: &Function,
         entry_point: &EntryPoint,
         used: &mut BTreeSet<String>,
-    ) -> Result<String, Error> {
+    ) -> Result<Body, Error> {
         let wrong = |text: String| Error::EntryPoint(format!("{}: {text}", entry_point.path));
         let mut is_unsafe = entry_point.is_unsafe;
         let mut arguments = Vec::new();
@@ -421,30 +404,21 @@ impl Writer<'_> {
             }
             arguments.push(argument);
         }
+        let mut input = String::new();
+        if let Some(pointer) = info {
+            let pointee = format!("valid::input({pointer})?");
+            input = format!("let info = {pointee};");
+            arguments.iter_mut().filter(|argument| **argument == pointee).for_each(|it| *it = "info".to_owned());
+            used.insert(pointer);
+            is_unsafe = true;
+        }
         let call = format!("{}({})", entry_point.path, arguments.join(", "));
-        let input = info.map_or_else(String::new, |pointer| {
-            used.insert(pointer.clone());
-            is_unsafe = true;
-            format!("let info = valid::input({pointer})?;")
-        });
-        let body = if records {
-            is_unsafe = true;
-            let call = if input.is_empty() { call } else { format!("{{ {input} {call} }}") };
-            format!("record({}, \"{name}\", |recorder| {call})", function.parameters[0].name)
-        } else {
-            let (body, writes) = write_output(&entry_point.output, function, used, call)
-                .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
-            is_unsafe |= writes;
-            format!("{input} {body}")
-        };
-        Ok(if is_unsafe {
-            format!(
-                "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-                unsafe {{ {body} }}"
-            )
-        } else {
-            body
-        })
+        if records {
+            return Ok(Body::Recording(if input.is_empty() { call } else { format!("{{ {input} {call} }}") }));
+        }
+        let (body, writes) = write_output(&entry_point.output, function, used, call)
+            .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
+        Ok(if is_unsafe || writes { Body::Unsafe(format!("{input} {body}")) } else { Body::Safe(body) })
     }
 
     /// The structure with a command's parameters, and the parameter that points at it.
@@ -678,37 +652,23 @@ fn write_output(
     call: String,
 ) -> Option<(String, bool)> {
     let output = plain(output);
-    let returned = function.output.as_deref().map(plain);
-    // Converts the body's value to the command's result.
-    let returns = |body: String, is_result: bool| match (returned.as_deref(), is_result) {
-        (Some("Result"), false) => format!("{body}.map(|()| vk::Result::SUCCESS)"),
-        (None, true) => format!("{body}.map(drop)"),
-        _ => body,
-    };
-    if output == "()" {
-        return Some((returns(call, false), false));
-    }
-    if output == "Result" || Some(&output) == returned.as_ref() {
+    if output == "()" || output == "Result" || Some(&output) == function.output.as_deref().map(plain).as_ref() {
         return Some((call, false));
     }
-    let place = function.parameters.last()?;
-    let raw = plain(&place.ty);
-    let pointee = raw.strip_prefix("*mut")?;
-    used.insert(place.name.clone());
-    let name = &place.name;
-    if output == pointee {
-        let body = format!("valid::output({name}, {call}?)");
-        return Some((returns(body, false), true));
-    }
-    if output.starts_with("Arc<") {
-        let body = format!("valid::output({name}, handle::create({call}?))");
-        return Some((returns(body, false), true));
-    }
-    if output == format!("Vec<{pointee}>") || output.starts_with(&format!("[{pointee};")) {
+    let Member { name, ty } = function.parameters.last()?;
+    let (variable, ty) = (without_prefix(name), plain(ty));
+    let pointee = ty.strip_prefix("*mut")?;
+    used.insert(name.clone());
+    let written = if output == pointee {
+        format!("valid::output({name}, {variable})")
+    } else if output.starts_with("Arc<") {
+        format!("valid::output({name}, handle::create({variable}))")
+    } else if output == format!("Vec<{pointee}>") || output.starts_with(&format!("[{pointee};")) {
         let count = &function.parameters.iter().rev().nth(1)?.name;
         used.insert(count.clone());
-        let body = format!("valid::enumerate({count}, {name}, &{call}?)");
-        return Some((returns(body, true), true));
-    }
-    None
+        format!("valid::enumerate({count}, {name}, &{variable})")
+    } else {
+        return None;
+    };
+    Some((format!("let {variable} = {call}?; {written}"), true))
 }

@@ -12,7 +12,7 @@ const FOLDER: &str = "driver/src";
 /// A function of a command.
 #[derive(Debug)]
 pub(crate) struct EntryPoint {
-    /// Its path within the driver.
+    /// Its path from the driver's root.
     pub(crate) path: String,
     /// True if it is unsafe to call.
     pub(crate) is_unsafe: bool,
@@ -52,7 +52,7 @@ fn module(path: &Path) -> String {
     let path = path.with_extension("");
     let names = path.iter().map(|name| name.to_string_lossy());
     let names: Vec<_> = names.filter(|name| name != "mod").collect();
-    format!("crate::{}", names.join("::"))
+    names.join("::")
 }
 
 /// The commands in a function's `doc(alias)` attributes.

@@ -23,6 +23,7 @@ mod registry;
 mod rust;
 mod spirv;
 mod support;
+mod tables;
 
 pub use error::Error;
 pub use file::File;

@@ -6,15 +6,18 @@ use crate::error::Error;
 use crate::registry::Registry;
 use crate::rust;
 use crate::support::Support;
+use crate::tables::{Row, Table, path};
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
-/// The core structure, whose members are properties.
-const CORE: &str = "VkPhysicalDeviceProperties";
+/// The structures that are in no chain, with their words in the table: the core structure, and its parts.
+const CORE: [(&str, &str); 3] = [
+    ("core", "VkPhysicalDeviceProperties"),
+    ("limits", "VkPhysicalDeviceLimits"),
+    ("sparse", "VkPhysicalDeviceSparseProperties"),
+];
 
 /// The members of the core structure that are themselves structures of properties.
-const NESTED: [(&str, &str); 2] =
-    [("limits", "VkPhysicalDeviceLimits"), ("sparse_properties", "VkPhysicalDeviceSparseProperties")];
+const PARTS: [&str; 2] = ["limits", "sparse_properties"];
 
 /// Members that have another name in the structure that holds all properties of a version.
 const RENAMED: [(&str, &str, &str); 3] = [
@@ -22,14 +25,6 @@ const RENAMED: [(&str, &str, &str); 3] = [
     ("VkPhysicalDeviceSubgroupProperties", "supported_operations", "subgroup_supported_operations"),
     ("VkPhysicalDeviceSubgroupProperties", "quad_operations_in_all_stages", "subgroup_quad_operations_in_all_stages"),
 ];
-
-/// A property: its name in the registry, its name in Rust and its type.
-#[derive(Debug)]
-pub(crate) struct Property<'a> {
-    name: &'a str,
-    field: &'a str,
-    ty: &'a str,
-}
 
 /// The structures of a chain that hold properties.
 pub(crate) fn structures<'a>(
@@ -45,105 +40,50 @@ pub(crate) fn field<'a>(structure: &str, member: &'a str) -> &'a str {
     RENAMED.iter().find(|(of, from, _)| *of == structure && *from == member).map_or(member, |(_, _, to)| to)
 }
 
-/// Adds a structure's properties, each name once.
-fn add<'a>(all: &mut Vec<Property<'a>>, chained: &Chained<'a>) -> Result<(), Error> {
-    for (member, declared) in chained.members() {
-        let field = field(chained.name, &declared.name);
-        if NESTED.iter().any(|(nested, _)| *nested == field) {
-            continue;
-        }
-        match all.iter().find(|property| property.field == field) {
-            Some(known) if known.ty != declared.ty => {
-                return Err(Error::Support(format!("{field} is of two types: {} and {}", known.ty, declared.ty)));
-            }
-            Some(_) => {}
-            None => all.push(Property { name: &member.name, field, ty: &declared.ty }),
-        }
-    }
-    Ok(())
-}
-
-/// An expression for a property as a member of a structure.
-fn value(field: &str, ty: &str) -> String {
-    if ty == "vk :: Bool32" { format!("self.{field}.into()") } else { format!("self.{field}") }
-}
-
 pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &Support) -> Result<String, Error> {
+    let mut holders = Vec::new();
+    for (heading, name) in CORE {
+        holders.push((heading, Chained::new(registry, declarations, name, None)?));
+    }
     let chained = structures(registry, declarations, support)?;
-    let core = Chained::new(registry, declarations, CORE, None)?;
-    let nested: BTreeMap<&str, Chained<'_>> = NESTED
-        .into_iter()
-        .map(|(member, name)| Ok((member, Chained::new(registry, declarations, name, None)?)))
-        .collect::<Result<_, Error>>()?;
-    let mut all = Vec::new();
-    add(&mut all, &core)?;
-    for (member, _) in NESTED {
-        add(&mut all, &nested[member])?;
-    }
-    for structure in &chained {
-        add(&mut all, structure)?;
-    }
+    holders.extend(chained.into_iter().map(|chained| ("structure", chained)));
 
-    let mut fields = String::new();
-    for Property { name, field, ty } in &all {
-        let ty = if *ty == "vk :: Bool32" { "bool" } else { *ty };
-        let _ = writeln!(fields, "/// `{name}`.\npub(crate) {field}: {ty},");
-    }
-    let literal = |structure: &Chained<'_>| -> String {
-        let mut members = String::new();
-        for (_, declared) in structure.members() {
-            let value = match nested.get(declared.name.as_str()) {
-                Some(nested) => {
-                    let name = nested.name.trim_start_matches("VkPhysicalDevice");
-                    format!("self.{}()", name.to_lowercase().replace("sparsep", "sparse_p"))
-                }
-                None => value(field(structure.name, &declared.name), &declared.ty),
-            };
-            let _ = writeln!(members, "{}: {value},", declared.name);
+    let mut types = BTreeMap::new();
+    let mut table = Table::default();
+    for (heading, chained) in &holders {
+        let mut rows = Vec::new();
+        for (member, declared) in chained.members() {
+            let field = field(chained.name, &declared.name);
+            if PARTS.contains(&field) {
+                continue;
+            }
+            let ty = declared.ty.as_str();
+            let first = *types.entry(field).or_insert(ty);
+            if first != ty {
+                return Err(Error::Support(format!("{field} is of two types: {first} and {ty}")));
+            }
+            rows.push(Row { name: &member.name, member: &declared.name, field, value: shown(ty) });
         }
-        members
-    };
-    let mut writes = String::new();
-    for structure in &chained {
-        let mut members = String::new();
-        for (_, declared) in structure.members() {
-            let value = value(field(structure.name, &declared.name), &declared.ty);
-            let _ = writeln!(members, "out.{} = {value};", declared.name);
-        }
-        let ty = &structure.declared.ty;
-        let _ = writeln!(writes, "if let Some(out) = structure.cast::<{ty}>() {{ {members} }}");
+        let ty = path(&chained.declared.ty);
+        table.add(ty, &format!("{heading} {ty}"), rows.into_iter());
     }
     rust::file(
         "//! Properties and limits, and the structures in which Vulkan asks for them.",
         &format!(
-            "use crate::abi::valid;
+            "use super::tables::properties;
+            use crate::abi::valid::ChainedOutput;
             use ash::vk;
 
-            /// Properties, each once, whatever structures hold it.
-            #[derive(Clone, Debug)]
-            pub(crate) struct Properties {{ {fields} }}
-
-            impl Properties {{
-                /// The properties of the core structure.
-                pub(crate) fn core(&self) -> vk::PhysicalDeviceProperties {{
-                    vk::PhysicalDeviceProperties {{ {core} }}
-                }}
-
-                fn limits(&self) -> vk::PhysicalDeviceLimits {{
-                    vk::PhysicalDeviceLimits {{ {limits} }}
-                }}
-
-                fn sparse_properties(&self) -> vk::PhysicalDeviceSparseProperties {{
-                    vk::PhysicalDeviceSparseProperties {{ {sparse} }}
-                }}
-
-                /// Writes the properties to a structure of a chain, if it holds any that are known here.
-                pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {{ {writes} }}
-            }}
-            ",
-            core = literal(&core),
-            limits = literal(&nested["limits"]),
-            sparse = literal(&nested["sparse_properties"]),
+{}",
+            table.text("properties")
         ),
     )
+}
+
+/// The type of a property, as a row shows it.
+fn shown(ty: &str) -> String {
+    match ty {
+        "vk :: Bool32" => "bool".to_owned(),
+        _ => ty.replace(" :: ", "::").replace(" ;", ";"),
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use sha2::{Digest, Sha256};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::Path;
 use vk_parse::{
     CommandDefinition, ExtensionChild, InterfaceItem, RegistryChild, TypeMember, TypeMemberMarkup, TypeSpec, TypesChild,
@@ -366,19 +366,6 @@ fn operand(rest: &mut &str, is_there: &dyn Fn(&str) -> bool) -> bool {
     let (name, after) = rest.split_at(end);
     *rest = after;
     is_there(name)
-}
-
-/// Sorts the requirements of core versions by version.
-pub fn by_version<T>(
-    requirements: &[Requirement<Version>],
-    newest: Version,
-    items: impl Fn(&Requirement<Version>) -> &[T],
-) -> BTreeMap<Version, Vec<&T>> {
-    let mut sorted: BTreeMap<Version, Vec<&T>> = BTreeMap::new();
-    for requirement in requirements.iter().filter(|r| r.by <= newest) {
-        sorted.entry(requirement.by).or_default().extend(items(requirement));
-    }
-    sorted
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+/// The columns of a line, as in the project's `rustfmt.toml`.
+pub(crate) const MAX_WIDTH: usize = 120;
+
 /// Parses a file of Rust.
 ///
 /// # Errors

@@ -57,7 +57,7 @@ pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &
     rust::file(
         "//! SPIR-V's capabilities, and what enables each.",
         &format!(
-            "use crate::registry::features::Features;
+            "use self::Enable::{{Absent, Extension, Feature, Property}};
             use crate::registry::properties::Properties;
             use ash::vk;
             use spirv::Capability;
@@ -66,9 +66,9 @@ pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &
             /// A thing that enables a capability.
             #[derive(Clone, Copy, Debug)]
             pub(crate) enum Enable {{
-                /// A feature, by its name in Rust.
-                Feature(&'static str, fn(&Features) -> bool),
-                /// A value of a property, by the property's name in Rust.
+                /// A feature, by its name.
+                Feature(&'static str),
+                /// A value of a property, and the property's name.
                 Property(&'static str, fn(&Properties) -> bool),
                 /// An extension of devices.
                 Extension(&'static CStr),
@@ -91,7 +91,7 @@ impl Known<'_> {
     fn enable(&self, enable: &Enable) -> Result<Option<String>, Error> {
         Ok(match enable {
             Enable::Version(name) if self.support.has(name) => None,
-            Enable::Extension(name) if self.support.has(name) => Some(format!("Enable::Extension(c\"{name}\")")),
+            Enable::Extension(name) if self.support.has(name) => Some(format!("Extension(c\"{name}\")")),
             Enable::Version(name) | Enable::Extension(name) => Some(absent(name)),
             Enable::Feature(feature) => Some(self.feature(feature)),
             Enable::Property(property) => Some(self.property(property)?),
@@ -101,16 +101,10 @@ impl Known<'_> {
 
     fn feature(&self, enable: &vk_parse::FeatureEnable) -> String {
         let structure = self.registry.type_name(&enable.struct_);
-        let field = self
-            .features
-            .iter()
-            .find(|chained| chained.name == structure)
-            .and_then(|chained| member(chained, &enable.feature));
         let name = &enable.feature;
-        match field {
-            Some(field) => format!("Enable::Feature(\"{name}\", |f| f.{field})"),
-            None => absent(name),
-        }
+        let mut holders = self.features.iter().filter(|chained| chained.name == structure);
+        let is_known = holders.any(|chained| member(chained, name).is_some());
+        if is_known { format!("Feature(\"{name}\")") } else { absent(name) }
     }
 
     fn property(&self, enable: &vk_parse::PropertyEnable) -> Result<String, Error> {
@@ -137,12 +131,12 @@ impl Known<'_> {
             }
         };
         let name = &enable.member;
-        Ok(format!("Enable::Property(\"{name}\", |p| {condition})"))
+        Ok(format!("Property(\"{name}\", |p| {condition})"))
     }
 }
 
 fn absent(name: &str) -> String {
-    format!("Enable::Absent(\"{name}\")")
+    format!("Absent(\"{name}\")")
 }
 
 /// The Rust name of a structure's member.

@@ -81,7 +81,7 @@ fn every_recorded_command_must_be_in_a_recording() {
     let commands = std::fs::read_to_string(commands).expect("the generated commands");
     let commands: String = commands.split_whitespace().collect();
     let names = commands
-        .split("guard(command_buffer,\"vkCmd")
+        .split("record(command_buffer,\"vkCmd")
         .skip(1)
         .filter_map(|rest| rest.split_once('"'))
         // The extension's text leaves out implicit valid usage, because that is generated.

@@ -30,14 +30,14 @@ pub(crate) fn decode(words: &[u32], mut each: impl FnMut(Instruction) -> Result<
             words: &words[..at + count],
             at: at + 1,
             literal_widths: &literal_widths,
-            it: Instruction { opcode, result_type: None, result_id: None, operands: Vec::new() },
+            instruction: Instruction { opcode, result_type: None, result_id: None, operands: Vec::new() },
         };
         decoder.operands(layout)?;
-        let it = decoder.it;
-        if let (Some(id), Some(width)) = (it.result_id, literal_width(&it, &literal_widths)) {
+        let instruction = decoder.instruction;
+        if let (Some(id), Some(width)) = (instruction.result_id, literal_width(&instruction, &literal_widths)) {
             literal_widths.insert(id, width);
         }
-        each(it)?;
+        each(instruction)?;
         at += count;
     }
     Ok(())
@@ -48,10 +48,10 @@ fn invalid<T>(word: usize, reason: impl std::fmt::Display) -> Result<T, Error> {
 }
 
 /// The number of bits of a literal of a type, or of a value's type.
-fn literal_width(it: &Instruction, widths: &HashMap<u32, u32>) -> Option<u32> {
-    match it.opcode {
-        Op::TypeInt | Op::TypeFloat => it.number(0).ok(),
-        _ => widths.get(&it.result_type?).copied(),
+fn literal_width(instruction: &Instruction, widths: &HashMap<u32, u32>) -> Option<u32> {
+    match instruction.opcode {
+        Op::TypeInt | Op::TypeFloat => instruction.number(0).ok(),
+        _ => widths.get(&instruction.result_type?).copied(),
     }
 }
 
@@ -63,7 +63,7 @@ struct Decoder<'a> {
     at: usize,
     /// The number of bits of literals, by the ids of types and values.
     literal_widths: &'a HashMap<u32, u32>,
-    it: Instruction,
+    instruction: Instruction,
 }
 
 impl Decoder<'_> {
@@ -93,7 +93,7 @@ impl Decoder<'_> {
     }
 
     fn invalid<T>(&self, reason: impl std::fmt::Display) -> Result<T, Error> {
-        invalid(self.at, format!("Op{:?}: {reason}", self.it.opcode))
+        invalid(self.at, format!("Op{:?}: {reason}", self.instruction.opcode))
     }
 
     fn word(&mut self) -> Result<u32, Error> {
@@ -106,13 +106,13 @@ impl Decoder<'_> {
 
     fn operand(&mut self, kind: Kind) -> Result<(), Error> {
         match kind {
-            Kind::IdResultType => self.it.result_type = Some(self.word()?),
-            Kind::IdResult => self.it.result_id = Some(self.word()?),
+            Kind::IdResultType => self.instruction.result_type = Some(self.word()?),
+            Kind::IdResult => self.instruction.result_id = Some(self.word()?),
             Kind::Id => self.id()?,
             Kind::Literal => self.literal()?,
-            Kind::TypedLiteral => self.typed_literal(self.it.result_type)?,
+            Kind::TypedLiteral => self.typed_literal(self.instruction.result_type)?,
             Kind::TypedLiteralIdPair => {
-                let selector = self.it.operands.first().and_then(Operand::id);
+                let selector = self.instruction.operands.first().and_then(Operand::id);
                 self.typed_literal(selector)?;
                 self.id()?;
             }
@@ -138,13 +138,13 @@ impl Decoder<'_> {
 
     fn id(&mut self) -> Result<(), Error> {
         let id = self.word()?;
-        self.it.operands.push(Operand::Id(id));
+        self.instruction.operands.push(Operand::Id(id));
         Ok(())
     }
 
     fn literal(&mut self) -> Result<(), Error> {
         let value = self.word()?;
-        self.it.operands.push(Operand::Literal(value));
+        self.instruction.operands.push(Operand::Literal(value));
         Ok(())
     }
 
@@ -155,7 +155,7 @@ impl Decoder<'_> {
             Some(64) => {
                 let (low, high) = (self.word()?, self.word()?);
                 let value = u64::from(high) << 32 | u64::from(low);
-                self.it.operands.push(Operand::Literal64(value));
+                self.instruction.operands.push(Operand::Literal64(value));
                 Ok(())
             }
             Some(width) => self.invalid(format!("there are no literals of {width} bits")),
@@ -175,7 +175,7 @@ impl Decoder<'_> {
             }
         }
         let string = String::from_utf8_lossy(&bytes).into_owned();
-        self.it.operands.push(Operand::String(string));
+        self.instruction.operands.push(Operand::String(string));
         Ok(())
     }
 
@@ -186,7 +186,7 @@ impl Decoder<'_> {
             self.at -= 1;
             return self.invalid(format!("{enumeration:?} has no {value}"));
         }
-        self.it.operands.push(Operand::Enumerant(value));
+        self.instruction.operands.push(Operand::Enumerant(value));
         if !enumeration.is_mask() {
             return self.parameters(enumeration.parameters(value));
         }

@@ -35,18 +35,18 @@ pub enum Error {
         reason: String,
     },
     /// An instruction breaks a rule of SPIR-V.
-    #[error("malformed SPIR-V: {place}: {reason}")]
+    #[error("malformed SPIR-V: {instruction}: {reason}")]
     Malformed {
         /// The instruction.
-        place: InstructionRef,
+        instruction: InstructionRef,
         /// The fault.
         reason: String,
     },
     /// An instruction needs something that this driver doesn't support.
-    #[error("unsupported SPIR-V: {place}: {reason}")]
+    #[error("unsupported SPIR-V: {instruction}: {reason}")]
     Unsupported {
         /// The instruction.
-        place: InstructionRef,
+        instruction: InstructionRef,
         /// The unsupported thing.
         reason: String,
     },
@@ -113,10 +113,10 @@ pub(crate) fn unsupported<T>(reason: impl Into<String>) -> Result<T> {
 
 impl Diagnostic {
     /// Adds the instruction, unless it is known already.
-    pub(crate) fn locate(self, place: InstructionRef) -> Error {
+    pub(crate) fn locate(self, instruction: InstructionRef) -> Error {
         match self {
-            Self::Malformed(reason) => Error::Malformed { place, reason },
-            Self::Unsupported(reason) => Error::Unsupported { place, reason },
+            Self::Malformed(reason) => Error::Malformed { instruction, reason },
+            Self::Unsupported(reason) => Error::Unsupported { instruction, reason },
             Self::Located(error) => error,
         }
     }

@@ -102,56 +102,61 @@ impl Globals {
         Ok(())
     }
 
-    fn instruction(&mut self, module: &Module, specialization: &Specialization, it: &Instruction) -> Result<()> {
-        if it.opcode == Op::Variable {
-            let ty = it.ty()?;
+    fn instruction(
+        &mut self,
+        module: &Module,
+        specialization: &Specialization,
+        instruction: &Instruction,
+    ) -> Result<()> {
+        if instruction.opcode == Op::Variable {
+            let ty = instruction.ty()?;
             let (class, pointee) = self.types.pointer(ty)?;
-            let initializer = it.id(1).ok();
+            let initializer = instruction.id(1).ok();
             let variable = GlobalVariable { ty, class, pointee, initializer };
-            self.variables.insert(it.result()?, variable);
+            self.variables.insert(instruction.result()?, variable);
             return Ok(());
         }
-        if it.opcode == Op::TypeForwardPointer {
-            return match it.enumerant(1, StorageClass::from_u32) {
-                Some(class) => self.types.forward(it.id(0)?, class),
+        if instruction.opcode == Op::TypeForwardPointer {
+            return match instruction.enumerant(1, StorageClass::from_u32) {
+                Some(class) => self.types.forward(instruction.id(0)?, class),
                 None => malformed("there is no storage class"),
             };
         }
-        if it.opcode.is_type() {
-            let ty = self.read_type(module, it)?;
-            return self.types.declare(it.result()?, ty);
+        if instruction.opcode.is_type() {
+            let ty = self.read_type(module, instruction)?;
+            return self.types.declare(instruction.result()?, ty);
         }
-        self.constant(module, specialization, it)
+        self.constant(module, specialization, instruction)
     }
 
-    fn read_type(&self, module: &Module, it: &Instruction) -> Result<Type> {
+    fn read_type(&self, module: &Module, instruction: &Instruction) -> Result<Type> {
         let stride = |id| module.literal(id, Decoration::ArrayStride);
-        Ok(match it.opcode {
+        Ok(match instruction.opcode {
             Op::TypeVoid => Type::Void,
             Op::TypeBool => Type::Scalar(Scalar::Bool),
             Op::TypeInt => {
-                let (width, signed) = (it.number(0)?, it.number(1)? != 0);
+                let (width, signed) = (instruction.number(0)?, instruction.number(1)? != 0);
                 if !matches!(width, 8 | 16 | 32 | 64) {
                     return unsupported(format!("integers of {width} bits"));
                 }
                 Type::Scalar(Scalar::Int { width, signed })
             }
             Op::TypeFloat => {
-                let width = it.number(0)?;
-                if !matches!(width, 16 | 32 | 64) || it.operands.len() > 1 {
+                let width = instruction.number(0)?;
+                if !matches!(width, 16 | 32 | 64) || instruction.operands.len() > 1 {
                     return unsupported("this kind of float");
                 }
                 Type::Scalar(Scalar::Float { width })
             }
             Op::TypeVector => {
-                let (element, count) = (it.id(0)?, it.number(1)?);
+                let (element, count) = (instruction.id(0)?, instruction.number(1)?);
                 if !matches!(self.types.get(element)?, Type::Scalar(_)) || !(2..=4).contains(&count) {
                     return malformed("vectors have two to four scalars");
                 }
                 Type::Vector { element, count }
             }
             Op::TypeMatrix => {
-                let (column, count) = (it.id(0)?, it.number(1)?);
+                let (column, count) = (instruction.id(0)?, instruction.number(1)?);
                 let Type::Vector { element, .. } = self.types.get(column)? else {
                     return malformed("columns of a matrix are vectors");
                 };
@@ -162,32 +167,34 @@ impl Globals {
                 Type::Matrix { column, count }
             }
             Op::TypeArray => Type::Array {
-                element: it.id(0)?,
-                count: match self.constant_u32(it.id(1)?) {
+                element: instruction.id(0)?,
+                count: match self.constant_u32(instruction.id(1)?) {
                     Some(count) if count > 0 => count,
                     _ => return malformed("the length isn't a positive constant"),
                 },
-                stride: stride(it.result()?),
+                stride: stride(instruction.result()?),
             },
-            Op::TypeRuntimeArray => Type::RuntimeArray { element: it.id(0)?, stride: stride(it.result()?) },
-            Op::TypeStruct => Type::Struct(self.members(module, it)?),
-            Op::TypePointer => match it.enumerant(0, StorageClass::from_u32) {
-                Some(class) => Type::Pointer { class, pointee: it.id(1)? },
+            Op::TypeRuntimeArray => {
+                Type::RuntimeArray { element: instruction.id(0)?, stride: stride(instruction.result()?) }
+            }
+            Op::TypeStruct => Type::Struct(self.members(module, instruction)?),
+            Op::TypePointer => match instruction.enumerant(0, StorageClass::from_u32) {
+                Some(class) => Type::Pointer { class, pointee: instruction.id(1)? },
                 None => return malformed("there is no storage class"),
             },
-            Op::TypeImage => Type::Image(image_type(it)?),
+            Op::TypeImage => Type::Image(image_type(instruction)?),
             Op::TypeSampler => Type::Sampler,
-            Op::TypeSampledImage => Type::SampledImage { image: it.id(0)? },
+            Op::TypeSampledImage => Type::SampledImage { image: instruction.id(0)? },
             Op::TypeFunction => Type::Function,
             _ => return unsupported("this type"),
         })
     }
 
-    fn members(&self, module: &Module, it: &Instruction) -> Result<Rc<[Member]>> {
-        let id = it.result()?;
+    fn members(&self, module: &Module, instruction: &Instruction) -> Result<Rc<[Member]>> {
+        let id = instruction.result()?;
         let mut start = Some(0_u32);
-        let mut members = Vec::with_capacity(it.operands.len());
-        for (index, ty) in it.ids(0).into_iter().enumerate() {
+        let mut members = Vec::with_capacity(instruction.operands.len());
+        for (index, ty) in instruction.ids(0).into_iter().enumerate() {
             let index = index as u32;
             members.push(Member {
                 ty,
@@ -202,9 +209,9 @@ impl Globals {
         Ok(members.into())
     }
 
-    fn constant(&mut self, module: &Module, specialization: &Specialization, it: &Instruction) -> Result<()> {
-        let (id, ty) = (it.result()?, it.ty()?);
-        if it.opcode == Op::Undef && self.types.is_opaque(ty) {
+    fn constant(&mut self, module: &Module, specialization: &Specialization, instruction: &Instruction) -> Result<()> {
+        let (id, ty) = (instruction.result()?, instruction.ty()?);
+        if instruction.opcode == Op::Undef && self.types.is_opaque(ty) {
             self.undefined.insert(id, ty);
             return Ok(());
         }
@@ -213,7 +220,7 @@ impl Globals {
             Some(spec_id) => specialization.bits(spec_id, bytes),
             None => Ok(None),
         };
-        let opcode = it.opcode;
+        let opcode = instruction.opcode;
         let bits = match opcode {
             Op::ConstantTrue => vec![1],
             Op::ConstantFalse => vec![0],
@@ -223,7 +230,7 @@ impl Globals {
             }
             Op::Constant | Op::SpecConstant => {
                 let (scalar, _) = self.types.vector(ty)?;
-                let literal = match it.operands.first() {
+                let literal = match instruction.operands.first() {
                     Some(Operand::Literal(bits)) => u64::from(*bits),
                     Some(Operand::Literal64(bits)) => *bits,
                     _ => return malformed("there is no value"),
@@ -241,7 +248,7 @@ impl Globals {
             Op::ConstantComposite | Op::SpecConstantComposite => {
                 let mut bits = Vec::new();
                 let limit = self.types.scalars(ty)? as usize;
-                for part in it.ids(0) {
+                for part in instruction.ids(0) {
                     let Some(part) = self.constants.get(&part) else {
                         return malformed(format!("%{part} isn't a constant"));
                     };
@@ -254,23 +261,25 @@ impl Globals {
             }
             Op::ConstantNull => vec![0; self.types.scalars(ty)? as usize],
             Op::Undef => vec![0; self.types.scalars(ty)? as usize],
-            Op::SpecConstantOp => evaluate(self, ty, &it.numbers(0))?,
+            Op::SpecConstantOp => evaluate(self, ty, &instruction.numbers(0))?,
             _ => return unsupported("this instruction outside a function"),
         };
         self.define(id, ty, bits)
     }
 }
 
-fn image_type(it: &Instruction) -> Result<ImageType> {
-    let (Some(dim), Some(format)) = (it.enumerant(1, Dim::from_u32), it.enumerant(6, ImageFormat::from_u32)) else {
+fn image_type(instruction: &Instruction) -> Result<ImageType> {
+    let (Some(dim), Some(format)) =
+        (instruction.enumerant(1, Dim::from_u32), instruction.enumerant(6, ImageFormat::from_u32))
+    else {
         return malformed("the image type isn't complete");
     };
     Ok(ImageType {
-        sampled_type: it.id(0)?,
+        sampled_type: instruction.id(0)?,
         dim,
-        arrayed: it.number(3)? != 0,
-        multisampled: it.number(4)? != 0,
-        sampled: it.number(5)?,
+        arrayed: instruction.number(3)? != 0,
+        multisampled: instruction.number(4)? != 0,
+        sampled: instruction.number(5)?,
         format,
     })
 }

@@ -70,15 +70,15 @@ struct Loader {
 }
 
 impl Loader {
-    fn add(&mut self, it: Instruction) -> Result<(), Error> {
+    fn add(&mut self, instruction: Instruction) -> Result<(), Error> {
         let sections = &mut self.sections;
-        match it.opcode {
-            Op::Capability => sections.capabilities.push(it),
-            Op::ExtInstImport => sections.imports.push(it),
-            Op::MemoryModel => sections.memory_model = Some(it),
-            Op::EntryPoint => sections.entry_points.push(it),
-            Op::ExecutionMode | Op::ExecutionModeId => sections.execution_modes.push(it),
-            Op::Name => sections.names.push(it),
+        match instruction.opcode {
+            Op::Capability => sections.capabilities.push(instruction),
+            Op::ExtInstImport => sections.imports.push(instruction),
+            Op::MemoryModel => sections.memory_model = Some(instruction),
+            Op::EntryPoint => sections.entry_points.push(instruction),
+            Op::ExecutionMode | Op::ExecutionModeId => sections.execution_modes.push(instruction),
+            Op::Name => sections.names.push(instruction),
             Op::Extension
             | Op::String
             | Op::SourceExtension
@@ -90,21 +90,21 @@ impl Loader {
             | Op::NoLine => {}
             // Debug information.
             Op::ExtInst if self.function.is_none() => {}
-            op if op.is_annotation() => sections.annotations.push(it),
-            op if op.is_type() || op.is_constant() => sections.globals.push(it),
-            Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(it),
+            op if op.is_annotation() => sections.annotations.push(instruction),
+            op if op.is_type() || op.is_constant() => sections.globals.push(instruction),
+            Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(instruction),
             Op::Function => {
-                let function = Function { definition: it, parameters: Vec::new(), blocks: Vec::new() };
+                let function = Function { definition: instruction, parameters: Vec::new(), blocks: Vec::new() };
                 if self.function.replace(function).is_some() {
                     return invalid("a function begins within another");
                 }
             }
             Op::FunctionParameter => match &mut self.function {
-                Some(function) => function.parameters.push(it),
+                Some(function) => function.parameters.push(instruction),
                 None => return invalid("a parameter outside functions"),
             },
             Op::Label => {
-                let block = Block { label: it.result_id, instructions: Vec::new() };
+                let block = Block { label: instruction.result_id, instructions: Vec::new() };
                 if self.function.is_none() {
                     return invalid("a block outside functions");
                 }
@@ -117,7 +117,7 @@ impl Loader {
                 let Some(block) = &mut self.block else {
                     return invalid(format!("Op{op:?} outside blocks"));
                 };
-                block.instructions.push(it);
+                block.instructions.push(instruction);
                 if is_terminator(op)
                     && let (Some(function), Some(block)) = (&mut self.function, self.block.take())
                 {

@@ -6,8 +6,8 @@
 //! its alias, such as `#[doc(alias = "vkCreateBuffer")]`. Parameters and results are converted:
 //! - handles become objects through [`handle`](crate::abi::handle), pointers and chains become references through
 //!   [`valid`](crate::abi::valid);
-//! - `Ok(())` is `VK_SUCCESS`, another success code is `Ok(vk::Result)`, and an error is logged, sent to the instance's
-//!   debug messengers and returned as [`Error::result`];
+//! - `Ok(())` is `VK_SUCCESS`, another success code is `Ok(vk::Result)` ([`Success`]), and an error is logged, sent to the
+//!   instance's debug messengers and returned as [`Error::result`];
 //! - output handles of a command that fails are unchanged, except if Vulkan requires null;
 //! - allocation callbacks are accepted and ignored, as Vulkan allows.
 
@@ -47,6 +47,34 @@ macro_rules! zero_on_failure {
 }
 zero_on_failure!(u32, u64, vk::PFN_vkVoidFunction);
 
+/// A value with which a command succeeds, as its result `R`.
+pub(crate) trait Success<R> {
+    /// The command's result.
+    fn result(self) -> R;
+}
+
+impl<R> Success<R> for R {
+    fn result(self) -> R {
+        self
+    }
+}
+
+impl Success<vk::Result> for () {
+    fn result(self) -> vk::Result {
+        vk::Result::SUCCESS
+    }
+}
+
+/// Commands without a result can't say that their output is incomplete.
+impl Success<()> for vk::Result {
+    fn result(self) {}
+}
+
+/// Commands that destroy an object drop it.
+impl<T> Success<()> for Option<Arc<T>> {
+    fn result(self) {}
+}
+
 /// A command's first parameter, which leads to the listener for its errors.
 pub(crate) trait Caller: Copy {
     /// The listener for errors, if there is one.
@@ -78,10 +106,14 @@ impl<T> Caller for *mut T {
 
 /// Runs a command. No panic leaves it, every error is reported, and the rounding mode of the application's thread does
 /// not matter.
-pub(crate) fn guard<C: Caller, R: ReturnCode>(caller: C, command: &str, body: impl FnOnce() -> Result<R, Error>) -> R {
+pub(crate) fn guard<C: Caller, R: ReturnCode, S: Success<R>>(
+    caller: C,
+    command: &str,
+    body: impl FnOnce() -> Result<S, Error>,
+) -> R {
     let _environment = FloatEnvironment::set_default();
     match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(value)) => value,
+        Ok(Ok(value)) => value.result(),
         Ok(Err(error)) => {
             // SAFETY: commands pass the application's own handle, which is valid or refused; those that destroy it
             // return an error only before they do.
@@ -99,6 +131,11 @@ pub(crate) fn guard<C: Caller, R: ReturnCode>(caller: C, command: &str, body: im
             R::failure(&error)
         }
     }
+}
+
+/// Fails a command that isn't supported.
+pub(crate) fn refuse<C: Caller, R: ReturnCode>(caller: C, command: &str) -> R {
+    guard(caller, command, || Err::<R, _>(Error::Unsupported { command: command.to_owned() }))
 }
 
 /// Logs an error and reports it to the listener.

@@ -13,7 +13,7 @@ use crate::pipeline::parts::VertexInput;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Allocation;
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use std::ffi::c_void;
 use std::sync::Arc;
 

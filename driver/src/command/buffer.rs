@@ -4,6 +4,7 @@
 use super::Command;
 use super::render_scope::RenderScope;
 use crate::abi::error::Error;
+use crate::abi::guard::guard;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid;
 use crate::device::Device;
@@ -190,7 +191,7 @@ pub(crate) struct Recorder {
     /// The name of the command that is being recorded.
     command: &'static str,
     status: Status,
-    usage: BeginFlags,
+    flags: BeginFlags,
     commands: Vec<Command>,
     finished: Option<Arc<Vec<Command>>>,
     /// The render pass, or dynamic rendering, within which commands are recorded.
@@ -227,7 +228,7 @@ impl Recorder {
         Self {
             command: "",
             status: Status::Initial,
-            usage: BeginFlags::default(),
+            flags: BeginFlags::default(),
             commands: Vec::new(),
             finished: None,
             pass: None,
@@ -236,6 +237,14 @@ impl Recorder {
             error: None,
             pending: Arc::default(),
         }
+    }
+
+    /// Fails a command that isn't supported.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`].
+    pub(crate) fn refuse(&self) -> Result<(), Error> {
+        Err(Error::Unsupported { command: self.command.to_owned() })
     }
 
     /// Fails within a set of Gaussian draws.
@@ -274,7 +283,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is pending or recording.
-    pub(crate) fn begin(&mut self, usage: BeginFlags) -> Result<(), Error> {
+    pub(crate) fn begin(&mut self, flags: BeginFlags) -> Result<(), Error> {
         if self.status == Status::Recording {
             return Err(Error::usage(
                 "VUID-vkBeginCommandBuffer-commandBuffer-00049",
@@ -283,8 +292,8 @@ impl Recorder {
         }
         self.reset()?;
         self.status = Status::Recording;
-        self.pass = usage.inherited_pass.clone().map(|formats| RenderScope::Inherited { formats });
-        self.usage = usage;
+        self.pass = flags.inherited_pass.clone().map(|formats| RenderScope::Inherited { formats });
+        self.flags = flags;
         Ok(())
     }
 
@@ -341,13 +350,13 @@ impl Recorder {
                 format!("a command buffer is {:?}, not executable", self.status),
             ));
         };
-        if self.pending.load(Ordering::Acquire) > 0 && !self.usage.simultaneous {
+        if self.pending.load(Ordering::Acquire) > 0 && !self.flags.simultaneous {
             return Err(Error::usage(
                 "VUID-vkQueueSubmit-pCommandBuffers-00071",
                 "a command buffer without VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT is pending already",
             ));
         }
-        if self.usage.one_time {
+        if self.flags.one_time {
             self.status = Status::Invalid;
         }
         Ok((Arc::clone(commands), PendingUse::new(&self.pending)))
@@ -415,7 +424,7 @@ impl Recorder {
     }
 }
 
-/// Records into a command buffer; see [`CommandBuffer::record`](CommandBuffer::record).
+/// The guarded body of a command that is recorded; see [`CommandBuffer::record`](CommandBuffer::record).
 ///
 /// # Safety
 /// The handle is live.
@@ -423,9 +432,11 @@ pub(crate) unsafe fn record(
     command_buffer: vk::CommandBuffer,
     command: &'static str,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe { handle::get(command_buffer)? }.record(command, record)
+) {
+    guard(command_buffer, command, || {
+        // SAFETY: the caller's promise.
+        unsafe { handle::get(command_buffer)? }.record(command, record)
+    })
 }
 
 /// The colour formats of the pass that a secondary command buffer continues.
@@ -583,9 +594,9 @@ mod tests {
     use crate::instance::Instance;
     use crate::registry::features::Features;
 
-    fn record(usage: BeginFlags) -> Recorder {
+    fn record(flags: BeginFlags) -> Recorder {
         let mut recorder = Recorder::new();
-        recorder.begin(usage).unwrap();
+        recorder.begin(flags).unwrap();
         recorder.packet(Packet::Barrier);
         recorder.end().unwrap();
         recorder

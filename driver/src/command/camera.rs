@@ -5,7 +5,7 @@ use super::buffer::Recorder;
 use crate::abi::error::Error;
 use crate::physical_device::limits;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use simdevice::state::gaussian::{Camera, CameraModel};
 use std::fmt::Debug;
 

@@ -7,8 +7,8 @@ use crate::device_addresses::Addresses;
 use crate::physical_device::formats;
 use ash::vk;
 use gaurast::vk::GaussianSphericalHarmonicsBufferGAURAST;
+use simdevice::BufferRange;
 use simdevice::Format;
-use simdevice::packet::BufferRange;
 
 #[doc(alias = "vkCmdBindGaussianSphericalHarmonicsGAURAST")]
 pub(crate) fn cmd_bind_gaussian_spherical_harmonics(

@@ -33,10 +33,10 @@ use crate::pipeline::parts::VertexInput;
 use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{Rect, Viewport};
-use simdevice::transform_feedback::CounterWords;
+use simdevice::transform_feedback::CounterBuffers;
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 
@@ -146,9 +146,9 @@ pub(crate) enum Command {
         buffer: BufferRange,
     },
     /// `vkCmdBeginTransformFeedbackEXT`: the counters are read when it executes.
-    BeginTransformFeedback(Box<CounterWords>),
+    BeginTransformFeedback(Box<CounterBuffers>),
     /// `vkCmdEndTransformFeedbackEXT`.
-    EndTransformFeedback(Box<CounterWords>),
+    EndTransformFeedback(Box<CounterBuffers>),
     /// `vkCmdDrawIndirectByteCountEXT`: the number of vertices is computed when it executes.
     DrawByteCount(DrawByteCount),
     /// `vkCmdBeginQuery` and `vkCmdBeginQueryIndexedEXT` of a query that counts primitives of a vertex stream.

@@ -6,9 +6,9 @@ use crate::abi::error::Error;
 use crate::query_pool::{QueryPool, require_queries};
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
+use simdevice::BufferRange;
 use simdevice::Packet;
 use simdevice::limits::MAX_VERTEX_STREAMS;
-use simdevice::packet::BufferRange;
 use std::sync::Arc;
 
 #[doc(alias = "vkCmdBeginQuery")]

@@ -1,7 +1,9 @@
 //! Commands that begin and end render passes and dynamic rendering.
 
 use super::buffer::Recorder;
-use super::render_scope::{DynamicAttachment, DynamicRendering, RenderPassInstance, RenderScope, color_formats};
+use super::render_scope::{
+    DynamicAttachment, DynamicRendering, RenderPassInstance, RenderScope, ResolveTo, color_formats,
+};
 use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
@@ -106,7 +108,7 @@ unsafe fn attachment(info: &vk::RenderingAttachmentInfo<'_>) -> Result<Option<Dy
         load: info.load_op,
         store: info.store_op,
         clear_value: info.clear_value,
-        resolve: resolve_view.map(Arc::clone).zip(mode),
+        resolve: resolve_view.zip(mode).map(|(view, mode)| ResolveTo { target: Arc::clone(view), mode }),
     }))
 }
 

@@ -10,7 +10,7 @@ use crate::render_pass::{AttachmentDescription, RenderPass, layers};
 use crate::resource::image::ImageView;
 use ash::vk;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::packet::{Attachment, LoadOp, Rendering, StoreOp};
+use simdevice::packet::{Attachment, AttachmentResolve, LoadOp, Rendering, StoreOp};
 use simdevice::state::{Rect, ResolveMode};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl RenderPassInstance {
         let resolved = subpass.resolve.iter().copied().chain(std::iter::repeat(None));
         let color = subpass.color.iter().zip(resolved).map(|(used, resolved)| {
             let ops = main_ops;
-            let resolve = resolved.map(|number| (number, ResolveMode::Average));
+            let resolve = resolved.map(|target| ResolveTo { target, mode: ResolveMode::Average });
             used.map(|number| self.attachment(index, number, Aspect::Color, ops, resolve)).transpose()
         });
         let depth_stencil = |aspect, ops| {
@@ -140,7 +140,7 @@ impl RenderPassInstance {
                     Aspect::Stencil => resolve.stencil,
                     Aspect::Color | Aspect::Depth => resolve.depth,
                 };
-                mode.map(|mode| (resolve.attachment, mode))
+                mode.map(|mode| ResolveTo { target: resolve.attachment, mode })
             });
             number.map(|number| self.attachment(index, number, aspect, ops, resolve)).transpose()
         };
@@ -222,23 +222,23 @@ impl RenderPassInstance {
         clear_value(view.view.format, value)
     }
 
-    /// An attachment and, if it is resolved, its resolve target and mode.
+    /// An attachment of a subpass; `resolve` names the attachment that it is resolved to.
     fn attachment(
         &self,
         subpass: usize,
         number: usize,
         aspect: Aspect,
         ops: fn(&AttachmentDescription) -> Ops,
-        resolve: Option<(usize, ResolveMode)>,
+        resolve: Option<ResolveTo<usize>>,
     ) -> Result<Attachment, Error> {
         let view = self.view(number)?;
         let layers = self.render_pass.subpasses[subpass].layers(self.layers);
         check_attachment(view, aspect, layers)?;
-        let resolve = resolve.map(|(number, mode)| {
-            let to = self.view(number)?;
+        let resolve = resolve.map(|ResolveTo { target, mode }| {
+            let to = self.view(target)?;
             check_attachment(to, aspect, layers)?;
             check_resolve(view, to)?;
-            Ok::<_, Error>((to.view.clone(), mode))
+            Ok::<_, Error>(AttachmentResolve { view: to.view.clone(), mode })
         });
         let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
         let clear = || self.clear_value(view, number);
@@ -263,6 +263,13 @@ fn stencil_ops(attachment: &AttachmentDescription) -> Ops {
     (attachment.stencil_load, attachment.stencil_store)
 }
 
+/// The resolve of an attachment, to another attachment or to a view.
+#[derive(Clone)]
+pub(crate) struct ResolveTo<T> {
+    pub(crate) target: T,
+    pub(crate) mode: ResolveMode,
+}
+
 /// An attachment of dynamic rendering.
 #[derive(Clone)]
 pub(crate) struct DynamicAttachment {
@@ -274,8 +281,8 @@ pub(crate) struct DynamicAttachment {
     pub(crate) store: vk::AttachmentStoreOp,
     /// The value that it is cleared to.
     pub(crate) clear_value: vk::ClearValue,
-    /// The view that it is resolved to, and how.
-    pub(crate) resolve: Option<(Arc<ImageView>, ResolveMode)>,
+    /// The resolve at the end, to a view.
+    pub(crate) resolve: Option<ResolveTo<Arc<ImageView>>>,
 }
 
 /// Dynamic rendering.
@@ -324,10 +331,10 @@ impl DynamicRendering {
         // Rendering that is suspended is resolved where it ends.
         let suspends = self.flags.contains(vk::RenderingFlags::SUSPENDING);
         let resolve = attachment.resolve.as_ref().filter(|_| !suspends);
-        let resolve = resolve.map(|(view, mode)| {
-            check_attachment(view, aspect, layers)?;
-            check_resolve(&attachment.view, view)?;
-            Ok::<_, Error>((view.view.clone(), *mode))
+        let resolve = resolve.map(|ResolveTo { target, mode }| {
+            check_attachment(target, aspect, layers)?;
+            check_resolve(&attachment.view, target)?;
+            Ok::<_, Error>(AttachmentResolve { view: target.view.clone(), mode: *mode })
         });
         let format = attachment.view.view.format;
         Ok(Attachment {

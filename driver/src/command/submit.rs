@@ -215,9 +215,9 @@ mod tests {
     use crate::device_sync::WaitResult;
     use crate::queue::Queue;
     use simdevice::Allocation;
+    use simdevice::BufferRange;
     use simdevice::Device;
     use simdevice::Packet;
-    use simdevice::packet::BufferRange;
 
     struct Fixture {
         sync: Arc<DeviceSync>,

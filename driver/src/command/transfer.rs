@@ -8,11 +8,11 @@ use crate::convert;
 use crate::resource::buffer::{Buffer, BufferRules};
 use crate::resource::image::{Image, count};
 use ash::vk;
+use simdevice::BufferRange;
 use simdevice::format::{Aspect, ClearValue, Numeric};
 use simdevice::packet::{
-    AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments, ClearImage,
-    CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers,
-    SubresourceRange,
+    AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, ClearAttachments, ClearImage, CopyBuffer,
+    CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,
 };
 use simdevice::state::ResolveMode;
 use simdevice::{Format, Packet};
@@ -79,8 +79,7 @@ pub(crate) fn cmd_copy_buffer_to_image2(
     regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    let rules = (&COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE);
-    let copy = copy_buffer_image(src_buffer, dst_image, regions, rules)?;
+    let copy = copy_buffer_image(src_buffer, dst_image, regions, &COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE)?;
     recorder.packet(Packet::CopyBufferToImage(copy));
     Ok(())
 }
@@ -93,8 +92,7 @@ pub(crate) fn cmd_copy_image_to_buffer2(
     regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    let rules = (&COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE);
-    let copy = copy_buffer_image(dst_buffer, src_image, regions, rules)?;
+    let copy = copy_buffer_image(dst_buffer, src_image, regions, &COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE)?;
     recorder.packet(Packet::CopyImageToBuffer(copy));
     Ok(())
 }
@@ -351,7 +349,8 @@ fn copy_buffer_image(
     buffer: &Buffer,
     image: &Image,
     regions: &[vk::BufferImageCopy2],
-    (buffer_rules, image_rules): (&BufferRules, &ImageRules),
+    buffer_rules: &BufferRules,
+    image_rules: &ImageRules,
 ) -> Result<CopyBufferImage, Error> {
     let side = image.desc.format.block_side();
     let region = |region: &vk::BufferImageCopy2| {
@@ -392,8 +391,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
     let mut converted = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
-            (source, &region.src_subresource, &COPY_SOURCE),
-            (target, &region.dst_subresource, &COPY_TARGET),
+            &CopySide { image: source_image, layers: region.src_subresource, rules: &COPY_SOURCE },
+            &CopySide { image: target_image, layers: region.dst_subresource, rules: &COPY_TARGET },
         )?;
         converted.extend(pairs.into_iter().map(|(source, target)| ImageCopyRegion {
             source,
@@ -429,8 +428,8 @@ fn blit_image(source: &Image, target: &Image, filter: vk::Filter, regions: &[vk:
     let mut converted = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
-            (source, &region.src_subresource, &BLIT_SOURCE),
-            (target, &region.dst_subresource, &BLIT_TARGET),
+            &CopySide { image: source, layers: region.src_subresource, rules: &BLIT_SOURCE },
+            &CopySide { image: target, layers: region.dst_subresource, rules: &BLIT_TARGET },
         )?;
         converted.extend(pairs.into_iter().map(|(source, target)| ImageBlitRegion {
             source,
@@ -598,16 +597,24 @@ fn layers(
     }
 }
 
+/// The source or the target of a copy.
+struct CopySide<'a> {
+    image: &'a Image,
+    layers: vk::ImageSubresourceLayers,
+    rules: &'a ImageRules,
+}
+
 /// The subresources on both sides of a copy, aspect by aspect.
 fn layer_pairs(
-    (source, from, source_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
-    (target, to, target_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
+    source: &CopySide<'_>,
+    target: &CopySide<'_>,
 ) -> Result<Vec<(SubresourceLayers, SubresourceLayers)>, Error> {
-    let (sources, targets) = (aspect_layers(source, from, source_rules)?, aspect_layers(target, to, target_rules)?);
+    let sources = aspect_layers(source.image, &source.layers, source.rules)?;
+    let targets = aspect_layers(target.image, &target.layers, target.rules)?;
     if sources.len() != targets.len() {
         return Err(Error::usage(
             "VUID-vkCmdCopyImage-srcImage-01551",
-            format!("a region goes from {from:?} to other aspects, {to:?}"),
+            format!("a region goes from {:?} to other aspects, {:?}", source.layers, target.layers),
         ));
     }
     Ok(sources.into_iter().zip(targets).collect())

@@ -9,7 +9,7 @@ use crate::query_pool::{QueryPool, require_queries};
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::limits::MAX_TRANSFORM_FEEDBACK_BUFFERS;
-use simdevice::transform_feedback::CounterWords;
+use simdevice::transform_feedback::CounterBuffers;
 use std::sync::Arc;
 
 /// The rules on the buffers that are written.
@@ -102,7 +102,7 @@ pub(crate) fn cmd_bind_transform_feedback_buffers(
     Ok(())
 }
 
-/// Makes transform feedback active or ends it. Returns the words of its counters.
+/// Makes transform feedback active or ends it. Returns its counter buffers.
 fn set_active(
     recorder: &mut Recorder,
     is_active: bool,
@@ -110,13 +110,13 @@ fn set_active(
     buffers: Option<Handles<'_, vk::Buffer>>,
     offsets: Option<&[vk::DeviceSize]>,
     rules: &CounterRules,
-) -> Result<Box<CounterWords>, Error> {
+) -> Result<Box<CounterBuffers>, Error> {
     recorder.require_pass()?;
     require_active(recorder, !is_active, rules.state)?;
     recorder.captures = is_active;
-    let mut words = Box::<CounterWords>::default();
+    let mut counters = Box::<CounterBuffers>::default();
     let Some(buffers) = buffers else {
-        return Ok(words);
+        return Ok(counters);
     };
     require_bindings(first, buffers.len(), rules.count)?;
     for (number, buffer) in buffers.objects().enumerate() {
@@ -125,11 +125,10 @@ fn set_active(
             if !offset.is_multiple_of(4) {
                 return Err(Error::usage(rules.alignment, format!("the offset {offset} is not a multiple of 4")));
             }
-            let word = buffer.range(offset, Some(4), &rules.counters)?;
-            words[first as usize + number] = Some(word);
+            counters[first as usize + number] = Some(buffer.range(offset, Some(4), &rules.counters)?);
         }
     }
-    Ok(words)
+    Ok(counters)
 }
 
 #[doc(alias = "vkCmdBeginTransformFeedbackEXT")]

@@ -11,46 +11,46 @@ use std::mem::MaybeUninit;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A descriptor pool. It owns the handles of its sets, and allocates no more sets and descriptors than it was made for.
-/// Descriptors of all types take the same room. Programs rely on that, as other drivers allow it: GStreamer 1.22 names
+/// Descriptors of all types count alike. Programs rely on that, as other drivers allow it: GStreamer 1.22 names
 /// one type of the two that it allocates. Bytes of inline uniform blocks are counted apart.
 #[derive(Debug)]
 pub(crate) struct DescriptorPool {
     max_sets: usize,
-    size: Room,
+    capacity: DescriptorCounts,
     flags: vk::DescriptorPoolCreateFlags,
     allocated: Mutex<Allocated>,
 }
 
-/// The allocated sets, and what they take.
+/// The allocated sets, and the counts of their descriptors.
 #[derive(Debug, Default)]
 struct Allocated {
     sets: HashSet<vk::DescriptorSet>,
-    taken: Room,
+    counts: DescriptorCounts,
 }
 
 /// Numbers of descriptors of all types but inline uniform blocks, and of bytes in those.
 #[derive(Clone, Copy, Debug, Default)]
-struct Room {
+struct DescriptorCounts {
     descriptors: u64,
     inline_bytes: u64,
 }
 
-impl Room {
-    /// The room of numbers of descriptors of each type.
+impl DescriptorCounts {
+    /// The counts of descriptors of each type.
     fn of(kinds: impl IntoIterator<Item = (vk::DescriptorType, u64)>) -> Self {
-        let mut room = Self::default();
+        let mut counts = Self::default();
         for (kind, count) in kinds {
-            let place = match kind {
-                vk::DescriptorType::INLINE_UNIFORM_BLOCK => &mut room.inline_bytes,
-                _ => &mut room.descriptors,
+            let sum = match kind {
+                vk::DescriptorType::INLINE_UNIFORM_BLOCK => &mut counts.inline_bytes,
+                _ => &mut counts.descriptors,
             };
-            *place = place.saturating_add(count);
+            *sum = sum.saturating_add(count);
         }
-        room
+        counts
     }
 
     /// The sum.
-    fn with(self, other: Self) -> Self {
+    fn plus(self, other: Self) -> Self {
         Self {
             descriptors: self.descriptors.saturating_add(other.descriptors),
             inline_bytes: self.inline_bytes.saturating_add(other.inline_bytes),
@@ -58,7 +58,7 @@ impl Room {
     }
 
     /// The difference, at least zero.
-    fn without(self, other: Self) -> Self {
+    fn minus(self, other: Self) -> Self {
         Self {
             descriptors: self.descriptors.saturating_sub(other.descriptors),
             inline_bytes: self.inline_bytes.saturating_sub(other.inline_bytes),
@@ -76,7 +76,7 @@ impl DescriptorPool {
         flags: vk::DescriptorPoolCreateFlags,
     ) -> Self {
         let sizes = pool_sizes.iter().map(|size| (size.ty, u64::from(size.descriptor_count)));
-        Self { max_sets: max_sets as usize, size: Room::of(sizes), flags, allocated: Mutex::default() }
+        Self { max_sets: max_sets as usize, capacity: DescriptorCounts::of(sizes), flags, allocated: Mutex::default() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Allocated> {
@@ -95,7 +95,7 @@ impl DescriptorPool {
         variable_counts: &[u32],
     ) -> Result<Vec<vk::DescriptorSet>, Error> {
         let mut allocated = self.lock();
-        let mut wanted = allocated.taken;
+        let mut wanted = allocated.counts;
         let after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
         for (index, layout) in layouts.iter().enumerate() {
             if layout.is_updated_after_bind() && !self.flags.contains(after_bind) {
@@ -105,15 +105,15 @@ impl DescriptorPool {
                 ));
             }
             let variable = variable_counts.get(index).copied().unwrap_or(0);
-            wanted = wanted.with(Room::of(layout.kinds(variable)));
+            wanted = wanted.plus(DescriptorCounts::of(layout.kinds(variable)));
         }
         let sets = allocated.sets.len() + layouts.len();
         if sets > self.max_sets {
             return Err(Error::OutOfPoolMemory(format!("{sets} sets are wanted of a pool of {}", self.max_sets)));
         }
         for (what, wanted, size) in [
-            ("descriptors", wanted.descriptors, self.size.descriptors),
-            ("bytes of inline uniform blocks", wanted.inline_bytes, self.size.inline_bytes),
+            ("descriptors", wanted.descriptors, self.capacity.descriptors),
+            ("bytes of inline uniform blocks", wanted.inline_bytes, self.capacity.inline_bytes),
         ] {
             if wanted > size {
                 return Err(Error::OutOfPoolMemory(format!("{wanted} {what} are wanted of a pool of {size}")));
@@ -126,7 +126,7 @@ impl DescriptorPool {
         let sets: Vec<_> = sets.collect::<Result<_, Error>>()?;
         let sets: Vec<_> = sets.into_iter().map(handle::create).collect();
         allocated.sets.extend(&sets);
-        allocated.taken = wanted;
+        allocated.counts = wanted;
         Ok(sets)
     }
 
@@ -157,8 +157,8 @@ impl DescriptorPool {
             }
             // SAFETY: the pool made the handle and has not destroyed it, and the caller no longer uses it.
             if let Some(set) = unsafe { handle::destroy(set) }? {
-                let room = Room::of(set.layout().kinds(set.variable_count()));
-                allocated.taken = allocated.taken.without(room);
+                let counts = DescriptorCounts::of(set.layout().kinds(set.variable_count()));
+                allocated.counts = allocated.counts.minus(counts);
             }
         }
         Ok(())

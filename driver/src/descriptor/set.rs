@@ -9,7 +9,7 @@ use crate::resource::buffer::{BufferRules, BufferView};
 use crate::resource::image::ImageView;
 use crate::resource::sampler::Sampler;
 use ash::vk;
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use simdevice::{Allocation, host};
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -61,6 +61,13 @@ pub(crate) struct DescriptorSet {
     layout: Arc<DescriptorSetLayout>,
     variable_count: u32,
     descriptors: Mutex<Vec<Descriptor>>,
+}
+
+/// A descriptor of a set: an element of a binding; in an inline uniform block, a byte of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BindingElement {
+    binding: u32,
+    element: u32,
 }
 
 /// An update of consecutive descriptors, already converted.
@@ -180,17 +187,18 @@ impl DescriptorSet {
     /// [`Error::InvalidUsage`], and nothing is replaced, if either set does not have these descriptors.
     pub(crate) fn copy(
         &self,
-        (binding, element): (u32, u32),
+        to: BindingElement,
         source: &Self,
-        (source_binding, source_element): (u32, u32),
+        from: BindingElement,
         count: u32,
     ) -> Result<(), Error> {
-        let kind = source.layout.binding(source_binding).map(|b| b.kind);
+        let BindingElement { binding, element } = to;
+        let kind = source.layout.binding(from.binding).map(|b| b.kind);
         if kind == Some(vk::DescriptorType::INLINE_UNIFORM_BLOCK) {
             let mut bytes = host::with_capacity(count as usize);
             bytes.resize(count as usize, 0u8);
-            let block = source.inline_block(source_binding)?;
-            in_block(&block, source_element, bytes.len(), |memory, offset| memory.read(offset, &mut bytes))?;
+            let block = source.inline_block(from.binding)?;
+            in_block(&block, from.element, bytes.len(), |memory, offset| memory.read(offset, &mut bytes))?;
             return self.write(&Write {
                 binding,
                 element,
@@ -199,14 +207,14 @@ impl DescriptorSet {
                 bytes,
             });
         }
-        let start = source.layout.index(source_binding, source_element)?;
+        let start = source.layout.index(from.binding, from.element)?;
         let found = source.lock().get(start..start + count as usize).map(host::copied);
         let Some(descriptors) = found else {
             return Err(Error::usage(
                 "VUID-VkCopyDescriptorSet-srcArrayElement-00346",
                 format!(
-                    "{count} descriptors from element {source_element} of binding {source_binding} on go beyond the \
-                     set"
+                    "{count} descriptors from element {} of binding {} on go beyond the set",
+                    from.element, from.binding
                 ),
             ));
         };
@@ -490,9 +498,9 @@ pub(crate) unsafe fn update_descriptor_sets(
             // SAFETY: the caller's promise.
             let (target, source) = unsafe { (handle::get(copy.dst_set)?, handle::get(copy.src_set)?) };
             target.copy(
-                (copy.dst_binding, copy.dst_array_element),
+                BindingElement { binding: copy.dst_binding, element: copy.dst_array_element },
                 source,
-                (copy.src_binding, copy.src_array_element),
+                BindingElement { binding: copy.src_binding, element: copy.src_array_element },
                 copy.descriptor_count,
             )?;
         }

@@ -40,23 +40,28 @@ pub(super) struct Command {
     pub(super) availability: Availability,
 }
 
-/// The rows, by scope and availability:
-/// `Device, Core(vk::API_VERSION_1_0) => { vkCmdDraw: vk::PFN_vkCmdDraw = vkCmdDraw; }`. Functions are checked against
-/// their types.
+/// The rows, by scope and availability: `Device, Core(vk::API_VERSION_1_0) => { vkCmdDraw: vk::PFN_vkCmdDraw; }`. A
+/// function has its command's name and is checked against the command's type. Other names of the command have rows of
+/// the form `vkCmdDrawIndirectCountKHR = vkCmdDrawIndirectCount;`.
 macro_rules! rows {
     ($($scope:ident, $availability:expr => {
-        $($name:ident: $type:path = $function:path;)*
+        $($name:ident $(: $type:path)? $(= $function:ident)?;)*
     })*) => {
         &[$($(Command {
             name: stringify!($name),
-            function: {
-                let function: $type = $function;
-                // SAFETY: function pointers have one size, and callers of a void function cast it back first.
-                unsafe { std::mem::transmute::<$type, unsafe extern "system" fn()>(function) }
-            },
+            function: rows!(@function $name $(: $type)? $(= $function)?),
             scope: Scope::$scope,
             availability: $availability,
         },)*)*]
+    };
+    (@function $name:ident: $type:path) => {{
+        let function: $type = $name;
+        // SAFETY: function pointers have one size, and callers of a void function cast it back first.
+        unsafe { std::mem::transmute::<$type, unsafe extern "system" fn()>(function) }
+    }};
+    (@function $name:ident = $function:ident) => {
+        // SAFETY: the pointer is that of a function, and callers of a void function cast it back first.
+        unsafe { std::mem::transmute::<*const (), unsafe extern "system" fn()>($function as *const ()) }
     };
 }
 pub(super) use rows;

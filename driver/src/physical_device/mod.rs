@@ -264,8 +264,8 @@ pub(crate) unsafe fn enumerate_performance_query_counters(
     // SAFETY: the caller's promise.
     unsafe {
         if !counters.is_null() {
-            let mut room = *valid::input(counter_count)?;
-            Structures::new(&raw mut room, counter_descriptions)?.fill(available, counters::describe).map(drop)?;
+            let mut capacity = *valid::input(counter_count)?;
+            Structures::new(&raw mut capacity, counter_descriptions)?.fill(available, counters::describe).map(drop)?;
         }
         Structures::new(counter_count, counters)?.fill(available, counters::fill)
     }

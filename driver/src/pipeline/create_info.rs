@@ -36,34 +36,34 @@ pub(super) unsafe fn read(
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     libraries: &[&GraphicsState],
 ) -> Result<GraphicsState, Error> {
-    let mut gathered = GraphicsState::default();
+    let mut graphics = GraphicsState::default();
     for library in libraries {
-        gathered.link(library)?;
+        graphics.link(library)?;
     }
     // SAFETY: the caller's promise.
     unsafe {
         let parts = parts(info, !libraries.is_empty());
-        gathered.claim(parts)?;
+        graphics.claim(parts)?;
         if let Some(state) = valid::optional(info.p_dynamic_state) {
             let dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
             let own =
                 dynamic.iter().filter(|&&state| dynamic_state::part(state).is_none_or(|part| parts.contains(part)));
-            gathered.dynamic.extend(own);
+            graphics.dynamic.extend(own);
         }
         let shaders = Parts::PRE_RASTERIZATION_SHADERS | Parts::FRAGMENT_SHADER;
         if parts.intersects(shaders) {
             if let Some(layout) = handle::get_optional(info.layout)? {
-                gathered.add_layout(layout);
+                graphics.add_layout(layout);
             }
-            read_stages(device, info, parts, &mut gathered)?;
+            read_stages(device, info, parts, &mut graphics)?;
         }
         if parts.contains(Parts::VERTEX_INPUT_INTERFACE) {
-            read_vertex_input(info, &mut gathered)?;
+            read_vertex_input(info, &mut graphics)?;
         }
         if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
-            read_rasterization(info, &mut gathered)?;
+            read_rasterization(info, &mut graphics)?;
         }
-        let draws = !gathered.discards();
+        let draws = !graphics.discards();
         let has_output = draws && parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
         let subpass = if parts.intersects(shaders | Parts::FRAGMENT_OUTPUT_INTERFACE) {
             Subpass::new(info, has_output)?
@@ -71,21 +71,21 @@ pub(super) unsafe fn read(
             Subpass::default()
         };
         if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
-            gathered.pre_rasterization.view_mask = subpass.view_mask;
+            graphics.pre_rasterization.view_mask = subpass.view_mask;
         }
         if draws && parts.contains(Parts::FRAGMENT_SHADER) {
             // Without a render pass, formats say whether there is such an attachment; the fragment output
             // interface has them.
             let is_unknown = info.render_pass == vk::RenderPass::null() && !has_output;
             if subpass.has_depth_stencil || is_unknown {
-                gathered.fragment_shader.depth_stencil = valid::optional(info.p_depth_stencil_state).map(depth_stencil);
+                graphics.fragment_shader.depth_stencil = valid::optional(info.p_depth_stencil_state).map(depth_stencil);
             }
         }
         if has_output {
-            read_output(info, subpass, &mut gathered)?;
+            read_output(info, subpass, &mut graphics)?;
         }
     }
-    Ok(gathered)
+    Ok(graphics)
 }
 
 /// The parts that a create info has itself, beside those of the libraries that it links.
@@ -110,16 +110,16 @@ unsafe fn read_stages(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     parts: Parts,
-    gathered: &mut GraphicsState,
+    graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     let stages = unsafe { valid::slice(info.p_stages, info.stage_count)? };
     for given in stages {
         let (part, stages) = if given.stage == vk::ShaderStageFlags::FRAGMENT {
-            let stages = &mut gathered.fragment_shader.stages;
+            let stages = &mut graphics.fragment_shader.stages;
             (Parts::FRAGMENT_SHADER, stages)
         } else {
-            let stages = &mut gathered.pre_rasterization.stages;
+            let stages = &mut graphics.pre_rasterization.stages;
             (Parts::PRE_RASTERIZATION_SHADERS, stages)
         };
         if parts.contains(part) {
@@ -137,10 +137,10 @@ unsafe fn read_stages(
 /// The create info and its chain are valid.
 unsafe fn read_vertex_input(
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    gathered: &mut GraphicsState,
+    graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
-    let is_dynamic = gathered.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
-    let own = &mut gathered.vertex_input;
+    let is_dynamic = graphics.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
+    let own = &mut graphics.vertex_input;
     // SAFETY: the caller's promise.
     unsafe {
         if !is_dynamic && let Some(state) = valid::optional(info.p_vertex_input_state) {
@@ -171,10 +171,10 @@ unsafe fn read_vertex_input(
 /// The create info and its chain are valid.
 unsafe fn read_rasterization(
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    gathered: &mut GraphicsState,
+    graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
-    let tessellates = gathered.tessellates();
-    let own = &mut gathered.pre_rasterization;
+    let tessellates = graphics.tessellates();
+    let own = &mut graphics.pre_rasterization;
     // SAFETY: the caller's promise.
     unsafe {
         own.gaussian =
@@ -218,10 +218,10 @@ unsafe fn read_rasterization(
             let lines = valid::find_in_chain::<vk::PipelineRasterizationLineStateCreateInfoKHR<'_>>(state.p_next);
             own.lines = lines.map(line_rasterization).unwrap_or_default();
         }
-        if !gathered.discards()
+        if !graphics.discards()
             && let Some(state) = valid::optional(info.p_viewport_state)
         {
-            read_viewports(state, gathered)?;
+            read_viewports(state, graphics)?;
         }
     }
     Ok(())
@@ -233,13 +233,13 @@ unsafe fn read_rasterization(
 /// The state and its chain are valid.
 unsafe fn read_viewports(
     state: &vk::PipelineViewportStateCreateInfo<'_>,
-    gathered: &mut GraphicsState,
+    graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
     use vk::DynamicState as S;
-    let is_dynamic = |states: [S; 2]| states.iter().any(|state| gathered.is_dynamic(*state));
+    let is_dynamic = |states: [S; 2]| states.iter().any(|state| graphics.is_dynamic(*state));
     let dynamic_viewports = is_dynamic([S::VIEWPORT, S::VIEWPORT_WITH_COUNT]);
     let dynamic_scissors = is_dynamic([S::SCISSOR, S::SCISSOR_WITH_COUNT]);
-    let own = &mut gathered.pre_rasterization;
+    let own = &mut graphics.pre_rasterization;
     own.viewport_count = state.viewport_count;
     own.scissor_count = state.scissor_count;
     // SAFETY: the caller's promise; a null pointer is not followed.
@@ -263,13 +263,13 @@ unsafe fn read_viewports(
 unsafe fn read_output(
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     subpass: Subpass,
-    gathered: &mut GraphicsState,
+    graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
     use vk::DynamicState as S;
-    let has_dynamic_blending = gathered.has_dynamic_blending();
+    let has_dynamic_blending = graphics.has_dynamic_blending();
     let [dynamic_mask, dynamic_enables] =
-        [S::SAMPLE_MASK_EXT, S::COLOR_WRITE_ENABLE_EXT].map(|state| gathered.is_dynamic(state));
-    let own = &mut gathered.fragment_output;
+        [S::SAMPLE_MASK_EXT, S::COLOR_WRITE_ENABLE_EXT].map(|state| graphics.is_dynamic(state));
+    let own = &mut graphics.fragment_output;
     own.has_depth_stencil = subpass.has_depth_stencil;
     own.color_formats = subpass.color_formats;
     // SAFETY: the caller's promise.

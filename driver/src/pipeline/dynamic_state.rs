@@ -1,11 +1,11 @@
 //! Dynamic state: the table of states that a command buffer may set, and the states that it has set.
 
 use super::parts::Parts;
-use super::state::{BlendEquations, FixedFunctionState as Fixed};
+use super::state::FixedFunctionState as Fixed;
 use crate::convert::StencilOps;
 use ash::vk;
 use simdevice::state::gaussian::GaussianOrder;
-use simdevice::state::{CompareOp, DepthBias, LogicOp, PolygonMode, Topology};
+use simdevice::state::{BlendEquations, CompareOp, DepthBias, LogicOp, PolygonMode, Topology};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;

@@ -110,14 +110,14 @@ impl PipelineLayout {
     }
 
     /// The difference between a shader's binding and the layout, if there is one.
-    fn descriptor_mismatch(&self, stage: Stage, wanted: &ShaderBinding) -> Option<String> {
-        let set = self.set_layouts.get(wanted.set as usize);
+    fn descriptor_mismatch(&self, stage: Stage, shader_binding: &ShaderBinding) -> Option<String> {
+        let set = self.set_layouts.get(shader_binding.set as usize);
         let set = set.and_then(Option::as_ref);
-        let given = set.and_then(|set| set.binding(wanted.binding));
+        let given = set.and_then(|set| set.binding(shader_binding.binding));
         let given = given.and_then(|given| Some((given, kind(given.kind)?)));
-        let name = wanted.name.as_ref();
+        let name = shader_binding.name.as_ref();
         let name = name.map_or_else(String::new, |name| format!(" (\"{name}\")"));
-        let place = format!("set {}, binding {}{name}", wanted.set, wanted.binding);
+        let place = format!("set {}, binding {}{name}", shader_binding.set, shader_binding.binding);
         let Some((given, given_kind)) = given else {
             return Some(format!("the {stage} shader uses {place}, which the pipeline layout doesn't have"));
         };
@@ -126,17 +126,17 @@ impl PipelineLayout {
         }
         // A combined descriptor can be used as either of its parts.
         let is_part = given_kind == DescriptorKind::CombinedImageSampler
-            && matches!(wanted.kind, DescriptorKind::SampledImage | DescriptorKind::Sampler);
-        if wanted.kind != given_kind && !is_part {
+            && matches!(shader_binding.kind, DescriptorKind::SampledImage | DescriptorKind::Sampler);
+        if shader_binding.kind != given_kind && !is_part {
             return Some(format!(
                 "{place} is a {:?} in the {stage} shader, but a {given_kind:?} in the pipeline layout",
-                wanted.kind
+                shader_binding.kind
             ));
         }
-        (wanted.count > given.count && !wanted.is_unsized).then(|| {
+        (shader_binding.count > given.count && !shader_binding.is_unsized).then(|| {
             format!(
                 "{place} has {} descriptors in the pipeline layout; the {stage} shader wants {}",
-                given.count, wanted.count
+                given.count, shader_binding.count
             )
         })
     }

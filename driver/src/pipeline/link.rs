@@ -203,7 +203,7 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
             sampling: Sampling::Center,
         };
         let written = OutputTarget::BuiltIn { built_in, component };
-        carry(vertex, written, (location, component));
+        carry(vertex, written, InterfaceComponent { location, component });
     }
 }
 
@@ -217,10 +217,10 @@ fn carry_captured(last: &mut Shader, varyings: &mut Varyings) -> Option<Captured
         vertex.stream = feedback.streams[buffer];
     }
     for scalar in &feedback.scalars {
-        let place = (LOCATION_OF_CAPTURED, captured.varyings);
-        if carry(last, scalar.target, place).is_some() {
+        let to = InterfaceComponent { location: LOCATION_OF_CAPTURED, component: captured.varyings };
+        if carry(last, scalar.target, to).is_some() {
             let value = CapturedValue { offset: scalar.offset, varying: first + captured.varyings };
-            varyings.insert(place, value.varying);
+            varyings.insert(to, value.varying);
             captured.varyings += 1;
             captured.buffers[scalar.buffer as usize].values.push(value);
         }
@@ -228,8 +228,9 @@ fn carry_captured(last: &mut Shader, varyings: &mut Varyings) -> Option<Captured
     Some(captured)
 }
 
-/// Writes an output to a place as well. `None` if the stage never writes it.
-fn carry(shader: &mut Shader, written: OutputTarget, (location, component): InterfaceComponent) -> Option<()> {
+/// Writes an output to a component of a location as well. `None` if the stage never writes it.
+fn carry(shader: &mut Shader, written: OutputTarget, to: InterfaceComponent) -> Option<()> {
+    let InterfaceComponent { location, component } = to;
     let target = OutputTarget::Location { location, component, index: 0 };
     if gives_memory(&shader.interface) {
         return carry_written(&mut shader.interface, written, target);
@@ -247,7 +248,7 @@ fn carry(shader: &mut Shader, written: OutputTarget, (location, component): Inte
 /// Numbers the components that the vertex stage writes and the fragment stage reads, in order.
 fn varyings_read(vertex: &Interface, fragment: &Interface) -> Varyings {
     let mut components: Vec<InterfaceComponent> =
-        components_read(fragment).filter(|place| writes(vertex, *place)).collect();
+        components_read(fragment).filter(|component| writes(vertex, *component)).collect();
     components.sort_unstable();
     components.dedup();
     components.into_iter().zip(0..).collect()
@@ -256,7 +257,7 @@ fn varyings_read(vertex: &Interface, fragment: &Interface) -> Varyings {
 /// The components that the fragment stage reads and the vertex stage doesn't write, in the order of its inputs.
 pub(super) fn unwritten(vertex: &Interface, fragment: &Interface) -> Vec<InterfaceComponent> {
     let mut components: Vec<InterfaceComponent> =
-        components_read(fragment).filter(|place| !writes(vertex, *place)).collect();
+        components_read(fragment).filter(|component| !writes(vertex, *component)).collect();
     components.dedup();
     components
 }
@@ -265,14 +266,14 @@ pub(super) fn unwritten(vertex: &Interface, fragment: &Interface) -> Vec<Interfa
 fn components_read(interface: &Interface) -> impl Iterator<Item = InterfaceComponent> {
     let inputs = interface.inputs.iter();
     inputs.filter_map(|input| match input.source {
-        InputSource::Location { location, component, .. } => Some((location, component)),
+        InputSource::Location { location, component, .. } => Some(InterfaceComponent { location, component }),
         InputSource::BuiltIn { .. } | InputSource::Patch => None,
     })
 }
 
 /// Reports whether a stage writes a component of a location.
-fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
-    components_written(interface).any(|written| written == place)
+fn writes(interface: &Interface, component: InterfaceComponent) -> bool {
+    components_written(interface).any(|written| written == component)
 }
 
 fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<VertexInput> {
@@ -297,7 +298,7 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
 fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<FragmentInput> {
     match input.source {
         InputSource::Location { location, component, interpolation, sampling } => {
-            varyings.get(&(location, component)).map(|&index| FragmentInput::Varying {
+            varyings.get(&InterfaceComponent { location, component }).map(|&index| FragmentInput::Varying {
                 index,
                 interpolation: match interpolation {
                     Interpolation::Perspective => interface::Interpolation::Perspective,

@@ -67,7 +67,7 @@ pub(super) fn tessellation(
     let wanted = &evaluation.interface.exchange.inputs.scalars;
     let taken: Vec<MemoryScalar> =
         memory.scalars.iter().copied().filter(|written| wanted.iter().any(|read| is_same(read, written))).collect();
-    let gives = VertexMemory {
+    let output_memory = VertexMemory {
         start: memory.start,
         stride: memory.stride,
         values: (0..).zip(&taken).map(|(number, it)| value(number, it)).collect(),
@@ -80,7 +80,7 @@ pub(super) fn tessellation(
     drop_outputs(&mut evaluation.program, &meanings);
     TessellationPrograms {
         control: program(control, |read| position(given, read.target)),
-        gives,
+        output_memory,
         outer_levels,
         inner_levels,
         output_vertices,
@@ -99,12 +99,12 @@ pub(super) fn geometry(
 ) -> GeometryPrograms {
     let memory = &shader.interface.exchange.outputs;
     let modes = shader.interface.modes;
-    let mut gives = VertexMemory { start: memory.start, stride: memory.stride, values: Vec::new() };
+    let mut output_memory = VertexMemory { start: memory.start, stride: memory.stride, values: Vec::new() };
     let mut outputs = Vec::new();
     for scalar in &memory.scalars {
         let meaning = vertex_output(scalar.target, varyings, live_outputs);
         if meaning.is_some() {
-            gives.values.push(value(outputs.len() as u32, scalar));
+            output_memory.values.push(value(outputs.len() as u32, scalar));
             outputs.push(meaning);
         }
     }
@@ -113,7 +113,7 @@ pub(super) fn geometry(
     GeometryPrograms {
         invocations: modes.invocations.unwrap_or(1).max(1),
         count: count.unwrap_or(0) as u32,
-        gives,
+        output_memory,
         vertex_bytes: shader.interface.exchange.vertex_bytes,
         outputs,
         corners: match modes.output {
@@ -150,8 +150,8 @@ fn program(mut shader: Shader, source: impl Fn(&MemoryScalar) -> Option<usize>) 
     let exchange = &shader.interface.exchange;
     let inputs: Vec<_> = shader.interface.inputs.iter().map(|input| primitive_input(input.source)).collect();
     zero_inputs(&mut shader.program, &inputs);
-    let takes = memory(&exchange.inputs, source);
-    PrimitiveProgram { inputs, takes, groups: exchange.groups, lanes: exchange.lanes, program: shader.program }
+    let input_memory = memory(&exchange.inputs, source);
+    PrimitiveProgram { inputs, input_memory, groups: exchange.groups, lanes: exchange.lanes, program: shader.program }
 }
 
 /// The values that a stage takes. Those without a source stay zero.
@@ -282,7 +282,7 @@ pub(crate) fn check(
 /// The components of locations that a stage writes.
 pub(super) fn components_written(interface: &Interface) -> impl Iterator<Item = InterfaceComponent> + '_ {
     targets(interface).filter_map(|target| match target {
-        OutputTarget::Location { location, component, .. } => Some((location, component)),
+        OutputTarget::Location { location, component, .. } => Some(InterfaceComponent { location, component }),
         _ => None,
     })
 }

@@ -76,17 +76,17 @@ impl GraphicsPipeline {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
-        let kind = if info.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
-            let gaussian = GaussianPipeline::new(device, info)?;
+    pub(crate) fn new(device: &Device, graphics: &GraphicsState) -> Result<Self, Error> {
+        let kind = if graphics.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+            let gaussian = GaussianPipeline::new(device, graphics)?;
             PipelineKind::Gaussian(Box::new(gaussian))
         } else {
-            PipelineKind::Primitive(Box::new(PrimitivePipeline::new(device, info)?))
+            PipelineKind::Primitive(Box::new(PrimitivePipeline::new(device, graphics)?))
         };
         Ok(Self {
             kind,
-            dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE)
-                || info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT),
+            dynamic_stride: graphics.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE)
+                || graphics.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT),
         })
     }
 }
@@ -133,16 +133,16 @@ unsafe fn new_graphics_pipeline(device: &Device, info: &vk::GraphicsPipelineCrea
         });
     }
     // SAFETY: the caller's promise.
-    let mut gathered = unsafe {
+    let mut graphics = unsafe {
         write_empty_creation_feedback(info.p_next)?;
         create_info::read(device, info, &libraries(info)?)?
     };
     if is_library {
-        stages::translate_library(device, &mut gathered)?;
-        return Ok(Pipeline::Library(Box::new(gathered)));
+        stages::translate_library(device, &mut graphics)?;
+        return Ok(Pipeline::Library(Box::new(graphics)));
     }
-    gathered.require_complete()?;
-    let pipeline = GraphicsPipeline::new(device, &gathered)?;
+    graphics.require_complete()?;
+    let pipeline = GraphicsPipeline::new(device, &graphics)?;
     Ok(Pipeline::Graphics(Arc::new(pipeline)))
 }
 

@@ -65,27 +65,27 @@ impl PrimitivePipeline {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, graphics: &GraphicsState) -> Result<Self, Error> {
         if !device.features().primitive_topology_list_restart {
-            info.require_no_list_restart()?;
+            graphics.require_no_list_restart()?;
         }
-        let mut fixed = FixedFunctionState::new(info)?;
+        let mut fixed = FixedFunctionState::new(graphics)?;
         fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
-        let (dynamic, viewports, scissors) = dynamic(info)?;
-        let layout = info.layout.as_ref().ok_or_else(|| {
+        let (dynamic, viewports, scissors) = dynamic(graphics)?;
+        let layout = graphics.layout.as_ref().ok_or_else(|| {
             Error::usage("VUID-VkGraphicsPipelineCreateInfo-layout-06602", "the pipeline has no layout")
         })?;
-        let stages = Stages::find(device, info)?;
+        let stages = Stages::find(device, graphics)?;
         let shaders = stages.translate(device, layout, fixed.draw.samples)?;
         link_primitives::check(
             shaders.tessellation.as_ref(),
             shaders.geometry.as_ref(),
-            (!info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)).then_some(fixed.draw.topology),
+            (!graphics.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)).then_some(fixed.draw.topology),
         )?;
         let locations = shaders.vertex.interface.locations_read();
-        let is_dynamic = info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
+        let is_dynamic = graphics.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
         let attributes =
-            if is_dynamic { Vec::new() } else { stages::attributes(&info.vertex_input.input, &locations)? };
+            if is_dynamic { Vec::new() } else { stages::attributes(&graphics.vertex_input.input, &locations)? };
         if let Some(fragment) = &shaders.fragment {
             let last = &shaders.last().interface;
             stages::warn_of_unwritten(device, last, &fragment.interface);
@@ -99,17 +99,17 @@ impl PrimitivePipeline {
         let evaluation_resources = resources(tessellation.map(|it| &it.evaluation));
         let geometry_resources = resources(shaders.geometry.as_ref());
         let fragment_resources = resources(shaders.fragment.as_ref());
-        let color = live_color_outputs(info, &fixed);
+        let color = live_color_outputs(graphics, &fixed);
         let live_outputs = LiveOutputs {
             color: &color,
-            second_source: info.fragment_output.blend.iter().any(reads_second_source)
-                || info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
+            second_source: graphics.fragment_output.blend.iter().any(reads_second_source)
+                || graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points
                 || shaders.geometry.is_some()
                 || shaders.tessellation.is_some()
-                || info.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
+                || graphics.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
                 || fixed.draw.polygon_mode == PolygonMode::Point,
-            views: info.pre_rasterization.view_mask != 0,
+            views: graphics.pre_rasterization.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(shaders, stream, live_outputs)?;
@@ -145,14 +145,14 @@ struct Stages<'a> {
 }
 
 impl<'a> Stages<'a> {
-    fn find(device: &Device, info: &'a GraphicsState) -> Result<Self, Error> {
+    fn find(device: &Device, graphics: &'a GraphicsState) -> Result<Self, Error> {
         use vk::ShaderStageFlags as F;
         let known = F::VERTEX | F::TESSELLATION_CONTROL | F::TESSELLATION_EVALUATION | F::GEOMETRY | F::FRAGMENT;
-        if let Some((stage, _)) = info.stages().find(|(stage, _)| !known.contains(*stage)) {
+        if let Some((stage, _)) = graphics.stages().find(|(stage, _)| !known.contains(*stage)) {
             return Err(Error::FeatureNotPresent(format!("a shader stage {stage:?}")));
         }
         let find = |wanted| {
-            let mut found = info.stages().filter(move |(stage, _)| *stage == wanted);
+            let mut found = graphics.stages().filter(move |(stage, _)| *stage == wanted);
             match (found.next(), found.next()) {
                 (_, Some(_)) => Err(Error::usage(
                     "VUID-VkGraphicsPipelineCreateInfo-stage-06897",
@@ -164,7 +164,7 @@ impl<'a> Stages<'a> {
         let vertex = find(F::VERTEX)?.ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
-                format!("a pipeline of topology {:?} has no vertex stage", info.vertex_input.topology),
+                format!("a pipeline of topology {:?} has no vertex stage", graphics.vertex_input.topology),
             )
         })?;
         let control = find(F::TESSELLATION_CONTROL)?;
@@ -188,9 +188,9 @@ impl<'a> Stages<'a> {
         let geometry = find(F::GEOMETRY)?;
         let fragment = find(F::FRAGMENT)?;
         require_features(device, tessellation.is_some(), geometry.is_some())?;
-        check_adjacency(device, info.vertex_input.topology)?;
-        check_patches(info, tessellation.is_some())?;
-        Ok(Self { vertex, tessellation, geometry, fragment: fragment.filter(|_| !info.discards()) })
+        check_adjacency(device, graphics.vertex_input.topology)?;
+        check_patches(graphics, tessellation.is_some())?;
+        Ok(Self { vertex, tessellation, geometry, fragment: fragment.filter(|_| !graphics.discards()) })
     }
 
     /// Translates all stages.
@@ -250,8 +250,8 @@ fn check_adjacency(device: &Device, topology: vk::PrimitiveTopology) -> Result<(
 }
 
 /// Refuses patches without tessellation, and tessellation of other primitives.
-fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
-    let topology = info.vertex_input.topology;
+fn check_patches(graphics: &GraphicsState, tessellates: bool) -> Result<(), Error> {
+    let topology = graphics.vertex_input.topology;
     let has_patches = topology == vk::PrimitiveTopology::PATCH_LIST;
     if has_patches && !tessellates {
         return Err(Error::usage(
@@ -259,14 +259,14 @@ fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
             "the topology is PATCH_LIST, and there are no tessellation stages",
         ));
     }
-    if tessellates && !has_patches && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY) {
+    if tessellates && !has_patches && !graphics.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY) {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-pStages-00736",
             format!("there are tessellation stages, and the topology is {topology:?}"),
         ));
     }
-    let points = info.pre_rasterization.patch_control_points;
-    let is_dynamic = info.is_dynamic(vk::DynamicState::PATCH_CONTROL_POINTS_EXT);
+    let points = graphics.pre_rasterization.patch_control_points;
+    let is_dynamic = graphics.is_dynamic(vk::DynamicState::PATCH_CONTROL_POINTS_EXT);
     if tessellates && !is_dynamic && !(1..=limits::MAX_PATCH_SIZE).contains(&points) {
         return Err(Error::usage(
             "VUID-VkPipelineTessellationStateCreateInfo-patchControlPoints-01214",
@@ -277,17 +277,17 @@ fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
 }
 
 /// The dynamic states, and the sources of viewports and scissors.
-fn dynamic(info: &GraphicsState) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
+fn dynamic(graphics: &GraphicsState) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
     use vk::DynamicState as S;
     let (mut viewports, mut scissors) = (ViewportSource::Static, ViewportSource::Static);
     let mut dynamic = Vec::new();
-    for &state in &info.dynamic {
+    for &state in &graphics.dynamic {
         match state {
             S::VIEWPORT => {
-                viewports = ViewportSource::Dynamic(info.pre_rasterization.viewport_count);
+                viewports = ViewportSource::Dynamic(graphics.pre_rasterization.viewport_count);
             }
             S::VIEWPORT_WITH_COUNT => viewports = ViewportSource::DynamicWithCount,
-            S::SCISSOR => scissors = ViewportSource::Dynamic(info.pre_rasterization.scissor_count),
+            S::SCISSOR => scissors = ViewportSource::Dynamic(graphics.pre_rasterization.scissor_count),
             S::SCISSOR_WITH_COUNT => scissors = ViewportSource::DynamicWithCount,
             state if dynamic_state::has_value(state) => dynamic.push(state),
             // Attribute streams are looked up for each draw.

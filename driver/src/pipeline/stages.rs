@@ -5,6 +5,7 @@ use super::layout::PipelineLayout;
 use super::link;
 use super::parts::{GraphicsState, VertexInput};
 use super::state::{AttributeSource, source};
+use super::varyings::InterfaceComponent;
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::device_addresses::Addresses;
@@ -73,8 +74,8 @@ pub(crate) fn translate(
 ///
 /// # Errors
 /// As [`translate`].
-pub(crate) fn translate_library(device: &Device, library: &mut GraphicsState) -> Result<(), Error> {
-    let Some(layout) = library.layout.clone() else {
+pub(crate) fn translate_library(device: &Device, graphics: &mut GraphicsState) -> Result<(), Error> {
+    let Some(layout) = graphics.layout.clone() else {
         return Ok(());
     };
     let kind = |stage| match stage {
@@ -85,7 +86,7 @@ pub(crate) fn translate_library(device: &Device, library: &mut GraphicsState) ->
         vk::ShaderStageFlags::FRAGMENT => Some(Stage::Fragment),
         _ => None,
     };
-    for (stage, shader) in library.stages_mut() {
+    for (stage, shader) in graphics.stages_mut() {
         if let Some(kind) = kind(*stage)
             && shader.keep_translations()
         {
@@ -99,9 +100,9 @@ pub(crate) fn translate_library(device: &Device, library: &mut GraphicsState) ->
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
-pub(crate) fn attributes(info: &VertexInput, locations: &[(u32, ScalarType)]) -> Result<Vec<AttributeSource>, Error> {
+pub(crate) fn attributes(input: &VertexInput, locations: &[(u32, ScalarType)]) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, ScalarType)| {
-        source(info, location).map_err(|what| {
+        source(input, location).map_err(|what| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
                 format!("the vertex shader reads location {location}, {what}"),
@@ -144,7 +145,7 @@ fn class(ty: ScalarType) -> (u8, bool) {
 
 /// Reports inputs that the stage before doesn't write. They read as zero.
 pub(crate) fn warn_of_unwritten(device: &Device, vertex: &Interface, fragment: &Interface) {
-    for (location, component) in link::unwritten(vertex, fragment) {
+    for InterfaceComponent { location, component } in link::unwritten(vertex, fragment) {
         let message = format!(
             "the fragment shader reads location {location}, component {component}, which the vertex shader doesn't \
              write; it reads as 0"

@@ -10,8 +10,8 @@ use gaurast::vk::GAUSSIAN_LOCATION_UNUSED_GAURAST;
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, LogicOp,
-    PolygonMode, StencilFace, StencilOp, Topology,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest,
+    DrawState, LogicOp, PolygonMode, StencilFace, StencilOp, Topology,
 };
 
 /// The source of an attribute.
@@ -34,7 +34,7 @@ pub(crate) struct AttributeSource {
 /// # Errors
 /// An [`Error`] if the location, its binding or its format is unsuitable.
 pub(crate) fn attribute(
-    info: &GraphicsState,
+    graphics: &GraphicsState,
     name: &str,
     location: u32,
     components: u32,
@@ -49,7 +49,7 @@ pub(crate) fn attribute(
             },
         )
     };
-    let source = source(&info.vertex_input.input, location).map_err(refuse)?;
+    let source = source(&graphics.vertex_input.input, location).map_err(refuse)?;
     let format = source.format;
     if format.is_integer() {
         return Err(refuse(format!("whose format {format:?} does not convert to floating point")));
@@ -64,11 +64,11 @@ pub(crate) fn attribute(
 ///
 /// # Errors
 /// The problem with the attribute, as the end of a sentence about its location.
-pub(crate) fn source(info: &VertexInput, location: u32) -> Result<AttributeSource, String> {
-    let attribute = info.attributes.iter().find(|a| a.location == location);
+pub(crate) fn source(input: &VertexInput, location: u32) -> Result<AttributeSource, String> {
+    let attribute = input.attributes.iter().find(|a| a.location == location);
     let attribute = attribute.ok_or("which the vertex input state does not have")?;
     let number = attribute.binding;
-    let binding = info.bindings.iter().find(|b| b.binding == number);
+    let binding = input.bindings.iter().find(|b| b.binding == number);
     let binding = binding.ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
     let format =
@@ -79,7 +79,7 @@ pub(crate) fn source(info: &VertexInput, location: u32) -> Result<AttributeSourc
     let instance_divisor = match binding.input_rate {
         vk::VertexInputRate::VERTEX => None,
         vk::VertexInputRate::INSTANCE => {
-            let given = info.divisors.iter().find(|it| it.binding == number);
+            let given = input.divisors.iter().find(|it| it.binding == number);
             Some(given.map_or(1, |it| it.divisor))
         }
         rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
@@ -98,9 +98,6 @@ pub(crate) struct AttachmentState {
     pub(super) write_enable: bool,
 }
 
-/// The equations of colour and alpha.
-pub(crate) type BlendEquations = (BlendEquation, BlendEquation);
-
 /// The equation that gives the source.
 const REPLACE: BlendEquation =
     BlendEquation { source: BlendFactor::One, destination: BlendFactor::Zero, op: BlendOp::Add };
@@ -108,7 +105,7 @@ const REPLACE: BlendEquation =
 impl AttachmentState {
     /// The state that writes the source unchanged.
     const WRITTEN: Self =
-        Self { blend_enable: false, equations: (REPLACE, REPLACE), write_mask: 0xf, write_enable: true };
+        Self { blend_enable: false, equations: BlendEquations::both(REPLACE), write_mask: 0xf, write_enable: true };
 
     /// The state for the device.
     fn blend_state(self) -> BlendState {
@@ -123,28 +120,28 @@ impl AttachmentState {
 ///
 /// # Errors
 /// An [`Error`] if their number is not that of the attachments, or for state that the device doesn't support.
-fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
-    let enables = &info.fragment_output.color_write_enables;
+fn attachment_states(graphics: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
+    let enables = &graphics.fragment_output.color_write_enables;
     let with_enables = |index: usize, state: AttachmentState| AttachmentState {
         write_enable: enables.get(index).is_none_or(|&enable| enable != vk::FALSE),
         ..state
     };
-    if info.has_dynamic_blending() {
-        let count = info.fragment_output.color_formats.len();
+    if graphics.has_dynamic_blending() {
+        let count = graphics.fragment_output.color_formats.len();
         let states = (0..count).map(|index| with_enables(index, AttachmentState::WRITTEN));
         return Ok(states.collect());
     }
-    if info.fragment_output.blend.len() != info.fragment_output.color_formats.len() {
+    if graphics.fragment_output.blend.len() != graphics.fragment_output.color_formats.len() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
             format!(
                 "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
-                info.fragment_output.blend.len(),
-                info.fragment_output.color_formats.len()
+                graphics.fragment_output.blend.len(),
+                graphics.fragment_output.color_formats.len()
             ),
         ));
     }
-    let given = info.fragment_output.blend.iter().enumerate();
+    let given = graphics.fragment_output.blend.iter().enumerate();
     given
         .map(|(index, given)| {
             let blend_enable = given.blend_enable != vk::FALSE;
@@ -154,8 +151,8 @@ fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error
                 ..AttachmentState::WRITTEN
             };
             // An unused value may be anything.
-            let may_blend = blend_enable || info.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
-            if may_blend && !info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT) {
+            let may_blend = blend_enable || graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
+            if may_blend && !graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT) {
                 state.equations = convert::blend_equations(given)?;
             }
             Ok(with_enables(index, state))
@@ -177,10 +174,10 @@ pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState)
     state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
 }
 
-/// A feature of the device: true if it is supported, and its name.
+/// A [`DeviceFeature`] by its name.
 macro_rules! supported {
     ($feature:ident) => {
-        (SUPPORTED.$feature, stringify!($feature))
+        DeviceFeature { is_supported: SUPPORTED.$feature, name: stringify!($feature) }
     };
 }
 
@@ -231,13 +228,13 @@ impl FixedFunctionState {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(info: &GraphicsState) -> Result<Self, Error> {
-        let mut state = Self::of(info, convert::topology(info.vertex_input.topology)?)?;
-        if !info.discards() {
-            state.set_viewports(info)?;
-            state.set_samples(info)?;
-            state.set_depth_stencil(info)?;
-            state.set_blend(info)?;
+    pub(crate) fn new(graphics: &GraphicsState) -> Result<Self, Error> {
+        let mut state = Self::of(graphics, convert::topology(graphics.vertex_input.topology)?)?;
+        if !graphics.discards() {
+            state.set_viewports(graphics)?;
+            state.set_samples(graphics)?;
+            state.set_depth_stencil(graphics)?;
+            state.set_blend(graphics)?;
         }
         Ok(state)
     }
@@ -246,65 +243,80 @@ impl FixedFunctionState {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
+    pub(crate) fn of_gaussians(graphics: &GraphicsState) -> Result<Self, Error> {
         // The topology has no effect.
-        let mut state = Self::of(info, Topology::TriangleStrip)?;
-        if !info.fragment_output.multisample.rasterization_samples.is_empty() {
-            state.set_samples(info)?;
+        let mut state = Self::of(graphics, Topology::TriangleStrip)?;
+        if !graphics.fragment_output.multisample.rasterization_samples.is_empty() {
+            state.set_samples(graphics)?;
         }
-        state.set_depth_stencil(info)?;
-        state.set_blend(info)?;
+        state.set_depth_stencil(graphics)?;
+        state.set_blend(graphics)?;
         Ok(state)
     }
 
     /// The state with vertex assembly and rasterization of the pipeline; all other state has no effect.
-    fn of(info: &GraphicsState, topology: Topology) -> Result<Self, Error> {
-        let raster = &info.pre_rasterization.rasterization;
+    fn of(graphics: &GraphicsState, topology: Topology) -> Result<Self, Error> {
+        let raster = &graphics.pre_rasterization.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
         let needs = [
-            (polygon_mode != PolygonMode::Fill, supported!(fill_mode_non_solid), "a polygon mode but FILL"),
-            (raster.depth_clamp_enable != vk::FALSE, supported!(depth_clamp), "depthClampEnable"),
-            (
-                raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
-                supported!(depth_bias_clamp),
-                "depthBiasClamp",
-            ),
-            (
-                !matches!(
-                    info.pre_rasterization.lines.line_rasterization_mode,
+            FeatureNeed {
+                is_needed: polygon_mode != PolygonMode::Fill,
+                feature: supported!(fill_mode_non_solid),
+                state: "a polygon mode but FILL",
+            },
+            FeatureNeed {
+                is_needed: raster.depth_clamp_enable != vk::FALSE,
+                feature: supported!(depth_clamp),
+                state: "depthClampEnable",
+            },
+            FeatureNeed {
+                is_needed: raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
+                feature: supported!(depth_bias_clamp),
+                state: "depthBiasClamp",
+            },
+            FeatureNeed {
+                is_needed: !matches!(
+                    graphics.pre_rasterization.lines.line_rasterization_mode,
                     vk::LineRasterizationModeKHR::DEFAULT | vk::LineRasterizationModeKHR::RECTANGULAR
                 ),
-                (SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines, "bresenhamLines or smoothLines"),
-                "a line rasterization mode but DEFAULT and RECTANGULAR",
-            ),
-            (
-                info.pre_rasterization.lines.stippled_line_enable != vk::FALSE
-                    && !info.is_dynamic(vk::DynamicState::LINE_STIPPLE_ENABLE_EXT),
-                supported!(stippled_rectangular_lines),
-                "stippledLineEnable",
-            ),
-            (info.line_width() != 1.0, supported!(wide_lines), "a line width but 1"),
+                feature: DeviceFeature {
+                    is_supported: SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines,
+                    name: "bresenhamLines or smoothLines",
+                },
+                state: "a line rasterization mode but DEFAULT and RECTANGULAR",
+            },
+            FeatureNeed {
+                is_needed: graphics.pre_rasterization.lines.stippled_line_enable != vk::FALSE
+                    && !graphics.is_dynamic(vk::DynamicState::LINE_STIPPLE_ENABLE_EXT),
+                feature: supported!(stippled_rectangular_lines),
+                state: "stippledLineEnable",
+            },
+            FeatureNeed {
+                is_needed: graphics.line_width() != 1.0,
+                feature: supported!(wide_lines),
+                state: "a line width but 1",
+            },
         ];
         require_all(&needs)?;
         let draw = DrawState {
             topology,
-            primitive_restart: info.vertex_input.primitive_restart,
+            primitive_restart: graphics.vertex_input.primitive_restart,
             viewports: Vec::new(),
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
             unrestricted_depth: false,
-            depth_clip: info.pre_rasterization.depth_clip,
-            negative_one_to_one: info.pre_rasterization.negative_one_to_one,
+            depth_clip: graphics.pre_rasterization.depth_clip,
+            negative_one_to_one: graphics.pre_rasterization.negative_one_to_one,
             rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,
             polygon_mode,
             cull_front: false,
             cull_back: false,
             front_clockwise: false,
             depth_bias: None,
-            line_width: info.line_width(),
-            provoking_last: info.pre_rasterization.provoking_last,
-            rasterized_stream: info.pre_rasterization.rasterized_stream,
-            lower_left_domain: info.pre_rasterization.lower_left_domain,
+            line_width: graphics.line_width(),
+            provoking_last: graphics.pre_rasterization.provoking_last,
+            rasterized_stream: graphics.pre_rasterization.rasterized_stream,
+            lower_left_domain: graphics.pre_rasterization.lower_left_domain,
             samples: 1,
             sample_mask: u32::MAX,
             sample_shading: false,
@@ -317,7 +329,7 @@ impl FixedFunctionState {
         };
         let mut state = Self {
             draw,
-            patch_control_points: info.pre_rasterization.patch_control_points,
+            patch_control_points: graphics.pre_rasterization.patch_control_points,
             depth_bias_enable: raster.depth_bias_enable != vk::FALSE,
             depth_bias: DepthBias {
                 constant: raster.depth_bias_constant_factor,
@@ -341,10 +353,10 @@ impl FixedFunctionState {
         Ok(state)
     }
 
-    fn set_viewports(&mut self, info: &GraphicsState) -> Result<(), Error> {
+    fn set_viewports(&mut self, graphics: &GraphicsState) -> Result<(), Error> {
         use vk::DynamicState as S;
-        let counts = [info.pre_rasterization.viewport_count, info.pre_rasterization.scissor_count];
-        let dynamic = [info.is_dynamic(S::VIEWPORT_WITH_COUNT), info.is_dynamic(S::SCISSOR_WITH_COUNT)];
+        let counts = [graphics.pre_rasterization.viewport_count, graphics.pre_rasterization.scissor_count];
+        let dynamic = [graphics.is_dynamic(S::VIEWPORT_WITH_COUNT), graphics.is_dynamic(S::SCISSOR_WITH_COUNT)];
         for (count, dynamic) in counts.into_iter().zip(dynamic) {
             if count > limits::properties().max_viewports {
                 return Err(Error::usage(
@@ -366,10 +378,10 @@ impl FixedFunctionState {
             ));
         }
         let has = |given: usize, count: u32| given == count as usize;
-        let static_viewports = !(dynamic[0] || info.is_dynamic(S::VIEWPORT));
-        let static_scissors = !(dynamic[1] || info.is_dynamic(S::SCISSOR));
-        if (static_viewports && !has(info.pre_rasterization.viewports.len(), counts[0]))
-            || (static_scissors && !has(info.pre_rasterization.scissors.len(), counts[1]))
+        let static_viewports = !(dynamic[0] || graphics.is_dynamic(S::VIEWPORT));
+        let static_scissors = !(dynamic[1] || graphics.is_dynamic(S::SCISSOR));
+        if (static_viewports && !has(graphics.pre_rasterization.viewports.len(), counts[0]))
+            || (static_scissors && !has(graphics.pre_rasterization.scissors.len(), counts[1]))
         {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
@@ -377,16 +389,16 @@ impl FixedFunctionState {
             ));
         }
         if static_viewports {
-            self.draw.viewports = info.pre_rasterization.viewports.iter().copied().map(convert::viewport).collect();
+            self.draw.viewports = graphics.pre_rasterization.viewports.iter().copied().map(convert::viewport).collect();
         }
         if static_scissors {
-            self.draw.scissors = info.pre_rasterization.scissors.iter().copied().map(convert::rect).collect();
+            self.draw.scissors = graphics.pre_rasterization.scissors.iter().copied().map(convert::rect).collect();
         }
         Ok(())
     }
 
-    fn set_samples(&mut self, info: &GraphicsState) -> Result<(), Error> {
-        let multisample = &info.fragment_output.multisample;
+    fn set_samples(&mut self, graphics: &GraphicsState) -> Result<(), Error> {
+        let multisample = &graphics.fragment_output.multisample;
         let samples = multisample.rasterization_samples;
         let supported = limits::properties().framebuffer_no_attachments_sample_counts;
         let count = samples.as_raw();
@@ -396,13 +408,21 @@ impl FixedFunctionState {
             )));
         }
         let needs = [
-            (multisample.sample_shading_enable != vk::FALSE, supported!(sample_rate_shading), "sampleShadingEnable"),
-            (multisample.alpha_to_one_enable != vk::FALSE, supported!(alpha_to_one), "alphaToOneEnable"),
+            FeatureNeed {
+                is_needed: multisample.sample_shading_enable != vk::FALSE,
+                feature: supported!(sample_rate_shading),
+                state: "sampleShadingEnable",
+            },
+            FeatureNeed {
+                is_needed: multisample.alpha_to_one_enable != vk::FALSE,
+                feature: supported!(alpha_to_one),
+                state: "alphaToOneEnable",
+            },
         ];
         require_all(&needs)?;
         let draw = &mut self.draw;
         draw.samples = count;
-        draw.sample_mask = info.fragment_output.sample_mask;
+        draw.sample_mask = graphics.fragment_output.sample_mask;
         // The device shades a pixel once or at every sample, and the requested number is a minimum.
         let shaded = (multisample.min_sample_shading * count as f32).ceil();
         draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
@@ -411,20 +431,24 @@ impl FixedFunctionState {
         Ok(())
     }
 
-    fn set_depth_stencil(&mut self, info: &GraphicsState) -> Result<(), Error> {
-        let Some(state) = info.depth_stencil() else {
+    fn set_depth_stencil(&mut self, graphics: &GraphicsState) -> Result<(), Error> {
+        let Some(state) = graphics.depth_stencil() else {
             return Ok(());
         };
         let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
-        require_all(&[(bounds_test, supported!(depth_bounds), "depthBoundsTestEnable")])?;
+        require_all(&[FeatureNeed {
+            is_needed: bounds_test,
+            feature: supported!(depth_bounds),
+            state: "depthBoundsTestEnable",
+        }])?;
         self.depth_test = state.depth_test_enable != vk::FALSE;
         self.depth_write = state.depth_write_enable != vk::FALSE;
         self.depth_bounds_test = bounds_test;
         self.depth_bounds = (state.min_depth_bounds, state.max_depth_bounds);
         // An unused value may be anything.
-        let may_test = |enabled, state| enabled || info.is_dynamic(state);
+        let may_test = |enabled, state| enabled || graphics.is_dynamic(state);
         let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
-        if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
+        if tests_depth && !graphics.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
             self.depth_compare = convert::compare_op(
                 state.depth_compare_op,
                 "VUID-VkPipelineDepthStencilStateCreateInfo-depthCompareOp-parameter",
@@ -432,7 +456,7 @@ impl FixedFunctionState {
         }
         self.stencil_test = state.stencil_test_enable != vk::FALSE;
         let tests_stencil = may_test(self.stencil_test, vk::DynamicState::STENCIL_TEST_ENABLE);
-        let static_ops = tests_stencil && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
+        let static_ops = tests_stencil && !graphics.is_dynamic(vk::DynamicState::STENCIL_OP);
         for (face, given) in [state.front, state.back].into_iter().enumerate() {
             if static_ops {
                 let ops = StencilOps::from_vk(
@@ -451,17 +475,17 @@ impl FixedFunctionState {
         Ok(())
     }
 
-    fn set_blend(&mut self, info: &GraphicsState) -> Result<(), Error> {
-        let (op, enable) = info.fragment_output.logic_op;
-        require_all(&[(enable, supported!(logic_op), "logicOpEnable")])?;
+    fn set_blend(&mut self, graphics: &GraphicsState) -> Result<(), Error> {
+        let (op, enable) = graphics.fragment_output.logic_op;
+        require_all(&[FeatureNeed { is_needed: enable, feature: supported!(logic_op), state: "logicOpEnable" }])?;
         self.logic_op_enable = enable;
         // An unused value may be anything.
-        let may_operate = enable || info.is_dynamic(vk::DynamicState::LOGIC_OP_ENABLE_EXT);
-        if may_operate && !info.is_dynamic(vk::DynamicState::LOGIC_OP_EXT) {
+        let may_operate = enable || graphics.is_dynamic(vk::DynamicState::LOGIC_OP_ENABLE_EXT);
+        if may_operate && !graphics.is_dynamic(vk::DynamicState::LOGIC_OP_EXT) {
             self.logic_op = convert::logic_op(op)?;
         }
-        self.attachments = attachment_states(info)?;
-        self.draw.blend_constants = info.fragment_output.blend_constants;
+        self.attachments = attachment_states(graphics)?;
+        self.draw.blend_constants = graphics.fragment_output.blend_constants;
         Ok(())
     }
 
@@ -596,7 +620,7 @@ fn blends_by_constants(attachments: &[AttachmentState]) -> bool {
     let blended = attachments.iter().filter(|attachment| attachment.blend_enable);
     blended
         .map(|attachment| attachment.equations)
-        .flat_map(|(color, alpha)| [color.source, color.destination, alpha.source, alpha.destination])
+        .flat_map(|BlendEquations { color, alpha }| [color.source, color.destination, alpha.source, alpha.destination])
         .any(|factor| {
             matches!(
                 factor,
@@ -638,23 +662,39 @@ pub(crate) fn class(topology: Topology) -> Class {
     }
 }
 
-/// Fails for the first required feature that the device lacks.
-fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
-    let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
-    match needs.iter().find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported)) {
+/// A feature of the device.
+struct DeviceFeature {
+    is_supported: bool,
+    name: &'static str,
+}
+
+/// The need of a pipeline for a feature.
+struct FeatureNeed {
+    /// True if the pipeline needs it.
+    is_needed: bool,
+    feature: DeviceFeature,
+    /// The state that needs it.
+    state: &'static str,
+}
+
+/// Fails for the first needed feature that the device lacks.
+fn require_all(needs: &[FeatureNeed]) -> Result<(), Error> {
+    match needs.iter().find(|need| need.is_needed && !need.feature.is_supported) {
         None => Ok(()),
-        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!("{what} (feature {feature})"))),
+        Some(FeatureNeed { feature, state, .. }) => {
+            Err(Error::FeatureNotPresent(format!("{state} (feature {})", feature.name)))
+        }
     }
 }
 
 /// True for each colour attachment whose source has an effect.
-pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
+pub(crate) fn live_color_outputs(graphics: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
     // Dynamic state may be enabled.
-    let any_mask = info.is_dynamic(vk::DynamicState::COLOR_WRITE_MASK_EXT);
-    let mut live_outputs: Vec<_> = std::iter::zip(&fixed.attachments, &info.fragment_output.color_formats)
+    let any_mask = graphics.is_dynamic(vk::DynamicState::COLOR_WRITE_MASK_EXT);
+    let mut live_outputs: Vec<_> = std::iter::zip(&fixed.attachments, &graphics.fragment_output.color_formats)
         .map(|(attachment, format)| (any_mask || attachment.write_mask != 0) && *format != vk::Format::UNDEFINED)
         .collect();
-    if fixed.draw.alpha_to_coverage || info.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT) {
+    if fixed.draw.alpha_to_coverage || graphics.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT) {
         match live_outputs.first_mut() {
             Some(first) => *first = true,
             None => live_outputs.push(true),

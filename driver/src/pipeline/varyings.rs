@@ -18,10 +18,14 @@ pub(crate) struct LiveOutputs<'a> {
     pub(crate) views: bool,
 }
 
-/// A location and a component of it.
-pub(crate) type InterfaceComponent = (u32, u32);
+/// A component of a location.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct InterfaceComponent {
+    pub(crate) location: u32,
+    pub(crate) component: u32,
+}
 
-/// The numbers of varyings, by location and component.
+/// The numbers of varyings.
 pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 
 /// The meaning of an output of the last stage before rasterization.
@@ -33,7 +37,7 @@ pub(super) fn vertex_output(
     match target {
         OutputTarget::VertexCount => None,
         OutputTarget::Location { location, component, .. } => {
-            varyings.get(&(location, component)).map(|&index| VertexOutput::Varying(index))
+            varyings.get(&InterfaceComponent { location, component }).map(|&index| VertexOutput::Varying(index))
         }
         OutputTarget::BuiltIn { built_in, component } => {
             let component = component as usize;

@@ -3,2558 +3,420 @@
 
 //! Features: those that this driver supports, and the structures in which Vulkan asks for them.
 
-use crate::abi::valid;
+use super::tables::features;
+use crate::abi::valid::{self, ChainedOutput};
 use ash::vk::{self, TaggedStructure};
 use std::ffi::CStr;
 
-/// Features, each once, whatever structures hold it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Features {
-    /// `robustBufferAccess`.
-    pub(crate) robust_buffer_access: bool,
-    /// `fullDrawIndexUint32`.
-    pub(crate) full_draw_index_uint32: bool,
-    /// `imageCubeArray`.
-    pub(crate) image_cube_array: bool,
-    /// `independentBlend`.
-    pub(crate) independent_blend: bool,
-    /// `geometryShader`.
-    pub(crate) geometry_shader: bool,
-    /// `tessellationShader`.
-    pub(crate) tessellation_shader: bool,
-    /// `sampleRateShading`.
-    pub(crate) sample_rate_shading: bool,
-    /// `dualSrcBlend`.
-    pub(crate) dual_src_blend: bool,
-    /// `logicOp`.
-    pub(crate) logic_op: bool,
-    /// `multiDrawIndirect`.
-    pub(crate) multi_draw_indirect: bool,
-    /// `drawIndirectFirstInstance`.
-    pub(crate) draw_indirect_first_instance: bool,
-    /// `depthClamp`.
-    pub(crate) depth_clamp: bool,
-    /// `depthBiasClamp`.
-    pub(crate) depth_bias_clamp: bool,
-    /// `fillModeNonSolid`.
-    pub(crate) fill_mode_non_solid: bool,
-    /// `depthBounds`.
-    pub(crate) depth_bounds: bool,
-    /// `wideLines`.
-    pub(crate) wide_lines: bool,
-    /// `largePoints`.
-    pub(crate) large_points: bool,
-    /// `alphaToOne`.
-    pub(crate) alpha_to_one: bool,
-    /// `multiViewport`.
-    pub(crate) multi_viewport: bool,
-    /// `samplerAnisotropy`.
-    pub(crate) sampler_anisotropy: bool,
-    /// `textureCompressionETC2`.
-    pub(crate) texture_compression_etc2: bool,
-    /// `textureCompressionASTC_LDR`.
-    pub(crate) texture_compression_astc_ldr: bool,
-    /// `textureCompressionBC`.
-    pub(crate) texture_compression_bc: bool,
-    /// `occlusionQueryPrecise`.
-    pub(crate) occlusion_query_precise: bool,
-    /// `pipelineStatisticsQuery`.
-    pub(crate) pipeline_statistics_query: bool,
-    /// `vertexPipelineStoresAndAtomics`.
-    pub(crate) vertex_pipeline_stores_and_atomics: bool,
-    /// `fragmentStoresAndAtomics`.
-    pub(crate) fragment_stores_and_atomics: bool,
-    /// `shaderTessellationAndGeometryPointSize`.
-    pub(crate) shader_tessellation_and_geometry_point_size: bool,
-    /// `shaderImageGatherExtended`.
-    pub(crate) shader_image_gather_extended: bool,
-    /// `shaderStorageImageExtendedFormats`.
-    pub(crate) shader_storage_image_extended_formats: bool,
-    /// `shaderStorageImageMultisample`.
-    pub(crate) shader_storage_image_multisample: bool,
-    /// `shaderStorageImageReadWithoutFormat`.
-    pub(crate) shader_storage_image_read_without_format: bool,
-    /// `shaderStorageImageWriteWithoutFormat`.
-    pub(crate) shader_storage_image_write_without_format: bool,
-    /// `shaderUniformBufferArrayDynamicIndexing`.
-    pub(crate) shader_uniform_buffer_array_dynamic_indexing: bool,
-    /// `shaderSampledImageArrayDynamicIndexing`.
-    pub(crate) shader_sampled_image_array_dynamic_indexing: bool,
-    /// `shaderStorageBufferArrayDynamicIndexing`.
-    pub(crate) shader_storage_buffer_array_dynamic_indexing: bool,
-    /// `shaderStorageImageArrayDynamicIndexing`.
-    pub(crate) shader_storage_image_array_dynamic_indexing: bool,
-    /// `shaderClipDistance`.
-    pub(crate) shader_clip_distance: bool,
-    /// `shaderCullDistance`.
-    pub(crate) shader_cull_distance: bool,
-    /// `shaderFloat64`.
-    pub(crate) shader_float64: bool,
-    /// `shaderInt64`.
-    pub(crate) shader_int64: bool,
-    /// `shaderInt16`.
-    pub(crate) shader_int16: bool,
-    /// `shaderResourceResidency`.
-    pub(crate) shader_resource_residency: bool,
-    /// `shaderResourceMinLod`.
-    pub(crate) shader_resource_min_lod: bool,
-    /// `sparseBinding`.
-    pub(crate) sparse_binding: bool,
-    /// `sparseResidencyBuffer`.
-    pub(crate) sparse_residency_buffer: bool,
-    /// `sparseResidencyImage2D`.
-    pub(crate) sparse_residency_image2_d: bool,
-    /// `sparseResidencyImage3D`.
-    pub(crate) sparse_residency_image3_d: bool,
-    /// `sparseResidency2Samples`.
-    pub(crate) sparse_residency2_samples: bool,
-    /// `sparseResidency4Samples`.
-    pub(crate) sparse_residency4_samples: bool,
-    /// `sparseResidency8Samples`.
-    pub(crate) sparse_residency8_samples: bool,
-    /// `sparseResidency16Samples`.
-    pub(crate) sparse_residency16_samples: bool,
-    /// `sparseResidencyAliased`.
-    pub(crate) sparse_residency_aliased: bool,
-    /// `variableMultisampleRate`.
-    pub(crate) variable_multisample_rate: bool,
-    /// `inheritedQueries`.
-    pub(crate) inherited_queries: bool,
-    /// `storageBuffer16BitAccess`.
-    pub(crate) storage_buffer16_bit_access: bool,
-    /// `uniformAndStorageBuffer16BitAccess`.
-    pub(crate) uniform_and_storage_buffer16_bit_access: bool,
-    /// `storagePushConstant16`.
-    pub(crate) storage_push_constant16: bool,
-    /// `storageInputOutput16`.
-    pub(crate) storage_input_output16: bool,
-    /// `multiview`.
-    pub(crate) multiview: bool,
-    /// `multiviewGeometryShader`.
-    pub(crate) multiview_geometry_shader: bool,
-    /// `multiviewTessellationShader`.
-    pub(crate) multiview_tessellation_shader: bool,
-    /// `variablePointersStorageBuffer`.
-    pub(crate) variable_pointers_storage_buffer: bool,
-    /// `variablePointers`.
-    pub(crate) variable_pointers: bool,
-    /// `protectedMemory`.
-    pub(crate) protected_memory: bool,
-    /// `samplerYcbcrConversion`.
-    pub(crate) sampler_ycbcr_conversion: bool,
-    /// `shaderDrawParameters`.
-    pub(crate) shader_draw_parameters: bool,
-    /// `samplerMirrorClampToEdge`.
-    pub(crate) sampler_mirror_clamp_to_edge: bool,
-    /// `drawIndirectCount`.
-    pub(crate) draw_indirect_count: bool,
-    /// `storageBuffer8BitAccess`.
-    pub(crate) storage_buffer8_bit_access: bool,
-    /// `uniformAndStorageBuffer8BitAccess`.
-    pub(crate) uniform_and_storage_buffer8_bit_access: bool,
-    /// `storagePushConstant8`.
-    pub(crate) storage_push_constant8: bool,
-    /// `shaderBufferInt64Atomics`.
-    pub(crate) shader_buffer_int64_atomics: bool,
-    /// `shaderSharedInt64Atomics`.
-    pub(crate) shader_shared_int64_atomics: bool,
-    /// `shaderFloat16`.
-    pub(crate) shader_float16: bool,
-    /// `shaderInt8`.
-    pub(crate) shader_int8: bool,
-    /// `descriptorIndexing`.
-    pub(crate) descriptor_indexing: bool,
-    /// `shaderInputAttachmentArrayDynamicIndexing`.
-    pub(crate) shader_input_attachment_array_dynamic_indexing: bool,
-    /// `shaderUniformTexelBufferArrayDynamicIndexing`.
-    pub(crate) shader_uniform_texel_buffer_array_dynamic_indexing: bool,
-    /// `shaderStorageTexelBufferArrayDynamicIndexing`.
-    pub(crate) shader_storage_texel_buffer_array_dynamic_indexing: bool,
-    /// `shaderUniformBufferArrayNonUniformIndexing`.
-    pub(crate) shader_uniform_buffer_array_non_uniform_indexing: bool,
-    /// `shaderSampledImageArrayNonUniformIndexing`.
-    pub(crate) shader_sampled_image_array_non_uniform_indexing: bool,
-    /// `shaderStorageBufferArrayNonUniformIndexing`.
-    pub(crate) shader_storage_buffer_array_non_uniform_indexing: bool,
-    /// `shaderStorageImageArrayNonUniformIndexing`.
-    pub(crate) shader_storage_image_array_non_uniform_indexing: bool,
-    /// `shaderInputAttachmentArrayNonUniformIndexing`.
-    pub(crate) shader_input_attachment_array_non_uniform_indexing: bool,
-    /// `shaderUniformTexelBufferArrayNonUniformIndexing`.
-    pub(crate) shader_uniform_texel_buffer_array_non_uniform_indexing: bool,
-    /// `shaderStorageTexelBufferArrayNonUniformIndexing`.
-    pub(crate) shader_storage_texel_buffer_array_non_uniform_indexing: bool,
-    /// `descriptorBindingUniformBufferUpdateAfterBind`.
-    pub(crate) descriptor_binding_uniform_buffer_update_after_bind: bool,
-    /// `descriptorBindingSampledImageUpdateAfterBind`.
-    pub(crate) descriptor_binding_sampled_image_update_after_bind: bool,
-    /// `descriptorBindingStorageImageUpdateAfterBind`.
-    pub(crate) descriptor_binding_storage_image_update_after_bind: bool,
-    /// `descriptorBindingStorageBufferUpdateAfterBind`.
-    pub(crate) descriptor_binding_storage_buffer_update_after_bind: bool,
-    /// `descriptorBindingUniformTexelBufferUpdateAfterBind`.
-    pub(crate) descriptor_binding_uniform_texel_buffer_update_after_bind: bool,
-    /// `descriptorBindingStorageTexelBufferUpdateAfterBind`.
-    pub(crate) descriptor_binding_storage_texel_buffer_update_after_bind: bool,
-    /// `descriptorBindingUpdateUnusedWhilePending`.
-    pub(crate) descriptor_binding_update_unused_while_pending: bool,
-    /// `descriptorBindingPartiallyBound`.
-    pub(crate) descriptor_binding_partially_bound: bool,
-    /// `descriptorBindingVariableDescriptorCount`.
-    pub(crate) descriptor_binding_variable_descriptor_count: bool,
-    /// `runtimeDescriptorArray`.
-    pub(crate) runtime_descriptor_array: bool,
-    /// `samplerFilterMinmax`.
-    pub(crate) sampler_filter_minmax: bool,
-    /// `scalarBlockLayout`.
-    pub(crate) scalar_block_layout: bool,
-    /// `imagelessFramebuffer`.
-    pub(crate) imageless_framebuffer: bool,
-    /// `uniformBufferStandardLayout`.
-    pub(crate) uniform_buffer_standard_layout: bool,
-    /// `shaderSubgroupExtendedTypes`.
-    pub(crate) shader_subgroup_extended_types: bool,
-    /// `separateDepthStencilLayouts`.
-    pub(crate) separate_depth_stencil_layouts: bool,
-    /// `hostQueryReset`.
-    pub(crate) host_query_reset: bool,
-    /// `timelineSemaphore`.
-    pub(crate) timeline_semaphore: bool,
-    /// `bufferDeviceAddress`.
-    pub(crate) buffer_device_address: bool,
-    /// `bufferDeviceAddressCaptureReplay`.
-    pub(crate) buffer_device_address_capture_replay: bool,
-    /// `bufferDeviceAddressMultiDevice`.
-    pub(crate) buffer_device_address_multi_device: bool,
-    /// `vulkanMemoryModel`.
-    pub(crate) vulkan_memory_model: bool,
-    /// `vulkanMemoryModelDeviceScope`.
-    pub(crate) vulkan_memory_model_device_scope: bool,
-    /// `vulkanMemoryModelAvailabilityVisibilityChains`.
-    pub(crate) vulkan_memory_model_availability_visibility_chains: bool,
-    /// `shaderOutputViewportIndex`.
-    pub(crate) shader_output_viewport_index: bool,
-    /// `shaderOutputLayer`.
-    pub(crate) shader_output_layer: bool,
-    /// `subgroupBroadcastDynamicId`.
-    pub(crate) subgroup_broadcast_dynamic_id: bool,
-    /// `robustImageAccess`.
-    pub(crate) robust_image_access: bool,
-    /// `inlineUniformBlock`.
-    pub(crate) inline_uniform_block: bool,
-    /// `descriptorBindingInlineUniformBlockUpdateAfterBind`.
-    pub(crate) descriptor_binding_inline_uniform_block_update_after_bind: bool,
-    /// `pipelineCreationCacheControl`.
-    pub(crate) pipeline_creation_cache_control: bool,
-    /// `privateData`.
-    pub(crate) private_data: bool,
-    /// `shaderDemoteToHelperInvocation`.
-    pub(crate) shader_demote_to_helper_invocation: bool,
-    /// `shaderTerminateInvocation`.
-    pub(crate) shader_terminate_invocation: bool,
-    /// `subgroupSizeControl`.
-    pub(crate) subgroup_size_control: bool,
-    /// `computeFullSubgroups`.
-    pub(crate) compute_full_subgroups: bool,
-    /// `synchronization2`.
-    pub(crate) synchronization2: bool,
-    /// `textureCompressionASTC_HDR`.
-    pub(crate) texture_compression_astc_hdr: bool,
-    /// `shaderZeroInitializeWorkgroupMemory`.
-    pub(crate) shader_zero_initialize_workgroup_memory: bool,
-    /// `dynamicRendering`.
-    pub(crate) dynamic_rendering: bool,
-    /// `shaderIntegerDotProduct`.
-    pub(crate) shader_integer_dot_product: bool,
-    /// `maintenance4`.
-    pub(crate) maintenance4: bool,
-    /// `shaderEarlyAndLateFragmentTests`.
-    pub(crate) shader_early_and_late_fragment_tests: bool,
-    /// `formatA4R4G4B4`.
-    pub(crate) format_a4r4g4b4: bool,
-    /// `formatA4B4G4R4`.
-    pub(crate) format_a4b4g4r4: bool,
-    /// `attachmentFeedbackLoopLayout`.
-    pub(crate) attachment_feedback_loop_layout: bool,
-    /// `borderColorSwizzle`.
-    pub(crate) border_color_swizzle: bool,
-    /// `borderColorSwizzleFromImage`.
-    pub(crate) border_color_swizzle_from_image: bool,
-    /// `colorWriteEnable`.
-    pub(crate) color_write_enable: bool,
-    /// `conditionalRendering`.
-    pub(crate) conditional_rendering: bool,
-    /// `inheritedConditionalRendering`.
-    pub(crate) inherited_conditional_rendering: bool,
-    /// `customBorderColors`.
-    pub(crate) custom_border_colors: bool,
-    /// `customBorderColorWithoutFormat`.
-    pub(crate) custom_border_color_without_format: bool,
-    /// `depthClampZeroOne`.
-    pub(crate) depth_clamp_zero_one: bool,
-    /// `depthClipControl`.
-    pub(crate) depth_clip_control: bool,
-    /// `depthClipEnable`.
-    pub(crate) depth_clip_enable: bool,
-    /// `extendedDynamicState`.
-    pub(crate) extended_dynamic_state: bool,
-    /// `extendedDynamicState2`.
-    pub(crate) extended_dynamic_state2: bool,
-    /// `extendedDynamicState2LogicOp`.
-    pub(crate) extended_dynamic_state2_logic_op: bool,
-    /// `extendedDynamicState2PatchControlPoints`.
-    pub(crate) extended_dynamic_state2_patch_control_points: bool,
-    /// `extendedDynamicState3TessellationDomainOrigin`.
-    pub(crate) extended_dynamic_state3_tessellation_domain_origin: bool,
-    /// `extendedDynamicState3DepthClampEnable`.
-    pub(crate) extended_dynamic_state3_depth_clamp_enable: bool,
-    /// `extendedDynamicState3PolygonMode`.
-    pub(crate) extended_dynamic_state3_polygon_mode: bool,
-    /// `extendedDynamicState3RasterizationSamples`.
-    pub(crate) extended_dynamic_state3_rasterization_samples: bool,
-    /// `extendedDynamicState3SampleMask`.
-    pub(crate) extended_dynamic_state3_sample_mask: bool,
-    /// `extendedDynamicState3AlphaToCoverageEnable`.
-    pub(crate) extended_dynamic_state3_alpha_to_coverage_enable: bool,
-    /// `extendedDynamicState3AlphaToOneEnable`.
-    pub(crate) extended_dynamic_state3_alpha_to_one_enable: bool,
-    /// `extendedDynamicState3LogicOpEnable`.
-    pub(crate) extended_dynamic_state3_logic_op_enable: bool,
-    /// `extendedDynamicState3ColorBlendEnable`.
-    pub(crate) extended_dynamic_state3_color_blend_enable: bool,
-    /// `extendedDynamicState3ColorBlendEquation`.
-    pub(crate) extended_dynamic_state3_color_blend_equation: bool,
-    /// `extendedDynamicState3ColorWriteMask`.
-    pub(crate) extended_dynamic_state3_color_write_mask: bool,
-    /// `extendedDynamicState3RasterizationStream`.
-    pub(crate) extended_dynamic_state3_rasterization_stream: bool,
-    /// `extendedDynamicState3ConservativeRasterizationMode`.
-    pub(crate) extended_dynamic_state3_conservative_rasterization_mode: bool,
-    /// `extendedDynamicState3ExtraPrimitiveOverestimationSize`.
-    pub(crate) extended_dynamic_state3_extra_primitive_overestimation_size: bool,
-    /// `extendedDynamicState3DepthClipEnable`.
-    pub(crate) extended_dynamic_state3_depth_clip_enable: bool,
-    /// `extendedDynamicState3SampleLocationsEnable`.
-    pub(crate) extended_dynamic_state3_sample_locations_enable: bool,
-    /// `extendedDynamicState3ColorBlendAdvanced`.
-    pub(crate) extended_dynamic_state3_color_blend_advanced: bool,
-    /// `extendedDynamicState3ProvokingVertexMode`.
-    pub(crate) extended_dynamic_state3_provoking_vertex_mode: bool,
-    /// `extendedDynamicState3LineRasterizationMode`.
-    pub(crate) extended_dynamic_state3_line_rasterization_mode: bool,
-    /// `extendedDynamicState3LineStippleEnable`.
-    pub(crate) extended_dynamic_state3_line_stipple_enable: bool,
-    /// `extendedDynamicState3DepthClipNegativeOneToOne`.
-    pub(crate) extended_dynamic_state3_depth_clip_negative_one_to_one: bool,
-    /// `extendedDynamicState3ViewportWScalingEnable`.
-    pub(crate) extended_dynamic_state3_viewport_w_scaling_enable: bool,
-    /// `extendedDynamicState3ViewportSwizzle`.
-    pub(crate) extended_dynamic_state3_viewport_swizzle: bool,
-    /// `extendedDynamicState3CoverageToColorEnable`.
-    pub(crate) extended_dynamic_state3_coverage_to_color_enable: bool,
-    /// `extendedDynamicState3CoverageToColorLocation`.
-    pub(crate) extended_dynamic_state3_coverage_to_color_location: bool,
-    /// `extendedDynamicState3CoverageModulationMode`.
-    pub(crate) extended_dynamic_state3_coverage_modulation_mode: bool,
-    /// `extendedDynamicState3CoverageModulationTableEnable`.
-    pub(crate) extended_dynamic_state3_coverage_modulation_table_enable: bool,
-    /// `extendedDynamicState3CoverageModulationTable`.
-    pub(crate) extended_dynamic_state3_coverage_modulation_table: bool,
-    /// `extendedDynamicState3CoverageReductionMode`.
-    pub(crate) extended_dynamic_state3_coverage_reduction_mode: bool,
-    /// `extendedDynamicState3RepresentativeFragmentTestEnable`.
-    pub(crate) extended_dynamic_state3_representative_fragment_test_enable: bool,
-    /// `extendedDynamicState3ShadingRateImageEnable`.
-    pub(crate) extended_dynamic_state3_shading_rate_image_enable: bool,
-    /// `graphicsPipelineLibrary`.
-    pub(crate) graphics_pipeline_library: bool,
-    /// `image2DViewOf3D`.
-    pub(crate) image2_d_view_of3_d: bool,
-    /// `sampler2DViewOf3D`.
-    pub(crate) sampler2_d_view_of3_d: bool,
-    /// `indexTypeUint8`.
-    pub(crate) index_type_uint8: bool,
-    /// `rectangularLines`.
-    pub(crate) rectangular_lines: bool,
-    /// `bresenhamLines`.
-    pub(crate) bresenham_lines: bool,
-    /// `smoothLines`.
-    pub(crate) smooth_lines: bool,
-    /// `stippledRectangularLines`.
-    pub(crate) stippled_rectangular_lines: bool,
-    /// `stippledBresenhamLines`.
-    pub(crate) stippled_bresenham_lines: bool,
-    /// `stippledSmoothLines`.
-    pub(crate) stippled_smooth_lines: bool,
-    /// `multiDraw`.
-    pub(crate) multi_draw: bool,
-    /// `nonSeamlessCubeMap`.
-    pub(crate) non_seamless_cube_map: bool,
-    /// `primitiveTopologyListRestart`.
-    pub(crate) primitive_topology_list_restart: bool,
-    /// `primitiveTopologyPatchListRestart`.
-    pub(crate) primitive_topology_patch_list_restart: bool,
-    /// `primitivesGeneratedQuery`.
-    pub(crate) primitives_generated_query: bool,
-    /// `primitivesGeneratedQueryWithRasterizerDiscard`.
-    pub(crate) primitives_generated_query_with_rasterizer_discard: bool,
-    /// `primitivesGeneratedQueryWithNonZeroStreams`.
-    pub(crate) primitives_generated_query_with_non_zero_streams: bool,
-    /// `provokingVertexLast`.
-    pub(crate) provoking_vertex_last: bool,
-    /// `transformFeedbackPreservesProvokingVertex`.
-    pub(crate) transform_feedback_preserves_provoking_vertex: bool,
-    /// `robustBufferAccess2`.
-    pub(crate) robust_buffer_access2: bool,
-    /// `robustImageAccess2`.
-    pub(crate) robust_image_access2: bool,
-    /// `nullDescriptor`.
-    pub(crate) null_descriptor: bool,
-    /// `shaderBufferFloat32Atomics`.
-    pub(crate) shader_buffer_float32_atomics: bool,
-    /// `shaderBufferFloat32AtomicAdd`.
-    pub(crate) shader_buffer_float32_atomic_add: bool,
-    /// `shaderBufferFloat64Atomics`.
-    pub(crate) shader_buffer_float64_atomics: bool,
-    /// `shaderBufferFloat64AtomicAdd`.
-    pub(crate) shader_buffer_float64_atomic_add: bool,
-    /// `shaderSharedFloat32Atomics`.
-    pub(crate) shader_shared_float32_atomics: bool,
-    /// `shaderSharedFloat32AtomicAdd`.
-    pub(crate) shader_shared_float32_atomic_add: bool,
-    /// `shaderSharedFloat64Atomics`.
-    pub(crate) shader_shared_float64_atomics: bool,
-    /// `shaderSharedFloat64AtomicAdd`.
-    pub(crate) shader_shared_float64_atomic_add: bool,
-    /// `shaderImageFloat32Atomics`.
-    pub(crate) shader_image_float32_atomics: bool,
-    /// `shaderImageFloat32AtomicAdd`.
-    pub(crate) shader_image_float32_atomic_add: bool,
-    /// `sparseImageFloat32Atomics`.
-    pub(crate) sparse_image_float32_atomics: bool,
-    /// `sparseImageFloat32AtomicAdd`.
-    pub(crate) sparse_image_float32_atomic_add: bool,
-    /// `shaderBufferFloat16Atomics`.
-    pub(crate) shader_buffer_float16_atomics: bool,
-    /// `shaderBufferFloat16AtomicAdd`.
-    pub(crate) shader_buffer_float16_atomic_add: bool,
-    /// `shaderBufferFloat16AtomicMinMax`.
-    pub(crate) shader_buffer_float16_atomic_min_max: bool,
-    /// `shaderBufferFloat32AtomicMinMax`.
-    pub(crate) shader_buffer_float32_atomic_min_max: bool,
-    /// `shaderBufferFloat64AtomicMinMax`.
-    pub(crate) shader_buffer_float64_atomic_min_max: bool,
-    /// `shaderSharedFloat16Atomics`.
-    pub(crate) shader_shared_float16_atomics: bool,
-    /// `shaderSharedFloat16AtomicAdd`.
-    pub(crate) shader_shared_float16_atomic_add: bool,
-    /// `shaderSharedFloat16AtomicMinMax`.
-    pub(crate) shader_shared_float16_atomic_min_max: bool,
-    /// `shaderSharedFloat32AtomicMinMax`.
-    pub(crate) shader_shared_float32_atomic_min_max: bool,
-    /// `shaderSharedFloat64AtomicMinMax`.
-    pub(crate) shader_shared_float64_atomic_min_max: bool,
-    /// `shaderImageFloat32AtomicMinMax`.
-    pub(crate) shader_image_float32_atomic_min_max: bool,
-    /// `sparseImageFloat32AtomicMinMax`.
-    pub(crate) sparse_image_float32_atomic_min_max: bool,
-    /// `texelBufferAlignment`.
-    pub(crate) texel_buffer_alignment: bool,
-    /// `transformFeedback`.
-    pub(crate) transform_feedback: bool,
-    /// `geometryStreams`.
-    pub(crate) geometry_streams: bool,
-    /// `vertexAttributeInstanceRateDivisor`.
-    pub(crate) vertex_attribute_instance_rate_divisor: bool,
-    /// `vertexAttributeInstanceRateZeroDivisor`.
-    pub(crate) vertex_attribute_instance_rate_zero_divisor: bool,
-    /// `vertexInputDynamicState`.
-    pub(crate) vertex_input_dynamic_state: bool,
-    /// `gaussianPrimitiveTopology`.
-    pub(crate) gaussian_primitive_topology: bool,
-    /// `vertexShaderProjection`.
-    pub(crate) vertex_shader_projection: bool,
-    /// `resolveFragmentShader`.
-    pub(crate) resolve_fragment_shader: bool,
-    /// `radialDistanceOrder`.
-    pub(crate) radial_distance_order: bool,
-    /// `primitiveOrder`.
-    pub(crate) primitive_order: bool,
-    /// `perPixelOrder`.
-    pub(crate) per_pixel_order: bool,
-    /// `rasterizationFloat16`.
-    pub(crate) rasterization_float16: bool,
-    /// `opacityCompensation`.
-    pub(crate) opacity_compensation: bool,
-    /// `orthographicCamera`.
-    pub(crate) orthographic_camera: bool,
-    /// `fisheyeCamera`.
-    pub(crate) fisheye_camera: bool,
-    /// `equirectangularCamera`.
-    pub(crate) equirectangular_camera: bool,
-    /// `unscentedProjection`.
-    pub(crate) unscented_projection: bool,
-    /// `gaussian2D`.
-    pub(crate) gaussian_2d: bool,
-    /// `uniformBufferCamera`.
-    pub(crate) uniform_buffer_camera: bool,
-    /// `mergedDraws`.
-    pub(crate) merged_draws: bool,
-    /// `gaussianInstancing`.
-    pub(crate) gaussian_instancing: bool,
-    /// `gaussianDepthStencil`.
-    pub(crate) gaussian_depth_stencil: bool,
-    /// `gaussianMultisample`.
-    pub(crate) gaussian_multisample: bool,
-    /// `gaussianApproximation`.
-    pub(crate) gaussian_approximation: bool,
-    /// `gaussianMultiview`.
-    pub(crate) gaussian_multiview: bool,
-    /// `attributeActivation`.
-    pub(crate) attribute_activation: bool,
-    /// `sphericalHarmonicsBuffer`.
-    pub(crate) spherical_harmonics_buffer: bool,
-    /// `gaussianDynamicState`.
-    pub(crate) gaussian_dynamic_state: bool,
-    /// `resolveGaussianIndices`.
-    pub(crate) resolve_gaussian_indices: bool,
-    /// `gaussianCutOff`.
-    pub(crate) gaussian_cut_off: bool,
-    /// `opacityCompensationFloor`.
-    pub(crate) opacity_compensation_floor: bool,
-    /// `performanceCounterQueryPools`.
-    pub(crate) performance_counter_query_pools: bool,
-    /// `performanceCounterMultipleQueryPools`.
-    pub(crate) performance_counter_multiple_query_pools: bool,
-    /// `shaderSubgroupClock`.
-    pub(crate) shader_subgroup_clock: bool,
-    /// `shaderDeviceClock`.
-    pub(crate) shader_device_clock: bool,
-    /// `workgroupMemoryExplicitLayout`.
-    pub(crate) workgroup_memory_explicit_layout: bool,
-    /// `workgroupMemoryExplicitLayoutScalarBlockLayout`.
-    pub(crate) workgroup_memory_explicit_layout_scalar_block_layout: bool,
-    /// `workgroupMemoryExplicitLayout8BitAccess`.
-    pub(crate) workgroup_memory_explicit_layout8_bit_access: bool,
-    /// `workgroupMemoryExplicitLayout16BitAccess`.
-    pub(crate) workgroup_memory_explicit_layout16_bit_access: bool,
+features! {
+    core vk::PhysicalDeviceFeatures {
+        robustBufferAccess => robust_buffer_access: true, mandatory 1.0;
+        fullDrawIndexUint32 => full_draw_index_uint32: true;
+        imageCubeArray => image_cube_array: true;
+        independentBlend => independent_blend: true;
+        geometryShader => geometry_shader: true;
+        tessellationShader => tessellation_shader: true;
+        sampleRateShading => sample_rate_shading: true;
+        dualSrcBlend => dual_src_blend: true;
+        logicOp => logic_op: true;
+        multiDrawIndirect => multi_draw_indirect: true;
+        drawIndirectFirstInstance => draw_indirect_first_instance: true;
+        depthClamp => depth_clamp: true;
+        depthBiasClamp => depth_bias_clamp: true;
+        fillModeNonSolid => fill_mode_non_solid: true;
+        depthBounds => depth_bounds: true;
+        wideLines => wide_lines: true;
+        largePoints => large_points: true;
+        alphaToOne => alpha_to_one: true;
+        multiViewport => multi_viewport: true;
+        samplerAnisotropy => sampler_anisotropy: true;
+        textureCompressionETC2 => texture_compression_etc2: false;
+        textureCompressionASTC_LDR => texture_compression_astc_ldr: false;
+        textureCompressionBC => texture_compression_bc: true;
+        occlusionQueryPrecise => occlusion_query_precise: true;
+        pipelineStatisticsQuery => pipeline_statistics_query: true;
+        vertexPipelineStoresAndAtomics => vertex_pipeline_stores_and_atomics: true;
+        fragmentStoresAndAtomics => fragment_stores_and_atomics: true;
+        shaderTessellationAndGeometryPointSize => shader_tessellation_and_geometry_point_size: true;
+        shaderImageGatherExtended => shader_image_gather_extended: true;
+        shaderStorageImageExtendedFormats => shader_storage_image_extended_formats: true;
+        shaderStorageImageMultisample => shader_storage_image_multisample: true;
+        shaderStorageImageReadWithoutFormat => shader_storage_image_read_without_format: true;
+        shaderStorageImageWriteWithoutFormat => shader_storage_image_write_without_format: true;
+        shaderUniformBufferArrayDynamicIndexing => shader_uniform_buffer_array_dynamic_indexing: true;
+        shaderSampledImageArrayDynamicIndexing => shader_sampled_image_array_dynamic_indexing: true, mandatory 1.2;
+        shaderStorageBufferArrayDynamicIndexing => shader_storage_buffer_array_dynamic_indexing: true, mandatory 1.2;
+        shaderStorageImageArrayDynamicIndexing => shader_storage_image_array_dynamic_indexing: true;
+        shaderClipDistance => shader_clip_distance: true;
+        shaderCullDistance => shader_cull_distance: true;
+        shaderFloat64 => shader_float64: true;
+        shaderInt64 => shader_int64: true, mandatory 1.2;
+        shaderInt16 => shader_int16: true;
+        shaderResourceResidency => shader_resource_residency: false;
+        shaderResourceMinLod => shader_resource_min_lod: true;
+        sparseBinding => sparse_binding: false;
+        sparseResidencyBuffer => sparse_residency_buffer: false;
+        sparseResidencyImage2D => sparse_residency_image2_d: false;
+        sparseResidencyImage3D => sparse_residency_image3_d: false;
+        sparseResidency2Samples => sparse_residency2_samples: false;
+        sparseResidency4Samples => sparse_residency4_samples: false;
+        sparseResidency8Samples => sparse_residency8_samples: false;
+        sparseResidency16Samples => sparse_residency16_samples: false;
+        sparseResidencyAliased => sparse_residency_aliased: false;
+        variableMultisampleRate => variable_multisample_rate: false;
+        inheritedQueries => inherited_queries: true;
+    }
+    structure vk::PhysicalDeviceVulkan11Features {
+        storageBuffer16BitAccess => storage_buffer16_bit_access: true, mandatory 1.1;
+        uniformAndStorageBuffer16BitAccess => uniform_and_storage_buffer16_bit_access: true;
+        storagePushConstant16 => storage_push_constant16: true;
+        storageInputOutput16 => storage_input_output16: false;
+        multiview => multiview: true, mandatory 1.1;
+        multiviewGeometryShader => multiview_geometry_shader: true;
+        multiviewTessellationShader => multiview_tessellation_shader: true;
+        variablePointersStorageBuffer => variable_pointers_storage_buffer: true;
+        variablePointers => variable_pointers: true;
+        protectedMemory => protected_memory: false;
+        samplerYcbcrConversion => sampler_ycbcr_conversion: false;
+        shaderDrawParameters => shader_draw_parameters: true, mandatory 1.1;
+    }
+    structure vk::PhysicalDeviceVulkan12Features {
+        samplerMirrorClampToEdge => sampler_mirror_clamp_to_edge: true, mandatory 1.2;
+        drawIndirectCount => draw_indirect_count: true, mandatory 1.2;
+        storageBuffer8BitAccess => storage_buffer8_bit_access: true, mandatory 1.2;
+        uniformAndStorageBuffer8BitAccess => uniform_and_storage_buffer8_bit_access: true;
+        storagePushConstant8 => storage_push_constant8: true;
+        shaderBufferInt64Atomics => shader_buffer_int64_atomics: true;
+        shaderSharedInt64Atomics => shader_shared_int64_atomics: true;
+        shaderFloat16 => shader_float16: true;
+        shaderInt8 => shader_int8: true;
+        descriptorIndexing => descriptor_indexing: true, mandatory 1.2;
+        shaderInputAttachmentArrayDynamicIndexing => shader_input_attachment_array_dynamic_indexing: false;
+        shaderUniformTexelBufferArrayDynamicIndexing =>
+            shader_uniform_texel_buffer_array_dynamic_indexing: true, mandatory 1.2;
+        shaderStorageTexelBufferArrayDynamicIndexing =>
+            shader_storage_texel_buffer_array_dynamic_indexing: true, mandatory 1.2;
+        shaderUniformBufferArrayNonUniformIndexing => shader_uniform_buffer_array_non_uniform_indexing: true;
+        shaderSampledImageArrayNonUniformIndexing =>
+            shader_sampled_image_array_non_uniform_indexing: true, mandatory 1.2;
+        shaderStorageBufferArrayNonUniformIndexing =>
+            shader_storage_buffer_array_non_uniform_indexing: true, mandatory 1.2;
+        shaderStorageImageArrayNonUniformIndexing => shader_storage_image_array_non_uniform_indexing: true;
+        shaderInputAttachmentArrayNonUniformIndexing => shader_input_attachment_array_non_uniform_indexing: false;
+        shaderUniformTexelBufferArrayNonUniformIndexing =>
+            shader_uniform_texel_buffer_array_non_uniform_indexing: true, mandatory 1.2;
+        shaderStorageTexelBufferArrayNonUniformIndexing => shader_storage_texel_buffer_array_non_uniform_indexing: true;
+        descriptorBindingUniformBufferUpdateAfterBind => descriptor_binding_uniform_buffer_update_after_bind: true;
+        descriptorBindingSampledImageUpdateAfterBind =>
+            descriptor_binding_sampled_image_update_after_bind: true, mandatory 1.2;
+        descriptorBindingStorageImageUpdateAfterBind =>
+            descriptor_binding_storage_image_update_after_bind: true, mandatory 1.2;
+        descriptorBindingStorageBufferUpdateAfterBind =>
+            descriptor_binding_storage_buffer_update_after_bind: true, mandatory 1.2;
+        descriptorBindingUniformTexelBufferUpdateAfterBind =>
+            descriptor_binding_uniform_texel_buffer_update_after_bind: true, mandatory 1.2;
+        descriptorBindingStorageTexelBufferUpdateAfterBind =>
+            descriptor_binding_storage_texel_buffer_update_after_bind: true, mandatory 1.2;
+        descriptorBindingUpdateUnusedWhilePending =>
+            descriptor_binding_update_unused_while_pending: true, mandatory 1.2;
+        descriptorBindingPartiallyBound => descriptor_binding_partially_bound: true, mandatory 1.2;
+        descriptorBindingVariableDescriptorCount => descriptor_binding_variable_descriptor_count: true;
+        runtimeDescriptorArray => runtime_descriptor_array: true, mandatory 1.2;
+        samplerFilterMinmax => sampler_filter_minmax: true, mandatory 1.2;
+        scalarBlockLayout => scalar_block_layout: true;
+        imagelessFramebuffer => imageless_framebuffer: true, mandatory 1.2;
+        uniformBufferStandardLayout => uniform_buffer_standard_layout: true, mandatory 1.2;
+        shaderSubgroupExtendedTypes => shader_subgroup_extended_types: true, mandatory 1.2;
+        separateDepthStencilLayouts => separate_depth_stencil_layouts: true, mandatory 1.2;
+        hostQueryReset => host_query_reset: true, mandatory 1.2;
+        timelineSemaphore => timeline_semaphore: true, mandatory 1.2;
+        bufferDeviceAddress => buffer_device_address: true, mandatory 1.3;
+        bufferDeviceAddressCaptureReplay => buffer_device_address_capture_replay: false;
+        bufferDeviceAddressMultiDevice => buffer_device_address_multi_device: false;
+        vulkanMemoryModel => vulkan_memory_model: true, mandatory 1.3;
+        vulkanMemoryModelDeviceScope => vulkan_memory_model_device_scope: true, mandatory 1.3;
+        vulkanMemoryModelAvailabilityVisibilityChains => vulkan_memory_model_availability_visibility_chains: true;
+        shaderOutputViewportIndex => shader_output_viewport_index: true, mandatory 1.2;
+        shaderOutputLayer => shader_output_layer: true, mandatory 1.2;
+        subgroupBroadcastDynamicId => subgroup_broadcast_dynamic_id: true, mandatory 1.2;
+    }
+    structure vk::PhysicalDeviceVulkan13Features {
+        robustImageAccess => robust_image_access: true, mandatory 1.3;
+        inlineUniformBlock => inline_uniform_block: true, mandatory 1.3;
+        descriptorBindingInlineUniformBlockUpdateAfterBind =>
+            descriptor_binding_inline_uniform_block_update_after_bind: true, mandatory 1.3;
+        pipelineCreationCacheControl => pipeline_creation_cache_control: true, mandatory 1.3;
+        privateData => private_data: true, mandatory 1.3;
+        shaderDemoteToHelperInvocation => shader_demote_to_helper_invocation: true, mandatory 1.3;
+        shaderTerminateInvocation => shader_terminate_invocation: true, mandatory 1.3;
+        subgroupSizeControl => subgroup_size_control: true, mandatory 1.3;
+        computeFullSubgroups => compute_full_subgroups: true, mandatory 1.3;
+        synchronization2 => synchronization2: true, mandatory 1.3;
+        textureCompressionASTC_HDR => texture_compression_astc_hdr: false;
+        shaderZeroInitializeWorkgroupMemory => shader_zero_initialize_workgroup_memory: true, mandatory 1.3;
+        dynamicRendering => dynamic_rendering: true, mandatory 1.3;
+        shaderIntegerDotProduct => shader_integer_dot_product: true, mandatory 1.3;
+        maintenance4 => maintenance4: true, mandatory 1.3;
+    }
+    structure vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD:
+        c"VK_AMD_shader_early_and_late_fragment_tests" {
+        shaderEarlyAndLateFragmentTests => shader_early_and_late_fragment_tests: true;
+    }
+    structure vk::PhysicalDevice4444FormatsFeaturesEXT: c"VK_EXT_4444_formats" {
+        formatA4R4G4B4 => format_a4r4g4b4: true;
+        formatA4B4G4R4 => format_a4b4g4r4: true;
+    }
+    structure vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT: c"VK_EXT_attachment_feedback_loop_layout" {
+        attachmentFeedbackLoopLayout => attachment_feedback_loop_layout: true;
+    }
+    structure vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT: c"VK_EXT_border_color_swizzle" {
+        borderColorSwizzle => border_color_swizzle: true;
+        borderColorSwizzleFromImage => border_color_swizzle_from_image: true;
+    }
+    structure vk::PhysicalDeviceColorWriteEnableFeaturesEXT: c"VK_EXT_color_write_enable" {
+        colorWriteEnable => color_write_enable: true;
+    }
+    structure vk::PhysicalDeviceConditionalRenderingFeaturesEXT: c"VK_EXT_conditional_rendering" {
+        conditionalRendering => conditional_rendering: true;
+        inheritedConditionalRendering => inherited_conditional_rendering: true;
+    }
+    structure vk::PhysicalDeviceCustomBorderColorFeaturesEXT: c"VK_EXT_custom_border_color" {
+        customBorderColors => custom_border_colors: true;
+        customBorderColorWithoutFormat => custom_border_color_without_format: true;
+    }
+    structure vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT: c"VK_EXT_depth_clamp_zero_one" {
+        depthClampZeroOne => depth_clamp_zero_one: true;
+    }
+    structure vk::PhysicalDeviceDepthClipControlFeaturesEXT: c"VK_EXT_depth_clip_control" {
+        depthClipControl => depth_clip_control: true;
+    }
+    structure vk::PhysicalDeviceDepthClipEnableFeaturesEXT: c"VK_EXT_depth_clip_enable" {
+        depthClipEnable => depth_clip_enable: true;
+    }
+    structure vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT: c"VK_EXT_extended_dynamic_state" {
+        extendedDynamicState => extended_dynamic_state: true;
+    }
+    structure vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT: c"VK_EXT_extended_dynamic_state2" {
+        extendedDynamicState2 => extended_dynamic_state2: true;
+        extendedDynamicState2LogicOp => extended_dynamic_state2_logic_op: true;
+        extendedDynamicState2PatchControlPoints => extended_dynamic_state2_patch_control_points: true;
+    }
+    structure vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT: c"VK_EXT_extended_dynamic_state3" {
+        extendedDynamicState3TessellationDomainOrigin => extended_dynamic_state3_tessellation_domain_origin: true;
+        extendedDynamicState3DepthClampEnable => extended_dynamic_state3_depth_clamp_enable: true;
+        extendedDynamicState3PolygonMode => extended_dynamic_state3_polygon_mode: true;
+        extendedDynamicState3RasterizationSamples => extended_dynamic_state3_rasterization_samples: false;
+        extendedDynamicState3SampleMask => extended_dynamic_state3_sample_mask: true;
+        extendedDynamicState3AlphaToCoverageEnable => extended_dynamic_state3_alpha_to_coverage_enable: true;
+        extendedDynamicState3AlphaToOneEnable => extended_dynamic_state3_alpha_to_one_enable: true;
+        extendedDynamicState3LogicOpEnable => extended_dynamic_state3_logic_op_enable: true;
+        extendedDynamicState3ColorBlendEnable => extended_dynamic_state3_color_blend_enable: true;
+        extendedDynamicState3ColorBlendEquation => extended_dynamic_state3_color_blend_equation: true;
+        extendedDynamicState3ColorWriteMask => extended_dynamic_state3_color_write_mask: true;
+        extendedDynamicState3RasterizationStream => extended_dynamic_state3_rasterization_stream: true;
+        extendedDynamicState3ConservativeRasterizationMode =>
+            extended_dynamic_state3_conservative_rasterization_mode: false;
+        extendedDynamicState3ExtraPrimitiveOverestimationSize =>
+            extended_dynamic_state3_extra_primitive_overestimation_size: false;
+        extendedDynamicState3DepthClipEnable => extended_dynamic_state3_depth_clip_enable: true;
+        extendedDynamicState3SampleLocationsEnable => extended_dynamic_state3_sample_locations_enable: false;
+        extendedDynamicState3ColorBlendAdvanced => extended_dynamic_state3_color_blend_advanced: false;
+        extendedDynamicState3ProvokingVertexMode => extended_dynamic_state3_provoking_vertex_mode: true;
+        extendedDynamicState3LineRasterizationMode => extended_dynamic_state3_line_rasterization_mode: true;
+        extendedDynamicState3LineStippleEnable => extended_dynamic_state3_line_stipple_enable: true;
+        extendedDynamicState3DepthClipNegativeOneToOne => extended_dynamic_state3_depth_clip_negative_one_to_one: true;
+        extendedDynamicState3ViewportWScalingEnable => extended_dynamic_state3_viewport_w_scaling_enable: false;
+        extendedDynamicState3ViewportSwizzle => extended_dynamic_state3_viewport_swizzle: false;
+        extendedDynamicState3CoverageToColorEnable => extended_dynamic_state3_coverage_to_color_enable: false;
+        extendedDynamicState3CoverageToColorLocation => extended_dynamic_state3_coverage_to_color_location: false;
+        extendedDynamicState3CoverageModulationMode => extended_dynamic_state3_coverage_modulation_mode: false;
+        extendedDynamicState3CoverageModulationTableEnable =>
+            extended_dynamic_state3_coverage_modulation_table_enable: false;
+        extendedDynamicState3CoverageModulationTable => extended_dynamic_state3_coverage_modulation_table: false;
+        extendedDynamicState3CoverageReductionMode => extended_dynamic_state3_coverage_reduction_mode: false;
+        extendedDynamicState3RepresentativeFragmentTestEnable =>
+            extended_dynamic_state3_representative_fragment_test_enable: false;
+        extendedDynamicState3ShadingRateImageEnable => extended_dynamic_state3_shading_rate_image_enable: false;
+    }
+    structure vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT: c"VK_EXT_graphics_pipeline_library" {
+        graphicsPipelineLibrary => graphics_pipeline_library: true;
+    }
+    structure vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT: c"VK_EXT_image_2d_view_of_3d" {
+        image2DViewOf3D => image2_d_view_of3_d: true;
+        sampler2DViewOf3D => sampler2_d_view_of3_d: true;
+    }
+    structure vk::PhysicalDeviceIndexTypeUint8FeaturesKHR: c"VK_EXT_index_type_uint8" {
+        indexTypeUint8 => index_type_uint8: true;
+    }
+    structure vk::PhysicalDeviceLineRasterizationFeaturesKHR: c"VK_EXT_line_rasterization" {
+        rectangularLines => rectangular_lines: true;
+        bresenhamLines => bresenham_lines: false;
+        smoothLines => smooth_lines: false;
+        stippledRectangularLines => stippled_rectangular_lines: false;
+        stippledBresenhamLines => stippled_bresenham_lines: false;
+        stippledSmoothLines => stippled_smooth_lines: false;
+    }
+    structure vk::PhysicalDeviceMultiDrawFeaturesEXT: c"VK_EXT_multi_draw" {
+        multiDraw => multi_draw: true;
+    }
+    structure vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT: c"VK_EXT_non_seamless_cube_map" {
+        nonSeamlessCubeMap => non_seamless_cube_map: true;
+    }
+    structure vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT: c"VK_EXT_primitive_topology_list_restart" {
+        primitiveTopologyListRestart => primitive_topology_list_restart: true;
+        primitiveTopologyPatchListRestart => primitive_topology_patch_list_restart: true;
+    }
+    structure vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT: c"VK_EXT_primitives_generated_query" {
+        primitivesGeneratedQuery => primitives_generated_query: true;
+        primitivesGeneratedQueryWithRasterizerDiscard => primitives_generated_query_with_rasterizer_discard: true;
+        primitivesGeneratedQueryWithNonZeroStreams => primitives_generated_query_with_non_zero_streams: true;
+    }
+    structure vk::PhysicalDeviceProvokingVertexFeaturesEXT: c"VK_EXT_provoking_vertex" {
+        provokingVertexLast => provoking_vertex_last: true;
+        transformFeedbackPreservesProvokingVertex => transform_feedback_preserves_provoking_vertex: true;
+    }
+    structure vk::PhysicalDeviceRobustness2FeaturesEXT: c"VK_EXT_robustness2" {
+        robustBufferAccess2 => robust_buffer_access2: true;
+        robustImageAccess2 => robust_image_access2: true;
+        nullDescriptor => null_descriptor: true;
+    }
+    structure vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT: c"VK_EXT_shader_atomic_float" {
+        shaderBufferFloat32Atomics => shader_buffer_float32_atomics: true;
+        shaderBufferFloat32AtomicAdd => shader_buffer_float32_atomic_add: true;
+        shaderBufferFloat64Atomics => shader_buffer_float64_atomics: false;
+        shaderBufferFloat64AtomicAdd => shader_buffer_float64_atomic_add: false;
+        shaderSharedFloat32Atomics => shader_shared_float32_atomics: true;
+        shaderSharedFloat32AtomicAdd => shader_shared_float32_atomic_add: true;
+        shaderSharedFloat64Atomics => shader_shared_float64_atomics: false;
+        shaderSharedFloat64AtomicAdd => shader_shared_float64_atomic_add: false;
+        shaderImageFloat32Atomics => shader_image_float32_atomics: true;
+        shaderImageFloat32AtomicAdd => shader_image_float32_atomic_add: true;
+        sparseImageFloat32Atomics => sparse_image_float32_atomics: false;
+        sparseImageFloat32AtomicAdd => sparse_image_float32_atomic_add: false;
+    }
+    structure vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT: c"VK_EXT_shader_atomic_float2" {
+        shaderBufferFloat16Atomics => shader_buffer_float16_atomics: false;
+        shaderBufferFloat16AtomicAdd => shader_buffer_float16_atomic_add: false;
+        shaderBufferFloat16AtomicMinMax => shader_buffer_float16_atomic_min_max: false;
+        shaderBufferFloat32AtomicMinMax => shader_buffer_float32_atomic_min_max: true;
+        shaderBufferFloat64AtomicMinMax => shader_buffer_float64_atomic_min_max: false;
+        shaderSharedFloat16Atomics => shader_shared_float16_atomics: false;
+        shaderSharedFloat16AtomicAdd => shader_shared_float16_atomic_add: false;
+        shaderSharedFloat16AtomicMinMax => shader_shared_float16_atomic_min_max: false;
+        shaderSharedFloat32AtomicMinMax => shader_shared_float32_atomic_min_max: true;
+        shaderSharedFloat64AtomicMinMax => shader_shared_float64_atomic_min_max: false;
+        shaderImageFloat32AtomicMinMax => shader_image_float32_atomic_min_max: true;
+        sparseImageFloat32AtomicMinMax => sparse_image_float32_atomic_min_max: false;
+    }
+    structure vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT: c"VK_EXT_texel_buffer_alignment" {
+        texelBufferAlignment => texel_buffer_alignment: true;
+    }
+    structure vk::PhysicalDeviceTransformFeedbackFeaturesEXT: c"VK_EXT_transform_feedback" {
+        transformFeedback => transform_feedback: true;
+        geometryStreams => geometry_streams: true;
+    }
+    structure vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR: c"VK_EXT_vertex_attribute_divisor" {
+        vertexAttributeInstanceRateDivisor => vertex_attribute_instance_rate_divisor: true;
+        vertexAttributeInstanceRateZeroDivisor => vertex_attribute_instance_rate_zero_divisor: true;
+    }
+    structure vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT: c"VK_EXT_vertex_input_dynamic_state" {
+        vertexInputDynamicState => vertex_input_dynamic_state: true;
+    }
+    structure gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST:
+        c"VK_GAURAST_gaussian_primitive_topology" {
+        gaussianPrimitiveTopology => gaussian_primitive_topology: true;
+        vertexShaderProjection => vertex_shader_projection: true;
+        resolveFragmentShader => resolve_fragment_shader: true;
+        radialDistanceOrder => radial_distance_order: true;
+        primitiveOrder => primitive_order: true;
+        perPixelOrder => per_pixel_order: true;
+        rasterizationFloat16 => rasterization_float16: true;
+        opacityCompensation => opacity_compensation: true;
+        orthographicCamera => orthographic_camera: true;
+        fisheyeCamera => fisheye_camera: true;
+        equirectangularCamera => equirectangular_camera: true;
+        unscentedProjection => unscented_projection: true;
+        gaussian2D => gaussian_2d: true;
+        uniformBufferCamera => uniform_buffer_camera: true;
+        mergedDraws => merged_draws: true;
+        gaussianInstancing => gaussian_instancing: true;
+        gaussianDepthStencil => gaussian_depth_stencil: true;
+        gaussianMultisample => gaussian_multisample: true;
+        gaussianApproximation => gaussian_approximation: true;
+        gaussianMultiview => gaussian_multiview: true;
+        attributeActivation => attribute_activation: true;
+        sphericalHarmonicsBuffer => spherical_harmonics_buffer: true;
+        gaussianDynamicState => gaussian_dynamic_state: true;
+        resolveGaussianIndices => resolve_gaussian_indices: true;
+        gaussianCutOff => gaussian_cut_off: true;
+        opacityCompensationFloor => opacity_compensation_floor: true;
+    }
+    structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
+        performanceCounterQueryPools => performance_counter_query_pools: true;
+        performanceCounterMultipleQueryPools => performance_counter_multiple_query_pools: false;
+    }
+    structure vk::PhysicalDeviceShaderClockFeaturesKHR: c"VK_KHR_shader_clock" {
+        shaderSubgroupClock => shader_subgroup_clock: true;
+        shaderDeviceClock => shader_device_clock: true;
+    }
+    structure vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR: c"VK_KHR_workgroup_memory_explicit_layout" {
+        workgroupMemoryExplicitLayout => workgroup_memory_explicit_layout: true;
+        workgroupMemoryExplicitLayoutScalarBlockLayout => workgroup_memory_explicit_layout_scalar_block_layout: true;
+        workgroupMemoryExplicitLayout8BitAccess => workgroup_memory_explicit_layout8_bit_access: true;
+        workgroupMemoryExplicitLayout16BitAccess => workgroup_memory_explicit_layout16_bit_access: true;
+    }
+    repeated vk::PhysicalDeviceProtectedMemoryFeatures { protected_memory }
+    repeated vk::PhysicalDevice16BitStorageFeatures {
+        storage_buffer16_bit_access, uniform_and_storage_buffer16_bit_access, storage_push_constant16,
+        storage_input_output16
+    }
+    repeated vk::PhysicalDeviceVariablePointersFeatures { variable_pointers_storage_buffer, variable_pointers }
+    repeated vk::PhysicalDeviceSamplerYcbcrConversionFeatures { sampler_ycbcr_conversion }
+    repeated vk::PhysicalDeviceMultiviewFeatures { multiview, multiview_geometry_shader, multiview_tessellation_shader }
+    repeated vk::PhysicalDeviceShaderDrawParametersFeatures { shader_draw_parameters }
+    repeated vk::PhysicalDeviceVulkanMemoryModelFeatures {
+        vulkan_memory_model, vulkan_memory_model_device_scope, vulkan_memory_model_availability_visibility_chains
+    }
+    repeated vk::PhysicalDeviceHostQueryResetFeatures { host_query_reset }
+    repeated vk::PhysicalDeviceTimelineSemaphoreFeatures { timeline_semaphore }
+    repeated vk::PhysicalDeviceBufferDeviceAddressFeatures {
+        buffer_device_address, buffer_device_address_capture_replay, buffer_device_address_multi_device
+    }
+    repeated vk::PhysicalDevice8BitStorageFeatures {
+        storage_buffer8_bit_access, uniform_and_storage_buffer8_bit_access, storage_push_constant8
+    }
+    repeated vk::PhysicalDeviceShaderAtomicInt64Features { shader_buffer_int64_atomics, shader_shared_int64_atomics }
+    repeated vk::PhysicalDeviceShaderFloat16Int8Features { shader_float16, shader_int8 }
+    repeated vk::PhysicalDeviceDescriptorIndexingFeatures {
+        shader_input_attachment_array_dynamic_indexing, shader_uniform_texel_buffer_array_dynamic_indexing,
+        shader_storage_texel_buffer_array_dynamic_indexing, shader_uniform_buffer_array_non_uniform_indexing,
+        shader_sampled_image_array_non_uniform_indexing, shader_storage_buffer_array_non_uniform_indexing,
+        shader_storage_image_array_non_uniform_indexing, shader_input_attachment_array_non_uniform_indexing,
+        shader_uniform_texel_buffer_array_non_uniform_indexing, shader_storage_texel_buffer_array_non_uniform_indexing,
+        descriptor_binding_uniform_buffer_update_after_bind, descriptor_binding_sampled_image_update_after_bind,
+        descriptor_binding_storage_image_update_after_bind, descriptor_binding_storage_buffer_update_after_bind,
+        descriptor_binding_uniform_texel_buffer_update_after_bind,
+        descriptor_binding_storage_texel_buffer_update_after_bind, descriptor_binding_update_unused_while_pending,
+        descriptor_binding_partially_bound, descriptor_binding_variable_descriptor_count, runtime_descriptor_array
+    }
+    repeated vk::PhysicalDeviceScalarBlockLayoutFeatures { scalar_block_layout }
+    repeated vk::PhysicalDeviceUniformBufferStandardLayoutFeatures { uniform_buffer_standard_layout }
+    repeated vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures { shader_subgroup_extended_types }
+    repeated vk::PhysicalDeviceImagelessFramebufferFeatures { imageless_framebuffer }
+    repeated vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures { separate_depth_stencil_layouts }
+    repeated vk::PhysicalDevicePrivateDataFeatures { private_data }
+    repeated vk::PhysicalDeviceSynchronization2Features { synchronization2 }
+    repeated vk::PhysicalDeviceTextureCompressionASTCHDRFeatures { texture_compression_astc_hdr }
+    repeated vk::PhysicalDeviceMaintenance4Features { maintenance4 }
+    repeated vk::PhysicalDeviceShaderTerminateInvocationFeatures { shader_terminate_invocation }
+    repeated vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures { shader_demote_to_helper_invocation }
+    repeated vk::PhysicalDevicePipelineCreationCacheControlFeatures { pipeline_creation_cache_control }
+    repeated vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures { shader_zero_initialize_workgroup_memory }
+    repeated vk::PhysicalDeviceImageRobustnessFeatures { robust_image_access }
+    repeated vk::PhysicalDeviceSubgroupSizeControlFeatures { subgroup_size_control, compute_full_subgroups }
+    repeated vk::PhysicalDeviceInlineUniformBlockFeatures {
+        inline_uniform_block, descriptor_binding_inline_uniform_block_update_after_bind
+    }
+    repeated vk::PhysicalDeviceShaderIntegerDotProductFeatures { shader_integer_dot_product }
+    repeated vk::PhysicalDeviceDynamicRenderingFeatures { dynamic_rendering }
 }
-
-/// The features that this driver supports.
-pub(crate) const SUPPORTED: Features = Features {
-    robust_buffer_access: true,
-    full_draw_index_uint32: true,
-    image_cube_array: true,
-    independent_blend: true,
-    geometry_shader: true,
-    tessellation_shader: true,
-    sample_rate_shading: true,
-    dual_src_blend: true,
-    logic_op: true,
-    multi_draw_indirect: true,
-    draw_indirect_first_instance: true,
-    depth_clamp: true,
-    depth_bias_clamp: true,
-    fill_mode_non_solid: true,
-    depth_bounds: true,
-    wide_lines: true,
-    large_points: true,
-    alpha_to_one: true,
-    multi_viewport: true,
-    sampler_anisotropy: true,
-    texture_compression_bc: true,
-    occlusion_query_precise: true,
-    pipeline_statistics_query: true,
-    vertex_pipeline_stores_and_atomics: true,
-    fragment_stores_and_atomics: true,
-    shader_tessellation_and_geometry_point_size: true,
-    shader_image_gather_extended: true,
-    shader_storage_image_extended_formats: true,
-    shader_storage_image_multisample: true,
-    shader_storage_image_read_without_format: true,
-    shader_storage_image_write_without_format: true,
-    shader_uniform_buffer_array_dynamic_indexing: true,
-    shader_sampled_image_array_dynamic_indexing: true,
-    shader_storage_buffer_array_dynamic_indexing: true,
-    shader_storage_image_array_dynamic_indexing: true,
-    shader_clip_distance: true,
-    shader_cull_distance: true,
-    shader_float64: true,
-    shader_int64: true,
-    shader_int16: true,
-    shader_resource_min_lod: true,
-    inherited_queries: true,
-    storage_buffer16_bit_access: true,
-    uniform_and_storage_buffer16_bit_access: true,
-    storage_push_constant16: true,
-    multiview: true,
-    multiview_geometry_shader: true,
-    multiview_tessellation_shader: true,
-    variable_pointers_storage_buffer: true,
-    variable_pointers: true,
-    shader_draw_parameters: true,
-    sampler_mirror_clamp_to_edge: true,
-    draw_indirect_count: true,
-    storage_buffer8_bit_access: true,
-    uniform_and_storage_buffer8_bit_access: true,
-    storage_push_constant8: true,
-    shader_buffer_int64_atomics: true,
-    shader_shared_int64_atomics: true,
-    shader_float16: true,
-    shader_int8: true,
-    descriptor_indexing: true,
-    shader_uniform_texel_buffer_array_dynamic_indexing: true,
-    shader_storage_texel_buffer_array_dynamic_indexing: true,
-    shader_uniform_buffer_array_non_uniform_indexing: true,
-    shader_sampled_image_array_non_uniform_indexing: true,
-    shader_storage_buffer_array_non_uniform_indexing: true,
-    shader_storage_image_array_non_uniform_indexing: true,
-    shader_uniform_texel_buffer_array_non_uniform_indexing: true,
-    shader_storage_texel_buffer_array_non_uniform_indexing: true,
-    descriptor_binding_uniform_buffer_update_after_bind: true,
-    descriptor_binding_sampled_image_update_after_bind: true,
-    descriptor_binding_storage_image_update_after_bind: true,
-    descriptor_binding_storage_buffer_update_after_bind: true,
-    descriptor_binding_uniform_texel_buffer_update_after_bind: true,
-    descriptor_binding_storage_texel_buffer_update_after_bind: true,
-    descriptor_binding_update_unused_while_pending: true,
-    descriptor_binding_partially_bound: true,
-    descriptor_binding_variable_descriptor_count: true,
-    runtime_descriptor_array: true,
-    sampler_filter_minmax: true,
-    scalar_block_layout: true,
-    imageless_framebuffer: true,
-    uniform_buffer_standard_layout: true,
-    shader_subgroup_extended_types: true,
-    separate_depth_stencil_layouts: true,
-    host_query_reset: true,
-    timeline_semaphore: true,
-    buffer_device_address: true,
-    vulkan_memory_model: true,
-    vulkan_memory_model_device_scope: true,
-    vulkan_memory_model_availability_visibility_chains: true,
-    shader_output_viewport_index: true,
-    shader_output_layer: true,
-    subgroup_broadcast_dynamic_id: true,
-    robust_image_access: true,
-    inline_uniform_block: true,
-    descriptor_binding_inline_uniform_block_update_after_bind: true,
-    pipeline_creation_cache_control: true,
-    private_data: true,
-    shader_demote_to_helper_invocation: true,
-    shader_terminate_invocation: true,
-    subgroup_size_control: true,
-    compute_full_subgroups: true,
-    synchronization2: true,
-    shader_zero_initialize_workgroup_memory: true,
-    dynamic_rendering: true,
-    shader_integer_dot_product: true,
-    maintenance4: true,
-    shader_early_and_late_fragment_tests: true,
-    format_a4r4g4b4: true,
-    format_a4b4g4r4: true,
-    attachment_feedback_loop_layout: true,
-    border_color_swizzle: true,
-    border_color_swizzle_from_image: true,
-    color_write_enable: true,
-    conditional_rendering: true,
-    inherited_conditional_rendering: true,
-    custom_border_colors: true,
-    custom_border_color_without_format: true,
-    depth_clamp_zero_one: true,
-    depth_clip_control: true,
-    depth_clip_enable: true,
-    extended_dynamic_state: true,
-    extended_dynamic_state2: true,
-    extended_dynamic_state2_logic_op: true,
-    extended_dynamic_state2_patch_control_points: true,
-    extended_dynamic_state3_tessellation_domain_origin: true,
-    extended_dynamic_state3_depth_clamp_enable: true,
-    extended_dynamic_state3_polygon_mode: true,
-    extended_dynamic_state3_sample_mask: true,
-    extended_dynamic_state3_alpha_to_coverage_enable: true,
-    extended_dynamic_state3_alpha_to_one_enable: true,
-    extended_dynamic_state3_logic_op_enable: true,
-    extended_dynamic_state3_color_blend_enable: true,
-    extended_dynamic_state3_color_blend_equation: true,
-    extended_dynamic_state3_color_write_mask: true,
-    extended_dynamic_state3_rasterization_stream: true,
-    extended_dynamic_state3_depth_clip_enable: true,
-    extended_dynamic_state3_provoking_vertex_mode: true,
-    extended_dynamic_state3_line_rasterization_mode: true,
-    extended_dynamic_state3_line_stipple_enable: true,
-    extended_dynamic_state3_depth_clip_negative_one_to_one: true,
-    graphics_pipeline_library: true,
-    image2_d_view_of3_d: true,
-    sampler2_d_view_of3_d: true,
-    index_type_uint8: true,
-    rectangular_lines: true,
-    multi_draw: true,
-    non_seamless_cube_map: true,
-    primitive_topology_list_restart: true,
-    primitive_topology_patch_list_restart: true,
-    primitives_generated_query: true,
-    primitives_generated_query_with_rasterizer_discard: true,
-    primitives_generated_query_with_non_zero_streams: true,
-    provoking_vertex_last: true,
-    transform_feedback_preserves_provoking_vertex: true,
-    robust_buffer_access2: true,
-    robust_image_access2: true,
-    null_descriptor: true,
-    shader_buffer_float32_atomics: true,
-    shader_buffer_float32_atomic_add: true,
-    shader_shared_float32_atomics: true,
-    shader_shared_float32_atomic_add: true,
-    shader_image_float32_atomics: true,
-    shader_image_float32_atomic_add: true,
-    shader_buffer_float32_atomic_min_max: true,
-    shader_shared_float32_atomic_min_max: true,
-    shader_image_float32_atomic_min_max: true,
-    texel_buffer_alignment: true,
-    transform_feedback: true,
-    geometry_streams: true,
-    vertex_attribute_instance_rate_divisor: true,
-    vertex_attribute_instance_rate_zero_divisor: true,
-    vertex_input_dynamic_state: true,
-    gaussian_primitive_topology: true,
-    vertex_shader_projection: true,
-    resolve_fragment_shader: true,
-    radial_distance_order: true,
-    primitive_order: true,
-    per_pixel_order: true,
-    rasterization_float16: true,
-    opacity_compensation: true,
-    orthographic_camera: true,
-    fisheye_camera: true,
-    equirectangular_camera: true,
-    unscented_projection: true,
-    gaussian_2d: true,
-    uniform_buffer_camera: true,
-    merged_draws: true,
-    gaussian_instancing: true,
-    gaussian_depth_stencil: true,
-    gaussian_multisample: true,
-    gaussian_approximation: true,
-    gaussian_multiview: true,
-    attribute_activation: true,
-    spherical_harmonics_buffer: true,
-    gaussian_dynamic_state: true,
-    resolve_gaussian_indices: true,
-    gaussian_cut_off: true,
-    opacity_compensation_floor: true,
-    performance_counter_query_pools: true,
-    shader_subgroup_clock: true,
-    shader_device_clock: true,
-    workgroup_memory_explicit_layout: true,
-    workgroup_memory_explicit_layout_scalar_block_layout: true,
-    workgroup_memory_explicit_layout8_bit_access: true,
-    workgroup_memory_explicit_layout16_bit_access: true,
-    ..Features::NONE
-};
-
-impl Features {
-    /// No feature.
-    pub(crate) const NONE: Self = Self {
-        robust_buffer_access: false,
-        full_draw_index_uint32: false,
-        image_cube_array: false,
-        independent_blend: false,
-        geometry_shader: false,
-        tessellation_shader: false,
-        sample_rate_shading: false,
-        dual_src_blend: false,
-        logic_op: false,
-        multi_draw_indirect: false,
-        draw_indirect_first_instance: false,
-        depth_clamp: false,
-        depth_bias_clamp: false,
-        fill_mode_non_solid: false,
-        depth_bounds: false,
-        wide_lines: false,
-        large_points: false,
-        alpha_to_one: false,
-        multi_viewport: false,
-        sampler_anisotropy: false,
-        texture_compression_etc2: false,
-        texture_compression_astc_ldr: false,
-        texture_compression_bc: false,
-        occlusion_query_precise: false,
-        pipeline_statistics_query: false,
-        vertex_pipeline_stores_and_atomics: false,
-        fragment_stores_and_atomics: false,
-        shader_tessellation_and_geometry_point_size: false,
-        shader_image_gather_extended: false,
-        shader_storage_image_extended_formats: false,
-        shader_storage_image_multisample: false,
-        shader_storage_image_read_without_format: false,
-        shader_storage_image_write_without_format: false,
-        shader_uniform_buffer_array_dynamic_indexing: false,
-        shader_sampled_image_array_dynamic_indexing: false,
-        shader_storage_buffer_array_dynamic_indexing: false,
-        shader_storage_image_array_dynamic_indexing: false,
-        shader_clip_distance: false,
-        shader_cull_distance: false,
-        shader_float64: false,
-        shader_int64: false,
-        shader_int16: false,
-        shader_resource_residency: false,
-        shader_resource_min_lod: false,
-        sparse_binding: false,
-        sparse_residency_buffer: false,
-        sparse_residency_image2_d: false,
-        sparse_residency_image3_d: false,
-        sparse_residency2_samples: false,
-        sparse_residency4_samples: false,
-        sparse_residency8_samples: false,
-        sparse_residency16_samples: false,
-        sparse_residency_aliased: false,
-        variable_multisample_rate: false,
-        inherited_queries: false,
-        storage_buffer16_bit_access: false,
-        uniform_and_storage_buffer16_bit_access: false,
-        storage_push_constant16: false,
-        storage_input_output16: false,
-        multiview: false,
-        multiview_geometry_shader: false,
-        multiview_tessellation_shader: false,
-        variable_pointers_storage_buffer: false,
-        variable_pointers: false,
-        protected_memory: false,
-        sampler_ycbcr_conversion: false,
-        shader_draw_parameters: false,
-        sampler_mirror_clamp_to_edge: false,
-        draw_indirect_count: false,
-        storage_buffer8_bit_access: false,
-        uniform_and_storage_buffer8_bit_access: false,
-        storage_push_constant8: false,
-        shader_buffer_int64_atomics: false,
-        shader_shared_int64_atomics: false,
-        shader_float16: false,
-        shader_int8: false,
-        descriptor_indexing: false,
-        shader_input_attachment_array_dynamic_indexing: false,
-        shader_uniform_texel_buffer_array_dynamic_indexing: false,
-        shader_storage_texel_buffer_array_dynamic_indexing: false,
-        shader_uniform_buffer_array_non_uniform_indexing: false,
-        shader_sampled_image_array_non_uniform_indexing: false,
-        shader_storage_buffer_array_non_uniform_indexing: false,
-        shader_storage_image_array_non_uniform_indexing: false,
-        shader_input_attachment_array_non_uniform_indexing: false,
-        shader_uniform_texel_buffer_array_non_uniform_indexing: false,
-        shader_storage_texel_buffer_array_non_uniform_indexing: false,
-        descriptor_binding_uniform_buffer_update_after_bind: false,
-        descriptor_binding_sampled_image_update_after_bind: false,
-        descriptor_binding_storage_image_update_after_bind: false,
-        descriptor_binding_storage_buffer_update_after_bind: false,
-        descriptor_binding_uniform_texel_buffer_update_after_bind: false,
-        descriptor_binding_storage_texel_buffer_update_after_bind: false,
-        descriptor_binding_update_unused_while_pending: false,
-        descriptor_binding_partially_bound: false,
-        descriptor_binding_variable_descriptor_count: false,
-        runtime_descriptor_array: false,
-        sampler_filter_minmax: false,
-        scalar_block_layout: false,
-        imageless_framebuffer: false,
-        uniform_buffer_standard_layout: false,
-        shader_subgroup_extended_types: false,
-        separate_depth_stencil_layouts: false,
-        host_query_reset: false,
-        timeline_semaphore: false,
-        buffer_device_address: false,
-        buffer_device_address_capture_replay: false,
-        buffer_device_address_multi_device: false,
-        vulkan_memory_model: false,
-        vulkan_memory_model_device_scope: false,
-        vulkan_memory_model_availability_visibility_chains: false,
-        shader_output_viewport_index: false,
-        shader_output_layer: false,
-        subgroup_broadcast_dynamic_id: false,
-        robust_image_access: false,
-        inline_uniform_block: false,
-        descriptor_binding_inline_uniform_block_update_after_bind: false,
-        pipeline_creation_cache_control: false,
-        private_data: false,
-        shader_demote_to_helper_invocation: false,
-        shader_terminate_invocation: false,
-        subgroup_size_control: false,
-        compute_full_subgroups: false,
-        synchronization2: false,
-        texture_compression_astc_hdr: false,
-        shader_zero_initialize_workgroup_memory: false,
-        dynamic_rendering: false,
-        shader_integer_dot_product: false,
-        maintenance4: false,
-        shader_early_and_late_fragment_tests: false,
-        format_a4r4g4b4: false,
-        format_a4b4g4r4: false,
-        attachment_feedback_loop_layout: false,
-        border_color_swizzle: false,
-        border_color_swizzle_from_image: false,
-        color_write_enable: false,
-        conditional_rendering: false,
-        inherited_conditional_rendering: false,
-        custom_border_colors: false,
-        custom_border_color_without_format: false,
-        depth_clamp_zero_one: false,
-        depth_clip_control: false,
-        depth_clip_enable: false,
-        extended_dynamic_state: false,
-        extended_dynamic_state2: false,
-        extended_dynamic_state2_logic_op: false,
-        extended_dynamic_state2_patch_control_points: false,
-        extended_dynamic_state3_tessellation_domain_origin: false,
-        extended_dynamic_state3_depth_clamp_enable: false,
-        extended_dynamic_state3_polygon_mode: false,
-        extended_dynamic_state3_rasterization_samples: false,
-        extended_dynamic_state3_sample_mask: false,
-        extended_dynamic_state3_alpha_to_coverage_enable: false,
-        extended_dynamic_state3_alpha_to_one_enable: false,
-        extended_dynamic_state3_logic_op_enable: false,
-        extended_dynamic_state3_color_blend_enable: false,
-        extended_dynamic_state3_color_blend_equation: false,
-        extended_dynamic_state3_color_write_mask: false,
-        extended_dynamic_state3_rasterization_stream: false,
-        extended_dynamic_state3_conservative_rasterization_mode: false,
-        extended_dynamic_state3_extra_primitive_overestimation_size: false,
-        extended_dynamic_state3_depth_clip_enable: false,
-        extended_dynamic_state3_sample_locations_enable: false,
-        extended_dynamic_state3_color_blend_advanced: false,
-        extended_dynamic_state3_provoking_vertex_mode: false,
-        extended_dynamic_state3_line_rasterization_mode: false,
-        extended_dynamic_state3_line_stipple_enable: false,
-        extended_dynamic_state3_depth_clip_negative_one_to_one: false,
-        extended_dynamic_state3_viewport_w_scaling_enable: false,
-        extended_dynamic_state3_viewport_swizzle: false,
-        extended_dynamic_state3_coverage_to_color_enable: false,
-        extended_dynamic_state3_coverage_to_color_location: false,
-        extended_dynamic_state3_coverage_modulation_mode: false,
-        extended_dynamic_state3_coverage_modulation_table_enable: false,
-        extended_dynamic_state3_coverage_modulation_table: false,
-        extended_dynamic_state3_coverage_reduction_mode: false,
-        extended_dynamic_state3_representative_fragment_test_enable: false,
-        extended_dynamic_state3_shading_rate_image_enable: false,
-        graphics_pipeline_library: false,
-        image2_d_view_of3_d: false,
-        sampler2_d_view_of3_d: false,
-        index_type_uint8: false,
-        rectangular_lines: false,
-        bresenham_lines: false,
-        smooth_lines: false,
-        stippled_rectangular_lines: false,
-        stippled_bresenham_lines: false,
-        stippled_smooth_lines: false,
-        multi_draw: false,
-        non_seamless_cube_map: false,
-        primitive_topology_list_restart: false,
-        primitive_topology_patch_list_restart: false,
-        primitives_generated_query: false,
-        primitives_generated_query_with_rasterizer_discard: false,
-        primitives_generated_query_with_non_zero_streams: false,
-        provoking_vertex_last: false,
-        transform_feedback_preserves_provoking_vertex: false,
-        robust_buffer_access2: false,
-        robust_image_access2: false,
-        null_descriptor: false,
-        shader_buffer_float32_atomics: false,
-        shader_buffer_float32_atomic_add: false,
-        shader_buffer_float64_atomics: false,
-        shader_buffer_float64_atomic_add: false,
-        shader_shared_float32_atomics: false,
-        shader_shared_float32_atomic_add: false,
-        shader_shared_float64_atomics: false,
-        shader_shared_float64_atomic_add: false,
-        shader_image_float32_atomics: false,
-        shader_image_float32_atomic_add: false,
-        sparse_image_float32_atomics: false,
-        sparse_image_float32_atomic_add: false,
-        shader_buffer_float16_atomics: false,
-        shader_buffer_float16_atomic_add: false,
-        shader_buffer_float16_atomic_min_max: false,
-        shader_buffer_float32_atomic_min_max: false,
-        shader_buffer_float64_atomic_min_max: false,
-        shader_shared_float16_atomics: false,
-        shader_shared_float16_atomic_add: false,
-        shader_shared_float16_atomic_min_max: false,
-        shader_shared_float32_atomic_min_max: false,
-        shader_shared_float64_atomic_min_max: false,
-        shader_image_float32_atomic_min_max: false,
-        sparse_image_float32_atomic_min_max: false,
-        texel_buffer_alignment: false,
-        transform_feedback: false,
-        geometry_streams: false,
-        vertex_attribute_instance_rate_divisor: false,
-        vertex_attribute_instance_rate_zero_divisor: false,
-        vertex_input_dynamic_state: false,
-        gaussian_primitive_topology: false,
-        vertex_shader_projection: false,
-        resolve_fragment_shader: false,
-        radial_distance_order: false,
-        primitive_order: false,
-        per_pixel_order: false,
-        rasterization_float16: false,
-        opacity_compensation: false,
-        orthographic_camera: false,
-        fisheye_camera: false,
-        equirectangular_camera: false,
-        unscented_projection: false,
-        gaussian_2d: false,
-        uniform_buffer_camera: false,
-        merged_draws: false,
-        gaussian_instancing: false,
-        gaussian_depth_stencil: false,
-        gaussian_multisample: false,
-        gaussian_approximation: false,
-        gaussian_multiview: false,
-        attribute_activation: false,
-        spherical_harmonics_buffer: false,
-        gaussian_dynamic_state: false,
-        resolve_gaussian_indices: false,
-        gaussian_cut_off: false,
-        opacity_compensation_floor: false,
-        performance_counter_query_pools: false,
-        performance_counter_multiple_query_pools: false,
-        shader_subgroup_clock: false,
-        shader_device_clock: false,
-        workgroup_memory_explicit_layout: false,
-        workgroup_memory_explicit_layout_scalar_block_layout: false,
-        workgroup_memory_explicit_layout8_bit_access: false,
-        workgroup_memory_explicit_layout16_bit_access: false,
-    };
-
-    /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 264] {
-        [
-            ("robustBufferAccess", self.robust_buffer_access),
-            ("fullDrawIndexUint32", self.full_draw_index_uint32),
-            ("imageCubeArray", self.image_cube_array),
-            ("independentBlend", self.independent_blend),
-            ("geometryShader", self.geometry_shader),
-            ("tessellationShader", self.tessellation_shader),
-            ("sampleRateShading", self.sample_rate_shading),
-            ("dualSrcBlend", self.dual_src_blend),
-            ("logicOp", self.logic_op),
-            ("multiDrawIndirect", self.multi_draw_indirect),
-            ("drawIndirectFirstInstance", self.draw_indirect_first_instance),
-            ("depthClamp", self.depth_clamp),
-            ("depthBiasClamp", self.depth_bias_clamp),
-            ("fillModeNonSolid", self.fill_mode_non_solid),
-            ("depthBounds", self.depth_bounds),
-            ("wideLines", self.wide_lines),
-            ("largePoints", self.large_points),
-            ("alphaToOne", self.alpha_to_one),
-            ("multiViewport", self.multi_viewport),
-            ("samplerAnisotropy", self.sampler_anisotropy),
-            ("textureCompressionETC2", self.texture_compression_etc2),
-            ("textureCompressionASTC_LDR", self.texture_compression_astc_ldr),
-            ("textureCompressionBC", self.texture_compression_bc),
-            ("occlusionQueryPrecise", self.occlusion_query_precise),
-            ("pipelineStatisticsQuery", self.pipeline_statistics_query),
-            ("vertexPipelineStoresAndAtomics", self.vertex_pipeline_stores_and_atomics),
-            ("fragmentStoresAndAtomics", self.fragment_stores_and_atomics),
-            ("shaderTessellationAndGeometryPointSize", self.shader_tessellation_and_geometry_point_size),
-            ("shaderImageGatherExtended", self.shader_image_gather_extended),
-            ("shaderStorageImageExtendedFormats", self.shader_storage_image_extended_formats),
-            ("shaderStorageImageMultisample", self.shader_storage_image_multisample),
-            ("shaderStorageImageReadWithoutFormat", self.shader_storage_image_read_without_format),
-            ("shaderStorageImageWriteWithoutFormat", self.shader_storage_image_write_without_format),
-            ("shaderUniformBufferArrayDynamicIndexing", self.shader_uniform_buffer_array_dynamic_indexing),
-            ("shaderSampledImageArrayDynamicIndexing", self.shader_sampled_image_array_dynamic_indexing),
-            ("shaderStorageBufferArrayDynamicIndexing", self.shader_storage_buffer_array_dynamic_indexing),
-            ("shaderStorageImageArrayDynamicIndexing", self.shader_storage_image_array_dynamic_indexing),
-            ("shaderClipDistance", self.shader_clip_distance),
-            ("shaderCullDistance", self.shader_cull_distance),
-            ("shaderFloat64", self.shader_float64),
-            ("shaderInt64", self.shader_int64),
-            ("shaderInt16", self.shader_int16),
-            ("shaderResourceResidency", self.shader_resource_residency),
-            ("shaderResourceMinLod", self.shader_resource_min_lod),
-            ("sparseBinding", self.sparse_binding),
-            ("sparseResidencyBuffer", self.sparse_residency_buffer),
-            ("sparseResidencyImage2D", self.sparse_residency_image2_d),
-            ("sparseResidencyImage3D", self.sparse_residency_image3_d),
-            ("sparseResidency2Samples", self.sparse_residency2_samples),
-            ("sparseResidency4Samples", self.sparse_residency4_samples),
-            ("sparseResidency8Samples", self.sparse_residency8_samples),
-            ("sparseResidency16Samples", self.sparse_residency16_samples),
-            ("sparseResidencyAliased", self.sparse_residency_aliased),
-            ("variableMultisampleRate", self.variable_multisample_rate),
-            ("inheritedQueries", self.inherited_queries),
-            ("storageBuffer16BitAccess", self.storage_buffer16_bit_access),
-            ("uniformAndStorageBuffer16BitAccess", self.uniform_and_storage_buffer16_bit_access),
-            ("storagePushConstant16", self.storage_push_constant16),
-            ("storageInputOutput16", self.storage_input_output16),
-            ("multiview", self.multiview),
-            ("multiviewGeometryShader", self.multiview_geometry_shader),
-            ("multiviewTessellationShader", self.multiview_tessellation_shader),
-            ("variablePointersStorageBuffer", self.variable_pointers_storage_buffer),
-            ("variablePointers", self.variable_pointers),
-            ("protectedMemory", self.protected_memory),
-            ("samplerYcbcrConversion", self.sampler_ycbcr_conversion),
-            ("shaderDrawParameters", self.shader_draw_parameters),
-            ("samplerMirrorClampToEdge", self.sampler_mirror_clamp_to_edge),
-            ("drawIndirectCount", self.draw_indirect_count),
-            ("storageBuffer8BitAccess", self.storage_buffer8_bit_access),
-            ("uniformAndStorageBuffer8BitAccess", self.uniform_and_storage_buffer8_bit_access),
-            ("storagePushConstant8", self.storage_push_constant8),
-            ("shaderBufferInt64Atomics", self.shader_buffer_int64_atomics),
-            ("shaderSharedInt64Atomics", self.shader_shared_int64_atomics),
-            ("shaderFloat16", self.shader_float16),
-            ("shaderInt8", self.shader_int8),
-            ("descriptorIndexing", self.descriptor_indexing),
-            ("shaderInputAttachmentArrayDynamicIndexing", self.shader_input_attachment_array_dynamic_indexing),
-            ("shaderUniformTexelBufferArrayDynamicIndexing", self.shader_uniform_texel_buffer_array_dynamic_indexing),
-            ("shaderStorageTexelBufferArrayDynamicIndexing", self.shader_storage_texel_buffer_array_dynamic_indexing),
-            ("shaderUniformBufferArrayNonUniformIndexing", self.shader_uniform_buffer_array_non_uniform_indexing),
-            ("shaderSampledImageArrayNonUniformIndexing", self.shader_sampled_image_array_non_uniform_indexing),
-            ("shaderStorageBufferArrayNonUniformIndexing", self.shader_storage_buffer_array_non_uniform_indexing),
-            ("shaderStorageImageArrayNonUniformIndexing", self.shader_storage_image_array_non_uniform_indexing),
-            ("shaderInputAttachmentArrayNonUniformIndexing", self.shader_input_attachment_array_non_uniform_indexing),
-            (
-                "shaderUniformTexelBufferArrayNonUniformIndexing",
-                self.shader_uniform_texel_buffer_array_non_uniform_indexing,
-            ),
-            (
-                "shaderStorageTexelBufferArrayNonUniformIndexing",
-                self.shader_storage_texel_buffer_array_non_uniform_indexing,
-            ),
-            ("descriptorBindingUniformBufferUpdateAfterBind", self.descriptor_binding_uniform_buffer_update_after_bind),
-            ("descriptorBindingSampledImageUpdateAfterBind", self.descriptor_binding_sampled_image_update_after_bind),
-            ("descriptorBindingStorageImageUpdateAfterBind", self.descriptor_binding_storage_image_update_after_bind),
-            ("descriptorBindingStorageBufferUpdateAfterBind", self.descriptor_binding_storage_buffer_update_after_bind),
-            (
-                "descriptorBindingUniformTexelBufferUpdateAfterBind",
-                self.descriptor_binding_uniform_texel_buffer_update_after_bind,
-            ),
-            (
-                "descriptorBindingStorageTexelBufferUpdateAfterBind",
-                self.descriptor_binding_storage_texel_buffer_update_after_bind,
-            ),
-            ("descriptorBindingUpdateUnusedWhilePending", self.descriptor_binding_update_unused_while_pending),
-            ("descriptorBindingPartiallyBound", self.descriptor_binding_partially_bound),
-            ("descriptorBindingVariableDescriptorCount", self.descriptor_binding_variable_descriptor_count),
-            ("runtimeDescriptorArray", self.runtime_descriptor_array),
-            ("samplerFilterMinmax", self.sampler_filter_minmax),
-            ("scalarBlockLayout", self.scalar_block_layout),
-            ("imagelessFramebuffer", self.imageless_framebuffer),
-            ("uniformBufferStandardLayout", self.uniform_buffer_standard_layout),
-            ("shaderSubgroupExtendedTypes", self.shader_subgroup_extended_types),
-            ("separateDepthStencilLayouts", self.separate_depth_stencil_layouts),
-            ("hostQueryReset", self.host_query_reset),
-            ("timelineSemaphore", self.timeline_semaphore),
-            ("bufferDeviceAddress", self.buffer_device_address),
-            ("bufferDeviceAddressCaptureReplay", self.buffer_device_address_capture_replay),
-            ("bufferDeviceAddressMultiDevice", self.buffer_device_address_multi_device),
-            ("vulkanMemoryModel", self.vulkan_memory_model),
-            ("vulkanMemoryModelDeviceScope", self.vulkan_memory_model_device_scope),
-            ("vulkanMemoryModelAvailabilityVisibilityChains", self.vulkan_memory_model_availability_visibility_chains),
-            ("shaderOutputViewportIndex", self.shader_output_viewport_index),
-            ("shaderOutputLayer", self.shader_output_layer),
-            ("subgroupBroadcastDynamicId", self.subgroup_broadcast_dynamic_id),
-            ("robustImageAccess", self.robust_image_access),
-            ("inlineUniformBlock", self.inline_uniform_block),
-            (
-                "descriptorBindingInlineUniformBlockUpdateAfterBind",
-                self.descriptor_binding_inline_uniform_block_update_after_bind,
-            ),
-            ("pipelineCreationCacheControl", self.pipeline_creation_cache_control),
-            ("privateData", self.private_data),
-            ("shaderDemoteToHelperInvocation", self.shader_demote_to_helper_invocation),
-            ("shaderTerminateInvocation", self.shader_terminate_invocation),
-            ("subgroupSizeControl", self.subgroup_size_control),
-            ("computeFullSubgroups", self.compute_full_subgroups),
-            ("synchronization2", self.synchronization2),
-            ("textureCompressionASTC_HDR", self.texture_compression_astc_hdr),
-            ("shaderZeroInitializeWorkgroupMemory", self.shader_zero_initialize_workgroup_memory),
-            ("dynamicRendering", self.dynamic_rendering),
-            ("shaderIntegerDotProduct", self.shader_integer_dot_product),
-            ("maintenance4", self.maintenance4),
-            ("shaderEarlyAndLateFragmentTests", self.shader_early_and_late_fragment_tests),
-            ("formatA4R4G4B4", self.format_a4r4g4b4),
-            ("formatA4B4G4R4", self.format_a4b4g4r4),
-            ("attachmentFeedbackLoopLayout", self.attachment_feedback_loop_layout),
-            ("borderColorSwizzle", self.border_color_swizzle),
-            ("borderColorSwizzleFromImage", self.border_color_swizzle_from_image),
-            ("colorWriteEnable", self.color_write_enable),
-            ("conditionalRendering", self.conditional_rendering),
-            ("inheritedConditionalRendering", self.inherited_conditional_rendering),
-            ("customBorderColors", self.custom_border_colors),
-            ("customBorderColorWithoutFormat", self.custom_border_color_without_format),
-            ("depthClampZeroOne", self.depth_clamp_zero_one),
-            ("depthClipControl", self.depth_clip_control),
-            ("depthClipEnable", self.depth_clip_enable),
-            ("extendedDynamicState", self.extended_dynamic_state),
-            ("extendedDynamicState2", self.extended_dynamic_state2),
-            ("extendedDynamicState2LogicOp", self.extended_dynamic_state2_logic_op),
-            ("extendedDynamicState2PatchControlPoints", self.extended_dynamic_state2_patch_control_points),
-            ("extendedDynamicState3TessellationDomainOrigin", self.extended_dynamic_state3_tessellation_domain_origin),
-            ("extendedDynamicState3DepthClampEnable", self.extended_dynamic_state3_depth_clamp_enable),
-            ("extendedDynamicState3PolygonMode", self.extended_dynamic_state3_polygon_mode),
-            ("extendedDynamicState3RasterizationSamples", self.extended_dynamic_state3_rasterization_samples),
-            ("extendedDynamicState3SampleMask", self.extended_dynamic_state3_sample_mask),
-            ("extendedDynamicState3AlphaToCoverageEnable", self.extended_dynamic_state3_alpha_to_coverage_enable),
-            ("extendedDynamicState3AlphaToOneEnable", self.extended_dynamic_state3_alpha_to_one_enable),
-            ("extendedDynamicState3LogicOpEnable", self.extended_dynamic_state3_logic_op_enable),
-            ("extendedDynamicState3ColorBlendEnable", self.extended_dynamic_state3_color_blend_enable),
-            ("extendedDynamicState3ColorBlendEquation", self.extended_dynamic_state3_color_blend_equation),
-            ("extendedDynamicState3ColorWriteMask", self.extended_dynamic_state3_color_write_mask),
-            ("extendedDynamicState3RasterizationStream", self.extended_dynamic_state3_rasterization_stream),
-            (
-                "extendedDynamicState3ConservativeRasterizationMode",
-                self.extended_dynamic_state3_conservative_rasterization_mode,
-            ),
-            (
-                "extendedDynamicState3ExtraPrimitiveOverestimationSize",
-                self.extended_dynamic_state3_extra_primitive_overestimation_size,
-            ),
-            ("extendedDynamicState3DepthClipEnable", self.extended_dynamic_state3_depth_clip_enable),
-            ("extendedDynamicState3SampleLocationsEnable", self.extended_dynamic_state3_sample_locations_enable),
-            ("extendedDynamicState3ColorBlendAdvanced", self.extended_dynamic_state3_color_blend_advanced),
-            ("extendedDynamicState3ProvokingVertexMode", self.extended_dynamic_state3_provoking_vertex_mode),
-            ("extendedDynamicState3LineRasterizationMode", self.extended_dynamic_state3_line_rasterization_mode),
-            ("extendedDynamicState3LineStippleEnable", self.extended_dynamic_state3_line_stipple_enable),
-            (
-                "extendedDynamicState3DepthClipNegativeOneToOne",
-                self.extended_dynamic_state3_depth_clip_negative_one_to_one,
-            ),
-            ("extendedDynamicState3ViewportWScalingEnable", self.extended_dynamic_state3_viewport_w_scaling_enable),
-            ("extendedDynamicState3ViewportSwizzle", self.extended_dynamic_state3_viewport_swizzle),
-            ("extendedDynamicState3CoverageToColorEnable", self.extended_dynamic_state3_coverage_to_color_enable),
-            ("extendedDynamicState3CoverageToColorLocation", self.extended_dynamic_state3_coverage_to_color_location),
-            ("extendedDynamicState3CoverageModulationMode", self.extended_dynamic_state3_coverage_modulation_mode),
-            (
-                "extendedDynamicState3CoverageModulationTableEnable",
-                self.extended_dynamic_state3_coverage_modulation_table_enable,
-            ),
-            ("extendedDynamicState3CoverageModulationTable", self.extended_dynamic_state3_coverage_modulation_table),
-            ("extendedDynamicState3CoverageReductionMode", self.extended_dynamic_state3_coverage_reduction_mode),
-            (
-                "extendedDynamicState3RepresentativeFragmentTestEnable",
-                self.extended_dynamic_state3_representative_fragment_test_enable,
-            ),
-            ("extendedDynamicState3ShadingRateImageEnable", self.extended_dynamic_state3_shading_rate_image_enable),
-            ("graphicsPipelineLibrary", self.graphics_pipeline_library),
-            ("image2DViewOf3D", self.image2_d_view_of3_d),
-            ("sampler2DViewOf3D", self.sampler2_d_view_of3_d),
-            ("indexTypeUint8", self.index_type_uint8),
-            ("rectangularLines", self.rectangular_lines),
-            ("bresenhamLines", self.bresenham_lines),
-            ("smoothLines", self.smooth_lines),
-            ("stippledRectangularLines", self.stippled_rectangular_lines),
-            ("stippledBresenhamLines", self.stippled_bresenham_lines),
-            ("stippledSmoothLines", self.stippled_smooth_lines),
-            ("multiDraw", self.multi_draw),
-            ("nonSeamlessCubeMap", self.non_seamless_cube_map),
-            ("primitiveTopologyListRestart", self.primitive_topology_list_restart),
-            ("primitiveTopologyPatchListRestart", self.primitive_topology_patch_list_restart),
-            ("primitivesGeneratedQuery", self.primitives_generated_query),
-            ("primitivesGeneratedQueryWithRasterizerDiscard", self.primitives_generated_query_with_rasterizer_discard),
-            ("primitivesGeneratedQueryWithNonZeroStreams", self.primitives_generated_query_with_non_zero_streams),
-            ("provokingVertexLast", self.provoking_vertex_last),
-            ("transformFeedbackPreservesProvokingVertex", self.transform_feedback_preserves_provoking_vertex),
-            ("robustBufferAccess2", self.robust_buffer_access2),
-            ("robustImageAccess2", self.robust_image_access2),
-            ("nullDescriptor", self.null_descriptor),
-            ("shaderBufferFloat32Atomics", self.shader_buffer_float32_atomics),
-            ("shaderBufferFloat32AtomicAdd", self.shader_buffer_float32_atomic_add),
-            ("shaderBufferFloat64Atomics", self.shader_buffer_float64_atomics),
-            ("shaderBufferFloat64AtomicAdd", self.shader_buffer_float64_atomic_add),
-            ("shaderSharedFloat32Atomics", self.shader_shared_float32_atomics),
-            ("shaderSharedFloat32AtomicAdd", self.shader_shared_float32_atomic_add),
-            ("shaderSharedFloat64Atomics", self.shader_shared_float64_atomics),
-            ("shaderSharedFloat64AtomicAdd", self.shader_shared_float64_atomic_add),
-            ("shaderImageFloat32Atomics", self.shader_image_float32_atomics),
-            ("shaderImageFloat32AtomicAdd", self.shader_image_float32_atomic_add),
-            ("sparseImageFloat32Atomics", self.sparse_image_float32_atomics),
-            ("sparseImageFloat32AtomicAdd", self.sparse_image_float32_atomic_add),
-            ("shaderBufferFloat16Atomics", self.shader_buffer_float16_atomics),
-            ("shaderBufferFloat16AtomicAdd", self.shader_buffer_float16_atomic_add),
-            ("shaderBufferFloat16AtomicMinMax", self.shader_buffer_float16_atomic_min_max),
-            ("shaderBufferFloat32AtomicMinMax", self.shader_buffer_float32_atomic_min_max),
-            ("shaderBufferFloat64AtomicMinMax", self.shader_buffer_float64_atomic_min_max),
-            ("shaderSharedFloat16Atomics", self.shader_shared_float16_atomics),
-            ("shaderSharedFloat16AtomicAdd", self.shader_shared_float16_atomic_add),
-            ("shaderSharedFloat16AtomicMinMax", self.shader_shared_float16_atomic_min_max),
-            ("shaderSharedFloat32AtomicMinMax", self.shader_shared_float32_atomic_min_max),
-            ("shaderSharedFloat64AtomicMinMax", self.shader_shared_float64_atomic_min_max),
-            ("shaderImageFloat32AtomicMinMax", self.shader_image_float32_atomic_min_max),
-            ("sparseImageFloat32AtomicMinMax", self.sparse_image_float32_atomic_min_max),
-            ("texelBufferAlignment", self.texel_buffer_alignment),
-            ("transformFeedback", self.transform_feedback),
-            ("geometryStreams", self.geometry_streams),
-            ("vertexAttributeInstanceRateDivisor", self.vertex_attribute_instance_rate_divisor),
-            ("vertexAttributeInstanceRateZeroDivisor", self.vertex_attribute_instance_rate_zero_divisor),
-            ("vertexInputDynamicState", self.vertex_input_dynamic_state),
-            ("gaussianPrimitiveTopology", self.gaussian_primitive_topology),
-            ("vertexShaderProjection", self.vertex_shader_projection),
-            ("resolveFragmentShader", self.resolve_fragment_shader),
-            ("radialDistanceOrder", self.radial_distance_order),
-            ("primitiveOrder", self.primitive_order),
-            ("perPixelOrder", self.per_pixel_order),
-            ("rasterizationFloat16", self.rasterization_float16),
-            ("opacityCompensation", self.opacity_compensation),
-            ("orthographicCamera", self.orthographic_camera),
-            ("fisheyeCamera", self.fisheye_camera),
-            ("equirectangularCamera", self.equirectangular_camera),
-            ("unscentedProjection", self.unscented_projection),
-            ("gaussian2D", self.gaussian_2d),
-            ("uniformBufferCamera", self.uniform_buffer_camera),
-            ("mergedDraws", self.merged_draws),
-            ("gaussianInstancing", self.gaussian_instancing),
-            ("gaussianDepthStencil", self.gaussian_depth_stencil),
-            ("gaussianMultisample", self.gaussian_multisample),
-            ("gaussianApproximation", self.gaussian_approximation),
-            ("gaussianMultiview", self.gaussian_multiview),
-            ("attributeActivation", self.attribute_activation),
-            ("sphericalHarmonicsBuffer", self.spherical_harmonics_buffer),
-            ("gaussianDynamicState", self.gaussian_dynamic_state),
-            ("resolveGaussianIndices", self.resolve_gaussian_indices),
-            ("gaussianCutOff", self.gaussian_cut_off),
-            ("opacityCompensationFloor", self.opacity_compensation_floor),
-            ("performanceCounterQueryPools", self.performance_counter_query_pools),
-            ("performanceCounterMultipleQueryPools", self.performance_counter_multiple_query_pools),
-            ("shaderSubgroupClock", self.shader_subgroup_clock),
-            ("shaderDeviceClock", self.shader_device_clock),
-            ("workgroupMemoryExplicitLayout", self.workgroup_memory_explicit_layout),
-            (
-                "workgroupMemoryExplicitLayoutScalarBlockLayout",
-                self.workgroup_memory_explicit_layout_scalar_block_layout,
-            ),
-            ("workgroupMemoryExplicitLayout8BitAccess", self.workgroup_memory_explicit_layout8_bit_access),
-            ("workgroupMemoryExplicitLayout16BitAccess", self.workgroup_memory_explicit_layout16_bit_access),
-        ]
-    }
-
-    /// The features of the core structure.
-    pub(crate) fn core(&self) -> vk::PhysicalDeviceFeatures {
-        vk::PhysicalDeviceFeatures {
-            robust_buffer_access: self.robust_buffer_access.into(),
-            full_draw_index_uint32: self.full_draw_index_uint32.into(),
-            image_cube_array: self.image_cube_array.into(),
-            independent_blend: self.independent_blend.into(),
-            geometry_shader: self.geometry_shader.into(),
-            tessellation_shader: self.tessellation_shader.into(),
-            sample_rate_shading: self.sample_rate_shading.into(),
-            dual_src_blend: self.dual_src_blend.into(),
-            logic_op: self.logic_op.into(),
-            multi_draw_indirect: self.multi_draw_indirect.into(),
-            draw_indirect_first_instance: self.draw_indirect_first_instance.into(),
-            depth_clamp: self.depth_clamp.into(),
-            depth_bias_clamp: self.depth_bias_clamp.into(),
-            fill_mode_non_solid: self.fill_mode_non_solid.into(),
-            depth_bounds: self.depth_bounds.into(),
-            wide_lines: self.wide_lines.into(),
-            large_points: self.large_points.into(),
-            alpha_to_one: self.alpha_to_one.into(),
-            multi_viewport: self.multi_viewport.into(),
-            sampler_anisotropy: self.sampler_anisotropy.into(),
-            texture_compression_etc2: self.texture_compression_etc2.into(),
-            texture_compression_astc_ldr: self.texture_compression_astc_ldr.into(),
-            texture_compression_bc: self.texture_compression_bc.into(),
-            occlusion_query_precise: self.occlusion_query_precise.into(),
-            pipeline_statistics_query: self.pipeline_statistics_query.into(),
-            vertex_pipeline_stores_and_atomics: self.vertex_pipeline_stores_and_atomics.into(),
-            fragment_stores_and_atomics: self.fragment_stores_and_atomics.into(),
-            shader_tessellation_and_geometry_point_size: self.shader_tessellation_and_geometry_point_size.into(),
-            shader_image_gather_extended: self.shader_image_gather_extended.into(),
-            shader_storage_image_extended_formats: self.shader_storage_image_extended_formats.into(),
-            shader_storage_image_multisample: self.shader_storage_image_multisample.into(),
-            shader_storage_image_read_without_format: self.shader_storage_image_read_without_format.into(),
-            shader_storage_image_write_without_format: self.shader_storage_image_write_without_format.into(),
-            shader_uniform_buffer_array_dynamic_indexing: self.shader_uniform_buffer_array_dynamic_indexing.into(),
-            shader_sampled_image_array_dynamic_indexing: self.shader_sampled_image_array_dynamic_indexing.into(),
-            shader_storage_buffer_array_dynamic_indexing: self.shader_storage_buffer_array_dynamic_indexing.into(),
-            shader_storage_image_array_dynamic_indexing: self.shader_storage_image_array_dynamic_indexing.into(),
-            shader_clip_distance: self.shader_clip_distance.into(),
-            shader_cull_distance: self.shader_cull_distance.into(),
-            shader_float64: self.shader_float64.into(),
-            shader_int64: self.shader_int64.into(),
-            shader_int16: self.shader_int16.into(),
-            shader_resource_residency: self.shader_resource_residency.into(),
-            shader_resource_min_lod: self.shader_resource_min_lod.into(),
-            sparse_binding: self.sparse_binding.into(),
-            sparse_residency_buffer: self.sparse_residency_buffer.into(),
-            sparse_residency_image2_d: self.sparse_residency_image2_d.into(),
-            sparse_residency_image3_d: self.sparse_residency_image3_d.into(),
-            sparse_residency2_samples: self.sparse_residency2_samples.into(),
-            sparse_residency4_samples: self.sparse_residency4_samples.into(),
-            sparse_residency8_samples: self.sparse_residency8_samples.into(),
-            sparse_residency16_samples: self.sparse_residency16_samples.into(),
-            sparse_residency_aliased: self.sparse_residency_aliased.into(),
-            variable_multisample_rate: self.variable_multisample_rate.into(),
-            inherited_queries: self.inherited_queries.into(),
-        }
-    }
-
-    /// Adds the features that the core structure requests.
-    pub(crate) fn add_core(&mut self, requested: &vk::PhysicalDeviceFeatures) {
-        self.robust_buffer_access |= requested.robust_buffer_access != vk::FALSE;
-        self.full_draw_index_uint32 |= requested.full_draw_index_uint32 != vk::FALSE;
-        self.image_cube_array |= requested.image_cube_array != vk::FALSE;
-        self.independent_blend |= requested.independent_blend != vk::FALSE;
-        self.geometry_shader |= requested.geometry_shader != vk::FALSE;
-        self.tessellation_shader |= requested.tessellation_shader != vk::FALSE;
-        self.sample_rate_shading |= requested.sample_rate_shading != vk::FALSE;
-        self.dual_src_blend |= requested.dual_src_blend != vk::FALSE;
-        self.logic_op |= requested.logic_op != vk::FALSE;
-        self.multi_draw_indirect |= requested.multi_draw_indirect != vk::FALSE;
-        self.draw_indirect_first_instance |= requested.draw_indirect_first_instance != vk::FALSE;
-        self.depth_clamp |= requested.depth_clamp != vk::FALSE;
-        self.depth_bias_clamp |= requested.depth_bias_clamp != vk::FALSE;
-        self.fill_mode_non_solid |= requested.fill_mode_non_solid != vk::FALSE;
-        self.depth_bounds |= requested.depth_bounds != vk::FALSE;
-        self.wide_lines |= requested.wide_lines != vk::FALSE;
-        self.large_points |= requested.large_points != vk::FALSE;
-        self.alpha_to_one |= requested.alpha_to_one != vk::FALSE;
-        self.multi_viewport |= requested.multi_viewport != vk::FALSE;
-        self.sampler_anisotropy |= requested.sampler_anisotropy != vk::FALSE;
-        self.texture_compression_etc2 |= requested.texture_compression_etc2 != vk::FALSE;
-        self.texture_compression_astc_ldr |= requested.texture_compression_astc_ldr != vk::FALSE;
-        self.texture_compression_bc |= requested.texture_compression_bc != vk::FALSE;
-        self.occlusion_query_precise |= requested.occlusion_query_precise != vk::FALSE;
-        self.pipeline_statistics_query |= requested.pipeline_statistics_query != vk::FALSE;
-        self.vertex_pipeline_stores_and_atomics |= requested.vertex_pipeline_stores_and_atomics != vk::FALSE;
-        self.fragment_stores_and_atomics |= requested.fragment_stores_and_atomics != vk::FALSE;
-        self.shader_tessellation_and_geometry_point_size |=
-            requested.shader_tessellation_and_geometry_point_size != vk::FALSE;
-        self.shader_image_gather_extended |= requested.shader_image_gather_extended != vk::FALSE;
-        self.shader_storage_image_extended_formats |= requested.shader_storage_image_extended_formats != vk::FALSE;
-        self.shader_storage_image_multisample |= requested.shader_storage_image_multisample != vk::FALSE;
-        self.shader_storage_image_read_without_format |=
-            requested.shader_storage_image_read_without_format != vk::FALSE;
-        self.shader_storage_image_write_without_format |=
-            requested.shader_storage_image_write_without_format != vk::FALSE;
-        self.shader_uniform_buffer_array_dynamic_indexing |=
-            requested.shader_uniform_buffer_array_dynamic_indexing != vk::FALSE;
-        self.shader_sampled_image_array_dynamic_indexing |=
-            requested.shader_sampled_image_array_dynamic_indexing != vk::FALSE;
-        self.shader_storage_buffer_array_dynamic_indexing |=
-            requested.shader_storage_buffer_array_dynamic_indexing != vk::FALSE;
-        self.shader_storage_image_array_dynamic_indexing |=
-            requested.shader_storage_image_array_dynamic_indexing != vk::FALSE;
-        self.shader_clip_distance |= requested.shader_clip_distance != vk::FALSE;
-        self.shader_cull_distance |= requested.shader_cull_distance != vk::FALSE;
-        self.shader_float64 |= requested.shader_float64 != vk::FALSE;
-        self.shader_int64 |= requested.shader_int64 != vk::FALSE;
-        self.shader_int16 |= requested.shader_int16 != vk::FALSE;
-        self.shader_resource_residency |= requested.shader_resource_residency != vk::FALSE;
-        self.shader_resource_min_lod |= requested.shader_resource_min_lod != vk::FALSE;
-        self.sparse_binding |= requested.sparse_binding != vk::FALSE;
-        self.sparse_residency_buffer |= requested.sparse_residency_buffer != vk::FALSE;
-        self.sparse_residency_image2_d |= requested.sparse_residency_image2_d != vk::FALSE;
-        self.sparse_residency_image3_d |= requested.sparse_residency_image3_d != vk::FALSE;
-        self.sparse_residency2_samples |= requested.sparse_residency2_samples != vk::FALSE;
-        self.sparse_residency4_samples |= requested.sparse_residency4_samples != vk::FALSE;
-        self.sparse_residency8_samples |= requested.sparse_residency8_samples != vk::FALSE;
-        self.sparse_residency16_samples |= requested.sparse_residency16_samples != vk::FALSE;
-        self.sparse_residency_aliased |= requested.sparse_residency_aliased != vk::FALSE;
-        self.variable_multisample_rate |= requested.variable_multisample_rate != vk::FALSE;
-        self.inherited_queries |= requested.inherited_queries != vk::FALSE;
-    }
-
-    /// Writes the features to a structure of a chain, if it holds any that are known here.
-    pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan11Features<'_>>() {
-            out.storage_buffer16_bit_access = self.storage_buffer16_bit_access.into();
-            out.uniform_and_storage_buffer16_bit_access = self.uniform_and_storage_buffer16_bit_access.into();
-            out.storage_push_constant16 = self.storage_push_constant16.into();
-            out.storage_input_output16 = self.storage_input_output16.into();
-            out.multiview = self.multiview.into();
-            out.multiview_geometry_shader = self.multiview_geometry_shader.into();
-            out.multiview_tessellation_shader = self.multiview_tessellation_shader.into();
-            out.variable_pointers_storage_buffer = self.variable_pointers_storage_buffer.into();
-            out.variable_pointers = self.variable_pointers.into();
-            out.protected_memory = self.protected_memory.into();
-            out.sampler_ycbcr_conversion = self.sampler_ycbcr_conversion.into();
-            out.shader_draw_parameters = self.shader_draw_parameters.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan12Features<'_>>() {
-            out.sampler_mirror_clamp_to_edge = self.sampler_mirror_clamp_to_edge.into();
-            out.draw_indirect_count = self.draw_indirect_count.into();
-            out.storage_buffer8_bit_access = self.storage_buffer8_bit_access.into();
-            out.uniform_and_storage_buffer8_bit_access = self.uniform_and_storage_buffer8_bit_access.into();
-            out.storage_push_constant8 = self.storage_push_constant8.into();
-            out.shader_buffer_int64_atomics = self.shader_buffer_int64_atomics.into();
-            out.shader_shared_int64_atomics = self.shader_shared_int64_atomics.into();
-            out.shader_float16 = self.shader_float16.into();
-            out.shader_int8 = self.shader_int8.into();
-            out.descriptor_indexing = self.descriptor_indexing.into();
-            out.shader_input_attachment_array_dynamic_indexing =
-                self.shader_input_attachment_array_dynamic_indexing.into();
-            out.shader_uniform_texel_buffer_array_dynamic_indexing =
-                self.shader_uniform_texel_buffer_array_dynamic_indexing.into();
-            out.shader_storage_texel_buffer_array_dynamic_indexing =
-                self.shader_storage_texel_buffer_array_dynamic_indexing.into();
-            out.shader_uniform_buffer_array_non_uniform_indexing =
-                self.shader_uniform_buffer_array_non_uniform_indexing.into();
-            out.shader_sampled_image_array_non_uniform_indexing =
-                self.shader_sampled_image_array_non_uniform_indexing.into();
-            out.shader_storage_buffer_array_non_uniform_indexing =
-                self.shader_storage_buffer_array_non_uniform_indexing.into();
-            out.shader_storage_image_array_non_uniform_indexing =
-                self.shader_storage_image_array_non_uniform_indexing.into();
-            out.shader_input_attachment_array_non_uniform_indexing =
-                self.shader_input_attachment_array_non_uniform_indexing.into();
-            out.shader_uniform_texel_buffer_array_non_uniform_indexing =
-                self.shader_uniform_texel_buffer_array_non_uniform_indexing.into();
-            out.shader_storage_texel_buffer_array_non_uniform_indexing =
-                self.shader_storage_texel_buffer_array_non_uniform_indexing.into();
-            out.descriptor_binding_uniform_buffer_update_after_bind =
-                self.descriptor_binding_uniform_buffer_update_after_bind.into();
-            out.descriptor_binding_sampled_image_update_after_bind =
-                self.descriptor_binding_sampled_image_update_after_bind.into();
-            out.descriptor_binding_storage_image_update_after_bind =
-                self.descriptor_binding_storage_image_update_after_bind.into();
-            out.descriptor_binding_storage_buffer_update_after_bind =
-                self.descriptor_binding_storage_buffer_update_after_bind.into();
-            out.descriptor_binding_uniform_texel_buffer_update_after_bind =
-                self.descriptor_binding_uniform_texel_buffer_update_after_bind.into();
-            out.descriptor_binding_storage_texel_buffer_update_after_bind =
-                self.descriptor_binding_storage_texel_buffer_update_after_bind.into();
-            out.descriptor_binding_update_unused_while_pending =
-                self.descriptor_binding_update_unused_while_pending.into();
-            out.descriptor_binding_partially_bound = self.descriptor_binding_partially_bound.into();
-            out.descriptor_binding_variable_descriptor_count = self.descriptor_binding_variable_descriptor_count.into();
-            out.runtime_descriptor_array = self.runtime_descriptor_array.into();
-            out.sampler_filter_minmax = self.sampler_filter_minmax.into();
-            out.scalar_block_layout = self.scalar_block_layout.into();
-            out.imageless_framebuffer = self.imageless_framebuffer.into();
-            out.uniform_buffer_standard_layout = self.uniform_buffer_standard_layout.into();
-            out.shader_subgroup_extended_types = self.shader_subgroup_extended_types.into();
-            out.separate_depth_stencil_layouts = self.separate_depth_stencil_layouts.into();
-            out.host_query_reset = self.host_query_reset.into();
-            out.timeline_semaphore = self.timeline_semaphore.into();
-            out.buffer_device_address = self.buffer_device_address.into();
-            out.buffer_device_address_capture_replay = self.buffer_device_address_capture_replay.into();
-            out.buffer_device_address_multi_device = self.buffer_device_address_multi_device.into();
-            out.vulkan_memory_model = self.vulkan_memory_model.into();
-            out.vulkan_memory_model_device_scope = self.vulkan_memory_model_device_scope.into();
-            out.vulkan_memory_model_availability_visibility_chains =
-                self.vulkan_memory_model_availability_visibility_chains.into();
-            out.shader_output_viewport_index = self.shader_output_viewport_index.into();
-            out.shader_output_layer = self.shader_output_layer.into();
-            out.subgroup_broadcast_dynamic_id = self.subgroup_broadcast_dynamic_id.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan13Features<'_>>() {
-            out.robust_image_access = self.robust_image_access.into();
-            out.inline_uniform_block = self.inline_uniform_block.into();
-            out.descriptor_binding_inline_uniform_block_update_after_bind =
-                self.descriptor_binding_inline_uniform_block_update_after_bind.into();
-            out.pipeline_creation_cache_control = self.pipeline_creation_cache_control.into();
-            out.private_data = self.private_data.into();
-            out.shader_demote_to_helper_invocation = self.shader_demote_to_helper_invocation.into();
-            out.shader_terminate_invocation = self.shader_terminate_invocation.into();
-            out.subgroup_size_control = self.subgroup_size_control.into();
-            out.compute_full_subgroups = self.compute_full_subgroups.into();
-            out.synchronization2 = self.synchronization2.into();
-            out.texture_compression_astc_hdr = self.texture_compression_astc_hdr.into();
-            out.shader_zero_initialize_workgroup_memory = self.shader_zero_initialize_workgroup_memory.into();
-            out.dynamic_rendering = self.dynamic_rendering.into();
-            out.shader_integer_dot_product = self.shader_integer_dot_product.into();
-            out.maintenance4 = self.maintenance4.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>() {
-            out.protected_memory = self.protected_memory.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>() {
-            out.storage_buffer16_bit_access = self.storage_buffer16_bit_access.into();
-            out.uniform_and_storage_buffer16_bit_access = self.uniform_and_storage_buffer16_bit_access.into();
-            out.storage_push_constant16 = self.storage_push_constant16.into();
-            out.storage_input_output16 = self.storage_input_output16.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>() {
-            out.variable_pointers_storage_buffer = self.variable_pointers_storage_buffer.into();
-            out.variable_pointers = self.variable_pointers.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>() {
-            out.sampler_ycbcr_conversion = self.sampler_ycbcr_conversion.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>() {
-            out.multiview = self.multiview.into();
-            out.multiview_geometry_shader = self.multiview_geometry_shader.into();
-            out.multiview_tessellation_shader = self.multiview_tessellation_shader.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>() {
-            out.shader_draw_parameters = self.shader_draw_parameters.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>() {
-            out.vulkan_memory_model = self.vulkan_memory_model.into();
-            out.vulkan_memory_model_device_scope = self.vulkan_memory_model_device_scope.into();
-            out.vulkan_memory_model_availability_visibility_chains =
-                self.vulkan_memory_model_availability_visibility_chains.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>() {
-            out.host_query_reset = self.host_query_reset.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>() {
-            out.timeline_semaphore = self.timeline_semaphore.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>() {
-            out.buffer_device_address = self.buffer_device_address.into();
-            out.buffer_device_address_capture_replay = self.buffer_device_address_capture_replay.into();
-            out.buffer_device_address_multi_device = self.buffer_device_address_multi_device.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>() {
-            out.storage_buffer8_bit_access = self.storage_buffer8_bit_access.into();
-            out.uniform_and_storage_buffer8_bit_access = self.uniform_and_storage_buffer8_bit_access.into();
-            out.storage_push_constant8 = self.storage_push_constant8.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>() {
-            out.shader_buffer_int64_atomics = self.shader_buffer_int64_atomics.into();
-            out.shader_shared_int64_atomics = self.shader_shared_int64_atomics.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>() {
-            out.shader_float16 = self.shader_float16.into();
-            out.shader_int8 = self.shader_int8.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>() {
-            out.shader_input_attachment_array_dynamic_indexing =
-                self.shader_input_attachment_array_dynamic_indexing.into();
-            out.shader_uniform_texel_buffer_array_dynamic_indexing =
-                self.shader_uniform_texel_buffer_array_dynamic_indexing.into();
-            out.shader_storage_texel_buffer_array_dynamic_indexing =
-                self.shader_storage_texel_buffer_array_dynamic_indexing.into();
-            out.shader_uniform_buffer_array_non_uniform_indexing =
-                self.shader_uniform_buffer_array_non_uniform_indexing.into();
-            out.shader_sampled_image_array_non_uniform_indexing =
-                self.shader_sampled_image_array_non_uniform_indexing.into();
-            out.shader_storage_buffer_array_non_uniform_indexing =
-                self.shader_storage_buffer_array_non_uniform_indexing.into();
-            out.shader_storage_image_array_non_uniform_indexing =
-                self.shader_storage_image_array_non_uniform_indexing.into();
-            out.shader_input_attachment_array_non_uniform_indexing =
-                self.shader_input_attachment_array_non_uniform_indexing.into();
-            out.shader_uniform_texel_buffer_array_non_uniform_indexing =
-                self.shader_uniform_texel_buffer_array_non_uniform_indexing.into();
-            out.shader_storage_texel_buffer_array_non_uniform_indexing =
-                self.shader_storage_texel_buffer_array_non_uniform_indexing.into();
-            out.descriptor_binding_uniform_buffer_update_after_bind =
-                self.descriptor_binding_uniform_buffer_update_after_bind.into();
-            out.descriptor_binding_sampled_image_update_after_bind =
-                self.descriptor_binding_sampled_image_update_after_bind.into();
-            out.descriptor_binding_storage_image_update_after_bind =
-                self.descriptor_binding_storage_image_update_after_bind.into();
-            out.descriptor_binding_storage_buffer_update_after_bind =
-                self.descriptor_binding_storage_buffer_update_after_bind.into();
-            out.descriptor_binding_uniform_texel_buffer_update_after_bind =
-                self.descriptor_binding_uniform_texel_buffer_update_after_bind.into();
-            out.descriptor_binding_storage_texel_buffer_update_after_bind =
-                self.descriptor_binding_storage_texel_buffer_update_after_bind.into();
-            out.descriptor_binding_update_unused_while_pending =
-                self.descriptor_binding_update_unused_while_pending.into();
-            out.descriptor_binding_partially_bound = self.descriptor_binding_partially_bound.into();
-            out.descriptor_binding_variable_descriptor_count = self.descriptor_binding_variable_descriptor_count.into();
-            out.runtime_descriptor_array = self.runtime_descriptor_array.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>() {
-            out.scalar_block_layout = self.scalar_block_layout.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>() {
-            out.uniform_buffer_standard_layout = self.uniform_buffer_standard_layout.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>() {
-            out.shader_subgroup_extended_types = self.shader_subgroup_extended_types.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>() {
-            out.imageless_framebuffer = self.imageless_framebuffer.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>() {
-            out.separate_depth_stencil_layouts = self.separate_depth_stencil_layouts.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>() {
-            out.private_data = self.private_data.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSynchronization2Features<'_>>() {
-            out.synchronization2 = self.synchronization2.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>() {
-            out.texture_compression_astc_hdr = self.texture_compression_astc_hdr.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance4Features<'_>>() {
-            out.maintenance4 = self.maintenance4.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>() {
-            out.shader_terminate_invocation = self.shader_terminate_invocation.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>() {
-            out.shader_demote_to_helper_invocation = self.shader_demote_to_helper_invocation.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>() {
-            out.pipeline_creation_cache_control = self.pipeline_creation_cache_control.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>() {
-            out.shader_zero_initialize_workgroup_memory = self.shader_zero_initialize_workgroup_memory.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>() {
-            out.robust_image_access = self.robust_image_access.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>() {
-            out.subgroup_size_control = self.subgroup_size_control.into();
-            out.compute_full_subgroups = self.compute_full_subgroups.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>() {
-            out.inline_uniform_block = self.inline_uniform_block.into();
-            out.descriptor_binding_inline_uniform_block_update_after_bind =
-                self.descriptor_binding_inline_uniform_block_update_after_bind.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>() {
-            out.shader_integer_dot_product = self.shader_integer_dot_product.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
-            out.dynamic_rendering = self.dynamic_rendering.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>() {
-            out.shader_early_and_late_fragment_tests = self.shader_early_and_late_fragment_tests.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>() {
-            out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
-            out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>() {
-            out.attachment_feedback_loop_layout = self.attachment_feedback_loop_layout.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>() {
-            out.border_color_swizzle = self.border_color_swizzle.into();
-            out.border_color_swizzle_from_image = self.border_color_swizzle_from_image.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>() {
-            out.color_write_enable = self.color_write_enable.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>() {
-            out.conditional_rendering = self.conditional_rendering.into();
-            out.inherited_conditional_rendering = self.inherited_conditional_rendering.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>() {
-            out.custom_border_colors = self.custom_border_colors.into();
-            out.custom_border_color_without_format = self.custom_border_color_without_format.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>() {
-            out.depth_clamp_zero_one = self.depth_clamp_zero_one.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>() {
-            out.depth_clip_control = self.depth_clip_control.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>() {
-            out.depth_clip_enable = self.depth_clip_enable.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>() {
-            out.extended_dynamic_state = self.extended_dynamic_state.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>() {
-            out.extended_dynamic_state2 = self.extended_dynamic_state2.into();
-            out.extended_dynamic_state2_logic_op = self.extended_dynamic_state2_logic_op.into();
-            out.extended_dynamic_state2_patch_control_points = self.extended_dynamic_state2_patch_control_points.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>() {
-            out.extended_dynamic_state3_tessellation_domain_origin =
-                self.extended_dynamic_state3_tessellation_domain_origin.into();
-            out.extended_dynamic_state3_depth_clamp_enable = self.extended_dynamic_state3_depth_clamp_enable.into();
-            out.extended_dynamic_state3_polygon_mode = self.extended_dynamic_state3_polygon_mode.into();
-            out.extended_dynamic_state3_rasterization_samples =
-                self.extended_dynamic_state3_rasterization_samples.into();
-            out.extended_dynamic_state3_sample_mask = self.extended_dynamic_state3_sample_mask.into();
-            out.extended_dynamic_state3_alpha_to_coverage_enable =
-                self.extended_dynamic_state3_alpha_to_coverage_enable.into();
-            out.extended_dynamic_state3_alpha_to_one_enable = self.extended_dynamic_state3_alpha_to_one_enable.into();
-            out.extended_dynamic_state3_logic_op_enable = self.extended_dynamic_state3_logic_op_enable.into();
-            out.extended_dynamic_state3_color_blend_enable = self.extended_dynamic_state3_color_blend_enable.into();
-            out.extended_dynamic_state3_color_blend_equation = self.extended_dynamic_state3_color_blend_equation.into();
-            out.extended_dynamic_state3_color_write_mask = self.extended_dynamic_state3_color_write_mask.into();
-            out.extended_dynamic_state3_rasterization_stream = self.extended_dynamic_state3_rasterization_stream.into();
-            out.extended_dynamic_state3_conservative_rasterization_mode =
-                self.extended_dynamic_state3_conservative_rasterization_mode.into();
-            out.extended_dynamic_state3_extra_primitive_overestimation_size =
-                self.extended_dynamic_state3_extra_primitive_overestimation_size.into();
-            out.extended_dynamic_state3_depth_clip_enable = self.extended_dynamic_state3_depth_clip_enable.into();
-            out.extended_dynamic_state3_sample_locations_enable =
-                self.extended_dynamic_state3_sample_locations_enable.into();
-            out.extended_dynamic_state3_color_blend_advanced = self.extended_dynamic_state3_color_blend_advanced.into();
-            out.extended_dynamic_state3_provoking_vertex_mode =
-                self.extended_dynamic_state3_provoking_vertex_mode.into();
-            out.extended_dynamic_state3_line_rasterization_mode =
-                self.extended_dynamic_state3_line_rasterization_mode.into();
-            out.extended_dynamic_state3_line_stipple_enable = self.extended_dynamic_state3_line_stipple_enable.into();
-            out.extended_dynamic_state3_depth_clip_negative_one_to_one =
-                self.extended_dynamic_state3_depth_clip_negative_one_to_one.into();
-            out.extended_dynamic_state3_viewport_w_scaling_enable =
-                self.extended_dynamic_state3_viewport_w_scaling_enable.into();
-            out.extended_dynamic_state3_viewport_swizzle = self.extended_dynamic_state3_viewport_swizzle.into();
-            out.extended_dynamic_state3_coverage_to_color_enable =
-                self.extended_dynamic_state3_coverage_to_color_enable.into();
-            out.extended_dynamic_state3_coverage_to_color_location =
-                self.extended_dynamic_state3_coverage_to_color_location.into();
-            out.extended_dynamic_state3_coverage_modulation_mode =
-                self.extended_dynamic_state3_coverage_modulation_mode.into();
-            out.extended_dynamic_state3_coverage_modulation_table_enable =
-                self.extended_dynamic_state3_coverage_modulation_table_enable.into();
-            out.extended_dynamic_state3_coverage_modulation_table =
-                self.extended_dynamic_state3_coverage_modulation_table.into();
-            out.extended_dynamic_state3_coverage_reduction_mode =
-                self.extended_dynamic_state3_coverage_reduction_mode.into();
-            out.extended_dynamic_state3_representative_fragment_test_enable =
-                self.extended_dynamic_state3_representative_fragment_test_enable.into();
-            out.extended_dynamic_state3_shading_rate_image_enable =
-                self.extended_dynamic_state3_shading_rate_image_enable.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>() {
-            out.graphics_pipeline_library = self.graphics_pipeline_library.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>() {
-            out.image2_d_view_of3_d = self.image2_d_view_of3_d.into();
-            out.sampler2_d_view_of3_d = self.sampler2_d_view_of3_d.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
-            out.index_type_uint8 = self.index_type_uint8.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>() {
-            out.rectangular_lines = self.rectangular_lines.into();
-            out.bresenham_lines = self.bresenham_lines.into();
-            out.smooth_lines = self.smooth_lines.into();
-            out.stippled_rectangular_lines = self.stippled_rectangular_lines.into();
-            out.stippled_bresenham_lines = self.stippled_bresenham_lines.into();
-            out.stippled_smooth_lines = self.stippled_smooth_lines.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>() {
-            out.multi_draw = self.multi_draw.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>() {
-            out.non_seamless_cube_map = self.non_seamless_cube_map.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>() {
-            out.primitive_topology_list_restart = self.primitive_topology_list_restart.into();
-            out.primitive_topology_patch_list_restart = self.primitive_topology_patch_list_restart.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>() {
-            out.primitives_generated_query = self.primitives_generated_query.into();
-            out.primitives_generated_query_with_rasterizer_discard =
-                self.primitives_generated_query_with_rasterizer_discard.into();
-            out.primitives_generated_query_with_non_zero_streams =
-                self.primitives_generated_query_with_non_zero_streams.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>() {
-            out.provoking_vertex_last = self.provoking_vertex_last.into();
-            out.transform_feedback_preserves_provoking_vertex =
-                self.transform_feedback_preserves_provoking_vertex.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>() {
-            out.robust_buffer_access2 = self.robust_buffer_access2.into();
-            out.robust_image_access2 = self.robust_image_access2.into();
-            out.null_descriptor = self.null_descriptor.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>() {
-            out.shader_buffer_float32_atomics = self.shader_buffer_float32_atomics.into();
-            out.shader_buffer_float32_atomic_add = self.shader_buffer_float32_atomic_add.into();
-            out.shader_buffer_float64_atomics = self.shader_buffer_float64_atomics.into();
-            out.shader_buffer_float64_atomic_add = self.shader_buffer_float64_atomic_add.into();
-            out.shader_shared_float32_atomics = self.shader_shared_float32_atomics.into();
-            out.shader_shared_float32_atomic_add = self.shader_shared_float32_atomic_add.into();
-            out.shader_shared_float64_atomics = self.shader_shared_float64_atomics.into();
-            out.shader_shared_float64_atomic_add = self.shader_shared_float64_atomic_add.into();
-            out.shader_image_float32_atomics = self.shader_image_float32_atomics.into();
-            out.shader_image_float32_atomic_add = self.shader_image_float32_atomic_add.into();
-            out.sparse_image_float32_atomics = self.sparse_image_float32_atomics.into();
-            out.sparse_image_float32_atomic_add = self.sparse_image_float32_atomic_add.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>() {
-            out.shader_buffer_float16_atomics = self.shader_buffer_float16_atomics.into();
-            out.shader_buffer_float16_atomic_add = self.shader_buffer_float16_atomic_add.into();
-            out.shader_buffer_float16_atomic_min_max = self.shader_buffer_float16_atomic_min_max.into();
-            out.shader_buffer_float32_atomic_min_max = self.shader_buffer_float32_atomic_min_max.into();
-            out.shader_buffer_float64_atomic_min_max = self.shader_buffer_float64_atomic_min_max.into();
-            out.shader_shared_float16_atomics = self.shader_shared_float16_atomics.into();
-            out.shader_shared_float16_atomic_add = self.shader_shared_float16_atomic_add.into();
-            out.shader_shared_float16_atomic_min_max = self.shader_shared_float16_atomic_min_max.into();
-            out.shader_shared_float32_atomic_min_max = self.shader_shared_float32_atomic_min_max.into();
-            out.shader_shared_float64_atomic_min_max = self.shader_shared_float64_atomic_min_max.into();
-            out.shader_image_float32_atomic_min_max = self.shader_image_float32_atomic_min_max.into();
-            out.sparse_image_float32_atomic_min_max = self.sparse_image_float32_atomic_min_max.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>() {
-            out.texel_buffer_alignment = self.texel_buffer_alignment.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>() {
-            out.transform_feedback = self.transform_feedback.into();
-            out.geometry_streams = self.geometry_streams.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>() {
-            out.vertex_attribute_instance_rate_divisor = self.vertex_attribute_instance_rate_divisor.into();
-            out.vertex_attribute_instance_rate_zero_divisor = self.vertex_attribute_instance_rate_zero_divisor.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>() {
-            out.vertex_input_dynamic_state = self.vertex_input_dynamic_state.into();
-        }
-        if let Some(out) = structure.cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>() {
-            out.gaussian_primitive_topology = self.gaussian_primitive_topology.into();
-            out.vertex_shader_projection = self.vertex_shader_projection.into();
-            out.resolve_fragment_shader = self.resolve_fragment_shader.into();
-            out.radial_distance_order = self.radial_distance_order.into();
-            out.primitive_order = self.primitive_order.into();
-            out.per_pixel_order = self.per_pixel_order.into();
-            out.rasterization_float16 = self.rasterization_float16.into();
-            out.opacity_compensation = self.opacity_compensation.into();
-            out.orthographic_camera = self.orthographic_camera.into();
-            out.fisheye_camera = self.fisheye_camera.into();
-            out.equirectangular_camera = self.equirectangular_camera.into();
-            out.unscented_projection = self.unscented_projection.into();
-            out.gaussian_2d = self.gaussian_2d.into();
-            out.uniform_buffer_camera = self.uniform_buffer_camera.into();
-            out.merged_draws = self.merged_draws.into();
-            out.gaussian_instancing = self.gaussian_instancing.into();
-            out.gaussian_depth_stencil = self.gaussian_depth_stencil.into();
-            out.gaussian_multisample = self.gaussian_multisample.into();
-            out.gaussian_approximation = self.gaussian_approximation.into();
-            out.gaussian_multiview = self.gaussian_multiview.into();
-            out.attribute_activation = self.attribute_activation.into();
-            out.spherical_harmonics_buffer = self.spherical_harmonics_buffer.into();
-            out.gaussian_dynamic_state = self.gaussian_dynamic_state.into();
-            out.resolve_gaussian_indices = self.resolve_gaussian_indices.into();
-            out.gaussian_cut_off = self.gaussian_cut_off.into();
-            out.opacity_compensation_floor = self.opacity_compensation_floor.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>() {
-            out.performance_counter_query_pools = self.performance_counter_query_pools.into();
-            out.performance_counter_multiple_query_pools = self.performance_counter_multiple_query_pools.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>() {
-            out.shader_subgroup_clock = self.shader_subgroup_clock.into();
-            out.shader_device_clock = self.shader_device_clock.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>() {
-            out.workgroup_memory_explicit_layout = self.workgroup_memory_explicit_layout.into();
-            out.workgroup_memory_explicit_layout_scalar_block_layout =
-                self.workgroup_memory_explicit_layout_scalar_block_layout.into();
-            out.workgroup_memory_explicit_layout8_bit_access = self.workgroup_memory_explicit_layout8_bit_access.into();
-            out.workgroup_memory_explicit_layout16_bit_access =
-                self.workgroup_memory_explicit_layout16_bit_access.into();
-        }
-    }
-
-    /// Adds the features that a structure of a chain requests, if it holds any that are known here.
-    pub(crate) fn add(&mut self, structure: &vk::BaseInStructure<'_>) {
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan11Features<'_>>(structure) {
-            self.storage_buffer16_bit_access |= requested.storage_buffer16_bit_access != vk::FALSE;
-            self.uniform_and_storage_buffer16_bit_access |=
-                requested.uniform_and_storage_buffer16_bit_access != vk::FALSE;
-            self.storage_push_constant16 |= requested.storage_push_constant16 != vk::FALSE;
-            self.storage_input_output16 |= requested.storage_input_output16 != vk::FALSE;
-            self.multiview |= requested.multiview != vk::FALSE;
-            self.multiview_geometry_shader |= requested.multiview_geometry_shader != vk::FALSE;
-            self.multiview_tessellation_shader |= requested.multiview_tessellation_shader != vk::FALSE;
-            self.variable_pointers_storage_buffer |= requested.variable_pointers_storage_buffer != vk::FALSE;
-            self.variable_pointers |= requested.variable_pointers != vk::FALSE;
-            self.protected_memory |= requested.protected_memory != vk::FALSE;
-            self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
-            self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan12Features<'_>>(structure) {
-            self.sampler_mirror_clamp_to_edge |= requested.sampler_mirror_clamp_to_edge != vk::FALSE;
-            self.draw_indirect_count |= requested.draw_indirect_count != vk::FALSE;
-            self.storage_buffer8_bit_access |= requested.storage_buffer8_bit_access != vk::FALSE;
-            self.uniform_and_storage_buffer8_bit_access |=
-                requested.uniform_and_storage_buffer8_bit_access != vk::FALSE;
-            self.storage_push_constant8 |= requested.storage_push_constant8 != vk::FALSE;
-            self.shader_buffer_int64_atomics |= requested.shader_buffer_int64_atomics != vk::FALSE;
-            self.shader_shared_int64_atomics |= requested.shader_shared_int64_atomics != vk::FALSE;
-            self.shader_float16 |= requested.shader_float16 != vk::FALSE;
-            self.shader_int8 |= requested.shader_int8 != vk::FALSE;
-            self.descriptor_indexing |= requested.descriptor_indexing != vk::FALSE;
-            self.shader_input_attachment_array_dynamic_indexing |=
-                requested.shader_input_attachment_array_dynamic_indexing != vk::FALSE;
-            self.shader_uniform_texel_buffer_array_dynamic_indexing |=
-                requested.shader_uniform_texel_buffer_array_dynamic_indexing != vk::FALSE;
-            self.shader_storage_texel_buffer_array_dynamic_indexing |=
-                requested.shader_storage_texel_buffer_array_dynamic_indexing != vk::FALSE;
-            self.shader_uniform_buffer_array_non_uniform_indexing |=
-                requested.shader_uniform_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_sampled_image_array_non_uniform_indexing |=
-                requested.shader_sampled_image_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_buffer_array_non_uniform_indexing |=
-                requested.shader_storage_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_image_array_non_uniform_indexing |=
-                requested.shader_storage_image_array_non_uniform_indexing != vk::FALSE;
-            self.shader_input_attachment_array_non_uniform_indexing |=
-                requested.shader_input_attachment_array_non_uniform_indexing != vk::FALSE;
-            self.shader_uniform_texel_buffer_array_non_uniform_indexing |=
-                requested.shader_uniform_texel_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_texel_buffer_array_non_uniform_indexing |=
-                requested.shader_storage_texel_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.descriptor_binding_uniform_buffer_update_after_bind |=
-                requested.descriptor_binding_uniform_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_sampled_image_update_after_bind |=
-                requested.descriptor_binding_sampled_image_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_image_update_after_bind |=
-                requested.descriptor_binding_storage_image_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_buffer_update_after_bind |=
-                requested.descriptor_binding_storage_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_uniform_texel_buffer_update_after_bind |=
-                requested.descriptor_binding_uniform_texel_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_texel_buffer_update_after_bind |=
-                requested.descriptor_binding_storage_texel_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_update_unused_while_pending |=
-                requested.descriptor_binding_update_unused_while_pending != vk::FALSE;
-            self.descriptor_binding_partially_bound |= requested.descriptor_binding_partially_bound != vk::FALSE;
-            self.descriptor_binding_variable_descriptor_count |=
-                requested.descriptor_binding_variable_descriptor_count != vk::FALSE;
-            self.runtime_descriptor_array |= requested.runtime_descriptor_array != vk::FALSE;
-            self.sampler_filter_minmax |= requested.sampler_filter_minmax != vk::FALSE;
-            self.scalar_block_layout |= requested.scalar_block_layout != vk::FALSE;
-            self.imageless_framebuffer |= requested.imageless_framebuffer != vk::FALSE;
-            self.uniform_buffer_standard_layout |= requested.uniform_buffer_standard_layout != vk::FALSE;
-            self.shader_subgroup_extended_types |= requested.shader_subgroup_extended_types != vk::FALSE;
-            self.separate_depth_stencil_layouts |= requested.separate_depth_stencil_layouts != vk::FALSE;
-            self.host_query_reset |= requested.host_query_reset != vk::FALSE;
-            self.timeline_semaphore |= requested.timeline_semaphore != vk::FALSE;
-            self.buffer_device_address |= requested.buffer_device_address != vk::FALSE;
-            self.buffer_device_address_capture_replay |= requested.buffer_device_address_capture_replay != vk::FALSE;
-            self.buffer_device_address_multi_device |= requested.buffer_device_address_multi_device != vk::FALSE;
-            self.vulkan_memory_model |= requested.vulkan_memory_model != vk::FALSE;
-            self.vulkan_memory_model_device_scope |= requested.vulkan_memory_model_device_scope != vk::FALSE;
-            self.vulkan_memory_model_availability_visibility_chains |=
-                requested.vulkan_memory_model_availability_visibility_chains != vk::FALSE;
-            self.shader_output_viewport_index |= requested.shader_output_viewport_index != vk::FALSE;
-            self.shader_output_layer |= requested.shader_output_layer != vk::FALSE;
-            self.subgroup_broadcast_dynamic_id |= requested.subgroup_broadcast_dynamic_id != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan13Features<'_>>(structure) {
-            self.robust_image_access |= requested.robust_image_access != vk::FALSE;
-            self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
-            self.descriptor_binding_inline_uniform_block_update_after_bind |=
-                requested.descriptor_binding_inline_uniform_block_update_after_bind != vk::FALSE;
-            self.pipeline_creation_cache_control |= requested.pipeline_creation_cache_control != vk::FALSE;
-            self.private_data |= requested.private_data != vk::FALSE;
-            self.shader_demote_to_helper_invocation |= requested.shader_demote_to_helper_invocation != vk::FALSE;
-            self.shader_terminate_invocation |= requested.shader_terminate_invocation != vk::FALSE;
-            self.subgroup_size_control |= requested.subgroup_size_control != vk::FALSE;
-            self.compute_full_subgroups |= requested.compute_full_subgroups != vk::FALSE;
-            self.synchronization2 |= requested.synchronization2 != vk::FALSE;
-            self.texture_compression_astc_hdr |= requested.texture_compression_astc_hdr != vk::FALSE;
-            self.shader_zero_initialize_workgroup_memory |=
-                requested.shader_zero_initialize_workgroup_memory != vk::FALSE;
-            self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
-            self.shader_integer_dot_product |= requested.shader_integer_dot_product != vk::FALSE;
-            self.maintenance4 |= requested.maintenance4 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>(structure) {
-            self.protected_memory |= requested.protected_memory != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>(structure) {
-            self.storage_buffer16_bit_access |= requested.storage_buffer16_bit_access != vk::FALSE;
-            self.uniform_and_storage_buffer16_bit_access |=
-                requested.uniform_and_storage_buffer16_bit_access != vk::FALSE;
-            self.storage_push_constant16 |= requested.storage_push_constant16 != vk::FALSE;
-            self.storage_input_output16 |= requested.storage_input_output16 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>(structure) {
-            self.variable_pointers_storage_buffer |= requested.variable_pointers_storage_buffer != vk::FALSE;
-            self.variable_pointers |= requested.variable_pointers != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>(structure) {
-            self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>(structure) {
-            self.multiview |= requested.multiview != vk::FALSE;
-            self.multiview_geometry_shader |= requested.multiview_geometry_shader != vk::FALSE;
-            self.multiview_tessellation_shader |= requested.multiview_tessellation_shader != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>(structure) {
-            self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(structure) {
-            self.vulkan_memory_model |= requested.vulkan_memory_model != vk::FALSE;
-            self.vulkan_memory_model_device_scope |= requested.vulkan_memory_model_device_scope != vk::FALSE;
-            self.vulkan_memory_model_availability_visibility_chains |=
-                requested.vulkan_memory_model_availability_visibility_chains != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>(structure) {
-            self.host_query_reset |= requested.host_query_reset != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>(structure) {
-            self.timeline_semaphore |= requested.timeline_semaphore != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(structure) {
-            self.buffer_device_address |= requested.buffer_device_address != vk::FALSE;
-            self.buffer_device_address_capture_replay |= requested.buffer_device_address_capture_replay != vk::FALSE;
-            self.buffer_device_address_multi_device |= requested.buffer_device_address_multi_device != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>(structure) {
-            self.storage_buffer8_bit_access |= requested.storage_buffer8_bit_access != vk::FALSE;
-            self.uniform_and_storage_buffer8_bit_access |=
-                requested.uniform_and_storage_buffer8_bit_access != vk::FALSE;
-            self.storage_push_constant8 |= requested.storage_push_constant8 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>(structure) {
-            self.shader_buffer_int64_atomics |= requested.shader_buffer_int64_atomics != vk::FALSE;
-            self.shader_shared_int64_atomics |= requested.shader_shared_int64_atomics != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>(structure) {
-            self.shader_float16 |= requested.shader_float16 != vk::FALSE;
-            self.shader_int8 |= requested.shader_int8 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>(structure) {
-            self.shader_input_attachment_array_dynamic_indexing |=
-                requested.shader_input_attachment_array_dynamic_indexing != vk::FALSE;
-            self.shader_uniform_texel_buffer_array_dynamic_indexing |=
-                requested.shader_uniform_texel_buffer_array_dynamic_indexing != vk::FALSE;
-            self.shader_storage_texel_buffer_array_dynamic_indexing |=
-                requested.shader_storage_texel_buffer_array_dynamic_indexing != vk::FALSE;
-            self.shader_uniform_buffer_array_non_uniform_indexing |=
-                requested.shader_uniform_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_sampled_image_array_non_uniform_indexing |=
-                requested.shader_sampled_image_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_buffer_array_non_uniform_indexing |=
-                requested.shader_storage_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_image_array_non_uniform_indexing |=
-                requested.shader_storage_image_array_non_uniform_indexing != vk::FALSE;
-            self.shader_input_attachment_array_non_uniform_indexing |=
-                requested.shader_input_attachment_array_non_uniform_indexing != vk::FALSE;
-            self.shader_uniform_texel_buffer_array_non_uniform_indexing |=
-                requested.shader_uniform_texel_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.shader_storage_texel_buffer_array_non_uniform_indexing |=
-                requested.shader_storage_texel_buffer_array_non_uniform_indexing != vk::FALSE;
-            self.descriptor_binding_uniform_buffer_update_after_bind |=
-                requested.descriptor_binding_uniform_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_sampled_image_update_after_bind |=
-                requested.descriptor_binding_sampled_image_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_image_update_after_bind |=
-                requested.descriptor_binding_storage_image_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_buffer_update_after_bind |=
-                requested.descriptor_binding_storage_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_uniform_texel_buffer_update_after_bind |=
-                requested.descriptor_binding_uniform_texel_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_storage_texel_buffer_update_after_bind |=
-                requested.descriptor_binding_storage_texel_buffer_update_after_bind != vk::FALSE;
-            self.descriptor_binding_update_unused_while_pending |=
-                requested.descriptor_binding_update_unused_while_pending != vk::FALSE;
-            self.descriptor_binding_partially_bound |= requested.descriptor_binding_partially_bound != vk::FALSE;
-            self.descriptor_binding_variable_descriptor_count |=
-                requested.descriptor_binding_variable_descriptor_count != vk::FALSE;
-            self.runtime_descriptor_array |= requested.runtime_descriptor_array != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>(structure) {
-            self.scalar_block_layout |= requested.scalar_block_layout != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>(structure) {
-            self.uniform_buffer_standard_layout |= requested.uniform_buffer_standard_layout != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>(structure) {
-            self.shader_subgroup_extended_types |= requested.shader_subgroup_extended_types != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>(structure) {
-            self.imageless_framebuffer |= requested.imageless_framebuffer != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>(structure) {
-            self.separate_depth_stencil_layouts |= requested.separate_depth_stencil_layouts != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>(structure) {
-            self.private_data |= requested.private_data != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSynchronization2Features<'_>>(structure) {
-            self.synchronization2 |= requested.synchronization2 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>(structure) {
-            self.texture_compression_astc_hdr |= requested.texture_compression_astc_hdr != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMaintenance4Features<'_>>(structure) {
-            self.maintenance4 |= requested.maintenance4 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>(structure) {
-            self.shader_terminate_invocation |= requested.shader_terminate_invocation != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(structure)
-        {
-            self.shader_demote_to_helper_invocation |= requested.shader_demote_to_helper_invocation != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>(structure) {
-            self.pipeline_creation_cache_control |= requested.pipeline_creation_cache_control != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>(structure) {
-            self.shader_zero_initialize_workgroup_memory |=
-                requested.shader_zero_initialize_workgroup_memory != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>(structure) {
-            self.robust_image_access |= requested.robust_image_access != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>(structure) {
-            self.subgroup_size_control |= requested.subgroup_size_control != vk::FALSE;
-            self.compute_full_subgroups |= requested.compute_full_subgroups != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>(structure) {
-            self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
-            self.descriptor_binding_inline_uniform_block_update_after_bind |=
-                requested.descriptor_binding_inline_uniform_block_update_after_bind != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>(structure) {
-            self.shader_integer_dot_product |= requested.shader_integer_dot_product != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(structure) {
-            self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
-        }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>(structure)
-        {
-            self.shader_early_and_late_fragment_tests |= requested.shader_early_and_late_fragment_tests != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure) {
-            self.format_a4r4g4b4 |= requested.format_a4r4g4b4 != vk::FALSE;
-            self.format_a4b4g4r4 |= requested.format_a4b4g4r4 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(structure)
-        {
-            self.attachment_feedback_loop_layout |= requested.attachment_feedback_loop_layout != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(structure) {
-            self.border_color_swizzle |= requested.border_color_swizzle != vk::FALSE;
-            self.border_color_swizzle_from_image |= requested.border_color_swizzle_from_image != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(structure) {
-            self.color_write_enable |= requested.color_write_enable != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(structure) {
-            self.conditional_rendering |= requested.conditional_rendering != vk::FALSE;
-            self.inherited_conditional_rendering |= requested.inherited_conditional_rendering != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure) {
-            self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
-            self.custom_border_color_without_format |= requested.custom_border_color_without_format != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>(structure) {
-            self.depth_clamp_zero_one |= requested.depth_clamp_zero_one != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure) {
-            self.depth_clip_control |= requested.depth_clip_control != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure) {
-            self.depth_clip_enable |= requested.depth_clip_enable != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure) {
-            self.extended_dynamic_state |= requested.extended_dynamic_state != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(structure) {
-            self.extended_dynamic_state2 |= requested.extended_dynamic_state2 != vk::FALSE;
-            self.extended_dynamic_state2_logic_op |= requested.extended_dynamic_state2_logic_op != vk::FALSE;
-            self.extended_dynamic_state2_patch_control_points |=
-                requested.extended_dynamic_state2_patch_control_points != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(structure) {
-            self.extended_dynamic_state3_tessellation_domain_origin |=
-                requested.extended_dynamic_state3_tessellation_domain_origin != vk::FALSE;
-            self.extended_dynamic_state3_depth_clamp_enable |=
-                requested.extended_dynamic_state3_depth_clamp_enable != vk::FALSE;
-            self.extended_dynamic_state3_polygon_mode |= requested.extended_dynamic_state3_polygon_mode != vk::FALSE;
-            self.extended_dynamic_state3_rasterization_samples |=
-                requested.extended_dynamic_state3_rasterization_samples != vk::FALSE;
-            self.extended_dynamic_state3_sample_mask |= requested.extended_dynamic_state3_sample_mask != vk::FALSE;
-            self.extended_dynamic_state3_alpha_to_coverage_enable |=
-                requested.extended_dynamic_state3_alpha_to_coverage_enable != vk::FALSE;
-            self.extended_dynamic_state3_alpha_to_one_enable |=
-                requested.extended_dynamic_state3_alpha_to_one_enable != vk::FALSE;
-            self.extended_dynamic_state3_logic_op_enable |=
-                requested.extended_dynamic_state3_logic_op_enable != vk::FALSE;
-            self.extended_dynamic_state3_color_blend_enable |=
-                requested.extended_dynamic_state3_color_blend_enable != vk::FALSE;
-            self.extended_dynamic_state3_color_blend_equation |=
-                requested.extended_dynamic_state3_color_blend_equation != vk::FALSE;
-            self.extended_dynamic_state3_color_write_mask |=
-                requested.extended_dynamic_state3_color_write_mask != vk::FALSE;
-            self.extended_dynamic_state3_rasterization_stream |=
-                requested.extended_dynamic_state3_rasterization_stream != vk::FALSE;
-            self.extended_dynamic_state3_conservative_rasterization_mode |=
-                requested.extended_dynamic_state3_conservative_rasterization_mode != vk::FALSE;
-            self.extended_dynamic_state3_extra_primitive_overestimation_size |=
-                requested.extended_dynamic_state3_extra_primitive_overestimation_size != vk::FALSE;
-            self.extended_dynamic_state3_depth_clip_enable |=
-                requested.extended_dynamic_state3_depth_clip_enable != vk::FALSE;
-            self.extended_dynamic_state3_sample_locations_enable |=
-                requested.extended_dynamic_state3_sample_locations_enable != vk::FALSE;
-            self.extended_dynamic_state3_color_blend_advanced |=
-                requested.extended_dynamic_state3_color_blend_advanced != vk::FALSE;
-            self.extended_dynamic_state3_provoking_vertex_mode |=
-                requested.extended_dynamic_state3_provoking_vertex_mode != vk::FALSE;
-            self.extended_dynamic_state3_line_rasterization_mode |=
-                requested.extended_dynamic_state3_line_rasterization_mode != vk::FALSE;
-            self.extended_dynamic_state3_line_stipple_enable |=
-                requested.extended_dynamic_state3_line_stipple_enable != vk::FALSE;
-            self.extended_dynamic_state3_depth_clip_negative_one_to_one |=
-                requested.extended_dynamic_state3_depth_clip_negative_one_to_one != vk::FALSE;
-            self.extended_dynamic_state3_viewport_w_scaling_enable |=
-                requested.extended_dynamic_state3_viewport_w_scaling_enable != vk::FALSE;
-            self.extended_dynamic_state3_viewport_swizzle |=
-                requested.extended_dynamic_state3_viewport_swizzle != vk::FALSE;
-            self.extended_dynamic_state3_coverage_to_color_enable |=
-                requested.extended_dynamic_state3_coverage_to_color_enable != vk::FALSE;
-            self.extended_dynamic_state3_coverage_to_color_location |=
-                requested.extended_dynamic_state3_coverage_to_color_location != vk::FALSE;
-            self.extended_dynamic_state3_coverage_modulation_mode |=
-                requested.extended_dynamic_state3_coverage_modulation_mode != vk::FALSE;
-            self.extended_dynamic_state3_coverage_modulation_table_enable |=
-                requested.extended_dynamic_state3_coverage_modulation_table_enable != vk::FALSE;
-            self.extended_dynamic_state3_coverage_modulation_table |=
-                requested.extended_dynamic_state3_coverage_modulation_table != vk::FALSE;
-            self.extended_dynamic_state3_coverage_reduction_mode |=
-                requested.extended_dynamic_state3_coverage_reduction_mode != vk::FALSE;
-            self.extended_dynamic_state3_representative_fragment_test_enable |=
-                requested.extended_dynamic_state3_representative_fragment_test_enable != vk::FALSE;
-            self.extended_dynamic_state3_shading_rate_image_enable |=
-                requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(structure) {
-            self.graphics_pipeline_library |= requested.graphics_pipeline_library != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure) {
-            self.image2_d_view_of3_d |= requested.image2_d_view_of3_d != vk::FALSE;
-            self.sampler2_d_view_of3_d |= requested.sampler2_d_view_of3_d != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure) {
-            self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(structure) {
-            self.rectangular_lines |= requested.rectangular_lines != vk::FALSE;
-            self.bresenham_lines |= requested.bresenham_lines != vk::FALSE;
-            self.smooth_lines |= requested.smooth_lines != vk::FALSE;
-            self.stippled_rectangular_lines |= requested.stippled_rectangular_lines != vk::FALSE;
-            self.stippled_bresenham_lines |= requested.stippled_bresenham_lines != vk::FALSE;
-            self.stippled_smooth_lines |= requested.stippled_smooth_lines != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure) {
-            self.multi_draw |= requested.multi_draw != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(structure) {
-            self.non_seamless_cube_map |= requested.non_seamless_cube_map != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
-        {
-            self.primitive_topology_list_restart |= requested.primitive_topology_list_restart != vk::FALSE;
-            self.primitive_topology_patch_list_restart |= requested.primitive_topology_patch_list_restart != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(structure) {
-            self.primitives_generated_query |= requested.primitives_generated_query != vk::FALSE;
-            self.primitives_generated_query_with_rasterizer_discard |=
-                requested.primitives_generated_query_with_rasterizer_discard != vk::FALSE;
-            self.primitives_generated_query_with_non_zero_streams |=
-                requested.primitives_generated_query_with_non_zero_streams != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure) {
-            self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
-            self.transform_feedback_preserves_provoking_vertex |=
-                requested.transform_feedback_preserves_provoking_vertex != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(structure) {
-            self.robust_buffer_access2 |= requested.robust_buffer_access2 != vk::FALSE;
-            self.robust_image_access2 |= requested.robust_image_access2 != vk::FALSE;
-            self.null_descriptor |= requested.null_descriptor != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(structure) {
-            self.shader_buffer_float32_atomics |= requested.shader_buffer_float32_atomics != vk::FALSE;
-            self.shader_buffer_float32_atomic_add |= requested.shader_buffer_float32_atomic_add != vk::FALSE;
-            self.shader_buffer_float64_atomics |= requested.shader_buffer_float64_atomics != vk::FALSE;
-            self.shader_buffer_float64_atomic_add |= requested.shader_buffer_float64_atomic_add != vk::FALSE;
-            self.shader_shared_float32_atomics |= requested.shader_shared_float32_atomics != vk::FALSE;
-            self.shader_shared_float32_atomic_add |= requested.shader_shared_float32_atomic_add != vk::FALSE;
-            self.shader_shared_float64_atomics |= requested.shader_shared_float64_atomics != vk::FALSE;
-            self.shader_shared_float64_atomic_add |= requested.shader_shared_float64_atomic_add != vk::FALSE;
-            self.shader_image_float32_atomics |= requested.shader_image_float32_atomics != vk::FALSE;
-            self.shader_image_float32_atomic_add |= requested.shader_image_float32_atomic_add != vk::FALSE;
-            self.sparse_image_float32_atomics |= requested.sparse_image_float32_atomics != vk::FALSE;
-            self.sparse_image_float32_atomic_add |= requested.sparse_image_float32_atomic_add != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(structure) {
-            self.shader_buffer_float16_atomics |= requested.shader_buffer_float16_atomics != vk::FALSE;
-            self.shader_buffer_float16_atomic_add |= requested.shader_buffer_float16_atomic_add != vk::FALSE;
-            self.shader_buffer_float16_atomic_min_max |= requested.shader_buffer_float16_atomic_min_max != vk::FALSE;
-            self.shader_buffer_float32_atomic_min_max |= requested.shader_buffer_float32_atomic_min_max != vk::FALSE;
-            self.shader_buffer_float64_atomic_min_max |= requested.shader_buffer_float64_atomic_min_max != vk::FALSE;
-            self.shader_shared_float16_atomics |= requested.shader_shared_float16_atomics != vk::FALSE;
-            self.shader_shared_float16_atomic_add |= requested.shader_shared_float16_atomic_add != vk::FALSE;
-            self.shader_shared_float16_atomic_min_max |= requested.shader_shared_float16_atomic_min_max != vk::FALSE;
-            self.shader_shared_float32_atomic_min_max |= requested.shader_shared_float32_atomic_min_max != vk::FALSE;
-            self.shader_shared_float64_atomic_min_max |= requested.shader_shared_float64_atomic_min_max != vk::FALSE;
-            self.shader_image_float32_atomic_min_max |= requested.shader_image_float32_atomic_min_max != vk::FALSE;
-            self.sparse_image_float32_atomic_min_max |= requested.sparse_image_float32_atomic_min_max != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure) {
-            self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(structure) {
-            self.transform_feedback |= requested.transform_feedback != vk::FALSE;
-            self.geometry_streams |= requested.geometry_streams != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure) {
-            self.vertex_attribute_instance_rate_divisor |=
-                requested.vertex_attribute_instance_rate_divisor != vk::FALSE;
-            self.vertex_attribute_instance_rate_zero_divisor |=
-                requested.vertex_attribute_instance_rate_zero_divisor != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(structure) {
-            self.vertex_input_dynamic_state |= requested.vertex_input_dynamic_state != vk::FALSE;
-        }
-        if let Some(requested) =
-            valid::cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(structure)
-        {
-            self.gaussian_primitive_topology |= requested.gaussian_primitive_topology != vk::FALSE;
-            self.vertex_shader_projection |= requested.vertex_shader_projection != vk::FALSE;
-            self.resolve_fragment_shader |= requested.resolve_fragment_shader != vk::FALSE;
-            self.radial_distance_order |= requested.radial_distance_order != vk::FALSE;
-            self.primitive_order |= requested.primitive_order != vk::FALSE;
-            self.per_pixel_order |= requested.per_pixel_order != vk::FALSE;
-            self.rasterization_float16 |= requested.rasterization_float16 != vk::FALSE;
-            self.opacity_compensation |= requested.opacity_compensation != vk::FALSE;
-            self.orthographic_camera |= requested.orthographic_camera != vk::FALSE;
-            self.fisheye_camera |= requested.fisheye_camera != vk::FALSE;
-            self.equirectangular_camera |= requested.equirectangular_camera != vk::FALSE;
-            self.unscented_projection |= requested.unscented_projection != vk::FALSE;
-            self.gaussian_2d |= requested.gaussian_2d != vk::FALSE;
-            self.uniform_buffer_camera |= requested.uniform_buffer_camera != vk::FALSE;
-            self.merged_draws |= requested.merged_draws != vk::FALSE;
-            self.gaussian_instancing |= requested.gaussian_instancing != vk::FALSE;
-            self.gaussian_depth_stencil |= requested.gaussian_depth_stencil != vk::FALSE;
-            self.gaussian_multisample |= requested.gaussian_multisample != vk::FALSE;
-            self.gaussian_approximation |= requested.gaussian_approximation != vk::FALSE;
-            self.gaussian_multiview |= requested.gaussian_multiview != vk::FALSE;
-            self.attribute_activation |= requested.attribute_activation != vk::FALSE;
-            self.spherical_harmonics_buffer |= requested.spherical_harmonics_buffer != vk::FALSE;
-            self.gaussian_dynamic_state |= requested.gaussian_dynamic_state != vk::FALSE;
-            self.resolve_gaussian_indices |= requested.resolve_gaussian_indices != vk::FALSE;
-            self.gaussian_cut_off |= requested.gaussian_cut_off != vk::FALSE;
-            self.opacity_compensation_floor |= requested.opacity_compensation_floor != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure) {
-            self.performance_counter_query_pools |= requested.performance_counter_query_pools != vk::FALSE;
-            self.performance_counter_multiple_query_pools |=
-                requested.performance_counter_multiple_query_pools != vk::FALSE;
-        }
-        if let Some(requested) = valid::cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(structure) {
-            self.shader_subgroup_clock |= requested.shader_subgroup_clock != vk::FALSE;
-            self.shader_device_clock |= requested.shader_device_clock != vk::FALSE;
-        }
-        if let Some(requested) =
-            valid::cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(structure)
-        {
-            self.workgroup_memory_explicit_layout |= requested.workgroup_memory_explicit_layout != vk::FALSE;
-            self.workgroup_memory_explicit_layout_scalar_block_layout |=
-                requested.workgroup_memory_explicit_layout_scalar_block_layout != vk::FALSE;
-            self.workgroup_memory_explicit_layout8_bit_access |=
-                requested.workgroup_memory_explicit_layout8_bit_access != vk::FALSE;
-            self.workgroup_memory_explicit_layout16_bit_access |=
-                requested.workgroup_memory_explicit_layout16_bit_access != vk::FALSE;
-        }
-    }
-}
-
-/// The extension without which the features of a structure can't be enabled; features of core need none.
-pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
-    match structure {
-        vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD::STRUCTURE_TYPE => {
-            Some(c"VK_AMD_shader_early_and_late_fragment_tests")
-        }
-        vk::PhysicalDevice4444FormatsFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_4444_formats"),
-        vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_attachment_feedback_loop_layout")
-        }
-        vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_border_color_swizzle"),
-        vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_color_write_enable"),
-        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_conditional_rendering"),
-        vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_custom_border_color"),
-        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clamp_zero_one"),
-        vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clip_control"),
-        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_depth_clip_enable"),
-        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state"),
-        vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state2"),
-        vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_extended_dynamic_state3"),
-        vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_graphics_pipeline_library")
-        }
-        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_image_2d_view_of_3d"),
-        vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_index_type_uint8"),
-        vk::PhysicalDeviceLineRasterizationFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_line_rasterization"),
-        vk::PhysicalDeviceMultiDrawFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_multi_draw"),
-        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_non_seamless_cube_map"),
-        vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_primitive_topology_list_restart")
-        }
-        vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_primitives_generated_query")
-        }
-        vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_provoking_vertex"),
-        vk::PhysicalDeviceRobustness2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_robustness2"),
-        vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_shader_atomic_float"),
-        vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_shader_atomic_float2"),
-        vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_texel_buffer_alignment"),
-        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_transform_feedback"),
-        vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_EXT_vertex_attribute_divisor"),
-        vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
-            Some(c"VK_EXT_vertex_input_dynamic_state")
-        }
-        gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::STRUCTURE_TYPE => {
-            Some(c"VK_GAURAST_gaussian_primitive_topology")
-        }
-        vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_performance_query"),
-        vk::PhysicalDeviceShaderClockFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_shader_clock"),
-        vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR::STRUCTURE_TYPE => {
-            Some(c"VK_KHR_workgroup_memory_explicit_layout")
-        }
-        _ => None,
-    }
-}
-
-/// The features that Vulkan makes mandatory, by the core version that does, and their names.
-#[cfg(test)]
-pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
-    (vk::API_VERSION_1_0, &["robustBufferAccess"]),
-    (vk::API_VERSION_1_1, &["multiview", "shaderDrawParameters", "storageBuffer16BitAccess"]),
-    (
-        vk::API_VERSION_1_2,
-        &[
-            "descriptorBindingPartiallyBound",
-            "descriptorBindingSampledImageUpdateAfterBind",
-            "descriptorBindingStorageBufferUpdateAfterBind",
-            "descriptorBindingStorageImageUpdateAfterBind",
-            "descriptorBindingStorageTexelBufferUpdateAfterBind",
-            "descriptorBindingUniformTexelBufferUpdateAfterBind",
-            "descriptorBindingUpdateUnusedWhilePending",
-            "descriptorIndexing",
-            "drawIndirectCount",
-            "hostQueryReset",
-            "imagelessFramebuffer",
-            "runtimeDescriptorArray",
-            "samplerFilterMinmax",
-            "samplerMirrorClampToEdge",
-            "separateDepthStencilLayouts",
-            "shaderInt64",
-            "shaderOutputLayer",
-            "shaderOutputViewportIndex",
-            "shaderSampledImageArrayDynamicIndexing",
-            "shaderSampledImageArrayNonUniformIndexing",
-            "shaderStorageBufferArrayDynamicIndexing",
-            "shaderStorageBufferArrayNonUniformIndexing",
-            "shaderStorageTexelBufferArrayDynamicIndexing",
-            "shaderSubgroupExtendedTypes",
-            "shaderUniformTexelBufferArrayDynamicIndexing",
-            "shaderUniformTexelBufferArrayNonUniformIndexing",
-            "storageBuffer8BitAccess",
-            "subgroupBroadcastDynamicId",
-            "timelineSemaphore",
-            "uniformBufferStandardLayout",
-        ],
-    ),
-    (
-        vk::API_VERSION_1_3,
-        &[
-            "bufferDeviceAddress",
-            "computeFullSubgroups",
-            "descriptorBindingInlineUniformBlockUpdateAfterBind",
-            "dynamicRendering",
-            "inlineUniformBlock",
-            "maintenance4",
-            "pipelineCreationCacheControl",
-            "privateData",
-            "robustImageAccess",
-            "shaderDemoteToHelperInvocation",
-            "shaderIntegerDotProduct",
-            "shaderTerminateInvocation",
-            "shaderZeroInitializeWorkgroupMemory",
-            "subgroupSizeControl",
-            "synchronization2",
-            "vulkanMemoryModel",
-            "vulkanMemoryModelDeviceScope",
-        ],
-    ),
-];

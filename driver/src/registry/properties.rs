@@ -3,1085 +3,420 @@
 
 //! Properties and limits, and the structures in which Vulkan asks for them.
 
-use crate::abi::valid;
+use super::tables::properties;
+use crate::abi::valid::ChainedOutput;
 use ash::vk;
 
-/// Properties, each once, whatever structures hold it.
-#[derive(Clone, Debug)]
-pub(crate) struct Properties {
-    /// `apiVersion`.
-    pub(crate) api_version: u32,
-    /// `driverVersion`.
-    pub(crate) driver_version: u32,
-    /// `vendorID`.
-    pub(crate) vendor_id: u32,
-    /// `deviceID`.
-    pub(crate) device_id: u32,
-    /// `deviceType`.
-    pub(crate) device_type: vk::PhysicalDeviceType,
-    /// `deviceName`.
-    pub(crate) device_name: [std::ffi::c_char; vk::MAX_PHYSICAL_DEVICE_NAME_SIZE],
-    /// `pipelineCacheUUID`.
-    pub(crate) pipeline_cache_uuid: [u8; vk::UUID_SIZE],
-    /// `maxImageDimension1D`.
-    pub(crate) max_image_dimension1_d: u32,
-    /// `maxImageDimension2D`.
-    pub(crate) max_image_dimension2_d: u32,
-    /// `maxImageDimension3D`.
-    pub(crate) max_image_dimension3_d: u32,
-    /// `maxImageDimensionCube`.
-    pub(crate) max_image_dimension_cube: u32,
-    /// `maxImageArrayLayers`.
-    pub(crate) max_image_array_layers: u32,
-    /// `maxTexelBufferElements`.
-    pub(crate) max_texel_buffer_elements: u32,
-    /// `maxUniformBufferRange`.
-    pub(crate) max_uniform_buffer_range: u32,
-    /// `maxStorageBufferRange`.
-    pub(crate) max_storage_buffer_range: u32,
-    /// `maxPushConstantsSize`.
-    pub(crate) max_push_constants_size: u32,
-    /// `maxMemoryAllocationCount`.
-    pub(crate) max_memory_allocation_count: u32,
-    /// `maxSamplerAllocationCount`.
-    pub(crate) max_sampler_allocation_count: u32,
-    /// `bufferImageGranularity`.
-    pub(crate) buffer_image_granularity: vk::DeviceSize,
-    /// `sparseAddressSpaceSize`.
-    pub(crate) sparse_address_space_size: vk::DeviceSize,
-    /// `maxBoundDescriptorSets`.
-    pub(crate) max_bound_descriptor_sets: u32,
-    /// `maxPerStageDescriptorSamplers`.
-    pub(crate) max_per_stage_descriptor_samplers: u32,
-    /// `maxPerStageDescriptorUniformBuffers`.
-    pub(crate) max_per_stage_descriptor_uniform_buffers: u32,
-    /// `maxPerStageDescriptorStorageBuffers`.
-    pub(crate) max_per_stage_descriptor_storage_buffers: u32,
-    /// `maxPerStageDescriptorSampledImages`.
-    pub(crate) max_per_stage_descriptor_sampled_images: u32,
-    /// `maxPerStageDescriptorStorageImages`.
-    pub(crate) max_per_stage_descriptor_storage_images: u32,
-    /// `maxPerStageDescriptorInputAttachments`.
-    pub(crate) max_per_stage_descriptor_input_attachments: u32,
-    /// `maxPerStageResources`.
-    pub(crate) max_per_stage_resources: u32,
-    /// `maxDescriptorSetSamplers`.
-    pub(crate) max_descriptor_set_samplers: u32,
-    /// `maxDescriptorSetUniformBuffers`.
-    pub(crate) max_descriptor_set_uniform_buffers: u32,
-    /// `maxDescriptorSetUniformBuffersDynamic`.
-    pub(crate) max_descriptor_set_uniform_buffers_dynamic: u32,
-    /// `maxDescriptorSetStorageBuffers`.
-    pub(crate) max_descriptor_set_storage_buffers: u32,
-    /// `maxDescriptorSetStorageBuffersDynamic`.
-    pub(crate) max_descriptor_set_storage_buffers_dynamic: u32,
-    /// `maxDescriptorSetSampledImages`.
-    pub(crate) max_descriptor_set_sampled_images: u32,
-    /// `maxDescriptorSetStorageImages`.
-    pub(crate) max_descriptor_set_storage_images: u32,
-    /// `maxDescriptorSetInputAttachments`.
-    pub(crate) max_descriptor_set_input_attachments: u32,
-    /// `maxVertexInputAttributes`.
-    pub(crate) max_vertex_input_attributes: u32,
-    /// `maxVertexInputBindings`.
-    pub(crate) max_vertex_input_bindings: u32,
-    /// `maxVertexInputAttributeOffset`.
-    pub(crate) max_vertex_input_attribute_offset: u32,
-    /// `maxVertexInputBindingStride`.
-    pub(crate) max_vertex_input_binding_stride: u32,
-    /// `maxVertexOutputComponents`.
-    pub(crate) max_vertex_output_components: u32,
-    /// `maxTessellationGenerationLevel`.
-    pub(crate) max_tessellation_generation_level: u32,
-    /// `maxTessellationPatchSize`.
-    pub(crate) max_tessellation_patch_size: u32,
-    /// `maxTessellationControlPerVertexInputComponents`.
-    pub(crate) max_tessellation_control_per_vertex_input_components: u32,
-    /// `maxTessellationControlPerVertexOutputComponents`.
-    pub(crate) max_tessellation_control_per_vertex_output_components: u32,
-    /// `maxTessellationControlPerPatchOutputComponents`.
-    pub(crate) max_tessellation_control_per_patch_output_components: u32,
-    /// `maxTessellationControlTotalOutputComponents`.
-    pub(crate) max_tessellation_control_total_output_components: u32,
-    /// `maxTessellationEvaluationInputComponents`.
-    pub(crate) max_tessellation_evaluation_input_components: u32,
-    /// `maxTessellationEvaluationOutputComponents`.
-    pub(crate) max_tessellation_evaluation_output_components: u32,
-    /// `maxGeometryShaderInvocations`.
-    pub(crate) max_geometry_shader_invocations: u32,
-    /// `maxGeometryInputComponents`.
-    pub(crate) max_geometry_input_components: u32,
-    /// `maxGeometryOutputComponents`.
-    pub(crate) max_geometry_output_components: u32,
-    /// `maxGeometryOutputVertices`.
-    pub(crate) max_geometry_output_vertices: u32,
-    /// `maxGeometryTotalOutputComponents`.
-    pub(crate) max_geometry_total_output_components: u32,
-    /// `maxFragmentInputComponents`.
-    pub(crate) max_fragment_input_components: u32,
-    /// `maxFragmentOutputAttachments`.
-    pub(crate) max_fragment_output_attachments: u32,
-    /// `maxFragmentDualSrcAttachments`.
-    pub(crate) max_fragment_dual_src_attachments: u32,
-    /// `maxFragmentCombinedOutputResources`.
-    pub(crate) max_fragment_combined_output_resources: u32,
-    /// `maxComputeSharedMemorySize`.
-    pub(crate) max_compute_shared_memory_size: u32,
-    /// `maxComputeWorkGroupCount`.
-    pub(crate) max_compute_work_group_count: [u32; 3],
-    /// `maxComputeWorkGroupInvocations`.
-    pub(crate) max_compute_work_group_invocations: u32,
-    /// `maxComputeWorkGroupSize`.
-    pub(crate) max_compute_work_group_size: [u32; 3],
-    /// `subPixelPrecisionBits`.
-    pub(crate) sub_pixel_precision_bits: u32,
-    /// `subTexelPrecisionBits`.
-    pub(crate) sub_texel_precision_bits: u32,
-    /// `mipmapPrecisionBits`.
-    pub(crate) mipmap_precision_bits: u32,
-    /// `maxDrawIndexedIndexValue`.
-    pub(crate) max_draw_indexed_index_value: u32,
-    /// `maxDrawIndirectCount`.
-    pub(crate) max_draw_indirect_count: u32,
-    /// `maxSamplerLodBias`.
-    pub(crate) max_sampler_lod_bias: f32,
-    /// `maxSamplerAnisotropy`.
-    pub(crate) max_sampler_anisotropy: f32,
-    /// `maxViewports`.
-    pub(crate) max_viewports: u32,
-    /// `maxViewportDimensions`.
-    pub(crate) max_viewport_dimensions: [u32; 2],
-    /// `viewportBoundsRange`.
-    pub(crate) viewport_bounds_range: [f32; 2],
-    /// `viewportSubPixelBits`.
-    pub(crate) viewport_sub_pixel_bits: u32,
-    /// `minMemoryMapAlignment`.
-    pub(crate) min_memory_map_alignment: usize,
-    /// `minTexelBufferOffsetAlignment`.
-    pub(crate) min_texel_buffer_offset_alignment: vk::DeviceSize,
-    /// `minUniformBufferOffsetAlignment`.
-    pub(crate) min_uniform_buffer_offset_alignment: vk::DeviceSize,
-    /// `minStorageBufferOffsetAlignment`.
-    pub(crate) min_storage_buffer_offset_alignment: vk::DeviceSize,
-    /// `minTexelOffset`.
-    pub(crate) min_texel_offset: i32,
-    /// `maxTexelOffset`.
-    pub(crate) max_texel_offset: u32,
-    /// `minTexelGatherOffset`.
-    pub(crate) min_texel_gather_offset: i32,
-    /// `maxTexelGatherOffset`.
-    pub(crate) max_texel_gather_offset: u32,
-    /// `minInterpolationOffset`.
-    pub(crate) min_interpolation_offset: f32,
-    /// `maxInterpolationOffset`.
-    pub(crate) max_interpolation_offset: f32,
-    /// `subPixelInterpolationOffsetBits`.
-    pub(crate) sub_pixel_interpolation_offset_bits: u32,
-    /// `maxFramebufferWidth`.
-    pub(crate) max_framebuffer_width: u32,
-    /// `maxFramebufferHeight`.
-    pub(crate) max_framebuffer_height: u32,
-    /// `maxFramebufferLayers`.
-    pub(crate) max_framebuffer_layers: u32,
-    /// `framebufferColorSampleCounts`.
-    pub(crate) framebuffer_color_sample_counts: vk::SampleCountFlags,
-    /// `framebufferDepthSampleCounts`.
-    pub(crate) framebuffer_depth_sample_counts: vk::SampleCountFlags,
-    /// `framebufferStencilSampleCounts`.
-    pub(crate) framebuffer_stencil_sample_counts: vk::SampleCountFlags,
-    /// `framebufferNoAttachmentsSampleCounts`.
-    pub(crate) framebuffer_no_attachments_sample_counts: vk::SampleCountFlags,
-    /// `maxColorAttachments`.
-    pub(crate) max_color_attachments: u32,
-    /// `sampledImageColorSampleCounts`.
-    pub(crate) sampled_image_color_sample_counts: vk::SampleCountFlags,
-    /// `sampledImageIntegerSampleCounts`.
-    pub(crate) sampled_image_integer_sample_counts: vk::SampleCountFlags,
-    /// `sampledImageDepthSampleCounts`.
-    pub(crate) sampled_image_depth_sample_counts: vk::SampleCountFlags,
-    /// `sampledImageStencilSampleCounts`.
-    pub(crate) sampled_image_stencil_sample_counts: vk::SampleCountFlags,
-    /// `storageImageSampleCounts`.
-    pub(crate) storage_image_sample_counts: vk::SampleCountFlags,
-    /// `maxSampleMaskWords`.
-    pub(crate) max_sample_mask_words: u32,
-    /// `timestampComputeAndGraphics`.
-    pub(crate) timestamp_compute_and_graphics: bool,
-    /// `timestampPeriod`.
-    pub(crate) timestamp_period: f32,
-    /// `maxClipDistances`.
-    pub(crate) max_clip_distances: u32,
-    /// `maxCullDistances`.
-    pub(crate) max_cull_distances: u32,
-    /// `maxCombinedClipAndCullDistances`.
-    pub(crate) max_combined_clip_and_cull_distances: u32,
-    /// `discreteQueuePriorities`.
-    pub(crate) discrete_queue_priorities: u32,
-    /// `pointSizeRange`.
-    pub(crate) point_size_range: [f32; 2],
-    /// `lineWidthRange`.
-    pub(crate) line_width_range: [f32; 2],
-    /// `pointSizeGranularity`.
-    pub(crate) point_size_granularity: f32,
-    /// `lineWidthGranularity`.
-    pub(crate) line_width_granularity: f32,
-    /// `strictLines`.
-    pub(crate) strict_lines: bool,
-    /// `standardSampleLocations`.
-    pub(crate) standard_sample_locations: bool,
-    /// `optimalBufferCopyOffsetAlignment`.
-    pub(crate) optimal_buffer_copy_offset_alignment: vk::DeviceSize,
-    /// `optimalBufferCopyRowPitchAlignment`.
-    pub(crate) optimal_buffer_copy_row_pitch_alignment: vk::DeviceSize,
-    /// `nonCoherentAtomSize`.
-    pub(crate) non_coherent_atom_size: vk::DeviceSize,
-    /// `residencyStandard2DBlockShape`.
-    pub(crate) residency_standard2_d_block_shape: bool,
-    /// `residencyStandard2DMultisampleBlockShape`.
-    pub(crate) residency_standard2_d_multisample_block_shape: bool,
-    /// `residencyStandard3DBlockShape`.
-    pub(crate) residency_standard3_d_block_shape: bool,
-    /// `residencyAlignedMipSize`.
-    pub(crate) residency_aligned_mip_size: bool,
-    /// `residencyNonResidentStrict`.
-    pub(crate) residency_non_resident_strict: bool,
-    /// `deviceUUID`.
-    pub(crate) device_uuid: [u8; vk::UUID_SIZE],
-    /// `driverUUID`.
-    pub(crate) driver_uuid: [u8; vk::UUID_SIZE],
-    /// `deviceLUID`.
-    pub(crate) device_luid: [u8; vk::LUID_SIZE],
-    /// `deviceNodeMask`.
-    pub(crate) device_node_mask: u32,
-    /// `deviceLUIDValid`.
-    pub(crate) device_luid_valid: bool,
-    /// `subgroupSize`.
-    pub(crate) subgroup_size: u32,
-    /// `subgroupSupportedStages`.
-    pub(crate) subgroup_supported_stages: vk::ShaderStageFlags,
-    /// `subgroupSupportedOperations`.
-    pub(crate) subgroup_supported_operations: vk::SubgroupFeatureFlags,
-    /// `subgroupQuadOperationsInAllStages`.
-    pub(crate) subgroup_quad_operations_in_all_stages: bool,
-    /// `pointClippingBehavior`.
-    pub(crate) point_clipping_behavior: vk::PointClippingBehavior,
-    /// `maxMultiviewViewCount`.
-    pub(crate) max_multiview_view_count: u32,
-    /// `maxMultiviewInstanceIndex`.
-    pub(crate) max_multiview_instance_index: u32,
-    /// `protectedNoFault`.
-    pub(crate) protected_no_fault: bool,
-    /// `maxPerSetDescriptors`.
-    pub(crate) max_per_set_descriptors: u32,
-    /// `maxMemoryAllocationSize`.
-    pub(crate) max_memory_allocation_size: vk::DeviceSize,
-    /// `driverID`.
-    pub(crate) driver_id: vk::DriverId,
-    /// `driverName`.
-    pub(crate) driver_name: [std::ffi::c_char; vk::MAX_DRIVER_NAME_SIZE],
-    /// `driverInfo`.
-    pub(crate) driver_info: [std::ffi::c_char; vk::MAX_DRIVER_INFO_SIZE],
-    /// `conformanceVersion`.
-    pub(crate) conformance_version: vk::ConformanceVersion,
-    /// `denormBehaviorIndependence`.
-    pub(crate) denorm_behavior_independence: vk::ShaderFloatControlsIndependence,
-    /// `roundingModeIndependence`.
-    pub(crate) rounding_mode_independence: vk::ShaderFloatControlsIndependence,
-    /// `shaderSignedZeroInfNanPreserveFloat16`.
-    pub(crate) shader_signed_zero_inf_nan_preserve_float16: bool,
-    /// `shaderSignedZeroInfNanPreserveFloat32`.
-    pub(crate) shader_signed_zero_inf_nan_preserve_float32: bool,
-    /// `shaderSignedZeroInfNanPreserveFloat64`.
-    pub(crate) shader_signed_zero_inf_nan_preserve_float64: bool,
-    /// `shaderDenormPreserveFloat16`.
-    pub(crate) shader_denorm_preserve_float16: bool,
-    /// `shaderDenormPreserveFloat32`.
-    pub(crate) shader_denorm_preserve_float32: bool,
-    /// `shaderDenormPreserveFloat64`.
-    pub(crate) shader_denorm_preserve_float64: bool,
-    /// `shaderDenormFlushToZeroFloat16`.
-    pub(crate) shader_denorm_flush_to_zero_float16: bool,
-    /// `shaderDenormFlushToZeroFloat32`.
-    pub(crate) shader_denorm_flush_to_zero_float32: bool,
-    /// `shaderDenormFlushToZeroFloat64`.
-    pub(crate) shader_denorm_flush_to_zero_float64: bool,
-    /// `shaderRoundingModeRTEFloat16`.
-    pub(crate) shader_rounding_mode_rte_float16: bool,
-    /// `shaderRoundingModeRTEFloat32`.
-    pub(crate) shader_rounding_mode_rte_float32: bool,
-    /// `shaderRoundingModeRTEFloat64`.
-    pub(crate) shader_rounding_mode_rte_float64: bool,
-    /// `shaderRoundingModeRTZFloat16`.
-    pub(crate) shader_rounding_mode_rtz_float16: bool,
-    /// `shaderRoundingModeRTZFloat32`.
-    pub(crate) shader_rounding_mode_rtz_float32: bool,
-    /// `shaderRoundingModeRTZFloat64`.
-    pub(crate) shader_rounding_mode_rtz_float64: bool,
-    /// `maxUpdateAfterBindDescriptorsInAllPools`.
-    pub(crate) max_update_after_bind_descriptors_in_all_pools: u32,
-    /// `shaderUniformBufferArrayNonUniformIndexingNative`.
-    pub(crate) shader_uniform_buffer_array_non_uniform_indexing_native: bool,
-    /// `shaderSampledImageArrayNonUniformIndexingNative`.
-    pub(crate) shader_sampled_image_array_non_uniform_indexing_native: bool,
-    /// `shaderStorageBufferArrayNonUniformIndexingNative`.
-    pub(crate) shader_storage_buffer_array_non_uniform_indexing_native: bool,
-    /// `shaderStorageImageArrayNonUniformIndexingNative`.
-    pub(crate) shader_storage_image_array_non_uniform_indexing_native: bool,
-    /// `shaderInputAttachmentArrayNonUniformIndexingNative`.
-    pub(crate) shader_input_attachment_array_non_uniform_indexing_native: bool,
-    /// `robustBufferAccessUpdateAfterBind`.
-    pub(crate) robust_buffer_access_update_after_bind: bool,
-    /// `quadDivergentImplicitLod`.
-    pub(crate) quad_divergent_implicit_lod: bool,
-    /// `maxPerStageDescriptorUpdateAfterBindSamplers`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_samplers: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindUniformBuffers`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_uniform_buffers: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindStorageBuffers`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_storage_buffers: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindSampledImages`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_sampled_images: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindStorageImages`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_storage_images: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindInputAttachments`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_input_attachments: u32,
-    /// `maxPerStageUpdateAfterBindResources`.
-    pub(crate) max_per_stage_update_after_bind_resources: u32,
-    /// `maxDescriptorSetUpdateAfterBindSamplers`.
-    pub(crate) max_descriptor_set_update_after_bind_samplers: u32,
-    /// `maxDescriptorSetUpdateAfterBindUniformBuffers`.
-    pub(crate) max_descriptor_set_update_after_bind_uniform_buffers: u32,
-    /// `maxDescriptorSetUpdateAfterBindUniformBuffersDynamic`.
-    pub(crate) max_descriptor_set_update_after_bind_uniform_buffers_dynamic: u32,
-    /// `maxDescriptorSetUpdateAfterBindStorageBuffers`.
-    pub(crate) max_descriptor_set_update_after_bind_storage_buffers: u32,
-    /// `maxDescriptorSetUpdateAfterBindStorageBuffersDynamic`.
-    pub(crate) max_descriptor_set_update_after_bind_storage_buffers_dynamic: u32,
-    /// `maxDescriptorSetUpdateAfterBindSampledImages`.
-    pub(crate) max_descriptor_set_update_after_bind_sampled_images: u32,
-    /// `maxDescriptorSetUpdateAfterBindStorageImages`.
-    pub(crate) max_descriptor_set_update_after_bind_storage_images: u32,
-    /// `maxDescriptorSetUpdateAfterBindInputAttachments`.
-    pub(crate) max_descriptor_set_update_after_bind_input_attachments: u32,
-    /// `supportedDepthResolveModes`.
-    pub(crate) supported_depth_resolve_modes: vk::ResolveModeFlags,
-    /// `supportedStencilResolveModes`.
-    pub(crate) supported_stencil_resolve_modes: vk::ResolveModeFlags,
-    /// `independentResolveNone`.
-    pub(crate) independent_resolve_none: bool,
-    /// `independentResolve`.
-    pub(crate) independent_resolve: bool,
-    /// `filterMinmaxSingleComponentFormats`.
-    pub(crate) filter_minmax_single_component_formats: bool,
-    /// `filterMinmaxImageComponentMapping`.
-    pub(crate) filter_minmax_image_component_mapping: bool,
-    /// `maxTimelineSemaphoreValueDifference`.
-    pub(crate) max_timeline_semaphore_value_difference: u64,
-    /// `framebufferIntegerColorSampleCounts`.
-    pub(crate) framebuffer_integer_color_sample_counts: vk::SampleCountFlags,
-    /// `minSubgroupSize`.
-    pub(crate) min_subgroup_size: u32,
-    /// `maxSubgroupSize`.
-    pub(crate) max_subgroup_size: u32,
-    /// `maxComputeWorkgroupSubgroups`.
-    pub(crate) max_compute_workgroup_subgroups: u32,
-    /// `requiredSubgroupSizeStages`.
-    pub(crate) required_subgroup_size_stages: vk::ShaderStageFlags,
-    /// `maxInlineUniformBlockSize`.
-    pub(crate) max_inline_uniform_block_size: u32,
-    /// `maxPerStageDescriptorInlineUniformBlocks`.
-    pub(crate) max_per_stage_descriptor_inline_uniform_blocks: u32,
-    /// `maxPerStageDescriptorUpdateAfterBindInlineUniformBlocks`.
-    pub(crate) max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: u32,
-    /// `maxDescriptorSetInlineUniformBlocks`.
-    pub(crate) max_descriptor_set_inline_uniform_blocks: u32,
-    /// `maxDescriptorSetUpdateAfterBindInlineUniformBlocks`.
-    pub(crate) max_descriptor_set_update_after_bind_inline_uniform_blocks: u32,
-    /// `maxInlineUniformTotalSize`.
-    pub(crate) max_inline_uniform_total_size: u32,
-    /// `integerDotProduct8BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product8_bit_unsigned_accelerated: bool,
-    /// `integerDotProduct8BitSignedAccelerated`.
-    pub(crate) integer_dot_product8_bit_signed_accelerated: bool,
-    /// `integerDotProduct8BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product8_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProduct4x8BitPackedUnsignedAccelerated`.
-    pub(crate) integer_dot_product4x8_bit_packed_unsigned_accelerated: bool,
-    /// `integerDotProduct4x8BitPackedSignedAccelerated`.
-    pub(crate) integer_dot_product4x8_bit_packed_signed_accelerated: bool,
-    /// `integerDotProduct4x8BitPackedMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product4x8_bit_packed_mixed_signedness_accelerated: bool,
-    /// `integerDotProduct16BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product16_bit_unsigned_accelerated: bool,
-    /// `integerDotProduct16BitSignedAccelerated`.
-    pub(crate) integer_dot_product16_bit_signed_accelerated: bool,
-    /// `integerDotProduct16BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product16_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProduct32BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product32_bit_unsigned_accelerated: bool,
-    /// `integerDotProduct32BitSignedAccelerated`.
-    pub(crate) integer_dot_product32_bit_signed_accelerated: bool,
-    /// `integerDotProduct32BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product32_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProduct64BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product64_bit_unsigned_accelerated: bool,
-    /// `integerDotProduct64BitSignedAccelerated`.
-    pub(crate) integer_dot_product64_bit_signed_accelerated: bool,
-    /// `integerDotProduct64BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product64_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating8BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating8BitSignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating8_bit_signed_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating8BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating4x8BitPackedUnsignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating4x8BitPackedSignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating4x8BitPackedMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating16BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating16BitSignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating16_bit_signed_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating16BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating32BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating32BitSignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating32_bit_signed_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating32BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating64BitUnsignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating64BitSignedAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating64_bit_signed_accelerated: bool,
-    /// `integerDotProductAccumulatingSaturating64BitMixedSignednessAccelerated`.
-    pub(crate) integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated: bool,
-    /// `storageTexelBufferOffsetAlignmentBytes`.
-    pub(crate) storage_texel_buffer_offset_alignment_bytes: vk::DeviceSize,
-    /// `storageTexelBufferOffsetSingleTexelAlignment`.
-    pub(crate) storage_texel_buffer_offset_single_texel_alignment: bool,
-    /// `uniformTexelBufferOffsetAlignmentBytes`.
-    pub(crate) uniform_texel_buffer_offset_alignment_bytes: vk::DeviceSize,
-    /// `uniformTexelBufferOffsetSingleTexelAlignment`.
-    pub(crate) uniform_texel_buffer_offset_single_texel_alignment: bool,
-    /// `maxBufferSize`.
-    pub(crate) max_buffer_size: vk::DeviceSize,
-    /// `maxCustomBorderColorSamplers`.
-    pub(crate) max_custom_border_color_samplers: u32,
-    /// `dynamicPrimitiveTopologyUnrestricted`.
-    pub(crate) dynamic_primitive_topology_unrestricted: bool,
-    /// `graphicsPipelineLibraryFastLinking`.
-    pub(crate) graphics_pipeline_library_fast_linking: bool,
-    /// `graphicsPipelineLibraryIndependentInterpolationDecoration`.
-    pub(crate) graphics_pipeline_library_independent_interpolation_decoration: bool,
-    /// `lineSubPixelPrecisionBits`.
-    pub(crate) line_sub_pixel_precision_bits: u32,
-    /// `maxMultiDrawCount`.
-    pub(crate) max_multi_draw_count: u32,
-    /// `provokingVertexModePerPipeline`.
-    pub(crate) provoking_vertex_mode_per_pipeline: bool,
-    /// `transformFeedbackPreservesTriangleFanProvokingVertex`.
-    pub(crate) transform_feedback_preserves_triangle_fan_provoking_vertex: bool,
-    /// `robustStorageBufferAccessSizeAlignment`.
-    pub(crate) robust_storage_buffer_access_size_alignment: vk::DeviceSize,
-    /// `robustUniformBufferAccessSizeAlignment`.
-    pub(crate) robust_uniform_buffer_access_size_alignment: vk::DeviceSize,
-    /// `maxTransformFeedbackStreams`.
-    pub(crate) max_transform_feedback_streams: u32,
-    /// `maxTransformFeedbackBuffers`.
-    pub(crate) max_transform_feedback_buffers: u32,
-    /// `maxTransformFeedbackBufferSize`.
-    pub(crate) max_transform_feedback_buffer_size: vk::DeviceSize,
-    /// `maxTransformFeedbackStreamDataSize`.
-    pub(crate) max_transform_feedback_stream_data_size: u32,
-    /// `maxTransformFeedbackBufferDataSize`.
-    pub(crate) max_transform_feedback_buffer_data_size: u32,
-    /// `maxTransformFeedbackBufferDataStride`.
-    pub(crate) max_transform_feedback_buffer_data_stride: u32,
-    /// `transformFeedbackQueries`.
-    pub(crate) transform_feedback_queries: bool,
-    /// `transformFeedbackStreamsLinesTriangles`.
-    pub(crate) transform_feedback_streams_lines_triangles: bool,
-    /// `transformFeedbackRasterizationStreamSelect`.
-    pub(crate) transform_feedback_rasterization_stream_select: bool,
-    /// `transformFeedbackDraw`.
-    pub(crate) transform_feedback_draw: bool,
-    /// `maxVertexAttribDivisor`.
-    pub(crate) max_vertex_attrib_divisor: u32,
-    /// `tileSize`.
-    pub(crate) tile_size: vk::Extent2D,
-    /// `maxSphericalHarmonicsDegree`.
-    pub(crate) max_spherical_harmonics_degree: u32,
-    /// `gaussianSampleCounts`.
-    pub(crate) gaussian_sample_counts: vk::SampleCountFlags,
-    /// `maxGaussiansPerDraw`.
-    pub(crate) max_gaussians_per_draw: u64,
-    /// `maxGaussiansPerSet`.
-    pub(crate) max_gaussians_per_set: u64,
-    /// `allowCommandBufferQueryCopies`.
-    pub(crate) allow_command_buffer_query_copies: bool,
-    /// `maxPushDescriptors`.
-    pub(crate) max_push_descriptors: u32,
-}
-
-impl Properties {
-    /// The properties of the core structure.
-    pub(crate) fn core(&self) -> vk::PhysicalDeviceProperties {
-        vk::PhysicalDeviceProperties {
-            api_version: self.api_version,
-            driver_version: self.driver_version,
-            vendor_id: self.vendor_id,
-            device_id: self.device_id,
-            device_type: self.device_type,
-            device_name: self.device_name,
-            pipeline_cache_uuid: self.pipeline_cache_uuid,
-            limits: self.limits(),
-            sparse_properties: self.sparse_properties(),
-        }
+properties! {
+    core vk::PhysicalDeviceProperties {
+        apiVersion => api_version: u32;
+        driverVersion => driver_version: u32;
+        vendorID => vendor_id: u32;
+        deviceID => device_id: u32;
+        deviceType => device_type: vk::PhysicalDeviceType;
+        deviceName => device_name: [std::ffi::c_char; vk::MAX_PHYSICAL_DEVICE_NAME_SIZE];
+        pipelineCacheUUID => pipeline_cache_uuid: [u8; vk::UUID_SIZE];
     }
-
-    fn limits(&self) -> vk::PhysicalDeviceLimits {
-        vk::PhysicalDeviceLimits {
-            max_image_dimension1_d: self.max_image_dimension1_d,
-            max_image_dimension2_d: self.max_image_dimension2_d,
-            max_image_dimension3_d: self.max_image_dimension3_d,
-            max_image_dimension_cube: self.max_image_dimension_cube,
-            max_image_array_layers: self.max_image_array_layers,
-            max_texel_buffer_elements: self.max_texel_buffer_elements,
-            max_uniform_buffer_range: self.max_uniform_buffer_range,
-            max_storage_buffer_range: self.max_storage_buffer_range,
-            max_push_constants_size: self.max_push_constants_size,
-            max_memory_allocation_count: self.max_memory_allocation_count,
-            max_sampler_allocation_count: self.max_sampler_allocation_count,
-            buffer_image_granularity: self.buffer_image_granularity,
-            sparse_address_space_size: self.sparse_address_space_size,
-            max_bound_descriptor_sets: self.max_bound_descriptor_sets,
-            max_per_stage_descriptor_samplers: self.max_per_stage_descriptor_samplers,
-            max_per_stage_descriptor_uniform_buffers: self.max_per_stage_descriptor_uniform_buffers,
-            max_per_stage_descriptor_storage_buffers: self.max_per_stage_descriptor_storage_buffers,
-            max_per_stage_descriptor_sampled_images: self.max_per_stage_descriptor_sampled_images,
-            max_per_stage_descriptor_storage_images: self.max_per_stage_descriptor_storage_images,
-            max_per_stage_descriptor_input_attachments: self.max_per_stage_descriptor_input_attachments,
-            max_per_stage_resources: self.max_per_stage_resources,
-            max_descriptor_set_samplers: self.max_descriptor_set_samplers,
-            max_descriptor_set_uniform_buffers: self.max_descriptor_set_uniform_buffers,
-            max_descriptor_set_uniform_buffers_dynamic: self.max_descriptor_set_uniform_buffers_dynamic,
-            max_descriptor_set_storage_buffers: self.max_descriptor_set_storage_buffers,
-            max_descriptor_set_storage_buffers_dynamic: self.max_descriptor_set_storage_buffers_dynamic,
-            max_descriptor_set_sampled_images: self.max_descriptor_set_sampled_images,
-            max_descriptor_set_storage_images: self.max_descriptor_set_storage_images,
-            max_descriptor_set_input_attachments: self.max_descriptor_set_input_attachments,
-            max_vertex_input_attributes: self.max_vertex_input_attributes,
-            max_vertex_input_bindings: self.max_vertex_input_bindings,
-            max_vertex_input_attribute_offset: self.max_vertex_input_attribute_offset,
-            max_vertex_input_binding_stride: self.max_vertex_input_binding_stride,
-            max_vertex_output_components: self.max_vertex_output_components,
-            max_tessellation_generation_level: self.max_tessellation_generation_level,
-            max_tessellation_patch_size: self.max_tessellation_patch_size,
-            max_tessellation_control_per_vertex_input_components: self
-                .max_tessellation_control_per_vertex_input_components,
-            max_tessellation_control_per_vertex_output_components: self
-                .max_tessellation_control_per_vertex_output_components,
-            max_tessellation_control_per_patch_output_components: self
-                .max_tessellation_control_per_patch_output_components,
-            max_tessellation_control_total_output_components: self.max_tessellation_control_total_output_components,
-            max_tessellation_evaluation_input_components: self.max_tessellation_evaluation_input_components,
-            max_tessellation_evaluation_output_components: self.max_tessellation_evaluation_output_components,
-            max_geometry_shader_invocations: self.max_geometry_shader_invocations,
-            max_geometry_input_components: self.max_geometry_input_components,
-            max_geometry_output_components: self.max_geometry_output_components,
-            max_geometry_output_vertices: self.max_geometry_output_vertices,
-            max_geometry_total_output_components: self.max_geometry_total_output_components,
-            max_fragment_input_components: self.max_fragment_input_components,
-            max_fragment_output_attachments: self.max_fragment_output_attachments,
-            max_fragment_dual_src_attachments: self.max_fragment_dual_src_attachments,
-            max_fragment_combined_output_resources: self.max_fragment_combined_output_resources,
-            max_compute_shared_memory_size: self.max_compute_shared_memory_size,
-            max_compute_work_group_count: self.max_compute_work_group_count,
-            max_compute_work_group_invocations: self.max_compute_work_group_invocations,
-            max_compute_work_group_size: self.max_compute_work_group_size,
-            sub_pixel_precision_bits: self.sub_pixel_precision_bits,
-            sub_texel_precision_bits: self.sub_texel_precision_bits,
-            mipmap_precision_bits: self.mipmap_precision_bits,
-            max_draw_indexed_index_value: self.max_draw_indexed_index_value,
-            max_draw_indirect_count: self.max_draw_indirect_count,
-            max_sampler_lod_bias: self.max_sampler_lod_bias,
-            max_sampler_anisotropy: self.max_sampler_anisotropy,
-            max_viewports: self.max_viewports,
-            max_viewport_dimensions: self.max_viewport_dimensions,
-            viewport_bounds_range: self.viewport_bounds_range,
-            viewport_sub_pixel_bits: self.viewport_sub_pixel_bits,
-            min_memory_map_alignment: self.min_memory_map_alignment,
-            min_texel_buffer_offset_alignment: self.min_texel_buffer_offset_alignment,
-            min_uniform_buffer_offset_alignment: self.min_uniform_buffer_offset_alignment,
-            min_storage_buffer_offset_alignment: self.min_storage_buffer_offset_alignment,
-            min_texel_offset: self.min_texel_offset,
-            max_texel_offset: self.max_texel_offset,
-            min_texel_gather_offset: self.min_texel_gather_offset,
-            max_texel_gather_offset: self.max_texel_gather_offset,
-            min_interpolation_offset: self.min_interpolation_offset,
-            max_interpolation_offset: self.max_interpolation_offset,
-            sub_pixel_interpolation_offset_bits: self.sub_pixel_interpolation_offset_bits,
-            max_framebuffer_width: self.max_framebuffer_width,
-            max_framebuffer_height: self.max_framebuffer_height,
-            max_framebuffer_layers: self.max_framebuffer_layers,
-            framebuffer_color_sample_counts: self.framebuffer_color_sample_counts,
-            framebuffer_depth_sample_counts: self.framebuffer_depth_sample_counts,
-            framebuffer_stencil_sample_counts: self.framebuffer_stencil_sample_counts,
-            framebuffer_no_attachments_sample_counts: self.framebuffer_no_attachments_sample_counts,
-            max_color_attachments: self.max_color_attachments,
-            sampled_image_color_sample_counts: self.sampled_image_color_sample_counts,
-            sampled_image_integer_sample_counts: self.sampled_image_integer_sample_counts,
-            sampled_image_depth_sample_counts: self.sampled_image_depth_sample_counts,
-            sampled_image_stencil_sample_counts: self.sampled_image_stencil_sample_counts,
-            storage_image_sample_counts: self.storage_image_sample_counts,
-            max_sample_mask_words: self.max_sample_mask_words,
-            timestamp_compute_and_graphics: self.timestamp_compute_and_graphics.into(),
-            timestamp_period: self.timestamp_period,
-            max_clip_distances: self.max_clip_distances,
-            max_cull_distances: self.max_cull_distances,
-            max_combined_clip_and_cull_distances: self.max_combined_clip_and_cull_distances,
-            discrete_queue_priorities: self.discrete_queue_priorities,
-            point_size_range: self.point_size_range,
-            line_width_range: self.line_width_range,
-            point_size_granularity: self.point_size_granularity,
-            line_width_granularity: self.line_width_granularity,
-            strict_lines: self.strict_lines.into(),
-            standard_sample_locations: self.standard_sample_locations.into(),
-            optimal_buffer_copy_offset_alignment: self.optimal_buffer_copy_offset_alignment,
-            optimal_buffer_copy_row_pitch_alignment: self.optimal_buffer_copy_row_pitch_alignment,
-            non_coherent_atom_size: self.non_coherent_atom_size,
-        }
+    limits vk::PhysicalDeviceLimits {
+        maxImageDimension1D => max_image_dimension1_d: u32;
+        maxImageDimension2D => max_image_dimension2_d: u32;
+        maxImageDimension3D => max_image_dimension3_d: u32;
+        maxImageDimensionCube => max_image_dimension_cube: u32;
+        maxImageArrayLayers => max_image_array_layers: u32;
+        maxTexelBufferElements => max_texel_buffer_elements: u32;
+        maxUniformBufferRange => max_uniform_buffer_range: u32;
+        maxStorageBufferRange => max_storage_buffer_range: u32;
+        maxPushConstantsSize => max_push_constants_size: u32;
+        maxMemoryAllocationCount => max_memory_allocation_count: u32;
+        maxSamplerAllocationCount => max_sampler_allocation_count: u32;
+        bufferImageGranularity => buffer_image_granularity: vk::DeviceSize;
+        sparseAddressSpaceSize => sparse_address_space_size: vk::DeviceSize;
+        maxBoundDescriptorSets => max_bound_descriptor_sets: u32;
+        maxPerStageDescriptorSamplers => max_per_stage_descriptor_samplers: u32;
+        maxPerStageDescriptorUniformBuffers => max_per_stage_descriptor_uniform_buffers: u32;
+        maxPerStageDescriptorStorageBuffers => max_per_stage_descriptor_storage_buffers: u32;
+        maxPerStageDescriptorSampledImages => max_per_stage_descriptor_sampled_images: u32;
+        maxPerStageDescriptorStorageImages => max_per_stage_descriptor_storage_images: u32;
+        maxPerStageDescriptorInputAttachments => max_per_stage_descriptor_input_attachments: u32;
+        maxPerStageResources => max_per_stage_resources: u32;
+        maxDescriptorSetSamplers => max_descriptor_set_samplers: u32;
+        maxDescriptorSetUniformBuffers => max_descriptor_set_uniform_buffers: u32;
+        maxDescriptorSetUniformBuffersDynamic => max_descriptor_set_uniform_buffers_dynamic: u32;
+        maxDescriptorSetStorageBuffers => max_descriptor_set_storage_buffers: u32;
+        maxDescriptorSetStorageBuffersDynamic => max_descriptor_set_storage_buffers_dynamic: u32;
+        maxDescriptorSetSampledImages => max_descriptor_set_sampled_images: u32;
+        maxDescriptorSetStorageImages => max_descriptor_set_storage_images: u32;
+        maxDescriptorSetInputAttachments => max_descriptor_set_input_attachments: u32;
+        maxVertexInputAttributes => max_vertex_input_attributes: u32;
+        maxVertexInputBindings => max_vertex_input_bindings: u32;
+        maxVertexInputAttributeOffset => max_vertex_input_attribute_offset: u32;
+        maxVertexInputBindingStride => max_vertex_input_binding_stride: u32;
+        maxVertexOutputComponents => max_vertex_output_components: u32;
+        maxTessellationGenerationLevel => max_tessellation_generation_level: u32;
+        maxTessellationPatchSize => max_tessellation_patch_size: u32;
+        maxTessellationControlPerVertexInputComponents => max_tessellation_control_per_vertex_input_components: u32;
+        maxTessellationControlPerVertexOutputComponents => max_tessellation_control_per_vertex_output_components: u32;
+        maxTessellationControlPerPatchOutputComponents => max_tessellation_control_per_patch_output_components: u32;
+        maxTessellationControlTotalOutputComponents => max_tessellation_control_total_output_components: u32;
+        maxTessellationEvaluationInputComponents => max_tessellation_evaluation_input_components: u32;
+        maxTessellationEvaluationOutputComponents => max_tessellation_evaluation_output_components: u32;
+        maxGeometryShaderInvocations => max_geometry_shader_invocations: u32;
+        maxGeometryInputComponents => max_geometry_input_components: u32;
+        maxGeometryOutputComponents => max_geometry_output_components: u32;
+        maxGeometryOutputVertices => max_geometry_output_vertices: u32;
+        maxGeometryTotalOutputComponents => max_geometry_total_output_components: u32;
+        maxFragmentInputComponents => max_fragment_input_components: u32;
+        maxFragmentOutputAttachments => max_fragment_output_attachments: u32;
+        maxFragmentDualSrcAttachments => max_fragment_dual_src_attachments: u32;
+        maxFragmentCombinedOutputResources => max_fragment_combined_output_resources: u32;
+        maxComputeSharedMemorySize => max_compute_shared_memory_size: u32;
+        maxComputeWorkGroupCount => max_compute_work_group_count: [u32; 3];
+        maxComputeWorkGroupInvocations => max_compute_work_group_invocations: u32;
+        maxComputeWorkGroupSize => max_compute_work_group_size: [u32; 3];
+        subPixelPrecisionBits => sub_pixel_precision_bits: u32;
+        subTexelPrecisionBits => sub_texel_precision_bits: u32;
+        mipmapPrecisionBits => mipmap_precision_bits: u32;
+        maxDrawIndexedIndexValue => max_draw_indexed_index_value: u32;
+        maxDrawIndirectCount => max_draw_indirect_count: u32;
+        maxSamplerLodBias => max_sampler_lod_bias: f32;
+        maxSamplerAnisotropy => max_sampler_anisotropy: f32;
+        maxViewports => max_viewports: u32;
+        maxViewportDimensions => max_viewport_dimensions: [u32; 2];
+        viewportBoundsRange => viewport_bounds_range: [f32; 2];
+        viewportSubPixelBits => viewport_sub_pixel_bits: u32;
+        minMemoryMapAlignment => min_memory_map_alignment: usize;
+        minTexelBufferOffsetAlignment => min_texel_buffer_offset_alignment: vk::DeviceSize;
+        minUniformBufferOffsetAlignment => min_uniform_buffer_offset_alignment: vk::DeviceSize;
+        minStorageBufferOffsetAlignment => min_storage_buffer_offset_alignment: vk::DeviceSize;
+        minTexelOffset => min_texel_offset: i32;
+        maxTexelOffset => max_texel_offset: u32;
+        minTexelGatherOffset => min_texel_gather_offset: i32;
+        maxTexelGatherOffset => max_texel_gather_offset: u32;
+        minInterpolationOffset => min_interpolation_offset: f32;
+        maxInterpolationOffset => max_interpolation_offset: f32;
+        subPixelInterpolationOffsetBits => sub_pixel_interpolation_offset_bits: u32;
+        maxFramebufferWidth => max_framebuffer_width: u32;
+        maxFramebufferHeight => max_framebuffer_height: u32;
+        maxFramebufferLayers => max_framebuffer_layers: u32;
+        framebufferColorSampleCounts => framebuffer_color_sample_counts: vk::SampleCountFlags;
+        framebufferDepthSampleCounts => framebuffer_depth_sample_counts: vk::SampleCountFlags;
+        framebufferStencilSampleCounts => framebuffer_stencil_sample_counts: vk::SampleCountFlags;
+        framebufferNoAttachmentsSampleCounts => framebuffer_no_attachments_sample_counts: vk::SampleCountFlags;
+        maxColorAttachments => max_color_attachments: u32;
+        sampledImageColorSampleCounts => sampled_image_color_sample_counts: vk::SampleCountFlags;
+        sampledImageIntegerSampleCounts => sampled_image_integer_sample_counts: vk::SampleCountFlags;
+        sampledImageDepthSampleCounts => sampled_image_depth_sample_counts: vk::SampleCountFlags;
+        sampledImageStencilSampleCounts => sampled_image_stencil_sample_counts: vk::SampleCountFlags;
+        storageImageSampleCounts => storage_image_sample_counts: vk::SampleCountFlags;
+        maxSampleMaskWords => max_sample_mask_words: u32;
+        timestampComputeAndGraphics => timestamp_compute_and_graphics: bool;
+        timestampPeriod => timestamp_period: f32;
+        maxClipDistances => max_clip_distances: u32;
+        maxCullDistances => max_cull_distances: u32;
+        maxCombinedClipAndCullDistances => max_combined_clip_and_cull_distances: u32;
+        discreteQueuePriorities => discrete_queue_priorities: u32;
+        pointSizeRange => point_size_range: [f32; 2];
+        lineWidthRange => line_width_range: [f32; 2];
+        pointSizeGranularity => point_size_granularity: f32;
+        lineWidthGranularity => line_width_granularity: f32;
+        strictLines => strict_lines: bool;
+        standardSampleLocations => standard_sample_locations: bool;
+        optimalBufferCopyOffsetAlignment => optimal_buffer_copy_offset_alignment: vk::DeviceSize;
+        optimalBufferCopyRowPitchAlignment => optimal_buffer_copy_row_pitch_alignment: vk::DeviceSize;
+        nonCoherentAtomSize => non_coherent_atom_size: vk::DeviceSize;
     }
-
-    fn sparse_properties(&self) -> vk::PhysicalDeviceSparseProperties {
-        vk::PhysicalDeviceSparseProperties {
-            residency_standard2_d_block_shape: self.residency_standard2_d_block_shape.into(),
-            residency_standard2_d_multisample_block_shape: self.residency_standard2_d_multisample_block_shape.into(),
-            residency_standard3_d_block_shape: self.residency_standard3_d_block_shape.into(),
-            residency_aligned_mip_size: self.residency_aligned_mip_size.into(),
-            residency_non_resident_strict: self.residency_non_resident_strict.into(),
-        }
+    sparse vk::PhysicalDeviceSparseProperties {
+        residencyStandard2DBlockShape => residency_standard2_d_block_shape: bool;
+        residencyStandard2DMultisampleBlockShape => residency_standard2_d_multisample_block_shape: bool;
+        residencyStandard3DBlockShape => residency_standard3_d_block_shape: bool;
+        residencyAlignedMipSize => residency_aligned_mip_size: bool;
+        residencyNonResidentStrict => residency_non_resident_strict: bool;
     }
-
-    /// Writes the properties to a structure of a chain, if it holds any that are known here.
-    pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan11Properties<'_>>() {
-            out.device_uuid = self.device_uuid;
-            out.driver_uuid = self.driver_uuid;
-            out.device_luid = self.device_luid;
-            out.device_node_mask = self.device_node_mask;
-            out.device_luid_valid = self.device_luid_valid.into();
-            out.subgroup_size = self.subgroup_size;
-            out.subgroup_supported_stages = self.subgroup_supported_stages;
-            out.subgroup_supported_operations = self.subgroup_supported_operations;
-            out.subgroup_quad_operations_in_all_stages = self.subgroup_quad_operations_in_all_stages.into();
-            out.point_clipping_behavior = self.point_clipping_behavior;
-            out.max_multiview_view_count = self.max_multiview_view_count;
-            out.max_multiview_instance_index = self.max_multiview_instance_index;
-            out.protected_no_fault = self.protected_no_fault.into();
-            out.max_per_set_descriptors = self.max_per_set_descriptors;
-            out.max_memory_allocation_size = self.max_memory_allocation_size;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan12Properties<'_>>() {
-            out.driver_id = self.driver_id;
-            out.driver_name = self.driver_name;
-            out.driver_info = self.driver_info;
-            out.conformance_version = self.conformance_version;
-            out.denorm_behavior_independence = self.denorm_behavior_independence;
-            out.rounding_mode_independence = self.rounding_mode_independence;
-            out.shader_signed_zero_inf_nan_preserve_float16 = self.shader_signed_zero_inf_nan_preserve_float16.into();
-            out.shader_signed_zero_inf_nan_preserve_float32 = self.shader_signed_zero_inf_nan_preserve_float32.into();
-            out.shader_signed_zero_inf_nan_preserve_float64 = self.shader_signed_zero_inf_nan_preserve_float64.into();
-            out.shader_denorm_preserve_float16 = self.shader_denorm_preserve_float16.into();
-            out.shader_denorm_preserve_float32 = self.shader_denorm_preserve_float32.into();
-            out.shader_denorm_preserve_float64 = self.shader_denorm_preserve_float64.into();
-            out.shader_denorm_flush_to_zero_float16 = self.shader_denorm_flush_to_zero_float16.into();
-            out.shader_denorm_flush_to_zero_float32 = self.shader_denorm_flush_to_zero_float32.into();
-            out.shader_denorm_flush_to_zero_float64 = self.shader_denorm_flush_to_zero_float64.into();
-            out.shader_rounding_mode_rte_float16 = self.shader_rounding_mode_rte_float16.into();
-            out.shader_rounding_mode_rte_float32 = self.shader_rounding_mode_rte_float32.into();
-            out.shader_rounding_mode_rte_float64 = self.shader_rounding_mode_rte_float64.into();
-            out.shader_rounding_mode_rtz_float16 = self.shader_rounding_mode_rtz_float16.into();
-            out.shader_rounding_mode_rtz_float32 = self.shader_rounding_mode_rtz_float32.into();
-            out.shader_rounding_mode_rtz_float64 = self.shader_rounding_mode_rtz_float64.into();
-            out.max_update_after_bind_descriptors_in_all_pools = self.max_update_after_bind_descriptors_in_all_pools;
-            out.shader_uniform_buffer_array_non_uniform_indexing_native =
-                self.shader_uniform_buffer_array_non_uniform_indexing_native.into();
-            out.shader_sampled_image_array_non_uniform_indexing_native =
-                self.shader_sampled_image_array_non_uniform_indexing_native.into();
-            out.shader_storage_buffer_array_non_uniform_indexing_native =
-                self.shader_storage_buffer_array_non_uniform_indexing_native.into();
-            out.shader_storage_image_array_non_uniform_indexing_native =
-                self.shader_storage_image_array_non_uniform_indexing_native.into();
-            out.shader_input_attachment_array_non_uniform_indexing_native =
-                self.shader_input_attachment_array_non_uniform_indexing_native.into();
-            out.robust_buffer_access_update_after_bind = self.robust_buffer_access_update_after_bind.into();
-            out.quad_divergent_implicit_lod = self.quad_divergent_implicit_lod.into();
-            out.max_per_stage_descriptor_update_after_bind_samplers =
-                self.max_per_stage_descriptor_update_after_bind_samplers;
-            out.max_per_stage_descriptor_update_after_bind_uniform_buffers =
-                self.max_per_stage_descriptor_update_after_bind_uniform_buffers;
-            out.max_per_stage_descriptor_update_after_bind_storage_buffers =
-                self.max_per_stage_descriptor_update_after_bind_storage_buffers;
-            out.max_per_stage_descriptor_update_after_bind_sampled_images =
-                self.max_per_stage_descriptor_update_after_bind_sampled_images;
-            out.max_per_stage_descriptor_update_after_bind_storage_images =
-                self.max_per_stage_descriptor_update_after_bind_storage_images;
-            out.max_per_stage_descriptor_update_after_bind_input_attachments =
-                self.max_per_stage_descriptor_update_after_bind_input_attachments;
-            out.max_per_stage_update_after_bind_resources = self.max_per_stage_update_after_bind_resources;
-            out.max_descriptor_set_update_after_bind_samplers = self.max_descriptor_set_update_after_bind_samplers;
-            out.max_descriptor_set_update_after_bind_uniform_buffers =
-                self.max_descriptor_set_update_after_bind_uniform_buffers;
-            out.max_descriptor_set_update_after_bind_uniform_buffers_dynamic =
-                self.max_descriptor_set_update_after_bind_uniform_buffers_dynamic;
-            out.max_descriptor_set_update_after_bind_storage_buffers =
-                self.max_descriptor_set_update_after_bind_storage_buffers;
-            out.max_descriptor_set_update_after_bind_storage_buffers_dynamic =
-                self.max_descriptor_set_update_after_bind_storage_buffers_dynamic;
-            out.max_descriptor_set_update_after_bind_sampled_images =
-                self.max_descriptor_set_update_after_bind_sampled_images;
-            out.max_descriptor_set_update_after_bind_storage_images =
-                self.max_descriptor_set_update_after_bind_storage_images;
-            out.max_descriptor_set_update_after_bind_input_attachments =
-                self.max_descriptor_set_update_after_bind_input_attachments;
-            out.supported_depth_resolve_modes = self.supported_depth_resolve_modes;
-            out.supported_stencil_resolve_modes = self.supported_stencil_resolve_modes;
-            out.independent_resolve_none = self.independent_resolve_none.into();
-            out.independent_resolve = self.independent_resolve.into();
-            out.filter_minmax_single_component_formats = self.filter_minmax_single_component_formats.into();
-            out.filter_minmax_image_component_mapping = self.filter_minmax_image_component_mapping.into();
-            out.max_timeline_semaphore_value_difference = self.max_timeline_semaphore_value_difference;
-            out.framebuffer_integer_color_sample_counts = self.framebuffer_integer_color_sample_counts;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan13Properties<'_>>() {
-            out.min_subgroup_size = self.min_subgroup_size;
-            out.max_subgroup_size = self.max_subgroup_size;
-            out.max_compute_workgroup_subgroups = self.max_compute_workgroup_subgroups;
-            out.required_subgroup_size_stages = self.required_subgroup_size_stages;
-            out.max_inline_uniform_block_size = self.max_inline_uniform_block_size;
-            out.max_per_stage_descriptor_inline_uniform_blocks = self.max_per_stage_descriptor_inline_uniform_blocks;
-            out.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks =
-                self.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks;
-            out.max_descriptor_set_inline_uniform_blocks = self.max_descriptor_set_inline_uniform_blocks;
-            out.max_descriptor_set_update_after_bind_inline_uniform_blocks =
-                self.max_descriptor_set_update_after_bind_inline_uniform_blocks;
-            out.max_inline_uniform_total_size = self.max_inline_uniform_total_size;
-            out.integer_dot_product8_bit_unsigned_accelerated =
-                self.integer_dot_product8_bit_unsigned_accelerated.into();
-            out.integer_dot_product8_bit_signed_accelerated = self.integer_dot_product8_bit_signed_accelerated.into();
-            out.integer_dot_product8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product8_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product4x8_bit_packed_unsigned_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_signed_accelerated =
-                self.integer_dot_product4x8_bit_packed_signed_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated =
-                self.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product16_bit_unsigned_accelerated =
-                self.integer_dot_product16_bit_unsigned_accelerated.into();
-            out.integer_dot_product16_bit_signed_accelerated = self.integer_dot_product16_bit_signed_accelerated.into();
-            out.integer_dot_product16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product16_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product32_bit_unsigned_accelerated =
-                self.integer_dot_product32_bit_unsigned_accelerated.into();
-            out.integer_dot_product32_bit_signed_accelerated = self.integer_dot_product32_bit_signed_accelerated.into();
-            out.integer_dot_product32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product32_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product64_bit_unsigned_accelerated =
-                self.integer_dot_product64_bit_unsigned_accelerated.into();
-            out.integer_dot_product64_bit_signed_accelerated = self.integer_dot_product64_bit_signed_accelerated.into();
-            out.integer_dot_product64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product64_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated.into();
-            out.storage_texel_buffer_offset_alignment_bytes = self.storage_texel_buffer_offset_alignment_bytes;
-            out.storage_texel_buffer_offset_single_texel_alignment =
-                self.storage_texel_buffer_offset_single_texel_alignment.into();
-            out.uniform_texel_buffer_offset_alignment_bytes = self.uniform_texel_buffer_offset_alignment_bytes;
-            out.uniform_texel_buffer_offset_single_texel_alignment =
-                self.uniform_texel_buffer_offset_single_texel_alignment.into();
-            out.max_buffer_size = self.max_buffer_size;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceProtectedMemoryProperties<'_>>() {
-            out.protected_no_fault = self.protected_no_fault.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceIDProperties<'_>>() {
-            out.device_uuid = self.device_uuid;
-            out.driver_uuid = self.driver_uuid;
-            out.device_luid = self.device_luid;
-            out.device_node_mask = self.device_node_mask;
-            out.device_luid_valid = self.device_luid_valid.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSubgroupProperties<'_>>() {
-            out.subgroup_size = self.subgroup_size;
-            out.supported_stages = self.subgroup_supported_stages;
-            out.supported_operations = self.subgroup_supported_operations;
-            out.quad_operations_in_all_stages = self.subgroup_quad_operations_in_all_stages.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>() {
-            out.max_per_set_descriptors = self.max_per_set_descriptors;
-            out.max_memory_allocation_size = self.max_memory_allocation_size;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePointClippingProperties<'_>>() {
-            out.point_clipping_behavior = self.point_clipping_behavior;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiviewProperties<'_>>() {
-            out.max_multiview_view_count = self.max_multiview_view_count;
-            out.max_multiview_instance_index = self.max_multiview_instance_index;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDriverProperties<'_>>() {
-            out.driver_id = self.driver_id;
-            out.driver_name = self.driver_name;
-            out.driver_info = self.driver_info;
-            out.conformance_version = self.conformance_version;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTimelineSemaphoreProperties<'_>>() {
-            out.max_timeline_semaphore_value_difference = self.max_timeline_semaphore_value_difference;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceFloatControlsProperties<'_>>() {
-            out.denorm_behavior_independence = self.denorm_behavior_independence;
-            out.rounding_mode_independence = self.rounding_mode_independence;
-            out.shader_signed_zero_inf_nan_preserve_float16 = self.shader_signed_zero_inf_nan_preserve_float16.into();
-            out.shader_signed_zero_inf_nan_preserve_float32 = self.shader_signed_zero_inf_nan_preserve_float32.into();
-            out.shader_signed_zero_inf_nan_preserve_float64 = self.shader_signed_zero_inf_nan_preserve_float64.into();
-            out.shader_denorm_preserve_float16 = self.shader_denorm_preserve_float16.into();
-            out.shader_denorm_preserve_float32 = self.shader_denorm_preserve_float32.into();
-            out.shader_denorm_preserve_float64 = self.shader_denorm_preserve_float64.into();
-            out.shader_denorm_flush_to_zero_float16 = self.shader_denorm_flush_to_zero_float16.into();
-            out.shader_denorm_flush_to_zero_float32 = self.shader_denorm_flush_to_zero_float32.into();
-            out.shader_denorm_flush_to_zero_float64 = self.shader_denorm_flush_to_zero_float64.into();
-            out.shader_rounding_mode_rte_float16 = self.shader_rounding_mode_rte_float16.into();
-            out.shader_rounding_mode_rte_float32 = self.shader_rounding_mode_rte_float32.into();
-            out.shader_rounding_mode_rte_float64 = self.shader_rounding_mode_rte_float64.into();
-            out.shader_rounding_mode_rtz_float16 = self.shader_rounding_mode_rtz_float16.into();
-            out.shader_rounding_mode_rtz_float32 = self.shader_rounding_mode_rtz_float32.into();
-            out.shader_rounding_mode_rtz_float64 = self.shader_rounding_mode_rtz_float64.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDescriptorIndexingProperties<'_>>() {
-            out.max_update_after_bind_descriptors_in_all_pools = self.max_update_after_bind_descriptors_in_all_pools;
-            out.shader_uniform_buffer_array_non_uniform_indexing_native =
-                self.shader_uniform_buffer_array_non_uniform_indexing_native.into();
-            out.shader_sampled_image_array_non_uniform_indexing_native =
-                self.shader_sampled_image_array_non_uniform_indexing_native.into();
-            out.shader_storage_buffer_array_non_uniform_indexing_native =
-                self.shader_storage_buffer_array_non_uniform_indexing_native.into();
-            out.shader_storage_image_array_non_uniform_indexing_native =
-                self.shader_storage_image_array_non_uniform_indexing_native.into();
-            out.shader_input_attachment_array_non_uniform_indexing_native =
-                self.shader_input_attachment_array_non_uniform_indexing_native.into();
-            out.robust_buffer_access_update_after_bind = self.robust_buffer_access_update_after_bind.into();
-            out.quad_divergent_implicit_lod = self.quad_divergent_implicit_lod.into();
-            out.max_per_stage_descriptor_update_after_bind_samplers =
-                self.max_per_stage_descriptor_update_after_bind_samplers;
-            out.max_per_stage_descriptor_update_after_bind_uniform_buffers =
-                self.max_per_stage_descriptor_update_after_bind_uniform_buffers;
-            out.max_per_stage_descriptor_update_after_bind_storage_buffers =
-                self.max_per_stage_descriptor_update_after_bind_storage_buffers;
-            out.max_per_stage_descriptor_update_after_bind_sampled_images =
-                self.max_per_stage_descriptor_update_after_bind_sampled_images;
-            out.max_per_stage_descriptor_update_after_bind_storage_images =
-                self.max_per_stage_descriptor_update_after_bind_storage_images;
-            out.max_per_stage_descriptor_update_after_bind_input_attachments =
-                self.max_per_stage_descriptor_update_after_bind_input_attachments;
-            out.max_per_stage_update_after_bind_resources = self.max_per_stage_update_after_bind_resources;
-            out.max_descriptor_set_update_after_bind_samplers = self.max_descriptor_set_update_after_bind_samplers;
-            out.max_descriptor_set_update_after_bind_uniform_buffers =
-                self.max_descriptor_set_update_after_bind_uniform_buffers;
-            out.max_descriptor_set_update_after_bind_uniform_buffers_dynamic =
-                self.max_descriptor_set_update_after_bind_uniform_buffers_dynamic;
-            out.max_descriptor_set_update_after_bind_storage_buffers =
-                self.max_descriptor_set_update_after_bind_storage_buffers;
-            out.max_descriptor_set_update_after_bind_storage_buffers_dynamic =
-                self.max_descriptor_set_update_after_bind_storage_buffers_dynamic;
-            out.max_descriptor_set_update_after_bind_sampled_images =
-                self.max_descriptor_set_update_after_bind_sampled_images;
-            out.max_descriptor_set_update_after_bind_storage_images =
-                self.max_descriptor_set_update_after_bind_storage_images;
-            out.max_descriptor_set_update_after_bind_input_attachments =
-                self.max_descriptor_set_update_after_bind_input_attachments;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSamplerFilterMinmaxProperties<'_>>() {
-            out.filter_minmax_single_component_formats = self.filter_minmax_single_component_formats.into();
-            out.filter_minmax_image_component_mapping = self.filter_minmax_image_component_mapping.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthStencilResolveProperties<'_>>() {
-            out.supported_depth_resolve_modes = self.supported_depth_resolve_modes;
-            out.supported_stencil_resolve_modes = self.supported_stencil_resolve_modes;
-            out.independent_resolve_none = self.independent_resolve_none.into();
-            out.independent_resolve = self.independent_resolve.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance4Properties<'_>>() {
-            out.max_buffer_size = self.max_buffer_size;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceSubgroupSizeControlProperties<'_>>() {
-            out.min_subgroup_size = self.min_subgroup_size;
-            out.max_subgroup_size = self.max_subgroup_size;
-            out.max_compute_workgroup_subgroups = self.max_compute_workgroup_subgroups;
-            out.required_subgroup_size_stages = self.required_subgroup_size_stages;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceInlineUniformBlockProperties<'_>>() {
-            out.max_inline_uniform_block_size = self.max_inline_uniform_block_size;
-            out.max_per_stage_descriptor_inline_uniform_blocks = self.max_per_stage_descriptor_inline_uniform_blocks;
-            out.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks =
-                self.max_per_stage_descriptor_update_after_bind_inline_uniform_blocks;
-            out.max_descriptor_set_inline_uniform_blocks = self.max_descriptor_set_inline_uniform_blocks;
-            out.max_descriptor_set_update_after_bind_inline_uniform_blocks =
-                self.max_descriptor_set_update_after_bind_inline_uniform_blocks;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderIntegerDotProductProperties<'_>>() {
-            out.integer_dot_product8_bit_unsigned_accelerated =
-                self.integer_dot_product8_bit_unsigned_accelerated.into();
-            out.integer_dot_product8_bit_signed_accelerated = self.integer_dot_product8_bit_signed_accelerated.into();
-            out.integer_dot_product8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product8_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product4x8_bit_packed_unsigned_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_signed_accelerated =
-                self.integer_dot_product4x8_bit_packed_signed_accelerated.into();
-            out.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated =
-                self.integer_dot_product4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product16_bit_unsigned_accelerated =
-                self.integer_dot_product16_bit_unsigned_accelerated.into();
-            out.integer_dot_product16_bit_signed_accelerated = self.integer_dot_product16_bit_signed_accelerated.into();
-            out.integer_dot_product16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product16_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product32_bit_unsigned_accelerated =
-                self.integer_dot_product32_bit_unsigned_accelerated.into();
-            out.integer_dot_product32_bit_signed_accelerated = self.integer_dot_product32_bit_signed_accelerated.into();
-            out.integer_dot_product32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product32_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product64_bit_unsigned_accelerated =
-                self.integer_dot_product64_bit_unsigned_accelerated.into();
-            out.integer_dot_product64_bit_signed_accelerated = self.integer_dot_product64_bit_signed_accelerated.into();
-            out.integer_dot_product64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product64_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_signed_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_signed_accelerated.into();
-            out.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated =
-                self.integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentProperties<'_>>() {
-            out.storage_texel_buffer_offset_alignment_bytes = self.storage_texel_buffer_offset_alignment_bytes;
-            out.storage_texel_buffer_offset_single_texel_alignment =
-                self.storage_texel_buffer_offset_single_texel_alignment.into();
-            out.uniform_texel_buffer_offset_alignment_bytes = self.uniform_texel_buffer_offset_alignment_bytes;
-            out.uniform_texel_buffer_offset_single_texel_alignment =
-                self.uniform_texel_buffer_offset_single_texel_alignment.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorPropertiesEXT<'_>>() {
-            out.max_custom_border_color_samplers = self.max_custom_border_color_samplers;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT<'_>>() {
-            out.dynamic_primitive_topology_unrestricted = self.dynamic_primitive_topology_unrestricted.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT<'_>>() {
-            out.graphics_pipeline_library_fast_linking = self.graphics_pipeline_library_fast_linking.into();
-            out.graphics_pipeline_library_independent_interpolation_decoration =
-                self.graphics_pipeline_library_independent_interpolation_decoration.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationPropertiesKHR<'_>>() {
-            out.line_sub_pixel_precision_bits = self.line_sub_pixel_precision_bits;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawPropertiesEXT<'_>>() {
-            out.max_multi_draw_count = self.max_multi_draw_count;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_>>() {
-            out.provoking_vertex_mode_per_pipeline = self.provoking_vertex_mode_per_pipeline.into();
-            out.transform_feedback_preserves_triangle_fan_provoking_vertex =
-                self.transform_feedback_preserves_triangle_fan_provoking_vertex.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceRobustness2PropertiesEXT<'_>>() {
-            out.robust_storage_buffer_access_size_alignment = self.robust_storage_buffer_access_size_alignment;
-            out.robust_uniform_buffer_access_size_alignment = self.robust_uniform_buffer_access_size_alignment;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackPropertiesEXT<'_>>() {
-            out.max_transform_feedback_streams = self.max_transform_feedback_streams;
-            out.max_transform_feedback_buffers = self.max_transform_feedback_buffers;
-            out.max_transform_feedback_buffer_size = self.max_transform_feedback_buffer_size;
-            out.max_transform_feedback_stream_data_size = self.max_transform_feedback_stream_data_size;
-            out.max_transform_feedback_buffer_data_size = self.max_transform_feedback_buffer_data_size;
-            out.max_transform_feedback_buffer_data_stride = self.max_transform_feedback_buffer_data_stride;
-            out.transform_feedback_queries = self.transform_feedback_queries.into();
-            out.transform_feedback_streams_lines_triangles = self.transform_feedback_streams_lines_triangles.into();
-            out.transform_feedback_rasterization_stream_select =
-                self.transform_feedback_rasterization_stream_select.into();
-            out.transform_feedback_draw = self.transform_feedback_draw.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_>>() {
-            out.max_vertex_attrib_divisor = self.max_vertex_attrib_divisor;
-        }
-        if let Some(out) = structure.cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>()
-        {
-            out.tile_size = self.tile_size;
-            out.max_spherical_harmonics_degree = self.max_spherical_harmonics_degree;
-            out.gaussian_sample_counts = self.gaussian_sample_counts;
-            out.max_gaussians_per_draw = self.max_gaussians_per_draw;
-            out.max_gaussians_per_set = self.max_gaussians_per_set;
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_>>() {
-            out.allow_command_buffer_query_copies = self.allow_command_buffer_query_copies.into();
-        }
-        if let Some(out) = structure.cast::<vk::PhysicalDevicePushDescriptorPropertiesKHR<'_>>() {
-            out.max_push_descriptors = self.max_push_descriptors;
-        }
+    structure vk::PhysicalDeviceVulkan11Properties {
+        deviceUUID => device_uuid: [u8; vk::UUID_SIZE];
+        driverUUID => driver_uuid: [u8; vk::UUID_SIZE];
+        deviceLUID => device_luid: [u8; vk::LUID_SIZE];
+        deviceNodeMask => device_node_mask: u32;
+        deviceLUIDValid => device_luid_valid: bool;
+        subgroupSize => subgroup_size: u32;
+        subgroupSupportedStages => subgroup_supported_stages: vk::ShaderStageFlags;
+        subgroupSupportedOperations => subgroup_supported_operations: vk::SubgroupFeatureFlags;
+        subgroupQuadOperationsInAllStages => subgroup_quad_operations_in_all_stages: bool;
+        pointClippingBehavior => point_clipping_behavior: vk::PointClippingBehavior;
+        maxMultiviewViewCount => max_multiview_view_count: u32;
+        maxMultiviewInstanceIndex => max_multiview_instance_index: u32;
+        protectedNoFault => protected_no_fault: bool;
+        maxPerSetDescriptors => max_per_set_descriptors: u32;
+        maxMemoryAllocationSize => max_memory_allocation_size: vk::DeviceSize;
+    }
+    structure vk::PhysicalDeviceVulkan12Properties {
+        driverID => driver_id: vk::DriverId;
+        driverName => driver_name: [std::ffi::c_char; vk::MAX_DRIVER_NAME_SIZE];
+        driverInfo => driver_info: [std::ffi::c_char; vk::MAX_DRIVER_INFO_SIZE];
+        conformanceVersion => conformance_version: vk::ConformanceVersion;
+        denormBehaviorIndependence => denorm_behavior_independence: vk::ShaderFloatControlsIndependence;
+        roundingModeIndependence => rounding_mode_independence: vk::ShaderFloatControlsIndependence;
+        shaderSignedZeroInfNanPreserveFloat16 => shader_signed_zero_inf_nan_preserve_float16: bool;
+        shaderSignedZeroInfNanPreserveFloat32 => shader_signed_zero_inf_nan_preserve_float32: bool;
+        shaderSignedZeroInfNanPreserveFloat64 => shader_signed_zero_inf_nan_preserve_float64: bool;
+        shaderDenormPreserveFloat16 => shader_denorm_preserve_float16: bool;
+        shaderDenormPreserveFloat32 => shader_denorm_preserve_float32: bool;
+        shaderDenormPreserveFloat64 => shader_denorm_preserve_float64: bool;
+        shaderDenormFlushToZeroFloat16 => shader_denorm_flush_to_zero_float16: bool;
+        shaderDenormFlushToZeroFloat32 => shader_denorm_flush_to_zero_float32: bool;
+        shaderDenormFlushToZeroFloat64 => shader_denorm_flush_to_zero_float64: bool;
+        shaderRoundingModeRTEFloat16 => shader_rounding_mode_rte_float16: bool;
+        shaderRoundingModeRTEFloat32 => shader_rounding_mode_rte_float32: bool;
+        shaderRoundingModeRTEFloat64 => shader_rounding_mode_rte_float64: bool;
+        shaderRoundingModeRTZFloat16 => shader_rounding_mode_rtz_float16: bool;
+        shaderRoundingModeRTZFloat32 => shader_rounding_mode_rtz_float32: bool;
+        shaderRoundingModeRTZFloat64 => shader_rounding_mode_rtz_float64: bool;
+        maxUpdateAfterBindDescriptorsInAllPools => max_update_after_bind_descriptors_in_all_pools: u32;
+        shaderUniformBufferArrayNonUniformIndexingNative =>
+            shader_uniform_buffer_array_non_uniform_indexing_native: bool;
+        shaderSampledImageArrayNonUniformIndexingNative => shader_sampled_image_array_non_uniform_indexing_native: bool;
+        shaderStorageBufferArrayNonUniformIndexingNative =>
+            shader_storage_buffer_array_non_uniform_indexing_native: bool;
+        shaderStorageImageArrayNonUniformIndexingNative => shader_storage_image_array_non_uniform_indexing_native: bool;
+        shaderInputAttachmentArrayNonUniformIndexingNative =>
+            shader_input_attachment_array_non_uniform_indexing_native: bool;
+        robustBufferAccessUpdateAfterBind => robust_buffer_access_update_after_bind: bool;
+        quadDivergentImplicitLod => quad_divergent_implicit_lod: bool;
+        maxPerStageDescriptorUpdateAfterBindSamplers => max_per_stage_descriptor_update_after_bind_samplers: u32;
+        maxPerStageDescriptorUpdateAfterBindUniformBuffers =>
+            max_per_stage_descriptor_update_after_bind_uniform_buffers: u32;
+        maxPerStageDescriptorUpdateAfterBindStorageBuffers =>
+            max_per_stage_descriptor_update_after_bind_storage_buffers: u32;
+        maxPerStageDescriptorUpdateAfterBindSampledImages =>
+            max_per_stage_descriptor_update_after_bind_sampled_images: u32;
+        maxPerStageDescriptorUpdateAfterBindStorageImages =>
+            max_per_stage_descriptor_update_after_bind_storage_images: u32;
+        maxPerStageDescriptorUpdateAfterBindInputAttachments =>
+            max_per_stage_descriptor_update_after_bind_input_attachments: u32;
+        maxPerStageUpdateAfterBindResources => max_per_stage_update_after_bind_resources: u32;
+        maxDescriptorSetUpdateAfterBindSamplers => max_descriptor_set_update_after_bind_samplers: u32;
+        maxDescriptorSetUpdateAfterBindUniformBuffers => max_descriptor_set_update_after_bind_uniform_buffers: u32;
+        maxDescriptorSetUpdateAfterBindUniformBuffersDynamic =>
+            max_descriptor_set_update_after_bind_uniform_buffers_dynamic: u32;
+        maxDescriptorSetUpdateAfterBindStorageBuffers => max_descriptor_set_update_after_bind_storage_buffers: u32;
+        maxDescriptorSetUpdateAfterBindStorageBuffersDynamic =>
+            max_descriptor_set_update_after_bind_storage_buffers_dynamic: u32;
+        maxDescriptorSetUpdateAfterBindSampledImages => max_descriptor_set_update_after_bind_sampled_images: u32;
+        maxDescriptorSetUpdateAfterBindStorageImages => max_descriptor_set_update_after_bind_storage_images: u32;
+        maxDescriptorSetUpdateAfterBindInputAttachments => max_descriptor_set_update_after_bind_input_attachments: u32;
+        supportedDepthResolveModes => supported_depth_resolve_modes: vk::ResolveModeFlags;
+        supportedStencilResolveModes => supported_stencil_resolve_modes: vk::ResolveModeFlags;
+        independentResolveNone => independent_resolve_none: bool;
+        independentResolve => independent_resolve: bool;
+        filterMinmaxSingleComponentFormats => filter_minmax_single_component_formats: bool;
+        filterMinmaxImageComponentMapping => filter_minmax_image_component_mapping: bool;
+        maxTimelineSemaphoreValueDifference => max_timeline_semaphore_value_difference: u64;
+        framebufferIntegerColorSampleCounts => framebuffer_integer_color_sample_counts: vk::SampleCountFlags;
+    }
+    structure vk::PhysicalDeviceVulkan13Properties {
+        minSubgroupSize => min_subgroup_size: u32;
+        maxSubgroupSize => max_subgroup_size: u32;
+        maxComputeWorkgroupSubgroups => max_compute_workgroup_subgroups: u32;
+        requiredSubgroupSizeStages => required_subgroup_size_stages: vk::ShaderStageFlags;
+        maxInlineUniformBlockSize => max_inline_uniform_block_size: u32;
+        maxPerStageDescriptorInlineUniformBlocks => max_per_stage_descriptor_inline_uniform_blocks: u32;
+        maxPerStageDescriptorUpdateAfterBindInlineUniformBlocks =>
+            max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: u32;
+        maxDescriptorSetInlineUniformBlocks => max_descriptor_set_inline_uniform_blocks: u32;
+        maxDescriptorSetUpdateAfterBindInlineUniformBlocks =>
+            max_descriptor_set_update_after_bind_inline_uniform_blocks: u32;
+        maxInlineUniformTotalSize => max_inline_uniform_total_size: u32;
+        integerDotProduct8BitUnsignedAccelerated => integer_dot_product8_bit_unsigned_accelerated: bool;
+        integerDotProduct8BitSignedAccelerated => integer_dot_product8_bit_signed_accelerated: bool;
+        integerDotProduct8BitMixedSignednessAccelerated => integer_dot_product8_bit_mixed_signedness_accelerated: bool;
+        integerDotProduct4x8BitPackedUnsignedAccelerated =>
+            integer_dot_product4x8_bit_packed_unsigned_accelerated: bool;
+        integerDotProduct4x8BitPackedSignedAccelerated => integer_dot_product4x8_bit_packed_signed_accelerated: bool;
+        integerDotProduct4x8BitPackedMixedSignednessAccelerated =>
+            integer_dot_product4x8_bit_packed_mixed_signedness_accelerated: bool;
+        integerDotProduct16BitUnsignedAccelerated => integer_dot_product16_bit_unsigned_accelerated: bool;
+        integerDotProduct16BitSignedAccelerated => integer_dot_product16_bit_signed_accelerated: bool;
+        integerDotProduct16BitMixedSignednessAccelerated =>
+            integer_dot_product16_bit_mixed_signedness_accelerated: bool;
+        integerDotProduct32BitUnsignedAccelerated => integer_dot_product32_bit_unsigned_accelerated: bool;
+        integerDotProduct32BitSignedAccelerated => integer_dot_product32_bit_signed_accelerated: bool;
+        integerDotProduct32BitMixedSignednessAccelerated =>
+            integer_dot_product32_bit_mixed_signedness_accelerated: bool;
+        integerDotProduct64BitUnsignedAccelerated => integer_dot_product64_bit_unsigned_accelerated: bool;
+        integerDotProduct64BitSignedAccelerated => integer_dot_product64_bit_signed_accelerated: bool;
+        integerDotProduct64BitMixedSignednessAccelerated =>
+            integer_dot_product64_bit_mixed_signedness_accelerated: bool;
+        integerDotProductAccumulatingSaturating8BitUnsignedAccelerated =>
+            integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated: bool;
+        integerDotProductAccumulatingSaturating8BitSignedAccelerated =>
+            integer_dot_product_accumulating_saturating8_bit_signed_accelerated: bool;
+        integerDotProductAccumulatingSaturating8BitMixedSignednessAccelerated =>
+            integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: bool;
+        integerDotProductAccumulatingSaturating4x8BitPackedUnsignedAccelerated =>
+            integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: bool;
+        integerDotProductAccumulatingSaturating4x8BitPackedSignedAccelerated =>
+            integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: bool;
+        integerDotProductAccumulatingSaturating4x8BitPackedMixedSignednessAccelerated =>
+            integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated: bool;
+        integerDotProductAccumulatingSaturating16BitUnsignedAccelerated =>
+            integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: bool;
+        integerDotProductAccumulatingSaturating16BitSignedAccelerated =>
+            integer_dot_product_accumulating_saturating16_bit_signed_accelerated: bool;
+        integerDotProductAccumulatingSaturating16BitMixedSignednessAccelerated =>
+            integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: bool;
+        integerDotProductAccumulatingSaturating32BitUnsignedAccelerated =>
+            integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated: bool;
+        integerDotProductAccumulatingSaturating32BitSignedAccelerated =>
+            integer_dot_product_accumulating_saturating32_bit_signed_accelerated: bool;
+        integerDotProductAccumulatingSaturating32BitMixedSignednessAccelerated =>
+            integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated: bool;
+        integerDotProductAccumulatingSaturating64BitUnsignedAccelerated =>
+            integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated: bool;
+        integerDotProductAccumulatingSaturating64BitSignedAccelerated =>
+            integer_dot_product_accumulating_saturating64_bit_signed_accelerated: bool;
+        integerDotProductAccumulatingSaturating64BitMixedSignednessAccelerated =>
+            integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated: bool;
+        storageTexelBufferOffsetAlignmentBytes => storage_texel_buffer_offset_alignment_bytes: vk::DeviceSize;
+        storageTexelBufferOffsetSingleTexelAlignment => storage_texel_buffer_offset_single_texel_alignment: bool;
+        uniformTexelBufferOffsetAlignmentBytes => uniform_texel_buffer_offset_alignment_bytes: vk::DeviceSize;
+        uniformTexelBufferOffsetSingleTexelAlignment => uniform_texel_buffer_offset_single_texel_alignment: bool;
+        maxBufferSize => max_buffer_size: vk::DeviceSize;
+    }
+    structure vk::PhysicalDeviceCustomBorderColorPropertiesEXT {
+        maxCustomBorderColorSamplers => max_custom_border_color_samplers: u32;
+    }
+    structure vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT {
+        dynamicPrimitiveTopologyUnrestricted => dynamic_primitive_topology_unrestricted: bool;
+    }
+    structure vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT {
+        graphicsPipelineLibraryFastLinking => graphics_pipeline_library_fast_linking: bool;
+        graphicsPipelineLibraryIndependentInterpolationDecoration =>
+            graphics_pipeline_library_independent_interpolation_decoration: bool;
+    }
+    structure vk::PhysicalDeviceLineRasterizationPropertiesKHR {
+        lineSubPixelPrecisionBits => line_sub_pixel_precision_bits: u32;
+    }
+    structure vk::PhysicalDeviceMultiDrawPropertiesEXT {
+        maxMultiDrawCount => max_multi_draw_count: u32;
+    }
+    structure vk::PhysicalDeviceProvokingVertexPropertiesEXT {
+        provokingVertexModePerPipeline => provoking_vertex_mode_per_pipeline: bool;
+        transformFeedbackPreservesTriangleFanProvokingVertex =>
+            transform_feedback_preserves_triangle_fan_provoking_vertex: bool;
+    }
+    structure vk::PhysicalDeviceRobustness2PropertiesEXT {
+        robustStorageBufferAccessSizeAlignment => robust_storage_buffer_access_size_alignment: vk::DeviceSize;
+        robustUniformBufferAccessSizeAlignment => robust_uniform_buffer_access_size_alignment: vk::DeviceSize;
+    }
+    structure vk::PhysicalDeviceTransformFeedbackPropertiesEXT {
+        maxTransformFeedbackStreams => max_transform_feedback_streams: u32;
+        maxTransformFeedbackBuffers => max_transform_feedback_buffers: u32;
+        maxTransformFeedbackBufferSize => max_transform_feedback_buffer_size: vk::DeviceSize;
+        maxTransformFeedbackStreamDataSize => max_transform_feedback_stream_data_size: u32;
+        maxTransformFeedbackBufferDataSize => max_transform_feedback_buffer_data_size: u32;
+        maxTransformFeedbackBufferDataStride => max_transform_feedback_buffer_data_stride: u32;
+        transformFeedbackQueries => transform_feedback_queries: bool;
+        transformFeedbackStreamsLinesTriangles => transform_feedback_streams_lines_triangles: bool;
+        transformFeedbackRasterizationStreamSelect => transform_feedback_rasterization_stream_select: bool;
+        transformFeedbackDraw => transform_feedback_draw: bool;
+    }
+    structure vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT {
+        maxVertexAttribDivisor => max_vertex_attrib_divisor: u32;
+    }
+    structure gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
+        tileSize => tile_size: vk::Extent2D;
+        maxSphericalHarmonicsDegree => max_spherical_harmonics_degree: u32;
+        gaussianSampleCounts => gaussian_sample_counts: vk::SampleCountFlags;
+        maxGaussiansPerDraw => max_gaussians_per_draw: u64;
+        maxGaussiansPerSet => max_gaussians_per_set: u64;
+    }
+    structure vk::PhysicalDevicePerformanceQueryPropertiesKHR {
+        allowCommandBufferQueryCopies => allow_command_buffer_query_copies: bool;
+    }
+    structure vk::PhysicalDevicePushDescriptorPropertiesKHR {
+        maxPushDescriptors => max_push_descriptors: u32;
+    }
+    repeated vk::PhysicalDeviceProtectedMemoryProperties { protected_no_fault }
+    repeated vk::PhysicalDeviceIDProperties {
+        device_uuid, driver_uuid, device_luid, device_node_mask, device_luid_valid
+    }
+    repeated vk::PhysicalDeviceSubgroupProperties {
+        subgroup_size, supported_stages: subgroup_supported_stages, supported_operations: subgroup_supported_operations,
+        quad_operations_in_all_stages: subgroup_quad_operations_in_all_stages
+    }
+    repeated vk::PhysicalDeviceMaintenance3Properties { max_per_set_descriptors, max_memory_allocation_size }
+    repeated vk::PhysicalDevicePointClippingProperties { point_clipping_behavior }
+    repeated vk::PhysicalDeviceMultiviewProperties { max_multiview_view_count, max_multiview_instance_index }
+    repeated vk::PhysicalDeviceDriverProperties { driver_id, driver_name, driver_info, conformance_version }
+    repeated vk::PhysicalDeviceTimelineSemaphoreProperties { max_timeline_semaphore_value_difference }
+    repeated vk::PhysicalDeviceFloatControlsProperties {
+        denorm_behavior_independence, rounding_mode_independence, shader_signed_zero_inf_nan_preserve_float16,
+        shader_signed_zero_inf_nan_preserve_float32, shader_signed_zero_inf_nan_preserve_float64,
+        shader_denorm_preserve_float16, shader_denorm_preserve_float32, shader_denorm_preserve_float64,
+        shader_denorm_flush_to_zero_float16, shader_denorm_flush_to_zero_float32, shader_denorm_flush_to_zero_float64,
+        shader_rounding_mode_rte_float16, shader_rounding_mode_rte_float32, shader_rounding_mode_rte_float64,
+        shader_rounding_mode_rtz_float16, shader_rounding_mode_rtz_float32, shader_rounding_mode_rtz_float64
+    }
+    repeated vk::PhysicalDeviceDescriptorIndexingProperties {
+        max_update_after_bind_descriptors_in_all_pools, shader_uniform_buffer_array_non_uniform_indexing_native,
+        shader_sampled_image_array_non_uniform_indexing_native, shader_storage_buffer_array_non_uniform_indexing_native,
+        shader_storage_image_array_non_uniform_indexing_native,
+        shader_input_attachment_array_non_uniform_indexing_native, robust_buffer_access_update_after_bind,
+        quad_divergent_implicit_lod, max_per_stage_descriptor_update_after_bind_samplers,
+        max_per_stage_descriptor_update_after_bind_uniform_buffers,
+        max_per_stage_descriptor_update_after_bind_storage_buffers,
+        max_per_stage_descriptor_update_after_bind_sampled_images,
+        max_per_stage_descriptor_update_after_bind_storage_images,
+        max_per_stage_descriptor_update_after_bind_input_attachments, max_per_stage_update_after_bind_resources,
+        max_descriptor_set_update_after_bind_samplers, max_descriptor_set_update_after_bind_uniform_buffers,
+        max_descriptor_set_update_after_bind_uniform_buffers_dynamic,
+        max_descriptor_set_update_after_bind_storage_buffers,
+        max_descriptor_set_update_after_bind_storage_buffers_dynamic,
+        max_descriptor_set_update_after_bind_sampled_images, max_descriptor_set_update_after_bind_storage_images,
+        max_descriptor_set_update_after_bind_input_attachments
+    }
+    repeated vk::PhysicalDeviceSamplerFilterMinmaxProperties {
+        filter_minmax_single_component_formats, filter_minmax_image_component_mapping
+    }
+    repeated vk::PhysicalDeviceDepthStencilResolveProperties {
+        supported_depth_resolve_modes, supported_stencil_resolve_modes, independent_resolve_none, independent_resolve
+    }
+    repeated vk::PhysicalDeviceMaintenance4Properties { max_buffer_size }
+    repeated vk::PhysicalDeviceSubgroupSizeControlProperties {
+        min_subgroup_size, max_subgroup_size, max_compute_workgroup_subgroups, required_subgroup_size_stages
+    }
+    repeated vk::PhysicalDeviceInlineUniformBlockProperties {
+        max_inline_uniform_block_size, max_per_stage_descriptor_inline_uniform_blocks,
+        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks, max_descriptor_set_inline_uniform_blocks,
+        max_descriptor_set_update_after_bind_inline_uniform_blocks
+    }
+    repeated vk::PhysicalDeviceShaderIntegerDotProductProperties {
+        integer_dot_product8_bit_unsigned_accelerated, integer_dot_product8_bit_signed_accelerated,
+        integer_dot_product8_bit_mixed_signedness_accelerated, integer_dot_product4x8_bit_packed_unsigned_accelerated,
+        integer_dot_product4x8_bit_packed_signed_accelerated,
+        integer_dot_product4x8_bit_packed_mixed_signedness_accelerated, integer_dot_product16_bit_unsigned_accelerated,
+        integer_dot_product16_bit_signed_accelerated, integer_dot_product16_bit_mixed_signedness_accelerated,
+        integer_dot_product32_bit_unsigned_accelerated, integer_dot_product32_bit_signed_accelerated,
+        integer_dot_product32_bit_mixed_signedness_accelerated, integer_dot_product64_bit_unsigned_accelerated,
+        integer_dot_product64_bit_signed_accelerated, integer_dot_product64_bit_mixed_signedness_accelerated,
+        integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated,
+        integer_dot_product_accumulating_saturating8_bit_signed_accelerated,
+        integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated,
+        integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated,
+        integer_dot_product_accumulating_saturating16_bit_signed_accelerated,
+        integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated,
+        integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated,
+        integer_dot_product_accumulating_saturating32_bit_signed_accelerated,
+        integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated,
+        integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated,
+        integer_dot_product_accumulating_saturating64_bit_signed_accelerated,
+        integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated
+    }
+    repeated vk::PhysicalDeviceTexelBufferAlignmentProperties {
+        storage_texel_buffer_offset_alignment_bytes, storage_texel_buffer_offset_single_texel_alignment,
+        uniform_texel_buffer_offset_alignment_bytes, uniform_texel_buffer_offset_single_texel_alignment
     }
 }

@@ -3,7 +3,7 @@
 
 //! SPIR-V's capabilities, and what enables each.
 
-use crate::registry::features::Features;
+use self::Enable::{Absent, Extension, Feature, Property};
 use crate::registry::properties::Properties;
 use ash::vk;
 use spirv::Capability;
@@ -12,9 +12,9 @@ use std::ffi::CStr;
 /// A thing that enables a capability.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Enable {
-    /// A feature, by its name in Rust.
-    Feature(&'static str, fn(&Features) -> bool),
-    /// A value of a property, by the property's name in Rust.
+    /// A feature, by its name.
+    Feature(&'static str),
+    /// A value of a property, and the property's name.
     Property(&'static str, fn(&Properties) -> bool),
     /// An extension of devices.
     Extension(&'static CStr),
@@ -26,361 +26,245 @@ pub(crate) enum Enable {
 /// capabilities that Vulkan doesn't know.
 pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
     match capability {
-        Capability::Geometry => &[Enable::Feature("geometryShader", |f| f.geometry_shader)],
-        Capability::Tessellation => &[Enable::Feature("tessellationShader", |f| f.tessellation_shader)],
-        Capability::Float64 => &[Enable::Feature("shaderFloat64", |f| f.shader_float64)],
-        Capability::Int64 => &[Enable::Feature("shaderInt64", |f| f.shader_int64)],
+        Capability::Geometry => &[Feature("geometryShader")],
+        Capability::Tessellation => &[Feature("tessellationShader")],
+        Capability::Float64 => &[Feature("shaderFloat64")],
+        Capability::Int64 => &[Feature("shaderInt64")],
         Capability::Int64Atomics => &[
-            Enable::Feature("shaderBufferInt64Atomics", |f| f.shader_buffer_int64_atomics),
-            Enable::Feature("shaderSharedInt64Atomics", |f| f.shader_shared_int64_atomics),
-            Enable::Absent("shaderImageInt64Atomics"),
+            Feature("shaderBufferInt64Atomics"),
+            Feature("shaderSharedInt64Atomics"),
+            Absent("shaderImageInt64Atomics"),
         ],
-        Capability::AtomicFloat16AddEXT => &[
-            Enable::Feature("shaderBufferFloat16AtomicAdd", |f| f.shader_buffer_float16_atomic_add),
-            Enable::Feature("shaderSharedFloat16AtomicAdd", |f| f.shader_shared_float16_atomic_add),
-        ],
+        Capability::AtomicFloat16AddEXT => {
+            &[Feature("shaderBufferFloat16AtomicAdd"), Feature("shaderSharedFloat16AtomicAdd")]
+        }
         Capability::AtomicFloat32AddEXT => &[
-            Enable::Feature("shaderBufferFloat32AtomicAdd", |f| f.shader_buffer_float32_atomic_add),
-            Enable::Feature("shaderSharedFloat32AtomicAdd", |f| f.shader_shared_float32_atomic_add),
-            Enable::Feature("shaderImageFloat32AtomicAdd", |f| f.shader_image_float32_atomic_add),
+            Feature("shaderBufferFloat32AtomicAdd"),
+            Feature("shaderSharedFloat32AtomicAdd"),
+            Feature("shaderImageFloat32AtomicAdd"),
         ],
-        Capability::AtomicFloat64AddEXT => &[
-            Enable::Feature("shaderBufferFloat64AtomicAdd", |f| f.shader_buffer_float64_atomic_add),
-            Enable::Feature("shaderSharedFloat64AtomicAdd", |f| f.shader_shared_float64_atomic_add),
-        ],
-        Capability::AtomicFloat16MinMaxEXT => &[
-            Enable::Feature("shaderBufferFloat16AtomicMinMax", |f| f.shader_buffer_float16_atomic_min_max),
-            Enable::Feature("shaderSharedFloat16AtomicMinMax", |f| f.shader_shared_float16_atomic_min_max),
-        ],
+        Capability::AtomicFloat64AddEXT => {
+            &[Feature("shaderBufferFloat64AtomicAdd"), Feature("shaderSharedFloat64AtomicAdd")]
+        }
+        Capability::AtomicFloat16MinMaxEXT => {
+            &[Feature("shaderBufferFloat16AtomicMinMax"), Feature("shaderSharedFloat16AtomicMinMax")]
+        }
         Capability::AtomicFloat32MinMaxEXT => &[
-            Enable::Feature("shaderBufferFloat32AtomicMinMax", |f| f.shader_buffer_float32_atomic_min_max),
-            Enable::Feature("shaderSharedFloat32AtomicMinMax", |f| f.shader_shared_float32_atomic_min_max),
-            Enable::Feature("shaderImageFloat32AtomicMinMax", |f| f.shader_image_float32_atomic_min_max),
+            Feature("shaderBufferFloat32AtomicMinMax"),
+            Feature("shaderSharedFloat32AtomicMinMax"),
+            Feature("shaderImageFloat32AtomicMinMax"),
         ],
-        Capability::AtomicFloat64MinMaxEXT => &[
-            Enable::Feature("shaderBufferFloat64AtomicMinMax", |f| f.shader_buffer_float64_atomic_min_max),
-            Enable::Feature("shaderSharedFloat64AtomicMinMax", |f| f.shader_shared_float64_atomic_min_max),
-        ],
-        Capability::AtomicFloat16VectorNV => &[Enable::Absent("shaderFloat16VectorAtomics")],
-        Capability::Int64ImageEXT => &[Enable::Absent("shaderImageInt64Atomics")],
-        Capability::Int16 => &[Enable::Feature("shaderInt16", |f| f.shader_int16)],
-        Capability::TessellationPointSize => &[Enable::Feature("shaderTessellationAndGeometryPointSize", |f| {
-            f.shader_tessellation_and_geometry_point_size
-        })],
-        Capability::GeometryPointSize => &[Enable::Feature("shaderTessellationAndGeometryPointSize", |f| {
-            f.shader_tessellation_and_geometry_point_size
-        })],
-        Capability::ImageGatherExtended => {
-            &[Enable::Feature("shaderImageGatherExtended", |f| f.shader_image_gather_extended)]
+        Capability::AtomicFloat64MinMaxEXT => {
+            &[Feature("shaderBufferFloat64AtomicMinMax"), Feature("shaderSharedFloat64AtomicMinMax")]
         }
-        Capability::StorageImageMultisample => {
-            &[Enable::Feature("shaderStorageImageMultisample", |f| f.shader_storage_image_multisample)]
-        }
-        Capability::UniformBufferArrayDynamicIndexing => {
-            &[Enable::Feature("shaderUniformBufferArrayDynamicIndexing", |f| {
-                f.shader_uniform_buffer_array_dynamic_indexing
-            })]
-        }
-        Capability::SampledImageArrayDynamicIndexing => {
-            &[Enable::Feature("shaderSampledImageArrayDynamicIndexing", |f| {
-                f.shader_sampled_image_array_dynamic_indexing
-            })]
-        }
-        Capability::StorageBufferArrayDynamicIndexing => {
-            &[Enable::Feature("shaderStorageBufferArrayDynamicIndexing", |f| {
-                f.shader_storage_buffer_array_dynamic_indexing
-            })]
-        }
-        Capability::StorageImageArrayDynamicIndexing => {
-            &[Enable::Feature("shaderStorageImageArrayDynamicIndexing", |f| {
-                f.shader_storage_image_array_dynamic_indexing
-            })]
-        }
-        Capability::ClipDistance => &[Enable::Feature("shaderClipDistance", |f| f.shader_clip_distance)],
-        Capability::CullDistance => &[Enable::Feature("shaderCullDistance", |f| f.shader_cull_distance)],
-        Capability::ImageCubeArray => &[Enable::Feature("imageCubeArray", |f| f.image_cube_array)],
-        Capability::SampleRateShading => &[Enable::Feature("sampleRateShading", |f| f.sample_rate_shading)],
-        Capability::SparseResidency => &[Enable::Feature("shaderResourceResidency", |f| f.shader_resource_residency)],
-        Capability::MinLod => &[Enable::Feature("shaderResourceMinLod", |f| f.shader_resource_min_lod)],
-        Capability::SampledCubeArray => &[Enable::Feature("imageCubeArray", |f| f.image_cube_array)],
-        Capability::ImageMSArray => {
-            &[Enable::Feature("shaderStorageImageMultisample", |f| f.shader_storage_image_multisample)]
-        }
-        Capability::InterpolationFunction => &[Enable::Feature("sampleRateShading", |f| f.sample_rate_shading)],
-        Capability::MultiViewport => &[Enable::Feature("multiViewport", |f| f.multi_viewport)],
-        Capability::DrawParameters => &[
-            Enable::Feature("shaderDrawParameters", |f| f.shader_draw_parameters),
-            Enable::Extension(c"VK_KHR_shader_draw_parameters"),
-        ],
-        Capability::MultiView => &[Enable::Feature("multiview", |f| f.multiview)],
-        Capability::VariablePointersStorageBuffer => {
-            &[Enable::Feature("variablePointersStorageBuffer", |f| f.variable_pointers_storage_buffer)]
-        }
-        Capability::VariablePointers => &[Enable::Feature("variablePointers", |f| f.variable_pointers)],
-        Capability::ShaderClockKHR => &[Enable::Extension(c"VK_KHR_shader_clock")],
-        Capability::StencilExportEXT => &[Enable::Absent("VK_EXT_shader_stencil_export")],
-        Capability::ImageReadWriteLodAMD => &[Enable::Absent("VK_AMD_shader_image_load_store_lod")],
-        Capability::ImageGatherBiasLodAMD => &[Enable::Absent("VK_AMD_texture_gather_bias_lod")],
-        Capability::FragmentMaskAMD => &[Enable::Absent("VK_AMD_shader_fragment_mask")],
-        Capability::SampleMaskOverrideCoverageNV => &[Enable::Absent("VK_NV_sample_mask_override_coverage")],
-        Capability::GeometryShaderPassthroughNV => &[Enable::Absent("VK_NV_geometry_shader_passthrough")],
-        Capability::ShaderViewportIndex => {
-            &[Enable::Feature("shaderOutputViewportIndex", |f| f.shader_output_viewport_index)]
-        }
-        Capability::ShaderLayer => &[Enable::Feature("shaderOutputLayer", |f| f.shader_output_layer)],
-        Capability::ShaderViewportMaskNV => &[Enable::Absent("VK_NV_viewport_array2")],
-        Capability::PerViewAttributesNV => &[Enable::Absent("VK_NVX_multiview_per_view_attributes")],
-        Capability::StorageBuffer16BitAccess => {
-            &[Enable::Feature("storageBuffer16BitAccess", |f| f.storage_buffer16_bit_access)]
-        }
-        Capability::UniformAndStorageBuffer16BitAccess => {
-            &[Enable::Feature("uniformAndStorageBuffer16BitAccess", |f| f.uniform_and_storage_buffer16_bit_access)]
-        }
-        Capability::StoragePushConstant16 => &[Enable::Feature("storagePushConstant16", |f| f.storage_push_constant16)],
-        Capability::StorageInputOutput16 => &[Enable::Feature("storageInputOutput16", |f| f.storage_input_output16)],
-        Capability::GroupNonUniform => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::AtomicFloat16VectorNV => &[Absent("shaderFloat16VectorAtomics")],
+        Capability::Int64ImageEXT => &[Absent("shaderImageInt64Atomics")],
+        Capability::Int16 => &[Feature("shaderInt16")],
+        Capability::TessellationPointSize => &[Feature("shaderTessellationAndGeometryPointSize")],
+        Capability::GeometryPointSize => &[Feature("shaderTessellationAndGeometryPointSize")],
+        Capability::ImageGatherExtended => &[Feature("shaderImageGatherExtended")],
+        Capability::StorageImageMultisample => &[Feature("shaderStorageImageMultisample")],
+        Capability::UniformBufferArrayDynamicIndexing => &[Feature("shaderUniformBufferArrayDynamicIndexing")],
+        Capability::SampledImageArrayDynamicIndexing => &[Feature("shaderSampledImageArrayDynamicIndexing")],
+        Capability::StorageBufferArrayDynamicIndexing => &[Feature("shaderStorageBufferArrayDynamicIndexing")],
+        Capability::StorageImageArrayDynamicIndexing => &[Feature("shaderStorageImageArrayDynamicIndexing")],
+        Capability::ClipDistance => &[Feature("shaderClipDistance")],
+        Capability::CullDistance => &[Feature("shaderCullDistance")],
+        Capability::ImageCubeArray => &[Feature("imageCubeArray")],
+        Capability::SampleRateShading => &[Feature("sampleRateShading")],
+        Capability::SparseResidency => &[Feature("shaderResourceResidency")],
+        Capability::MinLod => &[Feature("shaderResourceMinLod")],
+        Capability::SampledCubeArray => &[Feature("imageCubeArray")],
+        Capability::ImageMSArray => &[Feature("shaderStorageImageMultisample")],
+        Capability::InterpolationFunction => &[Feature("sampleRateShading")],
+        Capability::MultiViewport => &[Feature("multiViewport")],
+        Capability::DrawParameters => &[Feature("shaderDrawParameters"), Extension(c"VK_KHR_shader_draw_parameters")],
+        Capability::MultiView => &[Feature("multiview")],
+        Capability::VariablePointersStorageBuffer => &[Feature("variablePointersStorageBuffer")],
+        Capability::VariablePointers => &[Feature("variablePointers")],
+        Capability::ShaderClockKHR => &[Extension(c"VK_KHR_shader_clock")],
+        Capability::StencilExportEXT => &[Absent("VK_EXT_shader_stencil_export")],
+        Capability::ImageReadWriteLodAMD => &[Absent("VK_AMD_shader_image_load_store_lod")],
+        Capability::ImageGatherBiasLodAMD => &[Absent("VK_AMD_texture_gather_bias_lod")],
+        Capability::FragmentMaskAMD => &[Absent("VK_AMD_shader_fragment_mask")],
+        Capability::SampleMaskOverrideCoverageNV => &[Absent("VK_NV_sample_mask_override_coverage")],
+        Capability::GeometryShaderPassthroughNV => &[Absent("VK_NV_geometry_shader_passthrough")],
+        Capability::ShaderViewportIndex => &[Feature("shaderOutputViewportIndex")],
+        Capability::ShaderLayer => &[Feature("shaderOutputLayer")],
+        Capability::ShaderViewportMaskNV => &[Absent("VK_NV_viewport_array2")],
+        Capability::PerViewAttributesNV => &[Absent("VK_NVX_multiview_per_view_attributes")],
+        Capability::StorageBuffer16BitAccess => &[Feature("storageBuffer16BitAccess")],
+        Capability::UniformAndStorageBuffer16BitAccess => &[Feature("uniformAndStorageBuffer16BitAccess")],
+        Capability::StoragePushConstant16 => &[Feature("storagePushConstant16")],
+        Capability::StorageInputOutput16 => &[Feature("storageInputOutput16")],
+        Capability::GroupNonUniform => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::BASIC)
         })],
-        Capability::GroupNonUniformVote => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformVote => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::VOTE)
         })],
-        Capability::GroupNonUniformArithmetic => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformArithmetic => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC)
         })],
-        Capability::GroupNonUniformBallot => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformBallot => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::BALLOT)
         })],
-        Capability::GroupNonUniformShuffle => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformShuffle => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::SHUFFLE)
         })],
-        Capability::GroupNonUniformShuffleRelative => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformShuffleRelative => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE)
         })],
-        Capability::GroupNonUniformClustered => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformClustered => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::CLUSTERED)
         })],
-        Capability::GroupNonUniformQuad => &[Enable::Property("subgroupSupportedOperations", |p| {
+        Capability::GroupNonUniformQuad => &[Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::QUAD)
         })],
         Capability::GroupNonUniformPartitionedEXT => {
-            &[Enable::Absent("shaderSubgroupPartitioned"), Enable::Absent("subgroupSupportedOperations")]
+            &[Absent("shaderSubgroupPartitioned"), Absent("subgroupSupportedOperations")]
         }
-        Capability::SampleMaskPostDepthCoverage => &[Enable::Absent("VK_EXT_post_depth_coverage")],
-        Capability::RuntimeDescriptorArray => {
-            &[Enable::Feature("runtimeDescriptorArray", |f| f.runtime_descriptor_array)]
-        }
-        Capability::InputAttachmentArrayDynamicIndexing => {
-            &[Enable::Feature("shaderInputAttachmentArrayDynamicIndexing", |f| {
-                f.shader_input_attachment_array_dynamic_indexing
-            })]
-        }
+        Capability::SampleMaskPostDepthCoverage => &[Absent("VK_EXT_post_depth_coverage")],
+        Capability::RuntimeDescriptorArray => &[Feature("runtimeDescriptorArray")],
+        Capability::InputAttachmentArrayDynamicIndexing => &[Feature("shaderInputAttachmentArrayDynamicIndexing")],
         Capability::UniformTexelBufferArrayDynamicIndexing => {
-            &[Enable::Feature("shaderUniformTexelBufferArrayDynamicIndexing", |f| {
-                f.shader_uniform_texel_buffer_array_dynamic_indexing
-            })]
+            &[Feature("shaderUniformTexelBufferArrayDynamicIndexing")]
         }
         Capability::StorageTexelBufferArrayDynamicIndexing => {
-            &[Enable::Feature("shaderStorageTexelBufferArrayDynamicIndexing", |f| {
-                f.shader_storage_texel_buffer_array_dynamic_indexing
-            })]
+            &[Feature("shaderStorageTexelBufferArrayDynamicIndexing")]
         }
-        Capability::UniformBufferArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderUniformBufferArrayNonUniformIndexing", |f| {
-                f.shader_uniform_buffer_array_non_uniform_indexing
-            })]
-        }
-        Capability::SampledImageArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderSampledImageArrayNonUniformIndexing", |f| {
-                f.shader_sampled_image_array_non_uniform_indexing
-            })]
-        }
-        Capability::StorageBufferArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderStorageBufferArrayNonUniformIndexing", |f| {
-                f.shader_storage_buffer_array_non_uniform_indexing
-            })]
-        }
-        Capability::StorageImageArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderStorageImageArrayNonUniformIndexing", |f| {
-                f.shader_storage_image_array_non_uniform_indexing
-            })]
-        }
+        Capability::UniformBufferArrayNonUniformIndexing => &[Feature("shaderUniformBufferArrayNonUniformIndexing")],
+        Capability::SampledImageArrayNonUniformIndexing => &[Feature("shaderSampledImageArrayNonUniformIndexing")],
+        Capability::StorageBufferArrayNonUniformIndexing => &[Feature("shaderStorageBufferArrayNonUniformIndexing")],
+        Capability::StorageImageArrayNonUniformIndexing => &[Feature("shaderStorageImageArrayNonUniformIndexing")],
         Capability::InputAttachmentArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderInputAttachmentArrayNonUniformIndexing", |f| {
-                f.shader_input_attachment_array_non_uniform_indexing
-            })]
+            &[Feature("shaderInputAttachmentArrayNonUniformIndexing")]
         }
         Capability::UniformTexelBufferArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderUniformTexelBufferArrayNonUniformIndexing", |f| {
-                f.shader_uniform_texel_buffer_array_non_uniform_indexing
-            })]
+            &[Feature("shaderUniformTexelBufferArrayNonUniformIndexing")]
         }
         Capability::StorageTexelBufferArrayNonUniformIndexing => {
-            &[Enable::Feature("shaderStorageTexelBufferArrayNonUniformIndexing", |f| {
-                f.shader_storage_texel_buffer_array_non_uniform_indexing
-            })]
+            &[Feature("shaderStorageTexelBufferArrayNonUniformIndexing")]
         }
-        Capability::FragmentFullyCoveredEXT => &[Enable::Absent("VK_EXT_conservative_rasterization")],
-        Capability::Float16 => {
-            &[Enable::Feature("shaderFloat16", |f| f.shader_float16), Enable::Absent("VK_AMD_gpu_shader_half_float")]
-        }
-        Capability::Int8 => &[Enable::Feature("shaderInt8", |f| f.shader_int8)],
-        Capability::StorageBuffer8BitAccess => {
-            &[Enable::Feature("storageBuffer8BitAccess", |f| f.storage_buffer8_bit_access)]
-        }
-        Capability::UniformAndStorageBuffer8BitAccess => {
-            &[Enable::Feature("uniformAndStorageBuffer8BitAccess", |f| f.uniform_and_storage_buffer8_bit_access)]
-        }
-        Capability::StoragePushConstant8 => &[Enable::Feature("storagePushConstant8", |f| f.storage_push_constant8)],
-        Capability::VulkanMemoryModel => &[Enable::Feature("vulkanMemoryModel", |f| f.vulkan_memory_model)],
-        Capability::VulkanMemoryModelDeviceScope => {
-            &[Enable::Feature("vulkanMemoryModelDeviceScope", |f| f.vulkan_memory_model_device_scope)]
-        }
+        Capability::FragmentFullyCoveredEXT => &[Absent("VK_EXT_conservative_rasterization")],
+        Capability::Float16 => &[Feature("shaderFloat16"), Absent("VK_AMD_gpu_shader_half_float")],
+        Capability::Int8 => &[Feature("shaderInt8")],
+        Capability::StorageBuffer8BitAccess => &[Feature("storageBuffer8BitAccess")],
+        Capability::UniformAndStorageBuffer8BitAccess => &[Feature("uniformAndStorageBuffer8BitAccess")],
+        Capability::StoragePushConstant8 => &[Feature("storagePushConstant8")],
+        Capability::VulkanMemoryModel => &[Feature("vulkanMemoryModel")],
+        Capability::VulkanMemoryModelDeviceScope => &[Feature("vulkanMemoryModelDeviceScope")],
         Capability::DenormPreserve => &[
-            Enable::Property("shaderDenormPreserveFloat16", |p| p.shader_denorm_preserve_float16),
-            Enable::Property("shaderDenormPreserveFloat32", |p| p.shader_denorm_preserve_float32),
-            Enable::Property("shaderDenormPreserveFloat64", |p| p.shader_denorm_preserve_float64),
+            Property("shaderDenormPreserveFloat16", |p| p.shader_denorm_preserve_float16),
+            Property("shaderDenormPreserveFloat32", |p| p.shader_denorm_preserve_float32),
+            Property("shaderDenormPreserveFloat64", |p| p.shader_denorm_preserve_float64),
         ],
         Capability::DenormFlushToZero => &[
-            Enable::Property("shaderDenormFlushToZeroFloat16", |p| p.shader_denorm_flush_to_zero_float16),
-            Enable::Property("shaderDenormFlushToZeroFloat32", |p| p.shader_denorm_flush_to_zero_float32),
-            Enable::Property("shaderDenormFlushToZeroFloat64", |p| p.shader_denorm_flush_to_zero_float64),
+            Property("shaderDenormFlushToZeroFloat16", |p| p.shader_denorm_flush_to_zero_float16),
+            Property("shaderDenormFlushToZeroFloat32", |p| p.shader_denorm_flush_to_zero_float32),
+            Property("shaderDenormFlushToZeroFloat64", |p| p.shader_denorm_flush_to_zero_float64),
         ],
         Capability::SignedZeroInfNanPreserve => &[
-            Enable::Property("shaderSignedZeroInfNanPreserveFloat16", |p| {
-                p.shader_signed_zero_inf_nan_preserve_float16
-            }),
-            Enable::Property("shaderSignedZeroInfNanPreserveFloat32", |p| {
-                p.shader_signed_zero_inf_nan_preserve_float32
-            }),
-            Enable::Property("shaderSignedZeroInfNanPreserveFloat64", |p| {
-                p.shader_signed_zero_inf_nan_preserve_float64
-            }),
+            Property("shaderSignedZeroInfNanPreserveFloat16", |p| p.shader_signed_zero_inf_nan_preserve_float16),
+            Property("shaderSignedZeroInfNanPreserveFloat32", |p| p.shader_signed_zero_inf_nan_preserve_float32),
+            Property("shaderSignedZeroInfNanPreserveFloat64", |p| p.shader_signed_zero_inf_nan_preserve_float64),
         ],
         Capability::RoundingModeRTE => &[
-            Enable::Property("shaderRoundingModeRTEFloat16", |p| p.shader_rounding_mode_rte_float16),
-            Enable::Property("shaderRoundingModeRTEFloat32", |p| p.shader_rounding_mode_rte_float32),
-            Enable::Property("shaderRoundingModeRTEFloat64", |p| p.shader_rounding_mode_rte_float64),
+            Property("shaderRoundingModeRTEFloat16", |p| p.shader_rounding_mode_rte_float16),
+            Property("shaderRoundingModeRTEFloat32", |p| p.shader_rounding_mode_rte_float32),
+            Property("shaderRoundingModeRTEFloat64", |p| p.shader_rounding_mode_rte_float64),
         ],
         Capability::RoundingModeRTZ => &[
-            Enable::Property("shaderRoundingModeRTZFloat16", |p| p.shader_rounding_mode_rtz_float16),
-            Enable::Property("shaderRoundingModeRTZFloat32", |p| p.shader_rounding_mode_rtz_float32),
-            Enable::Property("shaderRoundingModeRTZFloat64", |p| p.shader_rounding_mode_rtz_float64),
+            Property("shaderRoundingModeRTZFloat16", |p| p.shader_rounding_mode_rtz_float16),
+            Property("shaderRoundingModeRTZFloat32", |p| p.shader_rounding_mode_rtz_float32),
+            Property("shaderRoundingModeRTZFloat64", |p| p.shader_rounding_mode_rtz_float64),
         ],
-        Capability::ComputeDerivativeGroupQuadsKHR => &[Enable::Absent("computeDerivativeGroupQuads")],
-        Capability::ComputeDerivativeGroupLinearKHR => &[Enable::Absent("computeDerivativeGroupLinear")],
-        Capability::ImageFootprintNV => &[Enable::Absent("imageFootprint")],
-        Capability::MeshShadingNV => &[Enable::Absent("VK_NV_mesh_shader")],
-        Capability::RayTracingKHR => &[Enable::Absent("rayTracingPipeline")],
-        Capability::RayQueryKHR => &[Enable::Absent("rayQuery")],
-        Capability::RayTraversalPrimitiveCullingKHR => {
-            &[Enable::Absent("rayTraversalPrimitiveCulling"), Enable::Absent("rayQuery")]
-        }
-        Capability::RayCullMaskKHR => &[Enable::Absent("rayTracingMaintenance1")],
-        Capability::RayTracingNV => &[Enable::Absent("VK_NV_ray_tracing")],
-        Capability::RayTracingMotionBlurNV => &[Enable::Absent("rayTracingMotionBlur")],
-        Capability::TransformFeedback => &[Enable::Feature("transformFeedback", |f| f.transform_feedback)],
-        Capability::GeometryStreams => &[Enable::Feature("geometryStreams", |f| f.geometry_streams)],
-        Capability::FragmentDensityEXT => &[Enable::Absent("fragmentDensityMap"), Enable::Absent("shadingRateImage")],
-        Capability::PhysicalStorageBufferAddresses => &[
-            Enable::Feature("bufferDeviceAddress", |f| f.buffer_device_address),
-            Enable::Absent("bufferDeviceAddress"),
-        ],
-        Capability::CooperativeMatrixNV => &[Enable::Absent("cooperativeMatrix")],
-        Capability::IntegerFunctions2INTEL => &[Enable::Absent("shaderIntegerFunctions2")],
-        Capability::ShaderSMBuiltinsNV => &[Enable::Absent("shaderSMBuiltins")],
-        Capability::FragmentShaderSampleInterlockEXT => &[Enable::Absent("fragmentShaderSampleInterlock")],
-        Capability::FragmentShaderPixelInterlockEXT => &[Enable::Absent("fragmentShaderPixelInterlock")],
+        Capability::ComputeDerivativeGroupQuadsKHR => &[Absent("computeDerivativeGroupQuads")],
+        Capability::ComputeDerivativeGroupLinearKHR => &[Absent("computeDerivativeGroupLinear")],
+        Capability::ImageFootprintNV => &[Absent("imageFootprint")],
+        Capability::MeshShadingNV => &[Absent("VK_NV_mesh_shader")],
+        Capability::RayTracingKHR => &[Absent("rayTracingPipeline")],
+        Capability::RayQueryKHR => &[Absent("rayQuery")],
+        Capability::RayTraversalPrimitiveCullingKHR => &[Absent("rayTraversalPrimitiveCulling"), Absent("rayQuery")],
+        Capability::RayCullMaskKHR => &[Absent("rayTracingMaintenance1")],
+        Capability::RayTracingNV => &[Absent("VK_NV_ray_tracing")],
+        Capability::RayTracingMotionBlurNV => &[Absent("rayTracingMotionBlur")],
+        Capability::TransformFeedback => &[Feature("transformFeedback")],
+        Capability::GeometryStreams => &[Feature("geometryStreams")],
+        Capability::FragmentDensityEXT => &[Absent("fragmentDensityMap"), Absent("shadingRateImage")],
+        Capability::PhysicalStorageBufferAddresses => &[Feature("bufferDeviceAddress"), Absent("bufferDeviceAddress")],
+        Capability::CooperativeMatrixNV => &[Absent("cooperativeMatrix")],
+        Capability::IntegerFunctions2INTEL => &[Absent("shaderIntegerFunctions2")],
+        Capability::ShaderSMBuiltinsNV => &[Absent("shaderSMBuiltins")],
+        Capability::FragmentShaderSampleInterlockEXT => &[Absent("fragmentShaderSampleInterlock")],
+        Capability::FragmentShaderPixelInterlockEXT => &[Absent("fragmentShaderPixelInterlock")],
         Capability::FragmentShaderShadingRateInterlockEXT => {
-            &[Enable::Absent("fragmentShaderShadingRateInterlock"), Enable::Absent("shadingRateImage")]
+            &[Absent("fragmentShaderShadingRateInterlock"), Absent("shadingRateImage")]
         }
-        Capability::DemoteToHelperInvocation => {
-            &[Enable::Feature("shaderDemoteToHelperInvocation", |f| f.shader_demote_to_helper_invocation)]
-        }
+        Capability::DemoteToHelperInvocation => &[Feature("shaderDemoteToHelperInvocation")],
         Capability::FragmentShadingRateKHR => &[
-            Enable::Absent("pipelineFragmentShadingRate"),
-            Enable::Absent("primitiveFragmentShadingRate"),
-            Enable::Absent("attachmentFragmentShadingRate"),
+            Absent("pipelineFragmentShadingRate"),
+            Absent("primitiveFragmentShadingRate"),
+            Absent("attachmentFragmentShadingRate"),
         ],
-        Capability::WorkgroupMemoryExplicitLayoutKHR => {
-            &[Enable::Feature("workgroupMemoryExplicitLayout", |f| f.workgroup_memory_explicit_layout)]
-        }
-        Capability::WorkgroupMemoryExplicitLayout8BitAccessKHR => {
-            &[Enable::Feature("workgroupMemoryExplicitLayout8BitAccess", |f| {
-                f.workgroup_memory_explicit_layout8_bit_access
-            })]
-        }
+        Capability::WorkgroupMemoryExplicitLayoutKHR => &[Feature("workgroupMemoryExplicitLayout")],
+        Capability::WorkgroupMemoryExplicitLayout8BitAccessKHR => &[Feature("workgroupMemoryExplicitLayout8BitAccess")],
         Capability::WorkgroupMemoryExplicitLayout16BitAccessKHR => {
-            &[Enable::Feature("workgroupMemoryExplicitLayout16BitAccess", |f| {
-                f.workgroup_memory_explicit_layout16_bit_access
-            })]
+            &[Feature("workgroupMemoryExplicitLayout16BitAccess")]
         }
-        Capability::DotProductInputAll => {
-            &[Enable::Feature("shaderIntegerDotProduct", |f| f.shader_integer_dot_product)]
-        }
-        Capability::DotProductInput4x8Bit => {
-            &[Enable::Feature("shaderIntegerDotProduct", |f| f.shader_integer_dot_product)]
-        }
-        Capability::DotProductInput4x8BitPacked => {
-            &[Enable::Feature("shaderIntegerDotProduct", |f| f.shader_integer_dot_product)]
-        }
-        Capability::DotProduct => &[Enable::Feature("shaderIntegerDotProduct", |f| f.shader_integer_dot_product)],
-        Capability::FragmentBarycentricKHR => &[Enable::Absent("fragmentShaderBarycentric")],
-        Capability::TextureSampleWeightedQCOM => &[Enable::Absent("textureSampleWeighted")],
-        Capability::TextureBoxFilterQCOM => &[Enable::Absent("textureBoxFilter")],
-        Capability::TextureBlockMatchQCOM => &[Enable::Absent("textureBlockMatch")],
-        Capability::TextureBlockMatch2QCOM => &[Enable::Absent("textureBlockMatch2")],
-        Capability::MeshShadingEXT => &[Enable::Absent("VK_EXT_mesh_shader")],
-        Capability::CoreBuiltinsARM => &[Enable::Absent("shaderCoreBuiltins")],
-        Capability::ShaderInvocationReorderNV => &[Enable::Absent("VK_NV_ray_tracing_invocation_reorder")],
-        Capability::RayTracingPositionFetchKHR => &[Enable::Absent("rayTracingPositionFetch")],
-        Capability::RayQueryPositionFetchKHR => &[Enable::Absent("rayTracingPositionFetch")],
-        Capability::TileImageColorReadAccessEXT => &[Enable::Absent("shaderTileImageColorReadAccess")],
-        Capability::TileImageDepthReadAccessEXT => &[Enable::Absent("shaderTileImageDepthReadAccess")],
-        Capability::TileImageStencilReadAccessEXT => &[Enable::Absent("shaderTileImageStencilReadAccess")],
-        Capability::CooperativeMatrixKHR => &[Enable::Absent("cooperativeMatrix")],
-        Capability::CooperativeMatrixConversionQCOM => &[Enable::Absent("cooperativeMatrixConversion")],
-        Capability::ShaderEnqueueAMDX => &[Enable::Absent("shaderEnqueue")],
-        Capability::GroupNonUniformRotateKHR => &[Enable::Absent("shaderSubgroupRotate")],
-        Capability::ExpectAssumeKHR => &[Enable::Absent("shaderExpectAssume")],
-        Capability::FloatControls2 => &[Enable::Absent("shaderFloatControls2")],
-        Capability::QuadControlKHR => &[Enable::Absent("shaderQuadControl")],
-        Capability::BFloat16TypeKHR => &[Enable::Absent("shaderBFloat16Type")],
-        Capability::BFloat16DotProductKHR => &[Enable::Absent("shaderBFloat16DotProduct")],
-        Capability::BFloat16CooperativeMatrixKHR => &[Enable::Absent("shaderBFloat16CooperativeMatrix")],
-        Capability::RawAccessChainsNV => &[Enable::Absent("shaderRawAccessChains")],
-        Capability::ReplicatedCompositesEXT => &[Enable::Absent("shaderReplicatedComposites")],
-        Capability::TensorAddressingNV => &[Enable::Absent("cooperativeMatrixTensorAddressing")],
-        Capability::CooperativeMatrixConversionsNV => &[Enable::Absent("cooperativeMatrixConversions")],
-        Capability::CooperativeMatrixTensorAddressingNV => &[Enable::Absent("cooperativeMatrixTensorAddressing")],
-        Capability::CooperativeMatrixBlockLoadsNV => &[Enable::Absent("cooperativeMatrixBlockLoads")],
-        Capability::RayTracingSpheresGeometryNV => &[Enable::Absent("spheres")],
-        Capability::RayTracingLinearSweptSpheresGeometryNV => &[Enable::Absent("linearSweptSpheres")],
-        Capability::RayTracingClusterAccelerationStructureNV => &[Enable::Absent("clusterAccelerationStructure")],
-        Capability::CooperativeVectorNV => &[Enable::Absent("cooperativeVector")],
-        Capability::CooperativeVectorTrainingNV => &[Enable::Absent("cooperativeVectorTraining")],
-        Capability::PushConstantBanksNV => &[Enable::Absent("pushConstantBank")],
-        Capability::ShaderInvocationReorderEXT => &[Enable::Absent("VK_EXT_ray_tracing_invocation_reorder")],
-        Capability::TileShadingQCOM => &[Enable::Absent("tileShading")],
-        Capability::TensorsARM => &[Enable::Absent("shaderTensorAccess")],
-        Capability::StorageTensorArrayDynamicIndexingARM => {
-            &[Enable::Absent("shaderStorageTensorArrayDynamicIndexing")]
-        }
-        Capability::StorageTensorArrayNonUniformIndexingARM => {
-            &[Enable::Absent("shaderStorageTensorArrayNonUniformIndexing")]
-        }
-        Capability::Float8EXT => &[Enable::Absent("shaderFloat8")],
-        Capability::Float8CooperativeMatrixEXT => &[Enable::Absent("shaderFloat8CooperativeMatrix")],
-        Capability::GraphARM => &[Enable::Absent("dataGraph")],
-        Capability::UntypedPointersKHR => &[Enable::Absent("shaderUntypedPointers")],
-        Capability::FMAKHR => &[
-            Enable::Absent("shaderFmaFloat16"),
-            Enable::Absent("shaderFmaFloat32"),
-            Enable::Absent("shaderFmaFloat64"),
-        ],
-        Capability::Shader64BitIndexingEXT => &[Enable::Absent("shader64BitIndexing")],
-        Capability::LongVectorEXT => &[Enable::Absent("longVector")],
-        Capability::DescriptorHeapEXT => &[Enable::Absent("descriptorHeap")],
-        Capability::CooperativeMatrixLayoutsARM => &[Enable::Absent("cooperativeMatrixArmLayouts")],
+        Capability::DotProductInputAll => &[Feature("shaderIntegerDotProduct")],
+        Capability::DotProductInput4x8Bit => &[Feature("shaderIntegerDotProduct")],
+        Capability::DotProductInput4x8BitPacked => &[Feature("shaderIntegerDotProduct")],
+        Capability::DotProduct => &[Feature("shaderIntegerDotProduct")],
+        Capability::FragmentBarycentricKHR => &[Absent("fragmentShaderBarycentric")],
+        Capability::TextureSampleWeightedQCOM => &[Absent("textureSampleWeighted")],
+        Capability::TextureBoxFilterQCOM => &[Absent("textureBoxFilter")],
+        Capability::TextureBlockMatchQCOM => &[Absent("textureBlockMatch")],
+        Capability::TextureBlockMatch2QCOM => &[Absent("textureBlockMatch2")],
+        Capability::MeshShadingEXT => &[Absent("VK_EXT_mesh_shader")],
+        Capability::CoreBuiltinsARM => &[Absent("shaderCoreBuiltins")],
+        Capability::ShaderInvocationReorderNV => &[Absent("VK_NV_ray_tracing_invocation_reorder")],
+        Capability::RayTracingPositionFetchKHR => &[Absent("rayTracingPositionFetch")],
+        Capability::RayQueryPositionFetchKHR => &[Absent("rayTracingPositionFetch")],
+        Capability::TileImageColorReadAccessEXT => &[Absent("shaderTileImageColorReadAccess")],
+        Capability::TileImageDepthReadAccessEXT => &[Absent("shaderTileImageDepthReadAccess")],
+        Capability::TileImageStencilReadAccessEXT => &[Absent("shaderTileImageStencilReadAccess")],
+        Capability::CooperativeMatrixKHR => &[Absent("cooperativeMatrix")],
+        Capability::CooperativeMatrixConversionQCOM => &[Absent("cooperativeMatrixConversion")],
+        Capability::ShaderEnqueueAMDX => &[Absent("shaderEnqueue")],
+        Capability::GroupNonUniformRotateKHR => &[Absent("shaderSubgroupRotate")],
+        Capability::ExpectAssumeKHR => &[Absent("shaderExpectAssume")],
+        Capability::FloatControls2 => &[Absent("shaderFloatControls2")],
+        Capability::QuadControlKHR => &[Absent("shaderQuadControl")],
+        Capability::BFloat16TypeKHR => &[Absent("shaderBFloat16Type")],
+        Capability::BFloat16DotProductKHR => &[Absent("shaderBFloat16DotProduct")],
+        Capability::BFloat16CooperativeMatrixKHR => &[Absent("shaderBFloat16CooperativeMatrix")],
+        Capability::RawAccessChainsNV => &[Absent("shaderRawAccessChains")],
+        Capability::ReplicatedCompositesEXT => &[Absent("shaderReplicatedComposites")],
+        Capability::TensorAddressingNV => &[Absent("cooperativeMatrixTensorAddressing")],
+        Capability::CooperativeMatrixConversionsNV => &[Absent("cooperativeMatrixConversions")],
+        Capability::CooperativeMatrixTensorAddressingNV => &[Absent("cooperativeMatrixTensorAddressing")],
+        Capability::CooperativeMatrixBlockLoadsNV => &[Absent("cooperativeMatrixBlockLoads")],
+        Capability::RayTracingSpheresGeometryNV => &[Absent("spheres")],
+        Capability::RayTracingLinearSweptSpheresGeometryNV => &[Absent("linearSweptSpheres")],
+        Capability::RayTracingClusterAccelerationStructureNV => &[Absent("clusterAccelerationStructure")],
+        Capability::CooperativeVectorNV => &[Absent("cooperativeVector")],
+        Capability::CooperativeVectorTrainingNV => &[Absent("cooperativeVectorTraining")],
+        Capability::PushConstantBanksNV => &[Absent("pushConstantBank")],
+        Capability::ShaderInvocationReorderEXT => &[Absent("VK_EXT_ray_tracing_invocation_reorder")],
+        Capability::TileShadingQCOM => &[Absent("tileShading")],
+        Capability::TensorsARM => &[Absent("shaderTensorAccess")],
+        Capability::StorageTensorArrayDynamicIndexingARM => &[Absent("shaderStorageTensorArrayDynamicIndexing")],
+        Capability::StorageTensorArrayNonUniformIndexingARM => &[Absent("shaderStorageTensorArrayNonUniformIndexing")],
+        Capability::Float8EXT => &[Absent("shaderFloat8")],
+        Capability::Float8CooperativeMatrixEXT => &[Absent("shaderFloat8CooperativeMatrix")],
+        Capability::GraphARM => &[Absent("dataGraph")],
+        Capability::UntypedPointersKHR => &[Absent("shaderUntypedPointers")],
+        Capability::FMAKHR => &[Absent("shaderFmaFloat16"), Absent("shaderFmaFloat32"), Absent("shaderFmaFloat64")],
+        Capability::Shader64BitIndexingEXT => &[Absent("shader64BitIndexing")],
+        Capability::LongVectorEXT => &[Absent("longVector")],
+        Capability::DescriptorHeapEXT => &[Absent("descriptorHeap")],
+        Capability::CooperativeMatrixLayoutsARM => &[Absent("cooperativeMatrixArmLayouts")],
         _ => &[],
     }
 }

@@ -10,7 +10,7 @@ use crate::physical_device::formats;
 use crate::physical_device::limits::{MAX_TEXEL_BUFFER_ELEMENTS, MIN_BUFFER_OFFSET_ALIGNMENT};
 use crate::physical_device::memory::ALL_TYPE_BITS;
 use ash::vk;
-use simdevice::packet::BufferRange;
+use simdevice::BufferRange;
 use simdevice::{Allocation, Format};
 use std::sync::{Arc, OnceLock};
 

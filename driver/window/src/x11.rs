@@ -260,8 +260,8 @@ impl X11Canvas {
         let [width, height] = self.size;
         let row_size = 4 * usize::from(width);
         // A request has a header of its own.
-        let room = self.connection.maximum_request_bytes().saturating_sub(64);
-        let rows = (room / row_size).clamp(1, usize::from(height));
+        let available = self.connection.maximum_request_bytes().saturating_sub(64);
+        let rows = (available / row_size).clamp(1, usize::from(height));
         let mut y = 0;
         for part in pixels.chunks(rows * row_size) {
             let part_height = (part.len() / row_size) as u16;

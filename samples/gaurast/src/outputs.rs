@@ -292,21 +292,21 @@ impl Outputs {
         places.filter_map(|place| place.file(index, view)).collect()
     }
 
-    /// The destinations of the first and the last view, for people.
-    pub fn told(&self, first: (usize, &View), last: (usize, &View)) -> String {
-        let told = |place: &Place| match place {
+    /// Describes the destinations of views `first` to `last`.
+    pub fn describe(&self, views: &[View], first: usize, last: usize) -> String {
+        let describe = |place: &Place| match place {
             Place::Stdout => "standard output".to_owned(),
             Place::Video(path) => path.display().to_string(),
             _ => {
-                let of = |(index, view): (usize, &View)| {
-                    let file = place.file(index, view).unwrap_or_default();
+                let of = |index: usize| {
+                    let file = place.file(index, &views[index]).unwrap_or_default();
                     file.display().to_string()
                 };
                 let (first, last) = (of(first), of(last));
                 if first == last { first } else { format!("{first} to {last}") }
             }
         };
-        self.places.iter().map(told).collect::<Vec<_>>().join(", ")
+        self.places.iter().map(describe).collect::<Vec<_>>().join(", ")
     }
 
     /// Creates a writer: creates folders and starts encoders for frames of `size`.

@@ -127,7 +127,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     }
     for drawn in &drawn {
         if let Some(reason) = drawn.nothing.as_deref().filter(|_| !quiet) {
-            let files = outputs.told((drawn.index, &views[drawn.index]), (drawn.index, &views[drawn.index]));
+            let files = outputs.describe(&views, drawn.index, drawn.index);
             eprintln!("gaurast: {files}: {reason}");
         }
     }

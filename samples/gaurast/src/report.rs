@@ -82,8 +82,7 @@ impl Summary<'_> {
         let (Some(first), Some(last)) = (self.drawn.first(), self.drawn.last()) else {
             return format!("wrote nothing{kept}");
         };
-        let view = |drawn: &Drawn| (drawn.index, &self.views[drawn.index]);
-        let places = self.outputs.told(view(first), view(last));
+        let places = self.outputs.describe(self.views, first.index, last.index);
         let camera = &self.views[first.index].camera;
         let size = format!("{}x{}", camera.width, camera.height);
         let counted = |count: usize, name: &str| match count {

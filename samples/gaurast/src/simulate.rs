@@ -404,7 +404,7 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     let frames: Vec<_> = once.into_iter().cycle().take(count.into()).collect();
     let spans = simulate::timeline(&frames, config);
     let modules = module_spans(trace, &frames, &spans, config);
-    let json = schedule::chrome_trace_of_modules(&spans, &modules, config);
+    let json = schedule::chrome_trace(&spans, &modules, config);
     replace(path, &serde_json::to_vec(&json)?)
 }
 

@@ -50,7 +50,7 @@ fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) 
         steps: results.iter().map(|(name, _)| value(name)).collect(),
         curves: numbers.iter().zip(COLORS).map(curve).collect(),
         marks: Vec::new(),
-        legend: Corner::UpperLeft,
+        legend_corner: Corner::UpperLeft,
     }
 }
 

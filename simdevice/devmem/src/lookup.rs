@@ -90,7 +90,7 @@ mod tests {
     use super::*;
     use crate::dispatch;
 
-    fn gathered(words: &[AtomicU32], places: [u32; 8]) -> [u32; 8] {
+    fn gather_words(words: &[AtomicU32], places: [u32; 8]) -> [u32; 8] {
         dispatch!(Level::new(), simd => {
             gather(simd, words, u32x8::simd_from(simd, places)).into()
         })
@@ -100,9 +100,9 @@ mod tests {
     fn nothing_beyond_the_end_is_read() {
         let words: Vec<AtomicU32> = (0..5).map(|word| AtomicU32::new(10 + word)).collect();
         let places = [0, 4, 5, u32::MAX, 2, 1 << 31, 3, 1];
-        assert_eq!(gathered(&words, places), [10, 14, 14, 14, 12, 14, 13, 11]);
-        assert_eq!(gathered(&words[..1], places), [10; 8]);
-        assert_eq!(gathered(&[], places), [0; 8]);
+        assert_eq!(gather_words(&words, places), [10, 14, 14, 14, 12, 14, 13, 11]);
+        assert_eq!(gather_words(&words[..1], places), [10; 8]);
+        assert_eq!(gather_words(&[], places), [0; 8]);
     }
 
     #[test]

@@ -76,7 +76,9 @@ fn mandelbrot() -> Program {
     let next_y = b.compute(Op::FFma, &[double, y, cy]);
     b.begin_continuing();
     let next = b.compute(Op::IAdd, &[i, one]);
-    b.assign_parallel(&[(x, next_x), (y, next_y), (i, next)]);
+    b.assign(x, next_x);
+    b.assign(y, next_y);
+    b.assign(i, next);
     b.end();
     b.assign(out, i);
     b.finish().expect("a valid program")

@@ -3,8 +3,8 @@
 use super::assemble::corners;
 use super::pieces::Pieces;
 use super::primitive_list::{ListedPrimitive, PrimitiveList};
-use super::primitive_stage::{ENOUGH_VERTICES, Environment, StageRunner};
 use super::shade::{OutputReader, Shaded, Vertices};
+use super::stage_runner::{ENOUGH_VERTICES, Environment, StageRunner};
 use crate::limits::MAX_VERTEX_STREAMS;
 use crate::program::interface::PrimitiveInput;
 use crate::program::primitive::GeometryStage;
@@ -42,7 +42,7 @@ impl<'a> GeometryShader<'a> {
             runner: StageRunner::new(&stage.stage, resources, environment),
             reader,
             provoking_last,
-            columns: vec![Vec::new(); stage.gives.values.len()],
+            columns: vec![Vec::new(); stage.output_memory.values.len()],
             shaded: Shaded::default(),
             listed: Vec::new(),
             strips: Default::default(),
@@ -66,7 +66,7 @@ impl<'a> GeometryShader<'a> {
             pieces.counters.add(Counter::GeometryInvocations, count as u64);
             ran?;
             let before = self.listed.len();
-            self.take(primitives, first, count);
+            self.append_batch(primitives, first, count);
             let emitted = self.listed.len() - before;
             pieces.counters.add(Counter::GeometryPrimitives, emitted as u64);
             if self.shaded.vertices.len() >= ENOUGH_VERTICES || first + count == invocations {
@@ -90,7 +90,7 @@ impl<'a> GeometryShader<'a> {
         for lane in 0..count {
             let slots = primitives.vertices_of((first + lane) / invocations);
             let values = slots.iter().map(|&slot| vertices.vertex(slot));
-            self.runner.take(lane, values, &[]);
+            self.runner.set_vertices(lane, values, &[]);
         }
         self.runner.run(count, |input, lane| match input {
             PrimitiveInput::PrimitiveId => primitives.ids[(first + lane) / invocations],
@@ -100,9 +100,9 @@ impl<'a> GeometryShader<'a> {
     }
 
     /// Appends the vertices of the last batch's lanes, and their primitives.
-    fn take(&mut self, primitives: &PrimitiveList, first: usize, lanes: usize) {
+    fn append_batch(&mut self, primitives: &PrimitiveList, first: usize, lanes: usize) {
         self.columns.iter_mut().for_each(Vec::clear);
-        let gives = &self.stage.gives;
+        let memory = &self.stage.output_memory;
         let vertex_bytes = self.stage.vertex_bytes;
         let mut vertices = 0;
         let slot_before = self.shaded.vertices.len() as u32;
@@ -111,17 +111,17 @@ impl<'a> GeometryShader<'a> {
             let id = primitives.ids[(first + lane) / self.stage.invocations];
             self.strips.iter_mut().for_each(Vec::clear);
             for number in 0..count {
-                let start = gives.start + lane as u32 * gives.stride + number * vertex_bytes;
+                let start = memory.start + lane as u32 * memory.stride + number * vertex_bytes;
                 let slot = slot_before + vertices;
-                let header = self.runner.given(start);
+                let header = self.runner.output_word(start);
                 let (begins, stream) = (header & 1 != 0, header >> 1);
                 self.list(stream, begins, slot, id);
                 let place = vertices as usize;
-                for (column, value) in self.columns.iter_mut().zip(&gives.values) {
+                for (column, value) in self.columns.iter_mut().zip(&memory.values) {
                     if place.is_multiple_of(16) {
                         host::push(column, Vector::default());
                     }
-                    let bits = self.runner.given(start + value.offset);
+                    let bits = self.runner.output_word(start + value.offset);
                     column[place / 16].0[place % 16] = bits;
                 }
                 vertices += 1;

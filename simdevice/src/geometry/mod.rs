@@ -23,10 +23,10 @@ mod pieces;
 pub(crate) mod points;
 mod primitive;
 mod primitive_list;
-mod primitive_stage;
 mod primitive_stages;
 mod setup;
 mod shade;
+mod stage_runner;
 mod tessellation_shader;
 #[cfg(test)]
 mod tests;
@@ -54,12 +54,12 @@ use fetch::Fetcher;
 use isa::ir::Rate;
 use isa::machine::{Stopped, Watchdog};
 use isa::resources::Resources;
-use pieces::Pieces;
+use pieces::{PieceNumber, Pieces};
 use primitive_list::{ListedPrimitive, list_corners};
-use primitive_stage::Environment;
-use primitive_stages::{PrimitiveStages, StageBindings, StageResources};
+use primitive_stages::{BoundStages, PrimitiveStages, StageResources};
 use setup::Setup;
 use shade::{OutputReader, Shaded, Shader};
+use stage_runner::Environment;
 use std::sync::atomic::{AtomicBool, AtomicU32};
 use std::time::Instant;
 use vertex_reuse::{RestartRun, VertexReuse, runs};
@@ -103,8 +103,8 @@ pub(crate) struct FrontEnd<'a> {
     draw: &'a Draw,
     runtime: &'a Runtime,
     surface: Surface,
-    prepared: BoundResources<'a>,
-    prepared_stages: StageBindings<'a>,
+    bound: BoundResources<'a>,
+    bound_stages: BoundStages<'a>,
     runs: Vec<RestartRun>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
@@ -155,8 +155,8 @@ impl<'a> FrontEnd<'a> {
             draw,
             runtime,
             surface,
-            prepared: draw.vertex_bindings.bind(runtime.level()),
-            prepared_stages: StageBindings::new(draw, runtime.level()),
+            bound: draw.vertex_bindings.bind(runtime.level()),
+            bound_stages: BoundStages::new(draw, runtime.level()),
             runs,
             transforms: transforms.take(state.scissors.len()).collect(),
             regions: regions.collect(),
@@ -184,7 +184,7 @@ impl<'a> FrontEnd<'a> {
             self.process_steps(counters)
         };
         self.draw.vertex_bindings.bump_generations();
-        self.prepared_stages.bump_generations();
+        self.bound_stages.bump_generations();
         let part = done.map(|segments| PrimitiveDraw {
             segments,
             regions: self.regions.clone(),
@@ -232,8 +232,8 @@ impl<'a> FrontEnd<'a> {
             view: self.surface.view,
             depth_unit: DepthUnit::of(self.surface.depth),
         };
-        let resources = self.prepared.resources();
-        let stage_resources = self.prepared_stages.resources();
+        let resources = self.bound.resources();
+        let stage_resources = self.bound_stages.resources();
         let cancel = AtomicBool::new(false);
         let (workers, ran) = self.runtime.share(
             range,
@@ -252,9 +252,9 @@ impl<'a> FrontEnd<'a> {
             host::reserve(&mut captured, finished.captured.len());
             captured.extend(finished.captured);
         }
-        done.sort_unstable_by_key(|(place, _)| *place);
+        done.sort_unstable_by_key(|(number, _)| *number);
         if let Some(capture) = &self.capture {
-            captured.sort_unstable_by_key(|(place, _)| *place);
+            captured.sort_unstable_by_key(|(number, _)| *number);
             for (_, primitives) in &captured {
                 capture.write(primitives, counters);
             }
@@ -388,7 +388,7 @@ impl<'a> Worker<'a> {
         if front.capture.is_some() {
             let state = &front.draw.state;
             list_corners(state.topology, state.provoking_last, reuse, &mut self.listed);
-            finished.set_up(&self.shaded, &self.listed, (segment, 0));
+            finished.set_up(&self.shaded, &self.listed, PieceNumber { segment, piece: 0 });
             return Ok(());
         }
         counters.add(Counter::PrimitivesOfStream0, reuse.primitives());
@@ -397,7 +397,7 @@ impl<'a> Worker<'a> {
             return Ok(());
         }
         finished.begin(&self.shaded).run(reuse);
-        finished.keep((segment, 0));
+        finished.keep(PieceNumber { segment, piece: 0 });
         Ok(())
     }
 }

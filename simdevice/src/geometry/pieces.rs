@@ -21,10 +21,19 @@ pub(super) struct Pieces<'a> {
     output: Output,
     pub counters: Counters,
     capture: Option<Capture<'a>>,
-    /// The captured primitives of the pieces, with the numbers of their segments and of the pieces in these.
-    pub captured: Vec<((u64, u32), CapturedPrimitives)>,
-    /// The pieces that have primitives, with the numbers of their segments and of the pieces in these.
-    pub segments: Vec<((u64, u32), PrimitiveSegment)>,
+    /// The captured primitives of the pieces.
+    pub captured: Vec<(PieceNumber, CapturedPrimitives)>,
+    /// The pieces that have primitives.
+    pub segments: Vec<(PieceNumber, PrimitiveSegment)>,
+}
+
+/// The number of a piece; pieces are drawn in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PieceNumber {
+    /// The number of the segment in the draw.
+    pub segment: u64,
+    /// The number of the piece in the segment.
+    pub piece: u32,
 }
 
 impl<'a> Pieces<'a> {
@@ -48,14 +57,14 @@ impl<'a> Pieces<'a> {
     }
 
     /// Captures listed primitives, and sets up those of the vertex stream that is rasterized.
-    pub(super) fn set_up(&mut self, shaded: &Shaded, primitives: &[ListedPrimitive], place: (u64, u32)) {
+    pub(super) fn set_up(&mut self, shaded: &Shaded, primitives: &[ListedPrimitive], number: PieceNumber) {
         for (stream, &counter) in (0..).zip(&Counter::PRIMITIVES_OF_STREAMS) {
             let of_stream = primitives.iter().filter(|it| it.stream == stream);
             self.counters.add(counter, of_stream.count() as u64);
         }
         if let Some(capture) = self.capture {
             let captured = capture.take(shaded, primitives);
-            host::push(&mut self.captured, (place, captured));
+            host::push(&mut self.captured, (number, captured));
         }
         let stream = self.setup.state.rasterized_stream;
         let rasterized = primitives.iter().filter(|it| it.stream == stream);
@@ -65,11 +74,11 @@ impl<'a> Pieces<'a> {
             return;
         }
         self.begin(shaded).run_list(rasterized);
-        self.keep(place);
+        self.keep(number);
     }
 
     /// Keeps the primitives that were set up last, copied to memory of their size, with lists by macro-tile.
-    pub(super) fn keep(&mut self, place: (u64, u32)) {
+    pub(super) fn keep(&mut self, number: PieceNumber) {
         let (output, setup, counters) = (&self.output, self.setup, &mut self.counters);
         counters.add(Counter::ClippingInvocations, output.assembled);
         counters.add(Counter::ClippingPrimitives, output.clipped);
@@ -85,6 +94,6 @@ impl<'a> Pieces<'a> {
         let elapsed = started.elapsed().as_nanos() as u64;
         counters.add(Counter::BinningTime, elapsed);
         let piece = PrimitiveSegment { primitives, varyings: Varyings { values, per_vertex }, bins };
-        host::push(&mut self.segments, (place, piece));
+        host::push(&mut self.segments, (number, piece));
     }
 }

@@ -1,10 +1,10 @@
 //! The tessellation and geometry programs of a draw, one after the other.
 
 use super::geometry_shader::GeometryShader;
-use super::pieces::Pieces;
+use super::pieces::{PieceNumber, Pieces};
 use super::primitive_list::{ListedPrimitive, PrimitiveList};
-use super::primitive_stage::Environment;
 use super::shade::{OutputReader, Shaded};
+use super::stage_runner::Environment;
 use super::tessellation_shader::TessellationShader;
 use super::vertex_reuse::VertexReuse;
 use crate::packet::Draw;
@@ -17,7 +17,7 @@ use isa::machine::Stopped;
 use isa::resources::Resources;
 
 /// The bindings of the programs, prepared for a draw.
-pub(super) struct StageBindings<'a> {
+pub(super) struct BoundStages<'a> {
     draw: &'a Draw,
     control: BoundResources<'a>,
     evaluation: BoundResources<'a>,
@@ -31,7 +31,7 @@ pub(super) struct StageResources<'a> {
     geometry: Resources<'a>,
 }
 
-impl<'a> StageBindings<'a> {
+impl<'a> BoundStages<'a> {
     pub(super) fn new(draw: &'a Draw, level: Level) -> Self {
         let bindings = &draw.primitive_bindings;
         Self {
@@ -65,7 +65,7 @@ pub(super) struct PrimitiveStages<'a> {
     provoking_last: bool,
     tessellation: Option<TessellationShader<'a>>,
     geometry: Option<GeometryShader<'a>>,
-    taken: PrimitiveList,
+    assembled: PrimitiveList,
     listed: Vec<ListedPrimitive>,
 }
 
@@ -99,7 +99,7 @@ impl<'a> PrimitiveStages<'a> {
                 let reader = reader(&stage.outputs);
                 GeometryShader::new(stage, reader, provoking_last, &resources.geometry, environment)
             }),
-            taken: PrimitiveList::default(),
+            assembled: PrimitiveList::default(),
             listed: Vec::new(),
         })
     }
@@ -112,11 +112,11 @@ impl<'a> PrimitiveStages<'a> {
         segment: u64,
         pieces: &mut Pieces<'_>,
     ) -> Result<(), Stopped> {
-        self.taken.assemble(self.topology, reuse);
-        let mut number = 0;
+        self.assembled.assemble(self.topology, reuse);
+        let mut number = PieceNumber { segment, piece: 0 };
         let mut set_up = |shaded: &Shaded, primitives: &[ListedPrimitive], pieces: &mut Pieces<'_>| {
-            pieces.set_up(shaded, primitives, (segment, number));
-            number += 1;
+            pieces.set_up(shaded, primitives, number);
+            number.piece += 1;
         };
         let Self { geometry, listed, provoking_last, .. } = self;
         let mut next = |shaded: &Shaded, primitives: &PrimitiveList, pieces: &mut Pieces<'_>| match geometry {
@@ -128,8 +128,8 @@ impl<'a> PrimitiveStages<'a> {
             }
         };
         match &mut self.tessellation {
-            Some(tessellation) => tessellation.run(shaded.values(), &self.taken, pieces, &mut next),
-            None => next(shaded, &self.taken, pieces),
+            Some(tessellation) => tessellation.run(shaded.values(), &self.assembled, pieces, &mut next),
+            None => next(shaded, &self.assembled, pieces),
         }
     }
 }

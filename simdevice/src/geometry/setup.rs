@@ -89,7 +89,7 @@ pub(super) struct AssembledPrimitive {
 /// A vertex of a primitive after clipping.
 #[derive(Clone, Copy)]
 pub(super) struct CornerVertex<'p> {
-    pub projected: &'p WindowVertex,
+    pub window_vertex: &'p WindowVertex,
     pub origin: Origin,
 }
 
@@ -122,7 +122,7 @@ impl<'a> SegmentSetup<'a> {
             for number in piece.first..piece.end {
                 let found = corners(state.topology, state.provoking_last, number);
                 let slots = three(found.places, |place| reuse.slot(piece, place));
-                let mut current = AssembledPrimitive {
+                let mut primitive = AssembledPrimitive {
                     id: piece.primitives_before.wrapping_add(number),
                     slots,
                     provoking: slots[found.provoking],
@@ -130,8 +130,8 @@ impl<'a> SegmentSetup<'a> {
                     layer: 0,
                     front: true,
                 };
-                self.choose_target(&mut current);
-                self.primitive(count, &mut current);
+                self.choose_target(&mut primitive);
+                self.primitive(count, &mut primitive);
             }
             self.out.assembled += u64::from(piece.end - piece.first);
         }
@@ -140,28 +140,28 @@ impl<'a> SegmentSetup<'a> {
     /// Sets up listed primitives.
     pub(super) fn run_list<'p>(mut self, primitives: impl Iterator<Item = &'p ListedPrimitive>) {
         let names_primitives = self.setup.outputs.primitive_id.is_some();
-        for primitive in primitives {
-            let mut current = AssembledPrimitive {
-                id: if names_primitives { self.optional(primitive.provoking).primitive_id } else { primitive.id },
-                slots: primitive.slots,
-                provoking: primitive.provoking,
+        for listed in primitives {
+            let mut primitive = AssembledPrimitive {
+                id: if names_primitives { self.optional(listed.provoking).primitive_id } else { listed.id },
+                slots: listed.slots,
+                provoking: listed.provoking,
                 viewport: 0,
                 layer: 0,
                 front: true,
             };
-            self.choose_target(&mut current);
-            self.primitive(self.setup.corners, &mut current);
+            self.choose_target(&mut primitive);
+            self.primitive(self.setup.corners, &mut primitive);
             self.out.assembled += 1;
         }
     }
 
     /// Sets up a primitive of `corners` corners.
     #[inline(always)]
-    fn primitive(&mut self, corners: usize, current: &mut AssembledPrimitive) {
+    fn primitive(&mut self, corners: usize, primitive: &mut AssembledPrimitive) {
         match corners {
-            1 => self.with_vertices(current, Self::point),
-            2 => self.with_vertices(current, Self::line),
-            _ => self.with_vertices(current, Self::triangle),
+            1 => self.with_vertices(primitive, Self::point),
+            2 => self.with_vertices(primitive, Self::line),
+            _ => self.with_vertices(primitive, Self::triangle),
         }
     }
 
@@ -171,32 +171,32 @@ impl<'a> SegmentSetup<'a> {
 
     /// Sets the layer and viewport of a primitive, which the provoking vertex selects. A layer that does not exist
     /// becomes the last one, and a viewport that does not exist the first. A view is drawn to its own layer.
-    fn choose_target(&self, current: &mut AssembledPrimitive) {
-        current.layer = self.setup.view.map_or(0, |view| view as u16);
+    fn choose_target(&self, primitive: &mut AssembledPrimitive) {
+        primitive.layer = self.setup.view.map_or(0, |view| view as u16);
         if self.shaded.optional.is_empty() {
             return;
         }
-        let optional = self.optional(current.provoking);
+        let optional = self.optional(primitive.provoking);
         if self.setup.view.is_none() {
             let layer = optional.layer.min(self.setup.layers.saturating_sub(1));
-            current.layer = layer.min(u16::MAX.into()) as u16;
+            primitive.layer = layer.min(u16::MAX.into()) as u16;
         }
         if (optional.viewport as usize) < self.setup.transforms.len() {
-            current.viewport = optional.viewport as u8;
+            primitive.viewport = optional.viewport as u8;
         }
     }
 
-    pub(super) fn transform(&self, current: &AssembledPrimitive) -> &'a Transform {
-        &self.setup.transforms[usize::from(current.viewport)]
+    pub(super) fn transform(&self, primitive: &AssembledPrimitive) -> &'a Transform {
+        &self.setup.transforms[usize::from(primitive.viewport)]
     }
 
     /// A shaded vertex with the projection of the primitive's viewport, which is not the first.
-    fn projected_again(&self, current: &AssembledPrimitive, slot: u32) -> Vertex {
+    fn projected_again(&self, primitive: &AssembledPrimitive, slot: u32) -> Vertex {
         let mut vertex = self.shaded.vertices[slot as usize];
-        let transform = self.transform(current);
-        vertex.projected = transform.project(vertex.position);
+        let transform = self.transform(primitive);
+        vertex.window_vertex = transform.project(vertex.position);
         let kept = vertex.code & (code::INVALID | code::ANY_USER | code::ANY_CULL);
-        vertex.code = kept | transform.code(vertex.position, &vertex.projected);
+        vertex.code = kept | transform.code(vertex.position, &vertex.window_vertex);
         vertex
     }
 
@@ -205,160 +205,160 @@ impl<'a> SegmentSetup<'a> {
     #[inline(always)]
     fn with_vertices<const N: usize>(
         &mut self,
-        current: &mut AssembledPrimitive,
+        primitive: &mut AssembledPrimitive,
         then: impl FnOnce(&mut Self, &mut AssembledPrimitive, [&Vertex; N]),
     ) {
         let shaded = self.shaded;
-        if current.viewport == 0 {
-            let vertices = std::array::from_fn(|corner| &shaded.vertices[current.slots[corner] as usize]);
-            then(self, current, vertices);
+        if primitive.viewport == 0 {
+            let vertices = std::array::from_fn(|corner| &shaded.vertices[primitive.slots[corner] as usize]);
+            then(self, primitive, vertices);
         } else {
             let vertices: [Vertex; N] =
-                std::array::from_fn(|corner| self.projected_again(current, current.slots[corner]));
-            then(self, current, vertices.each_ref());
+                std::array::from_fn(|corner| self.projected_again(primitive, primitive.slots[corner]));
+            then(self, primitive, vertices.each_ref());
         }
     }
 
-    fn point(&mut self, current: &mut AssembledPrimitive, [vertex]: [&Vertex; 1]) {
+    fn point(&mut self, primitive: &mut AssembledPrimitive, [vertex]: [&Vertex; 1]) {
         if vertex.code & (code::CLIP | code::ANY_SIDE | code::ANY_CULL) != 0 {
             return;
         }
         self.out.clipped += 1;
-        let slot = current.slots[0];
-        let place = CornerVertex { projected: &vertex.projected, origin: Origin::Slot(slot) };
-        self.push_point(current, place, self.optional(slot).point_size, 0.0);
+        let slot = primitive.slots[0];
+        let corner = CornerVertex { window_vertex: &vertex.window_vertex, origin: Origin::Slot(slot) };
+        self.push_point(primitive, corner, self.optional(slot).point_size, 0.0);
     }
 
-    fn line(&mut self, current: &mut AssembledPrimitive, ends: [&Vertex; 2]) {
+    fn line(&mut self, primitive: &mut AssembledPrimitive, ends: [&Vertex; 2]) {
         let (all, any) = (ends[0].code & ends[1].code, ends[0].code | ends[1].code);
         // A wide line may extend into the view volume from outside of its sides.
         if all & code::OUTSIDE & !code::ANY_SIDE != 0 || any & code::INVALID != 0 {
             return;
         }
-        let mut projected = ends.map(|end| end.projected);
-        let mut origins = [0, 1].map(|end: usize| Origin::Slot(current.slots[end]));
+        let mut projected = ends.map(|end| end.window_vertex);
+        let mut origins = [0, 1].map(|end: usize| Origin::Slot(primitive.slots[end]));
         if any & code::CLIP != 0 {
-            let clipper = self.clipper(current);
+            let clipper = self.clipper(primitive);
             let Some(clipped) = clipper.line(ends.map(|end| end.position)) else {
                 return;
             };
             for (end, vertex) in clipped.iter().enumerate() {
                 if vertex.corner().is_none() {
-                    projected[end] = self.transform(current).project(narrow(vertex));
-                    origins[end] = self.new_vertex(current, vertex);
+                    projected[end] = self.transform(primitive).project(narrow(vertex));
+                    origins[end] = self.new_vertex(primitive, vertex);
                 }
             }
         }
         self.out.clipped += 1;
-        let [from, to] = [0, 1].map(|end: usize| CornerVertex { projected: &projected[end], origin: origins[end] });
-        self.push_line(current, from, to, 0.0);
+        let [from, to] = [0, 1].map(|end: usize| CornerVertex { window_vertex: &projected[end], origin: origins[end] });
+        self.push_line(primitive, from, to, 0.0);
     }
 
-    fn clipper(&self, current: &AssembledPrimitive) -> Clipper<'a> {
+    fn clipper(&self, primitive: &AssembledPrimitive) -> Clipper<'a> {
         let count = self.setup.outputs.clip.iter().rposition(Option::is_some);
-        let distances = current.slots.map(|slot| self.optional(slot).clip);
-        Clipper { transform: self.transform(current), distances, distance_count: count.map_or(0, |last| last + 1) }
+        let distances = primitive.slots.map(|slot| self.optional(slot).clip);
+        Clipper { transform: self.transform(primitive), distances, distance_count: count.map_or(0, |last| last + 1) }
     }
 
     #[inline(always)]
-    fn triangle(&mut self, current: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
+    fn triangle(&mut self, primitive: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
         let [a, b, c] = three(vertices, |vertex| vertex.code);
         let (all, any) = (a & b & c, a | b | c);
         if all & code::OUTSIDE != 0 || any & code::INVALID != 0 {
             return;
         }
         if any & code::CLIP != 0 {
-            self.clipped_triangle(current, vertices);
+            self.clipped_triangle(primitive, vertices);
             return;
         }
         self.out.clipped += 1;
-        let area = cross(three(vertices, |vertex| vertex.projected.snapped));
-        if !self.faces(current, area) {
+        let area = cross(three(vertices, |vertex| vertex.window_vertex.snapped));
+        if !self.faces(primitive, area) {
             return;
         }
-        let place = |corner: usize| CornerVertex {
-            projected: &vertices[corner].projected,
-            origin: Origin::Slot(current.slots[corner]),
+        let corner = |number: usize| CornerVertex {
+            window_vertex: &vertices[number].window_vertex,
+            origin: Origin::Slot(primitive.slots[number]),
         };
-        let places = [place(0), place(1), place(2)];
+        let corners = [corner(0), corner(1), corner(2)];
         if self.setup.state.polygon_mode != PolygonMode::Fill {
-            self.outline(current, &places, |_| true);
+            self.outline(primitive, &corners, |_| true);
         } else if area != 0 {
-            self.push_triangle(current, places, area);
+            self.push_triangle(primitive, corners, area);
         }
     }
 
     #[cold]
-    fn clipped_triangle(&mut self, current: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
-        let clipper = self.clipper(current);
+    fn clipped_triangle(&mut self, primitive: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
+        let clipper = self.clipper(primitive);
         let polygon = clipper.triangle(vertices.map(|vertex| vertex.position));
         let clipped = polygon.vertices();
         if clipped.len() < 3 {
             return;
         }
         self.out.clipped += clipped.len() as u64 - 2;
-        let transform = self.transform(current);
+        let transform = self.transform(primitive);
         let mut projected = [WindowVertex::default(); MOST_VERTICES];
         for (projected, vertex) in projected.iter_mut().zip(clipped) {
             *projected = match vertex.corner() {
-                Some(corner) => vertices[corner].projected,
+                Some(corner) => vertices[corner].window_vertex,
                 None => transform.project(narrow(vertex)),
             };
         }
         // Visibility is decided before vertices are made.
-        let fan = |place: usize| cross([0, place, place + 1].map(|i: usize| projected[i].snapped));
+        let fan = |number: usize| cross([0, number, number + 1].map(|i: usize| projected[i].snapped));
         let area: i64 = (1..clipped.len() - 1).map(fan).sum();
         let fills = self.setup.state.polygon_mode == PolygonMode::Fill;
-        if !self.faces(current, area) || (fills && area == 0) {
+        if !self.faces(primitive, area) || (fills && area == 0) {
             return;
         }
-        let mut places =
-            [CornerVertex { projected: &projected[0], origin: Origin::Slot(current.slots[0]) }; MOST_VERTICES];
+        let mut corners =
+            [CornerVertex { window_vertex: &projected[0], origin: Origin::Slot(primitive.slots[0]) }; MOST_VERTICES];
         for (number, vertex) in clipped.iter().enumerate() {
-            places[number] = CornerVertex {
-                projected: &projected[number],
+            corners[number] = CornerVertex {
+                window_vertex: &projected[number],
                 origin: match vertex.corner() {
-                    Some(corner) => Origin::Slot(current.slots[corner]),
-                    None => self.new_vertex(current, vertex),
+                    Some(corner) => Origin::Slot(primitive.slots[corner]),
+                    None => self.new_vertex(primitive, vertex),
                 },
             };
         }
-        let places = &places[..clipped.len()];
+        let corners = &corners[..clipped.len()];
         if !fills {
-            self.outline(current, places, |place| clipped[place].edge);
+            self.outline(primitive, corners, |number| clipped[number].edge);
             return;
         }
-        for pair in places[1..].windows(2) {
-            let corners = [places[0], pair[0], pair[1]];
-            let part = cross(corners.map(|place| place.projected.snapped));
+        for pair in corners[1..].windows(2) {
+            let triangle = [corners[0], pair[0], pair[1]];
+            let part = cross(triangle.map(|corner| corner.window_vertex.snapped));
             // A triangle of the fan that snapping has turned over lies within its neighbours.
             if part.signum() == area.signum() {
-                self.push_triangle(current, corners, part);
+                self.push_triangle(primitive, triangle, part);
             }
         }
     }
 
     /// Sets the facing of a polygon of this area, and returns true if such polygons are drawn. y points down, so that a
     /// positive area is clockwise. A polygon without area faces the back.
-    fn faces(&self, current: &mut AssembledPrimitive, area: i64) -> bool {
+    fn faces(&self, primitive: &mut AssembledPrimitive, area: i64) -> bool {
         let state = self.setup.state;
-        current.front = area != 0 && (area > 0) == state.front_clockwise;
-        !if current.front { state.cull_front } else { state.cull_back }
+        primitive.front = area != 0 && (area > 0) == state.front_clockwise;
+        !if primitive.front { state.cull_front } else { state.cull_back }
     }
 
     /// Draws the edges of a polygon that belong to its outline, or the first vertex of each.
-    fn outline(&mut self, current: &AssembledPrimitive, places: &[CornerVertex], edge: impl Fn(usize) -> bool) {
-        let bias = self.bias([places[0], places[1], places[2]]);
-        let next = |place: usize| (place + 1) % places.len();
-        for place in (0..places.len()).filter(|&place| edge(place)) {
+    fn outline(&mut self, primitive: &AssembledPrimitive, corners: &[CornerVertex], edge: impl Fn(usize) -> bool) {
+        let bias = self.bias([corners[0], corners[1], corners[2]]);
+        let next = |number: usize| (number + 1) % corners.len();
+        for number in (0..corners.len()).filter(|&number| edge(number)) {
             if self.setup.state.polygon_mode == PolygonMode::Line {
-                self.push_line(current, places[place], places[next(place)], bias);
+                self.push_line(primitive, corners[number], corners[next(number)], bias);
             } else {
-                let size = match places[place].origin {
+                let size = match corners[number].origin {
                     Origin::Slot(slot) => self.optional(slot).point_size,
-                    Origin::New { .. } => self.optional(current.provoking).point_size,
+                    Origin::New { .. } => self.optional(primitive.provoking).point_size,
                 };
-                self.push_point(current, places[place], size, bias);
+                self.push_point(primitive, corners[number], size, bias);
             }
         }
     }
@@ -366,7 +366,7 @@ impl<'a> SegmentSetup<'a> {
     pub(super) fn bias(&self, corners: [CornerVertex; 3]) -> f32 {
         match &self.setup.state.depth_bias {
             Some(bias) => {
-                let corners = corners.map(|place| place.projected);
+                let corners = corners.map(|corner| corner.window_vertex);
                 depth_bias::bias(bias, self.setup.depth_unit, corners)
             }
             None => 0.0,
@@ -406,29 +406,35 @@ struct Shape {
 
 impl SegmentSetup<'_> {
     #[inline(always)]
-    pub(super) fn push_triangle(&mut self, current: &AssembledPrimitive, places: [CornerVertex; 3], area: i64) {
-        let [a, b, c] = places;
-        let places = nearest_first(if area > 0 { [a, b, c] } else { [a, c, b] });
-        let corners = three(places, |place| place.projected.snapped);
-        let Some(pixels) = self.pixels(current, &corners) else {
+    pub(super) fn push_triangle(&mut self, primitive: &AssembledPrimitive, vertices: [CornerVertex; 3], area: i64) {
+        let [a, b, c] = vertices;
+        let vertices = nearest_first(if area > 0 { [a, b, c] } else { [a, c, b] });
+        let corners = three(vertices, |vertex| vertex.window_vertex.snapped);
+        let Some(pixels) = self.pixels(primitive, &corners) else {
             return;
         };
         if self.setup.state.samples == 1 && covers_nothing(&corners, pixels) {
             return;
         }
-        let bias = self.bias(places);
+        let bias = self.bias(vertices);
         let shape = Shape {
             kind: PrimitiveKind::Triangle,
             corners,
-            offsets: offsets(places),
-            depth: three(places, |place| place.projected.depth + bias),
+            offsets: offsets(vertices),
+            depth: three(vertices, |vertex| vertex.window_vertex.depth + bias),
             pixels,
         };
-        self.push(current, &shape, places);
+        self.push(primitive, &shape, vertices);
     }
 
-    pub(super) fn push_line(&mut self, current: &AssembledPrimitive, from: CornerVertex, to: CornerVertex, bias: f32) {
-        let (a, b) = (from.projected.window, to.projected.window);
+    pub(super) fn push_line(
+        &mut self,
+        primitive: &AssembledPrimitive,
+        from: CornerVertex,
+        to: CornerVertex,
+        bias: f32,
+    ) {
+        let (a, b) = (from.window_vertex.window, to.window_vertex.window);
         let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
         let length = (dx * dx + dy * dy).sqrt();
         if length.is_nan() || length <= 0.0 {
@@ -444,43 +450,43 @@ impl SegmentSetup<'_> {
         }
         let last = [b[0] - side[0], b[1] - side[1]];
         let [c0, c1, c2] = corners;
-        if let Some(pixels) = self.pixels(current, &[c0, c1, c2, last]) {
-            let places = [from, from, to];
+        if let Some(pixels) = self.pixels(primitive, &[c0, c1, c2, last]) {
+            let vertices = [from, from, to];
             let shape = Shape {
                 kind: PrimitiveKind::Line,
                 corners,
                 offsets: UNMOVED,
-                depth: places.map(|place| place.projected.depth + bias),
+                depth: vertices.map(|vertex| vertex.window_vertex.depth + bias),
                 pixels,
             };
-            self.push(current, &shape, places);
+            self.push(primitive, &shape, vertices);
         }
     }
 
-    pub(super) fn push_point(&mut self, current: &AssembledPrimitive, place: CornerVertex, size: f32, bias: f32) {
+    pub(super) fn push_point(&mut self, primitive: &AssembledPrimitive, vertex: CornerVertex, size: f32, bias: f32) {
         let size = if size.is_nan() { 1.0 } else { size.clamp(0.0, MAX_POINT_SIZE) };
         let side = snap_length(size).max(ONE);
-        let [x, y] = place.projected.window.map(|at| snap_away(at) - side / 2);
+        let [x, y] = vertex.window_vertex.window.map(|at| snap_away(at) - side / 2);
         let corners = [[x, y], [x + side, y], [x + side, y + side]];
-        if let Some(pixels) = self.pixels(current, &corners) {
+        if let Some(pixels) = self.pixels(primitive, &corners) {
             let shape = Shape {
                 kind: PrimitiveKind::Point,
                 corners,
                 offsets: UNMOVED,
-                depth: [place.projected.depth + bias; 3],
+                depth: [vertex.window_vertex.depth + bias; 3],
                 pixels,
             };
-            self.push(current, &shape, [place; 3]);
+            self.push(primitive, &shape, [vertex; 3]);
         }
     }
 
     /// The pixels that may have a sample within the bounds of these corners and may be touched; `None` if there are
     /// none.
     #[inline(always)]
-    fn pixels(&self, current: &AssembledPrimitive, corners: &[[i32; 2]]) -> Option<Pixels> {
+    fn pixels(&self, primitive: &AssembledPrimitive, corners: &[[i32; 2]]) -> Option<Pixels> {
         // The least and the greatest coordinate of a sample within a pixel.
         let (low, high) = if self.setup.state.samples == 1 { (128, 128) } else { (32, 224) };
-        let region = &self.setup.regions[usize::from(current.viewport)];
+        let region = &self.setup.regions[usize::from(primitive.viewport)];
         let along = |axis: usize, start: i32, length: u32| {
             let (mut least, mut greatest) = (i32::MAX, i32::MIN);
             for corner in corners {
@@ -499,21 +505,21 @@ impl SegmentSetup<'_> {
     }
 
     #[inline(always)]
-    fn push(&mut self, current: &AssembledPrimitive, shape: &Shape, places: [CornerVertex; 3]) {
-        let vertices = three(places, |place| self.number(place.origin));
-        let provoking = self.number(Origin::Slot(current.provoking));
+    fn push(&mut self, primitive: &AssembledPrimitive, shape: &Shape, vertices: [CornerVertex; 3]) {
+        let numbers = three(vertices, |vertex| self.number(vertex.origin));
+        let provoking = self.number(Origin::Slot(primitive.provoking));
         let primitive = Primitive {
             corners: shape.corners,
             offsets: shape.offsets,
             depth: shape.depth,
-            inverse_w: three(places, |place| place.projected.inverse_w),
-            vertices,
+            inverse_w: three(vertices, |vertex| vertex.window_vertex.inverse_w),
+            vertices: numbers,
             provoking,
-            id: current.id,
+            id: primitive.id,
             kind: shape.kind,
-            front: current.front,
-            viewport: current.viewport,
-            layer: current.layer,
+            front: primitive.front,
+            viewport: primitive.viewport,
+            layer: primitive.layer,
         };
         let number = self.out.primitives.len() as u32;
         bin(&self.setup.grid, &primitive, number, shape.pixels, &mut self.out.pairs);
@@ -538,13 +544,13 @@ impl SegmentSetup<'_> {
     }
 
     /// Adds a vertex that clipping made, with its interpolated varyings, to the output.
-    pub(super) fn new_vertex(&mut self, current: &AssembledPrimitive, vertex: &ClipVertex) -> Origin {
+    pub(super) fn new_vertex(&mut self, primitive: &AssembledPrimitive, vertex: &ClipVertex) -> Origin {
         let number = self.out.vertices;
         self.out.vertices += 1;
         let weights = vertex.weights;
         // Weights in the framebuffer are those in clip space times w, normalized to a sum of 1.
         let mut linear = weights;
-        for (weight, slot) in linear.iter_mut().zip(current.slots) {
+        for (weight, slot) in linear.iter_mut().zip(primitive.slots) {
             *weight *= f64::from(self.shaded.vertices[slot as usize].position[3]);
         }
         let sum: f64 = linear.iter().sum();
@@ -558,7 +564,7 @@ impl SegmentSetup<'_> {
                     if weights[corner] == 0.0 {
                         return 0.0;
                     }
-                    let value = f32::from_bits(of(current.slots[corner], varying));
+                    let value = f32::from_bits(of(primitive.slots[corner], varying));
                     weights[corner] * f64::from(value)
                 };
                 ((part(0) + part(1) + part(2)) as f32).to_bits()
@@ -566,7 +572,7 @@ impl SegmentSetup<'_> {
             let value = match interpolation {
                 Interpolation::Perspective => mix(weights),
                 Interpolation::Linear => mix(linear),
-                Interpolation::Flat => of(current.provoking, varying),
+                Interpolation::Flat => of(primitive.provoking, varying),
             };
             host::push(&mut self.out.varyings, value);
         }
@@ -578,7 +584,7 @@ impl SegmentSetup<'_> {
 /// value. A far vertex may have so large a value that the sum would lose precision near the eye.
 #[inline(always)]
 fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
-    let [wa, wb, wc] = three([a, b, c], |place| place.projected.inverse_w);
+    let [wa, wb, wc] = three([a, b, c], |vertex| vertex.window_vertex.inverse_w);
     if wb > wa && wb >= wc {
         [b, c, a]
     } else if wc > wa && wc > wb {
@@ -590,10 +596,10 @@ fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
 
 /// The positions of a triangle's vertices before snapping, relative to its corners.
 #[inline(always)]
-fn offsets(places: [CornerVertex; 3]) -> [[i16; 2]; 3] {
+fn offsets(vertices: [CornerVertex; 3]) -> [[i16; 2]; 3] {
     let mut offsets = UNMOVED;
-    for (offset, place) in offsets.iter_mut().zip(places) {
-        let WindowVertex { window, snapped, .. } = place.projected;
+    for (offset, vertex) in offsets.iter_mut().zip(vertices) {
+        let WindowVertex { window, snapped, .. } = vertex.window_vertex;
         for axis in 0..2 {
             let off = f64::from(window[axis]) - f64::from(snapped[axis]) / f64::from(ONE);
             offset[axis] = (off * OFFSET_UNITS) as i16;

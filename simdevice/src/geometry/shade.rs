@@ -19,7 +19,7 @@ use isa::resources::Resources;
 pub(super) struct Vertex {
     /// The position in clip space.
     pub position: [f32; 4],
-    pub projected: WindowVertex,
+    pub window_vertex: WindowVertex,
     /// The clip code; see [`code`].
     pub code: u32,
 }
@@ -142,7 +142,7 @@ impl OutputReader<'_> {
             for (lane, vertex) in vertices.iter_mut().enumerate() {
                 *vertex = Vertex {
                     position: [position[0][lane], position[1][lane], position[2][lane], position[3][lane]],
-                    projected: WindowVertex {
+                    window_vertex: WindowVertex {
                         window: [projections.window[0][lane], projections.window[1][lane]],
                         snapped: [projections.snapped[0][lane], projections.snapped[1][lane]],
                         depth: projections.depth[lane],

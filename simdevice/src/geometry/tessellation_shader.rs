@@ -3,8 +3,8 @@
 
 use super::pieces::Pieces;
 use super::primitive_list::PrimitiveList;
-use super::primitive_stage::{ENOUGH_VERTICES, Environment, StageRunner};
 use super::shade::{OutputReader, Shaded, Vertices};
+use super::stage_runner::{ENOUGH_VERTICES, Environment, StageRunner};
 use crate::program::interface::PrimitiveInput;
 use crate::program::primitive::TessellationStage;
 use crate::stats::counters::Counter;
@@ -26,7 +26,7 @@ pub(super) struct TessellationShader<'a> {
     patches: Vec<u32>,
     /// The number of values of each vertex and of each patch.
     values: usize,
-    divided: TessellatedPatch,
+    tessellated: TessellatedPatch,
     batch: Batch,
     shaded: Shaded,
     primitives: PrimitiveList,
@@ -62,8 +62,8 @@ impl<'a> TessellationShader<'a> {
             tessellation,
             environment,
             patches: Vec::new(),
-            values: stage.gives.values.len(),
-            divided: TessellatedPatch::default(),
+            values: stage.output_memory.values.len(),
+            tessellated: TessellatedPatch::default(),
             batch: Batch::default(),
             shaded: Shaded::default(),
             primitives: PrimitiveList::default(),
@@ -89,19 +89,19 @@ impl<'a> TessellationShader<'a> {
             ran?;
             self.take_patches(count);
             for patch in 0..count {
-                self.divide(patch, patches.ids[first + patch], pieces)?;
+                self.tessellate(patch, patches.ids[first + patch], pieces)?;
                 if self.shaded.vertices.len() >= ENOUGH_VERTICES {
                     self.evaluate(pieces)?;
-                    self.hand_over(pieces, receive)?;
+                    self.flush(pieces, receive)?;
                 }
             }
             // The next patches of the control program replace these.
             self.evaluate(pieces)?;
         }
-        self.hand_over(pieces, receive)
+        self.flush(pieces, receive)
     }
 
-    fn hand_over(&mut self, pieces: &mut Pieces<'_>, receive: &mut Receiver<'_>) -> Result<(), Stopped> {
+    fn flush(&mut self, pieces: &mut Pieces<'_>, receive: &mut Receiver<'_>) -> Result<(), Stopped> {
         if self.primitives.len() > 0 {
             receive(&self.shaded, &self.primitives, pieces)?;
         }
@@ -121,7 +121,7 @@ impl<'a> TessellationShader<'a> {
         for patch in 0..count {
             let slots = patches.vertices_of(first + patch);
             let values = slots.iter().map(|&slot| vertices.vertex(slot));
-            self.control.take(patch, values, &[]);
+            self.control.set_vertices(patch, values, &[]);
         }
         let per_patch = self.stage.output_vertices;
         self.control.run(count * per_patch, |input, lane| match input {
@@ -133,16 +133,18 @@ impl<'a> TessellationShader<'a> {
 
     /// Copies what the control program gave, since its next batch replaces it.
     fn take_patches(&mut self, count: usize) {
-        let gives = &self.stage.gives;
+        let memory = &self.stage.output_memory;
         self.patches.clear();
         for patch in 0..count as u32 {
-            let start = gives.start + patch * gives.stride;
+            let start = memory.start + patch * memory.stride;
             for row in 0..=self.stage.output_vertices {
                 let is_patch = row == self.stage.output_vertices;
-                for value in &gives.values {
+                for value in &memory.values {
                     let bits = match value.vertex_stride {
-                        Some(stride) if !is_patch => self.control.given(start + value.offset + row as u32 * stride),
-                        None if is_patch => self.control.given(start + value.offset),
+                        Some(stride) if !is_patch => {
+                            self.control.output_word(start + value.offset + row as u32 * stride)
+                        }
+                        None if is_patch => self.control.output_word(start + value.offset),
                         _ => 0,
                     };
                     host::push(&mut self.patches, bits);
@@ -151,23 +153,24 @@ impl<'a> TessellationShader<'a> {
         }
     }
 
-    /// Divides a patch of the control program's batch, and adds its vertices to batches of the evaluation program.
-    fn divide(&mut self, patch: usize, id: u32, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
-        let gives = &self.stage.gives;
-        let start = gives.start + patch as u32 * gives.stride;
-        let level = |offset: Option<u32>| f32::from_bits(offset.map_or(0, |offset| self.control.given(start + offset)));
+    /// Tessellates a patch of the control program's batch, and adds its vertices to batches of the evaluation program.
+    fn tessellate(&mut self, patch: usize, id: u32, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
+        let memory = &self.stage.output_memory;
+        let start = memory.start + patch as u32 * memory.stride;
+        let level =
+            |offset: Option<u32>| f32::from_bits(offset.map_or(0, |offset| self.control.output_word(start + offset)));
         let outer = self.stage.outer_levels.map(level);
         let inner = self.stage.inner_levels.map(level);
-        let mut divided = std::mem::take(&mut self.divided);
-        self.tessellation.tessellate(outer, inner, &mut divided);
+        let mut tessellated = std::mem::take(&mut self.tessellated);
+        self.tessellation.tessellate(outer, inner, &mut tessellated);
         let first = (self.shaded.vertices.len() + self.batch.points.len()) as u32;
-        let count = divided.indices.len() / self.primitives.per_primitive;
-        for &index in &divided.indices {
+        let count = tessellated.indices.len() / self.primitives.per_primitive;
+        for &index in &tessellated.indices {
             host::push(&mut self.primitives.vertices, first + index);
         }
         self.number(id, count);
         let lanes = self.evaluation.stage.lanes;
-        let mut rest = &divided.points[..];
+        let mut rest = &tessellated.points[..];
         while !rest.is_empty() {
             if self.batch.points.len() == lanes || self.batch.ids.len() == self.evaluation.stage.groups {
                 self.evaluate(pieces)?;
@@ -177,14 +180,14 @@ impl<'a> TessellationShader<'a> {
             let rows = &self.patches[patch * values..][..values];
             let (vertices, of_patch) = rows.split_at(values - self.values);
             let vertices = vertices.chunks_exact(self.values.max(1));
-            self.evaluation.take(group, vertices, of_patch);
+            self.evaluation.set_vertices(group, vertices, of_patch);
             self.batch.ids.push(id);
             let part = rest.len().min(lanes - self.batch.points.len());
             self.batch.points.extend(&rest[..part]);
             self.batch.groups.resize(self.batch.points.len(), group as u32);
             rest = &rest[part..];
         }
-        self.divided = divided;
+        self.tessellated = tessellated;
         Ok(())
     }
 

@@ -25,7 +25,7 @@ const SCAN: u32 = 1 << 16;
 /// The runs of a draw that have primitives, and the number of vertices of all runs.
 pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
     let topology = draw.state.topology;
-    let mut gathered = Runs { topology, runs: Vec::new(), primitives: 0, vertices: 0 };
+    let mut runs = Runs { topology, runs: Vec::new(), primitives: 0, vertices: 0 };
     match &draw.indices {
         Some(stream) if draw.state.primitive_restart => {
             let restart = stream.restart_index();
@@ -38,16 +38,16 @@ pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
                 stream.read(u64::from(draw.first) + u64::from(block), len, &mut indices);
                 for (place, &index) in (block..).zip(&indices) {
                     if index == restart {
-                        gathered.push(start, place);
+                        runs.push(start, place);
                         start = place + 1;
                     }
                 }
             }
-            gathered.push(start, draw.count);
+            runs.push(start, draw.count);
         }
-        _ => gathered.push(0, draw.count),
+        _ => runs.push(0, draw.count),
     }
-    (gathered.runs, gathered.vertices)
+    (runs.runs, runs.vertices)
 }
 
 struct Runs {

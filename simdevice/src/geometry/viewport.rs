@@ -136,9 +136,9 @@ impl Transform {
         WindowVertex { window, snapped: [snap(window[0]), snap(window[1])], depth: map(z * inverse_w, 2), inverse_w }
     }
 
-    /// The clip code of a vertex at this position. `projected` is its projection.
+    /// The clip code of a vertex at this position. `window_vertex` is its projection.
     #[inline(always)]
-    pub(super) fn code(&self, position: [f32; 4], projected: &WindowVertex) -> u32 {
+    pub(super) fn code(&self, position: [f32; 4], window_vertex: &WindowVertex) -> u32 {
         let [x, y, z, w] = position;
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let finite = (x * 0.0 + y * 0.0) + (z * 0.0 + w * 0.0) == 0.0;
@@ -150,7 +150,7 @@ impl Transform {
         code |= bit(self.clip_depth & (z < self.near * w), code::NEAR);
         code |= bit(self.clip_depth & (z > w), code::FAR);
         let guard = GUARD as f32;
-        let [wx, wy] = projected.window;
+        let [wx, wy] = window_vertex.window;
         // Comparisons with NaN, which the division may give, are false.
         let inside = (wx.abs() <= guard) & (wy.abs() <= guard);
         code | bit(!inside & !behind, code::GUARD)

@@ -7,7 +7,7 @@ use super::display::{
 use super::transfer::{BlitImage, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ResolveImage};
 use super::{ClearAttachments, Dispatch, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage, Rendering};
 use crate::stats::query::QueryPool;
-use crate::transform_feedback::{CounterWords, TransformFeedback};
+use crate::transform_feedback::{CounterBuffers, TransformFeedback};
 use devmem::BufferRange;
 use std::fmt;
 use std::fmt::{Display, Formatter};
@@ -89,14 +89,14 @@ pub enum Packet {
         feedback: Arc<TransformFeedback>,
         /// The words from which the numbers of bytes that are written already are read, by buffer. Without one, a buffer
         /// is written from its beginning.
-        counters: CounterWords,
+        counters: CounterBuffers,
     },
     /// Ends transform feedback.
     EndTransformFeedback {
         /// The transform feedback.
         feedback: Arc<TransformFeedback>,
         /// The words to which the numbers of bytes that have been written are stored, by buffer.
-        counters: CounterWords,
+        counters: CounterBuffers,
     },
     /// Makes `count` queries from `first` on unavailable.
     ResetQueries {

@@ -1,13 +1,13 @@
 //! Packets as text for people: one line each, with the most important state.
 
 use super::{
-    Attachment, AttachmentClear, BufferRange, ClearAttachments, GaussianAppend, GaussianBegin, LoadOp, Rendering,
-    SubresourceLayers,
+    Attachment, AttachmentClear, ClearAttachments, GaussianAppend, GaussianBegin, LoadOp, Rendering, SubresourceLayers,
 };
 use crate::format::Aspect;
 use crate::image::{Image, ImageView};
 use crate::packet::Draw;
-use crate::state::{BlendState, CompareOp, DepthStencil, LogicOp};
+use crate::state::{BlendEquations, BlendState, CompareOp, DepthStencil, LogicOp};
+use devmem::BufferRange;
 use std::fmt::{self, Display, Formatter};
 
 /// Displays a value by a function.
@@ -77,8 +77,8 @@ pub(super) fn attachment<'a>(name: &'a str, attachment: &'a Attachment) -> impl 
             LoadOp::DontCare => f.write_str(" undefined")?,
         }
         write!(f, " then {:?}", attachment.store)?;
-        if let Some((target, mode)) = &attachment.resolve {
-            write!(f, ", resolved by {mode:?} to {}", view(target))?;
+        if let Some(resolve) = &attachment.resolve {
+            write!(f, ", resolved by {:?} to {}", resolve.mode, view(&resolve.view))?;
         }
         Ok(())
     })
@@ -154,7 +154,7 @@ pub(super) fn output<'a>(
         for blend in blend {
             match blend.equations {
                 None => f.write_str(", replaced")?,
-                Some((color, alpha)) => {
+                Some(BlendEquations { color, alpha }) => {
                     write!(f, ", {:?} {:?} {:?}", color.op, color.source, color.destination)?;
                     if alpha != color {
                         write!(f, ", alpha {:?} {:?} {:?}", alpha.op, alpha.source, alpha.destination)?;

@@ -8,12 +8,11 @@ mod rendering;
 mod transfer;
 
 pub use command::Packet;
-pub use devmem::BufferRange;
 pub use draw::{
     Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
     GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
 };
-pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
+pub use rendering::{Attachment, AttachmentClear, AttachmentResolve, ClearAttachments, LoadOp, Rendering, StoreOp};
 pub use transfer::{
     BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
     ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,

@@ -35,9 +35,17 @@ pub struct Attachment {
     pub load: LoadOp,
     /// The operation at the end of the pass.
     pub store: StoreOp,
-    /// The view to which the pass's area is resolved at the end, if any, and the mode. `store` does not apply to it. It
-    /// has one sample per texel, and is as large as `view`.
-    pub resolve: Option<(ImageView, ResolveMode)>,
+    /// The resolve of the pass's area at the end, if there is one. `store` does not apply to it.
+    pub resolve: Option<AttachmentResolve>,
+}
+
+/// The resolve of an attachment.
+#[derive(Clone, Debug)]
+pub struct AttachmentResolve {
+    /// The view that is written. It has one sample per texel, and is as large as the attachment.
+    pub view: ImageView,
+    /// The combination of samples.
+    pub mode: ResolveMode,
 }
 
 /// A render pass: see [`Packet::BeginRendering`](crate::Packet::BeginRendering).

@@ -1,11 +1,11 @@
 //! Packets of copies, blits, resolves and clears. Copies of compressed images count blocks instead of texels; blits
 //! always count texels.
 
-use super::BufferRange;
 use crate::format::{Aspect, ClearValue};
 use crate::image::Image;
 use crate::state::ResolveMode;
 use crate::texture::Filter;
+use devmem::BufferRange;
 use std::sync::Arc;
 
 /// A region of a buffer-to-buffer copy; offsets are relative to the packet's ranges.

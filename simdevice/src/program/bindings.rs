@@ -1,8 +1,7 @@
 //! The buffers, images, samplers and constants that the programs of a draw or dispatch are bound to.
 
-use crate::packet::BufferRange;
 use crate::texture::{ImageBinding, ImageTable, Sampler};
-use devmem::Allocation;
+use devmem::{Allocation, BufferRange};
 use fearless_simd::Level;
 use isa::resources::{GlobalMemory, NoGlobalMemory, Resources, words};
 use std::sync::Arc;

@@ -109,7 +109,7 @@ pub struct PrimitiveProgram {
     /// The meanings of its inputs, by slot.
     pub inputs: Vec<Option<PrimitiveInput>>,
     /// The vertices that it takes. Their values are numbered as the stage before gives them.
-    pub takes: VertexMemory,
+    pub input_memory: VertexMemory,
     /// The number of primitives or patches of a batch.
     pub groups: u32,
     /// The lanes of a batch.
@@ -144,7 +144,7 @@ pub struct TessellationPrograms {
     /// The control program: a lane for each vertex of an output patch.
     pub control: PrimitiveProgram,
     /// The vertices and the patch that it gives.
-    pub gives: VertexMemory,
+    pub output_memory: VertexMemory,
     /// The first byte, within a patch, of each outer level; `None` is 0.
     pub outer_levels: [Option<u32>; 4],
     /// The first byte, within a patch, of each inner level; `None` is 0.
@@ -170,7 +170,7 @@ pub struct GeometryPrograms {
     pub count: u32,
     /// The vertices that it gives. Each begins with a word: bit 0 is 1 if the vertex is the first of a strip, and the
     /// bits above are the number of its stream.
-    pub gives: VertexMemory,
+    pub output_memory: VertexMemory,
     /// The bytes of a vertex that it gives.
     pub vertex_bytes: u32,
     /// The meanings of the values that it gives; `None` is not used.

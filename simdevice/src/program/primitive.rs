@@ -19,7 +19,7 @@ pub(crate) struct PrimitiveStage {
     pub machines: MachinePool,
     pub inputs: Vec<(u32, PrimitiveInput)>,
     /// The vertices that it takes.
-    pub takes: VertexMemory,
+    pub input_memory: VertexMemory,
     /// The number of primitives or patches of a batch.
     pub groups: usize,
     /// The lanes of a batch.
@@ -31,7 +31,7 @@ pub(crate) struct PrimitiveStage {
 pub(crate) struct TessellationStage {
     pub control: PrimitiveStage,
     /// The vertices and the patch that the control program gives.
-    pub gives: VertexMemory,
+    pub output_memory: VertexMemory,
     /// The first bytes of the outer and inner levels in the memory of a patch.
     pub outer_levels: [Option<u32>; 4],
     pub inner_levels: [Option<u32>; 2],
@@ -51,10 +51,10 @@ pub(crate) struct GeometryStage {
     /// The output that counts a lane's vertices.
     pub count: u32,
     /// The vertices that it gives.
-    pub gives: VertexMemory,
+    pub output_memory: VertexMemory,
     /// The bytes of each.
     pub vertex_bytes: u32,
-    /// The outputs, by number in `gives`.
+    /// The outputs, by number in `output_memory`.
     pub outputs: VertexOutputs,
     /// The number of corners of the primitives that it gives.
     pub corners: usize,
@@ -74,7 +74,7 @@ impl PrimitiveStage {
         let inputs = inputs.filter_map(|input| Some((input.slot, meaning(input.slot)?)));
         Ok(Self {
             inputs: inputs.collect(),
-            takes: stage.takes.clone(),
+            input_memory: stage.input_memory.clone(),
             groups: stage.groups as usize,
             lanes: stage.lanes as usize,
             machines: MachinePool::new(executable),
@@ -91,7 +91,7 @@ impl TessellationStage {
     ) -> Result<Self, InvalidProgram> {
         Ok(Self {
             control: PrimitiveStage::new(level, &programs.control)?,
-            gives: programs.gives.clone(),
+            output_memory: programs.output_memory.clone(),
             outer_levels: programs.outer_levels,
             inner_levels: programs.inner_levels,
             output_vertices: programs.output_vertices as usize,
@@ -113,7 +113,7 @@ impl GeometryStage {
             stage: PrimitiveStage::new(level, &programs.program)?,
             invocations: programs.invocations as usize,
             count: programs.count,
-            gives: programs.gives.clone(),
+            output_memory: programs.output_memory.clone(),
             vertex_bytes: programs.vertex_bytes,
             outputs,
             corners: programs.corners,

@@ -145,6 +145,6 @@ impl VertexProgram {
 
 /// The number of values that a program takes from the stage before it.
 fn values_taken(program: &PrimitiveProgram) -> u32 {
-    let numbers = program.takes.values.iter().map(|value| value.number + 1);
+    let numbers = program.input_memory.values.iter().map(|value| value.number + 1);
     numbers.max().unwrap_or(0)
 }

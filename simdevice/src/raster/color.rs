@@ -6,7 +6,7 @@ use super::tile_buffer::QuadAddresses;
 use crate::format::unorm8::{Colors, clamp, pack_unorm8, pack_unorm8_in_range, unpack_unorm8};
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
 use crate::simd::{as_floats, bits_of, floats_of};
-use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState, LogicOp};
+use crate::state::{BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, LogicOp};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::Vector;
 
@@ -15,7 +15,7 @@ use isa::Vector;
 pub struct ColorOutput {
     format: Format,
     codec: Codec,
-    equations: Option<(BlendEquation, BlendEquation)>,
+    equations: Option<BlendEquations>,
     /// The kernel for the equations, if there is one.
     over: Option<Over>,
     constants: [f32; 4],
@@ -43,10 +43,10 @@ const PREMULTIPLIED: BlendEquation = over(BlendFactor::One);
 const STRAIGHT: BlendEquation = over(BlendFactor::SrcAlpha);
 
 impl Over {
-    fn of(equations: (BlendEquation, BlendEquation)) -> Option<Self> {
-        if equations == (PREMULTIPLIED, PREMULTIPLIED) {
+    fn of(equations: BlendEquations) -> Option<Self> {
+        if equations == BlendEquations::both(PREMULTIPLIED) {
             Some(Self::Premultiplied)
-        } else if equations == (STRAIGHT, STRAIGHT) {
+        } else if equations == BlendEquations::both(STRAIGHT) {
             Some(Self::Straight)
         } else {
             None
@@ -125,7 +125,7 @@ impl ColorOutput {
                     | BlendFactor::OneMinusSrc1Alpha
             )
         };
-        self.equations.is_some_and(|(color, alpha)| {
+        self.equations.is_some_and(|BlendEquations { color, alpha }| {
             [color, alpha].iter().any(|equation| dual(equation.source) || dual(equation.destination))
         })
     }
@@ -338,7 +338,7 @@ impl ColorOutput {
     fn blend<S: Simd>(
         &self,
         simd: S,
-        equations: (BlendEquation, BlendEquation),
+        equations: BlendEquations,
         source: &Colors<S>,
         second: &Colors<S>,
         destination: &Colors<S>,
@@ -354,7 +354,7 @@ impl ColorOutput {
     fn blend_by_any<S: Simd>(
         &self,
         simd: S,
-        equations: (BlendEquation, BlendEquation),
+        equations: BlendEquations,
         source: Colors<S>,
         second: Colors<S>,
         destination: Colors<S>,
@@ -369,7 +369,7 @@ impl ColorOutput {
                     }
                 }
                 let operands = Operands { source, second, destination, constants: self.constants };
-                let (color, alpha) = equations;
+                let BlendEquations { color, alpha } = equations;
                 let mut blended = source;
                 for (component, value) in blended.iter_mut().enumerate() {
                     let equation = if component == 3 { alpha } else { color };

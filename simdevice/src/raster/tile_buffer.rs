@@ -267,20 +267,21 @@ impl TileBuffer {
         }
     }
 
-    /// Resolves a touched tile: writes one sample for each of its pixels to `resolve`.
+    /// Resolves a touched tile: writes one sample for each of its pixels to `resolved`.
     pub fn resolve(
         &mut self,
         level: Level,
         target: &Target,
-        (resolve, mode): (&Target, ResolveMode),
+        resolved: &Target,
+        mode: ResolveMode,
         layer: u32,
         tile: &Tile,
     ) {
         let (format, samples, stride) = (target.format(), self.samples, self.stride);
-        let Some(resolved_rows) = resolve.sample(layer, 0) else {
+        let Some(resolved_rows) = resolved.sample(layer, 0) else {
             return;
         };
-        if samples == SAMPLES && mode == ResolveMode::Average && is_unorm8(format) && resolve.format() == format {
+        if samples == SAMPLES && mode == ResolveMode::Average && is_unorm8(format) && resolved.format() == format {
             let words = &self.words[tile.index * SAMPLES * AREA..][..SAMPLES * AREA];
             let mut means = [0; AREA];
             dispatch!(level, simd => unorm8_means(simd, words, &mut means));
@@ -292,7 +293,7 @@ impl TileBuffer {
             }
             return;
         }
-        let (size, resolved_size) = (format.texel_size(), resolve.format().texel_size());
+        let (size, resolved_size) = (format.texel_size(), resolved.format().texel_size());
         let has_mean = mode != ResolveMode::Average || !format.is_integer();
         let copied = mode == ResolveMode::SampleZero || !has_mean || samples == 1;
         for (y, columns) in tile.rows(tile.pixels) {
@@ -315,10 +316,10 @@ impl TileBuffer {
             }
             let bytes = &mut row[..count * resolved_size];
             if !copied {
-                let mut resolved = [[0f32; 4]; SIDE];
+                let mut row = [[0f32; 4]; SIDE];
                 let rows = decoded[..used].iter().map(|row| &row[..count]);
-                resolve_row(format, mode, rows, &mut resolved[..count]);
-                resolve.format().encode_row(&resolved[..count], bytes);
+                resolve_row(format, mode, rows, &mut row[..count]);
+                resolved.format().encode_row(&row[..count], bytes);
             }
             resolved_rows.write(tile.pixel(columns.start, y), bytes);
         }

@@ -116,11 +116,27 @@ pub struct BlendEquation {
     pub op: BlendOp,
 }
 
+/// The blend equations of colour and alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BlendEquations {
+    /// The equation of red, green and blue.
+    pub color: BlendEquation,
+    /// The equation of alpha.
+    pub alpha: BlendEquation,
+}
+
+impl BlendEquations {
+    /// The same equation for colour and alpha.
+    pub const fn both(equation: BlendEquation) -> Self {
+        Self { color: equation, alpha: equation }
+    }
+}
+
 /// The blending of one colour attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BlendState {
-    /// The colour and alpha equations; `None` replaces the destination.
-    pub equations: Option<(BlendEquation, BlendEquation)>,
+    /// The equations; `None` replaces the destination.
+    pub equations: Option<BlendEquations>,
     /// Bits 0 to 3 enable writes to R, G, B and A.
     pub write_mask: u8,
 }

@@ -2,7 +2,7 @@
 
 use crate::format::{Aspect, Format};
 use crate::image::ImageView;
-use crate::packet::BufferRange;
+use devmem::BufferRange;
 
 /// The source of a component that a program reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -17,12 +17,24 @@ pub fn copy_image(copy: &CopyImage) {
 /// The part of a slice or layer of a region that both images have.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlicePair {
-    /// The source's subresource, and the first texel in it.
-    pub source: (SubresourceLayout, [u32; 3]),
-    /// The target's subresource, and the first texel in it.
-    pub target: (SubresourceLayout, [u32; 3]),
+    pub source: SlicePart,
+    pub target: SlicePart,
     /// The number of texels in x and y.
     pub extent: [u32; 2],
+}
+
+/// A part of a slice or layer of an image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlicePart {
+    pub layout: SubresourceLayout,
+    /// The first texel in the subresource.
+    pub first: [u32; 3],
+}
+
+/// A slice or layer of an image.
+struct Slice {
+    layout: SubresourceLayout,
+    z: u32,
 }
 
 /// One side of a region.
@@ -33,8 +45,8 @@ struct Side<'a> {
 }
 
 impl Side<'_> {
-    /// The subresource and z of slice number `index`. A 3D image has slices, other images have layers.
-    fn slice(&self, index: u32) -> Option<(SubresourceLayout, u32)> {
+    /// Slice number `index`. A 3D image has slices, other images have layers.
+    fn slice(&self, index: u32) -> Option<Slice> {
         let z = i64::from(self.offset[2]);
         let (layer, z) = match self.image.desc.kind {
             ImageKind::D3 => (self.layers.base_layer, z + i64::from(index)),
@@ -42,7 +54,7 @@ impl Side<'_> {
         };
         let layout = self.image.subresource(self.layers.aspect, self.layers.mip_level, layer)?;
         let z = u32::try_from(z).ok().filter(|&z| z < layout.extent[2])?;
-        Some((layout, z))
+        Some(Slice { layout, z })
     }
 
     /// An upper bound of the number of slices or layers.
@@ -59,26 +71,22 @@ pub(super) fn for_each_slice(source: &Image, target: &Image, region: &ImageCopyR
     // Offsets before the first slice are outside by at most this number of slices.
     for index in 0..slices.min(source.slices().max(target.slices())) {
         if let (Some(from), Some(to)) = (source.slice(index), target.slice(index)) {
-            f(&overlap(region, from, to));
+            f(&overlap(region, &from, &to));
         }
     }
 }
 
 /// The region in x and y, clipped to the source, and the rest of it clipped to the target.
-fn overlap(
-    region: &ImageCopyRegion,
-    (source, source_z): (SubresourceLayout, u32),
-    (target, target_z): (SubresourceLayout, u32),
-) -> SlicePair {
+fn overlap(region: &ImageCopyRegion, source: &Slice, target: &Slice) -> SlicePair {
     let [(from_x, to_x, width), (from_y, to_y, height)] = [0, 1].map(|axis| {
-        let from = clip(region.source_offset[axis], region.extent[axis], source.extent[axis]);
+        let from = clip(region.source_offset[axis], region.extent[axis], source.layout.extent[axis]);
         let offset = i64::from(region.target_offset[axis]) + i64::from(from.skipped);
-        let to = clip(i32::try_from(offset).unwrap_or(i32::MAX), from.count, target.extent[axis]);
+        let to = clip(i32::try_from(offset).unwrap_or(i32::MAX), from.count, target.layout.extent[axis]);
         (from.first.saturating_add(to.skipped), to.first, to.count)
     });
     SlicePair {
-        source: (source, [from_x, from_y, source_z]),
-        target: (target, [to_x, to_y, target_z]),
+        source: SlicePart { layout: source.layout, first: [from_x, from_y, source.z] },
+        target: SlicePart { layout: target.layout, first: [to_x, to_y, target.z] },
         extent: [width, height],
     }
 }
@@ -89,7 +97,7 @@ pub(super) fn below([x, y, z]: [u32; 3], row: u32) -> [u32; 3] {
 }
 
 fn copy_slice(copy: &CopyImage, pair: &SlicePair) {
-    let ((source, from), (target, to)) = (&pair.source, &pair.target);
+    let (source, target) = (&pair.source.layout, &pair.target.layout);
     if source.format.texel_size() != target.format.texel_size() {
         log::warn!("left out an image copy between texels of different sizes");
         return;
@@ -102,8 +110,8 @@ fn copy_slice(copy: &CopyImage, pair: &SlicePair) {
         let is_dense = size == source.row_pitch && size == target.row_pitch;
         let rows = if is_dense { height.max(1) } else { 1 };
         for row in (0..height).step_by(rows as usize) {
-            let from = copy.source.row(&source, below(*from, row), size);
-            let to = copy.target.row(&target, below(*to, row), size);
+            let from = copy.source.row(&source, below(pair.source.first, row), size);
+            let to = copy.target.row(&target, below(pair.target.first, row), size);
             let copied = from.zip(to).map(|(from, to)| {
                 let memory = &copy.target.memory;
                 memory.copy_from(to, &copy.source.memory, from, size * u64::from(rows))

@@ -13,10 +13,11 @@ mod tests;
 
 use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
-use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
+use crate::packet::{BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage};
 use crate::runtime::Runtime;
 use crate::transfer::region::clip;
 pub use blit::blit_image;
+use devmem::BufferRange;
 pub use image_copy::copy_image;
 use rayon::prelude::*;
 pub use resolve::resolve_image;
@@ -90,7 +91,7 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, runtime: 
         for index in 0..layers.layer_count.min(end - first) {
             let layout = copy.image.subresource(layers.aspect, layers.mip_level, first + index);
             if let Some(layout) = layout {
-                copy_layer(copy, direction, (region, index), &layout, runtime);
+                copy_layer(copy, direction, region, index, &layout, runtime);
             }
         }
     }
@@ -104,7 +105,8 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, runtime: 
 fn copy_layer(
     copy: &CopyBufferImage,
     direction: Direction,
-    (region, index): (&BufferImageRegion, u32),
+    region: &BufferImageRegion,
+    index: u32,
     layout: &SubresourceLayout,
     runtime: &Runtime,
 ) {

@@ -19,7 +19,7 @@ pub fn resolve_image(resolve: &ResolveImage) {
 }
 
 fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
-    let ((source, from), (target, to)) = (&pair.source, &pair.target);
+    let (source, target) = (&pair.source.layout, &pair.target.layout);
     let [width, height] = pair.extent.map(|texels| texels as usize);
     let mut bytes: Vec<u8> = host::zeroed(width * source.format.texel_size());
     let mut encoded: Vec<u8> = host::zeroed(width * target.format.texel_size());
@@ -29,7 +29,7 @@ fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
     for row in 0..height as u32 {
         for (sample, texels) in (0..).zip(&mut samples) {
             let layout = source.sample(sample);
-            let read = resolve.source.read_row(&layout, below(*from, row), &mut bytes);
+            let read = resolve.source.read_row(&layout, below(pair.source.first, row), &mut bytes);
             if read.is_none() {
                 return;
             }
@@ -39,7 +39,7 @@ fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
         resolve_row(source.format, resolve.mode, rows, &mut resolved);
         target.format.encode_row(&resolved, &mut encoded);
         let target = target.sample(0);
-        if resolve.target.write_row(&target, below(*to, row), &encoded).is_none() {
+        if resolve.target.write_row(&target, below(pair.target.first, row), &encoded).is_none() {
             return;
         }
     }

@@ -5,8 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::*;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
-use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect, Viewport};
-use simdevice::{Allocation, Config, Format, Image, ImageView, Packet};
+use simdevice::state::{BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, Rect, Viewport};
+use simdevice::{Allocation, BufferRange, Config, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
 /// The width of every test's framebuffer, in pixels. Neither side is a multiple of a tile's.
@@ -18,7 +18,7 @@ pub const HEIGHT: u32 = 83;
 pub const EVERYTHING: Rect = Rect { x: 0, y: 0, width: WIDTH, height: HEIGHT };
 
 /// Blending of premultiplied colours with the "over" operator.
-pub const OVER: BlendState = BlendState { equations: Some((OVER_EQUATION, OVER_EQUATION)), write_mask: 0xF };
+pub const OVER: BlendState = BlendState { equations: Some(BlendEquations::both(OVER_EQUATION)), write_mask: 0xF };
 const OVER_EQUATION: BlendEquation =
     BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
 

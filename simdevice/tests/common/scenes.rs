@@ -20,7 +20,7 @@ use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{CompareOp, DepthStencil, DepthTest, DrawState, Topology};
 use simdevice::stats::recorder::Recorder;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
+use simdevice::{Allocation, BufferRange, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
 /// The kind of a scene.

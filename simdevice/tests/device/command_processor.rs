@@ -4,7 +4,7 @@ use crate::common::*;
 use simdevice::command_processor::ExecutionError;
 use simdevice::packet::*;
 use simdevice::stats::query::{QueryKind, QueryPool, QueryResult, host_time};
-use simdevice::{CommandProcessor, Device, Format, Packet};
+use simdevice::{BufferRange, CommandProcessor, Device, Format, Packet};
 use std::sync::Arc;
 
 fn processor() -> CommandProcessor {

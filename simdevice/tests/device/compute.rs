@@ -1,11 +1,12 @@
 //! Dispatches through the command processor: every workgroup runs, work is counted, and every dispatch ends.
 
+use simdevice::BufferRange;
 use simdevice::command_processor::ExecutionError;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format, Label, Program, Rate, Space, Statement, Type};
 use simdevice::isa::machine::Stopped;
 use simdevice::isa::op::Op;
-use simdevice::packet::{BufferRange, Dispatch};
+use simdevice::packet::Dispatch;
 use simdevice::program::bindings::Bindings;
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::ComputeInput;

@@ -4,7 +4,7 @@ use crate::common::*;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::packet::*;
 use simdevice::runtime::FlushPolicy;
-use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect};
+use simdevice::state::{BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, Rect};
 use simdevice::stats::counters::{Counter, Counters};
 use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
@@ -38,7 +38,7 @@ fn rect(x: i32, y: i32, width: u32, height: u32) -> Rect {
 
 fn blend(source: BlendFactor, destination: BlendFactor, op: BlendOp, write_mask: u8) -> BlendState {
     let equation = BlendEquation { source, destination, op };
-    BlendState { equations: Some((equation, equation)), write_mask }
+    BlendState { equations: Some(BlendEquations::both(equation)), write_mask }
 }
 
 /// Draws and clears of every kind. A barrier may stand between two of the groups of packets.

@@ -197,7 +197,7 @@ fn timelines_are_well_formed_and_engines_do_one_thing_at_a_time() {
             let frames: Vec<_> =
                 trace.frames.iter().map(|frame| simulate::simulate(frame, &hardware)).cycle().take(5).collect();
             let spans = simulate::timeline(&frames, &hardware);
-            let text = serde_json::to_string(&schedule::chrome_trace(&spans, &hardware)).unwrap();
+            let text = serde_json::to_string(&schedule::chrome_trace(&spans, &[], &hardware)).unwrap();
             let json: serde_json::Value = serde_json::from_str(&text).unwrap();
             let events = json["traceEvents"].as_array().unwrap();
             let mut tracks = std::collections::BTreeMap::<u64, Vec<[f64; 2]>>::new();

@@ -213,13 +213,8 @@ pub struct ModuleSpan {
 /// The track of the first module.
 const FIRST_MODULE: u32 = 10;
 
-/// The timeline as a Chrome trace, with `other_data`.
-pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<T> {
-    chrome_trace_of_modules(spans, &[], other_data)
-}
-
-/// The timeline as a Chrome trace, with another row for each module, on which each tile is a span.
-pub fn chrome_trace_of_modules<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_data: T) -> ChromeTrace<T> {
+/// The timeline as a Chrome trace with `other_data`. Each of `modules` has another row, on which each tile is a span.
+pub fn chrome_trace<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_data: T) -> ChromeTrace<T> {
     let track = |engine: Engine| match engine {
         Engine::ShaderCores => 1,
         Engine::Rasterizer => 2,
@@ -321,7 +316,7 @@ mod tests {
     #[test]
     fn the_trace_has_an_event_per_span() {
         let spans = timeline(&[STAGES; 3], POLICY);
-        let trace = serde_json::to_value(chrome_trace(&spans, [1])).unwrap();
+        let trace = serde_json::to_value(chrome_trace(&spans, &[], [1])).unwrap();
         let events = trace["traceEvents"].as_array().unwrap();
         let complete: Vec<_> = events.iter().filter(|event| event["ph"] == "X").collect();
         assert_eq!(complete.len(), spans.len());

@@ -90,19 +90,19 @@ pub struct Shared<'a> {
 struct Listed<'a> {
     frame: Cow<'a, FrameWork>,
     baseline_evaluations: OnceLock<f64>,
-    divided: Mutex<Vec<(Division, Arc<Divided>)>>,
+    rasterizer_works: Mutex<Vec<(Division, Arc<RasterizerWork>)>>,
 }
 
 /// A frame's work for rasterizers of one division.
 #[derive(Debug)]
-struct Divided {
+struct RasterizerWork {
     tasks: Vec<Task>,
     changed: Changed,
 }
 
 impl<'a> Listed<'a> {
     fn new(frame: Cow<'a, FrameWork>) -> Self {
-        Self { frame, baseline_evaluations: OnceLock::new(), divided: Mutex::default() }
+        Self { frame, baseline_evaluations: OnceLock::new(), rasterizer_works: Mutex::default() }
     }
 
     /// The evaluations of stage 3 on shader cores. The original code ends a tile's list when all its pixels are
@@ -117,23 +117,25 @@ impl<'a> Listed<'a> {
     }
 
     /// The work for a rasterizer, made when it is first asked for.
-    fn divided(&self, raster: &Rasterizer) -> Arc<Divided> {
+    fn rasterizer_work(&self, raster: &Rasterizer) -> Arc<RasterizerWork> {
         let division = Division::of(raster);
-        let mut known = self.divided.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.rasterizer_works.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known.iter().find(|(of, _)| *of == division);
-        if let Some((_, divided)) = found {
-            return Arc::clone(divided);
+        if let Some((_, work)) = found {
+            return Arc::clone(work);
         }
-        let divided =
-            Arc::new(Divided { tasks: plan::tasks(&self.frame, &division), changed: changed(&self.frame, &division) });
-        known.push((division, Arc::clone(&divided)));
-        divided
+        let work = Arc::new(RasterizerWork {
+            tasks: plan::tasks(&self.frame, &division),
+            changed: changed(&self.frame, &division),
+        });
+        known.push((division, Arc::clone(&work)));
+        work
     }
 
     /// Rasterizes while others move `others_gb_s` to and from main memory.
     fn rasterize(&self, config: &Config, others_gb_s: f64) -> RasterReport {
-        let divided = self.divided(&config.rasterizer);
-        fast::rasterize_tasks(&divided.tasks, config, others_gb_s).0
+        let work = self.rasterizer_work(&config.rasterizer);
+        fast::rasterize_tasks(&work.tasks, config, others_gb_s).0
     }
 }
 
@@ -290,7 +292,7 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
             chosen = together;
         }
     }
-    let changed = of_rasterizer.divided(&config.rasterizer).changed;
+    let changed = of_rasterizer.rasterizer_work(&config.rasterizer).changed;
     let mut energy = Energy::default();
     if policy.has_rasterizer {
         energy = energy::rasterizer(&chosen.raster, changed, config);

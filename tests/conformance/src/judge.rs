@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ash::vk;
 use gaurast::vk::GaussianPrecisionGAURAST as Precision;
-use gaurast_oracle::compare::{Limits, Verdict, verdict};
+use gaurast_oracle::compare::{Accuracy, Limits};
 use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::{
     OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference, Stored,
@@ -74,7 +74,7 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     let (mut depth, mut stencil, mut greatest) = (Vec::new(), Vec::new(), 1.0_f64);
     let sets = sets(draw);
     for members in &sets {
-        let (scene, instances) = gathered(draw, members);
+        let (scene, instances) = combined_scene(draw, members);
         let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
         let colors = (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok());
         greatest = colors.flat_map(|splat| splat.color).fold(greatest, f64::max);
@@ -209,7 +209,7 @@ pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
 }
 
 /// The attributes of a set's Gaussians after conversion to binary32, and their instances.
-pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
+pub(crate) fn combined_scene(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
     let scene = &draw.scene;
     let triples = (scene.degree + 1).pow(2) as usize;
     let stored = |value: f32| {
@@ -318,17 +318,17 @@ impl Expected {
         }
     }
 
-    /// The verdict on a picture's colours.
-    pub fn verdict(&self, picture: &Picture) -> Verdict {
+    /// The accuracy of a picture's colours.
+    pub fn accuracy(&self, picture: &Picture) -> Accuracy {
         let limits = Limits { distance: self.distance, ..Limits::ENVELOPE_ONLY };
-        verdict(&picture.color, &self.color, limits)
+        Accuracy::of(&picture.color, &self.color, limits)
     }
 
     /// A description of the first error in a picture, or `None` if it is correct.
     pub fn fault(&self, picture: &Picture) -> Option<String> {
-        let verdict = self.verdict(picture);
-        if !verdict.holds() {
-            return Some(format!("colours: {verdict}"));
+        let accuracy = self.accuracy(picture);
+        if !accuracy.holds() {
+            return Some(format!("colours: {accuracy}"));
         }
         let place = |at: usize| [at % self.color.width as usize, at / self.color.width as usize];
         for (at, (allowed, code)) in self.depth.iter().zip(&picture.stored.depth).enumerate() {

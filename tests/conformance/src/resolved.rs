@@ -5,7 +5,7 @@ use gaurast_oracle::oracle::{OracleDepthFormat, OracleScene, OracleTests};
 
 use crate::draw::{Camera, Draw, Shown};
 use crate::implementation::Picture;
-use crate::judge::{CONTRACT, gathered, oracle_camera, oracle_state, sets};
+use crate::judge::{CONTRACT, combined_scene, oracle_camera, oracle_state, sets};
 
 /// The inputs of a draw's resolve shader, and those that it shows.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ impl Inputs {
     /// Computes the inputs of a draw, which has one set, whose shader shows some of them.
     pub(crate) fn of(draw: &Draw, shown: Shown) -> Self {
         let members = sets(draw).swap_remove(0);
-        let (scene, instances) = gathered(draw, &members);
+        let (scene, instances) = combined_scene(draw, &members);
         let scene = OracleScene { requested_degree: draw.degree, instances: &instances, ..scene.as_oracle() };
         let (camera, viewport) = (oracle_camera(draw), draw.viewport());
         let tests = OracleTests {
@@ -141,10 +141,10 @@ impl Inputs {
                 let expected = self.camera(location);
                 let mut farthest = 0.0_f64;
                 for (value, expected) in color.into_iter().zip(expected) {
-                    let room = 1e-7 * expected.abs().max(f64::MIN_POSITIVE);
+                    let tolerance = 1e-7 * expected.abs().max(f64::MIN_POSITIVE);
                     let values = std::iter::once(expected);
                     if f64::from(value) != expected {
-                        farthest = farthest.max(within(values, value, room)?);
+                        farthest = farthest.max(within(values, value, tolerance)?);
                     }
                 }
                 Ok(farthest)
@@ -158,9 +158,9 @@ impl Inputs {
         ways: &[&Resolved],
         mut medians: impl Iterator<Item = f64>,
         value: f64,
-        room: f64,
+        tolerance: f64,
     ) -> Result<(), String> {
-        let is_one = medians.any(|median| (median - value).abs() <= room);
+        let is_one = medians.any(|median| (median - value).abs() <= tolerance);
         let is_unknown = ways.iter().any(|way| way.medians_exhausted);
         if is_one || is_unknown { Ok(()) } else { Err("the median is another one".to_owned()) }
     }
@@ -189,10 +189,10 @@ impl Inputs {
 }
 
 /// The distance of a number from the least and the greatest of others.
-fn within(values: impl Iterator<Item = f64>, value: f32, room: f64) -> Result<f64, String> {
+fn within(values: impl Iterator<Item = f64>, value: f32, tolerance: f64) -> Result<f64, String> {
     let (low, high) =
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let value = f64::from(value);
     let distance = (low - value).max(value - high).max(0.0);
-    if distance <= room { Ok(distance) } else { Err(format!("{value} is not within {low} to {high}")) }
+    if distance <= tolerance { Ok(distance) } else { Err(format!("{value} is not within {low} to {high}")) }
 }

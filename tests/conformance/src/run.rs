@@ -88,7 +88,7 @@ impl Expectation {
                 Err(message) => nothing(message),
             },
             After::Attachments(expected) => match expected.fault(&picture) {
-                None => Outcome::Pass(expected.verdict(&picture).max_distance),
+                None => Outcome::Pass(expected.accuracy(&picture).max_distance),
                 Some(message) => Outcome::Fail(Failure { message, picture: Some((expected.clone(), picture.color)) }),
             },
         }

@@ -11,7 +11,7 @@ use gaurast_second as second;
 
 use crate::draw::{Blend, ColorFormat, Draw};
 use crate::implementation::{Error, Implementation, Picture};
-use crate::judge::{gathered, sets};
+use crate::judge::{combined_scene, sets};
 
 /// The second implementation.
 pub struct Second;
@@ -56,7 +56,7 @@ impl Implementation for Second {
             depth: depths.map(|&code| format.map_or(0.0, |format| format.depth(code))).collect(),
         };
         for members in sets(draw) {
-            let (scene, _) = gathered(draw, &members);
+            let (scene, _) = combined_scene(draw, &members);
             let stored = (scene.degree + 1).pow(2) as usize;
             let drawn = (draw.degree + 1).pow(2) as usize;
             let gaussians: Vec<second::Gaussian> = (0..scene.positions.len())

@@ -4,14 +4,15 @@ use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use ash::vk;
 use gaurast_testkit::packets::{attributes, buffer, image, stream, texels};
 use gaurast_tests::triangles::edges::to_clip;
+use simdevice::BufferRange;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format as Word, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
 use simdevice::packet::{
-    Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments, ClearImage,
-    CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes, GaussianBegin, LoadOp, PrimitiveBindings,
-    Rendering, StoreOp, SubresourceLayers, SubresourceRange,
+    Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, ClearAttachments, ClearImage, CopyBuffer,
+    CopyBufferImage, GaussianAppend, GaussianAttributes, GaussianBegin, LoadOp, PrimitiveBindings, Rendering, StoreOp,
+    SubresourceLayers, SubresourceRange,
 };
 use simdevice::packet::{Dispatch, Draw};
 use simdevice::program::bindings::Bindings;
@@ -24,7 +25,8 @@ use simdevice::program::vertex::DrawPipeline;
 use simdevice::runtime::{FlushPolicy, SimdLevel};
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{
-    self, BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState, Rect, Topology, Viewport,
+    self, BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState, Rect,
+    Topology, Viewport,
 };
 use simdevice::stats::recorder::Recorder;
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
@@ -145,7 +147,7 @@ fn depth_stencil(test: DepthTest) -> DepthStencil {
 
 fn blend(blends: bool) -> BlendState {
     let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
-    BlendState { equations: blends.then_some((over, over)), write_mask: 0xF }
+    BlendState { equations: blends.then_some(BlendEquations::both(over)), write_mask: 0xF }
 }
 
 impl Resources {

@@ -9,8 +9,8 @@ use simdevice::format::{Aspect, ClearValue};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
-    Attachment, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp, PrimitiveBindings,
-    Rendering, StoreOp,
+    Attachment, AttachmentResolve, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp,
+    PrimitiveBindings, Rendering, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
@@ -274,7 +274,10 @@ impl Case<'_> {
                 .map(|(color, to)| {
                     let attachment = attachment(color, ClearValue::Float(self.clear));
                     let mode = ResolveMode::Average;
-                    Some(Attachment { resolve: (self.samples > 1).then(|| (to.clone(), mode)), ..attachment })
+                    Some(Attachment {
+                        resolve: (self.samples > 1).then(|| AttachmentResolve { view: to.clone(), mode }),
+                        ..attachment
+                    })
                 })
                 .collect(),
             depth: Some(attachment(&depth, stored)),

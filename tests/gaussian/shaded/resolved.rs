@@ -17,7 +17,7 @@ use simdevice::program::interface::{
 };
 use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::Camera;
-use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp};
+use simdevice::state::{BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp};
 use simdevice::stats::counters::Counter;
 use std::sync::Arc;
 
@@ -167,7 +167,7 @@ fn what_a_program_writes_is_blended() {
     let outputs = cloud(43, 1000);
     let device = device(SimdLevel::Best);
     let over = BlendEquation { source: BlendFactor::One, destination: BlendFactor::OneMinusSrcAlpha, op: BlendOp::Add };
-    let blended = BlendState { equations: Some((over, over)), write_mask: 0b0101 };
+    let blended = BlendState { equations: Some(BlendEquations::both(over)), write_mask: 0b0101 };
     let inputs = everything();
     let accumulated = [&inputs[..4], &inputs[..4]].concat();
     let case = |resolve| Case {

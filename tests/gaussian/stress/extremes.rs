@@ -5,7 +5,7 @@ use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecision
 use gaurast_testkit::{
     GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, TargetOptions, opaque, over,
 };
-use gaurast_tests::compare::{Limits, verdict};
+use gaurast_tests::compare::{Accuracy, Limits};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 
@@ -64,8 +64,8 @@ fn more_than_2_to_the_24_primitives_keep_their_order() {
     let alone = SceneBuffers::new(0, seen.iter().cycle().take(2 * INSTANCES as usize).cloned());
     let view = OracleCamera::new(&camera(size), size).expect("a camera");
     let reference = render_bounded(&alone.as_oracle(), &view, &OracleState::default());
-    let judged = verdict(&image, &reference, Limits::ENVELOPE_ONLY);
-    assert!(judged.holds(), "{judged}");
+    let accuracy = Accuracy::of(&image, &reference, Limits::ENVELOPE_ONLY);
+    assert!(accuracy.holds(), "{accuracy}");
 }
 
 /// Complete tile lists would have 3.3e8 entries, more than their limit, so tiles search the sorted sequence instead.
@@ -89,8 +89,8 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     let view = OracleCamera::new(&camera(size).principal_point([0.5; 2]), [1, 1]).expect("a camera");
     let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
     let middle = image[1024 * 2048 + 1024];
-    let judged = verdict(&[middle], &reference, Limits::ENVELOPE_ONLY);
-    assert!(judged.holds(), "{judged}");
+    let accuracy = Accuracy::of(&[middle], &reference, Limits::ENVELOPE_ONLY);
+    assert!(accuracy.holds(), "{accuracy}");
     let far = |pixel: &[f32; 4]| (0..4).any(|c| (pixel[c] - middle[c]).abs() > 1e-5);
     assert_eq!(image.iter().position(far), None);
 }

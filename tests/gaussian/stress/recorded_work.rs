@@ -3,8 +3,8 @@
 use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::recorded::{Agreement, read};
 
+use super::accuracy::draw;
 use super::scenes::all;
-use super::verdicts::draw;
 
 #[gaurast_runner::test]
 fn models_of_the_rasterizer_agree_on_stress_scenes() {

@@ -1,10 +1,10 @@
 //! The references that tests and benchmarks compare pictures of Gaussians with: a renderer in binary64, measures of the
 //! difference between two pictures, and generated scenes.
 //!
-//! A verdict on a picture of any renderer:
+//! The accuracy of a picture of any renderer:
 //!
 //! ```
-//! use gaurast_oracle::compare::{Limits, verdict};
+//! use gaurast_oracle::compare::{Accuracy, Limits};
 //! use gaurast_oracle::oracle::{OracleCamera, OracleState, render_bounded};
 //! use gaurast_oracle::scenes::SceneBuffers;
 //!
@@ -19,9 +19,9 @@
 //!
 //! // The pixels of the picture in question, as floats, premultiplied, row by row.
 //! let picture: Vec<[f32; 4]> = reference.to_f32();
-//! let verdict = verdict(&picture, &reference, Limits::CONTRACT);
-//! println!("{verdict}");
-//! assert!(verdict.holds());
+//! let accuracy = Accuracy::of(&picture, &reference, Limits::CONTRACT);
+//! println!("{accuracy}");
+//! assert!(accuracy.holds());
 //! ```
 
 pub mod compare;

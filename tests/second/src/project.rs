@@ -154,9 +154,9 @@ pub(crate) fn project(
 /// R(q), of a quaternion that need not be normalized.
 fn turn(quaternion: [f32; 4]) -> Matrix {
     let largest = quaternion.iter().fold(0.0f32, |largest, component| largest.max(component.abs()));
-    let divided = widened(quaternion).map(|component| component / f64::from(largest));
-    let norm = divided.iter().map(|component| component * component).sum::<f64>().sqrt();
-    let [w, x, y, z] = divided.map(|component| component / norm);
+    let scaled = widened(quaternion).map(|component| component / f64::from(largest));
+    let norm = scaled.iter().map(|component| component * component).sum::<f64>().sqrt();
+    let [w, x, y, z] = scaled.map(|component| component / norm);
     [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],

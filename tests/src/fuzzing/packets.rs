@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
+use simdevice::BufferRange;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::{
-    Activations, Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion, BufferImageRegion,
-    BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, GaussianAppend,
+    Activations, Attachment, AttachmentClear, AttachmentResolve, AttributeStream, BlitImage, BufferCopyRegion,
+    BufferImageRegion, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, GaussianAppend,
     GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion, IndexStream, LoadOp, ModelAttributes,
     Rendering, ResolveImage, StoreOp, SubresourceLayers, SubresourceRange,
 };
@@ -269,7 +270,7 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
         if bytes.rarely(6) {
             let target = resources.image(bytes)?;
             let mode = bytes.one(&[ResolveMode::Average, ResolveMode::SampleZero, ResolveMode::Max]);
-            attachment.resolve = Some((view(bytes, target), mode));
+            attachment.resolve = Some(AttachmentResolve { view: view(bytes, target), mode });
         }
         Some(attachment)
     };

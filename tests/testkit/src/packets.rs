@@ -1,9 +1,10 @@
 //! Resources of packets: buffers, images and the attributes of Gaussians, in device memory.
 
 use gaurast_oracle::scenes::SceneBuffers;
+use simdevice::BufferRange;
 use simdevice::format::Aspect;
 use simdevice::image::{ImageDesc, ImageKind};
-use simdevice::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
+use simdevice::packet::{AttributeStream, GaussianAttributes, ModelAttributes};
 use simdevice::{Allocation, Format, Image, ImageView};
 use std::sync::Arc;
 

@@ -158,7 +158,7 @@ unsafe fn look(
     }
     if let Some(device) = created {
         let get = link.get_device_proc_addr;
-        Device::new((device, physical_device), get, Arc::clone(instance), facts).register();
+        Device::new(device, physical_device, get, Arc::clone(instance), facts).register();
     }
 }
 

@@ -10,7 +10,7 @@ use crate::facts::Harmonics;
 use crate::hooks::objects::{is_storage, written_buffers};
 use crate::interface::{find, slice};
 use crate::objects::{Objects, Subpass};
-use crate::recording::{BoundSet, Call, IndexBuffer, Operation, Recording, VertexBuffer};
+use crate::recording::{BoundSet, Call, IndexBuffer, Operation, Recording, SubpassIndex, VertexBuffer};
 use crate::report::Faults;
 use crate::rules::{self, dynamic};
 
@@ -257,12 +257,12 @@ records! {
     }
     cmd_begin_render_pass(begin: *const vk::RenderPassBeginInfo<'_>, contents: vk::SubpassContents)
         |state, _faults| {
-        begin_render_pass(state, &*begin);
+        begin_render_pass(state.0, state.1, &*begin);
     }
     cmd_begin_render_pass2(
         begin: *const vk::RenderPassBeginInfo<'_>, subpass: *const vk::SubpassBeginInfo<'_>
     ) |state, _faults| {
-        begin_render_pass(state, &*begin);
+        begin_render_pass(state.0, state.1, &*begin);
     }
     cmd_next_subpass(contents: vk::SubpassContents) |state, faults| {
         rules::set::require_ended(state.0, "vkCmdNextSubpass", faults);
@@ -480,8 +480,9 @@ fn set_own(recording: &mut Recording, state: vk::DynamicState, bits: u32, faults
     }
 }
 
-fn begin_render_pass((recording, objects): (&mut Recording, &mut Objects), begin: &vk::RenderPassBeginInfo<'_>) {
-    let pass = objects.render_passes.get(&begin.render_pass).cloned();
-    let subpass = pass.as_ref().and_then(|pass| pass.first().cloned());
-    recording.begin_pass(subpass.unwrap_or_default(), pass.map(|pass| (pass, 0)));
+fn begin_render_pass(recording: &mut Recording, objects: &Objects, begin: &vk::RenderPassBeginInfo<'_>) {
+    let render_pass = objects.render_passes.get(&begin.render_pass).cloned();
+    let subpass = render_pass.as_ref().and_then(|render_pass| render_pass.first().cloned());
+    let index = render_pass.map(|render_pass| SubpassIndex { render_pass, index: 0 });
+    recording.begin_pass(subpass.unwrap_or_default(), index);
 }

@@ -1,6 +1,7 @@
 //! The contents of a draw's buffers, as the device finds them when it executes.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use ash::vk;
 use gaurast::vk::{
@@ -206,12 +207,12 @@ impl Gaussians {
             let format = Format::of(attribute.format);
             let binding = draw.pipeline.bindings.get(&attribute.binding)?;
             let divisor = binding.by_instance.then_some(u64::from(binding.divisor));
-            let (first, last) = match divisor {
+            let range = match divisor {
                 Some(divisor) => {
                     let steps = (looked_at - 1).checked_div(divisor);
-                    (first_instance, first_instance + steps.unwrap_or(0))
+                    first_instance..=first_instance + steps.unwrap_or(0)
                 }
-                None => (low, high),
+                None => low..=high,
             };
             if !format.is_readable() {
                 return None;
@@ -219,7 +220,7 @@ impl Gaussians {
             let elements = match places.get(&attribute.binding) {
                 Some(&place) => place,
                 None => {
-                    let elements = read_elements(draw, attribute.binding, (first, last), reader)?;
+                    let elements = read_elements(draw, attribute.binding, range, reader)?;
                     gaussians.elements.push(elements);
                     let place = gaussians.elements.len() - 1;
                     places.insert(attribute.binding, place);
@@ -255,7 +256,9 @@ impl Gaussians {
     }
 }
 
-fn read_elements(draw: &Draw, number: u32, (first, last): (u64, u64), reader: &dyn Reader) -> Option<Elements> {
+/// Reads a range of the elements of a vertex buffer: those of vertices or of instances.
+fn read_elements(draw: &Draw, number: u32, range: RangeInclusive<u64>, reader: &dyn Reader) -> Option<Elements> {
+    let (first, last) = range.into_inner();
     let bound = draw.vertex_buffers.get(&number)?;
     let binding = draw.pipeline.bindings.get(&number)?;
     let stride = u64::from(bound.stride.unwrap_or(binding.stride));

@@ -1,5 +1,6 @@
 //! Draws as they are recorded.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -232,8 +233,9 @@ fn check_ranges(
     if let Call::Indices(..) = call {
         check_indices(recording, first, count, objects, faults);
     }
-    let by_vertex = matches!(call, Call::Vertices(_)).then_some((first, count));
-    check_vertices(recording, pipeline, by_vertex, (first_instance, instances), objects, faults);
+    let range = |first: u32, count: u32| u64::from(first)..u64::from(first) + u64::from(count);
+    let vertices = matches!(call, Call::Vertices(_)).then(|| range(first, count));
+    check_vertices(recording, pipeline, vertices, range(first_instance, instances), objects, faults);
     let locations = &gaussian.attribute_locations;
     let used = [
         locations.position,
@@ -299,11 +301,13 @@ fn bound_bytes(recording: &Recording, binding: u32, objects: &Objects) -> Option
     Some(bound.size.map_or(size, |given| given.min(size)))
 }
 
+/// Warns about attributes of vertices and instances that lie beyond their buffers. Both ranges are not empty; `vertices`
+/// is `None` in indexed draws.
 fn check_vertices(
     recording: &Recording,
     pipeline: &Pipeline,
-    by_vertex: Option<(u32, u32)>,
-    (first_instance, instances): (u32, u32),
+    vertices: Option<Range<u64>>,
+    instances: Range<u64>,
     objects: &Objects,
     faults: &mut Faults,
 ) {
@@ -323,13 +327,13 @@ fn check_vertices(
         };
         let stride = recording.vertex_buffers[&number].stride.unwrap_or(binding.stride);
         let (what, first, last) = if binding.by_instance {
-            let steps = (instances - 1).checked_div(binding.divisor).unwrap_or(0);
-            ("instance", first_instance, u64::from(first_instance) + u64::from(steps))
+            let steps = (instances.end - 1 - instances.start).checked_div(binding.divisor.into()).unwrap_or(0);
+            ("instance", instances.start, instances.start + steps)
         } else {
-            let Some((first, count)) = by_vertex else {
+            let Some(vertices) = &vertices else {
                 continue;
             };
-            ("vertex", first, u64::from(first) + u64::from(count) - 1)
+            ("vertex", vertices.start, vertices.end - 1)
         };
         let size = u64::from(attribute.offset) + u64::from(Format::of(attribute.format).bytes);
         let end = last * u64::from(stride) + size;

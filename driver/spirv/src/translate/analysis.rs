@@ -90,8 +90,9 @@ impl Analysis {
             self.roots.insert(id, id);
             self.pointer_types.extend(parameter.result_type.map(|ty| (id, ty)));
         }
-        for it in instructions() {
-            self.instruction(module, globals, it).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+        for instruction in instructions() {
+            self.instruction(module, globals, instruction)
+                .map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
         }
         let tree = self
             .structurize(module, globals, function)
@@ -100,47 +101,47 @@ impl Analysis {
         Ok(())
     }
 
-    fn instruction(&mut self, module: &Module, globals: &Globals, it: &Instruction) -> Result<()> {
-        for index in 0..it.operands.len() {
-            if let Ok(id) = it.id(index)
+    fn instruction(&mut self, module: &Module, globals: &Globals, instruction: &Instruction) -> Result<()> {
+        for index in 0..instruction.operands.len() {
+            if let Ok(id) = instruction.id(index)
                 && globals.variables.contains_key(&id)
             {
                 self.used.insert(id);
             }
         }
-        if let (Some(id), Some(ty)) = (it.result_id, it.result_type) {
+        if let (Some(id), Some(ty)) = (instruction.result_id, instruction.result_type) {
             self.pointer_types.insert(id, ty);
         }
-        match it.opcode {
+        match instruction.opcode {
             Op::Variable => {
-                let id = it.result()?;
+                let id = instruction.result()?;
                 self.roots.insert(id, id);
-                let (_, pointee) = globals.types.pointer(it.ty()?)?;
+                let (_, pointee) = globals.types.pointer(instruction.ty()?)?;
                 if !globals.types.is_value(pointee) {
                     self.in_memory.insert(id);
                 }
             }
             Op::AccessChain | Op::InBoundsAccessChain => {
-                if let Some(root) = self.roots.get(&it.id(0)?).copied() {
-                    self.roots.insert(it.result()?, root);
-                    if let Some(pointee) = self.pointee(globals, it.id(0)?)
-                        && indexes_array(globals, pointee, &it.ids(1))
+                if let Some(root) = self.roots.get(&instruction.id(0)?).copied() {
+                    self.roots.insert(instruction.result()?, root);
+                    if let Some(pointee) = self.pointee(globals, instruction.id(0)?)
+                        && indexes_array(globals, pointee, &instruction.ids(1))
                     {
                         self.in_memory.insert(root);
                     }
                 }
             }
             Op::CopyObject => {
-                if let Some(root) = self.roots.get(&it.id(0)?).copied() {
-                    self.roots.insert(it.result()?, root);
+                if let Some(root) = self.roots.get(&instruction.id(0)?).copied() {
+                    self.roots.insert(instruction.result()?, root);
                 }
             }
             Op::FunctionCall => {
-                let Some(callee) = module.functions.get(&it.id(0)?) else {
+                let Some(callee) = module.functions.get(&instruction.id(0)?) else {
                     return malformed("there is no such function");
                 };
                 let parameters = &module.sections.functions[*callee].parameters;
-                for (parameter, argument) in parameters.iter().zip(it.ids(1)) {
+                for (parameter, argument) in parameters.iter().zip(instruction.ids(1)) {
                     if let (Some(parameter), Some(root)) = (parameter.result_id, self.roots.get(&argument)) {
                         self.arguments.entry(parameter).or_default().push(*root);
                     }
@@ -176,8 +177,8 @@ impl Analysis {
         let mut stores = Vec::with_capacity(function.blocks.len());
         for block in &function.blocks {
             let mut stored = Vec::new();
-            for it in &block.instructions {
-                self.stores(module, globals, it, &mut stored)?;
+            for instruction in &block.instructions {
+                self.stores(module, globals, instruction, &mut stored)?;
             }
             stored.sort_unstable();
             stored.dedup();
@@ -187,21 +188,21 @@ impl Analysis {
     }
 
     /// Adds the variables and pointer parameters that an instruction stores to.
-    fn stores(&self, module: &Module, globals: &Globals, it: &Instruction, into: &mut Vec<u32>) -> Result<()> {
+    fn stores(&self, module: &Module, globals: &Globals, instruction: &Instruction, into: &mut Vec<u32>) -> Result<()> {
         let root = |id: u32| self.roots.get(&id).copied();
-        match it.opcode {
-            Op::Store | Op::CopyMemory => into.extend(root(it.id(0)?)),
+        match instruction.opcode {
+            Op::Store | Op::CopyMemory => into.extend(root(instruction.id(0)?)),
             // Modf and Frexp store through a pointer.
-            Op::ExtInst => into.extend(it.ids(2).into_iter().filter_map(root)),
+            Op::ExtInst => into.extend(instruction.ids(2).into_iter().filter_map(root)),
             Op::FunctionCall => {
-                let Some(callee) = module.functions.get(&it.id(0)?) else {
+                let Some(callee) = module.functions.get(&instruction.id(0)?) else {
                     return malformed("there is no such function");
                 };
                 let Some(tree) = self.trees.get(callee) else {
                     return unsupported("a call to a function that isn't translated");
                 };
                 let parameters = &module.sections.functions[*callee].parameters;
-                let arguments = it.ids(1);
+                let arguments = instruction.ids(1);
                 for stored in tree.modified.iter() {
                     let position = parameters.iter().position(|parameter| parameter.result_id == Some(*stored));
                     into.extend(match position {

@@ -32,32 +32,32 @@ fn atomic_op(op: Op) -> Result<AtomicOp> {
 }
 
 /// Translates atomic instructions.
-pub fn atomic(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let pointer = t.pointer(it.id(0)?)?;
-    match it.opcode {
+pub fn atomic(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let pointer = t.pointer(instruction.id(0)?)?;
+    match instruction.opcode {
         Op::AtomicLoad => match &pointer {
             Pointer::Texel { .. } => {
                 let reg = load_texel(t, &pointer)?;
-                t.define(it, vec![reg])
+                t.define(instruction, vec![reg])
             }
             _ => {
                 let regs = load_from(t, &pointer)?;
-                t.define(it, regs)
+                t.define(instruction, regs)
             }
         },
         Op::AtomicStore => {
-            let value = t.reg(it.id(3)?)?;
+            let value = t.reg(instruction.id(3)?)?;
             match &pointer {
                 Pointer::Texel { .. } => store_texel(t, &pointer, value),
                 _ => store_to(t, &pointer, &[value]),
             }
         }
-        _ => read_modify_write(t, it, &pointer),
+        _ => read_modify_write(t, instruction, &pointer),
     }
 }
 
-fn read_modify_write(t: &mut Translator, it: &Instruction, pointer: &Pointer) -> Result<()> {
-    let (scalar, count) = t.globals.types.vector(it.ty()?)?;
+fn read_modify_write(t: &mut Translator, instruction: &Instruction, pointer: &Pointer) -> Result<()> {
+    let (scalar, count) = t.globals.types.vector(instruction.ty()?)?;
     if count != 1 {
         return malformed("the result isn't a scalar");
     }
@@ -66,28 +66,28 @@ fn read_modify_write(t: &mut Translator, it: &Instruction, pointer: &Pointer) ->
         false => t.emit.u32(1),
     };
     let mut comparator = None;
-    let (op, value) = match it.opcode {
+    let (op, value) = match instruction.opcode {
         Op::AtomicIIncrement => (AtomicOp::IAdd, one(t)),
         Op::AtomicIDecrement => {
             let one = one(t);
             (AtomicOp::IAdd, t.emit.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[one]))
         }
         Op::AtomicISub => {
-            let value = t.reg(it.id(3)?)?;
+            let value = t.reg(instruction.id(3)?)?;
             (AtomicOp::IAdd, t.emit.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[value]))
         }
         Op::AtomicCompareExchange => {
-            comparator = Some(t.reg(it.id(5)?)?);
-            (AtomicOp::CompareExchange, t.reg(it.id(4)?)?)
+            comparator = Some(t.reg(instruction.id(5)?)?);
+            (AtomicOp::CompareExchange, t.reg(instruction.id(4)?)?)
         }
-        other => (atomic_op(other)?, t.reg(it.id(3)?)?),
+        other => (atomic_op(other)?, t.reg(instruction.id(3)?)?),
     };
     let float = matches!(op, AtomicOp::FAdd | AtomicOp::FMin | AtomicOp::FMax);
     if float && scalar != (Scalar::Float { width: 32 }) {
         return unsupported("atomics on floats that aren't 32 bits");
     }
     let old = apply(t, pointer, op, scalar, value, comparator)?;
-    t.define(it, vec![old])
+    t.define(instruction, vec![old])
 }
 
 fn apply(

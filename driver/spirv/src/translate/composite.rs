@@ -43,46 +43,46 @@ impl Matrix {
 }
 
 /// Translates composite instructions.
-pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
-    match it.opcode {
+pub fn composite(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    match instruction.opcode {
         Op::CompositeConstruct => {
-            let limit = t.globals.types.scalars(it.ty()?)? as usize;
+            let limit = t.globals.types.scalars(instruction.ty()?)? as usize;
             t.emit.charge_budget(limit)?;
             let mut regs = Vec::with_capacity(limit);
-            for part in it.ids(0) {
+            for part in instruction.ids(0) {
                 regs.extend_from_slice(&t.regs(part)?);
                 if regs.len() > limit {
                     return malformed("there are more parts than the type has");
                 }
             }
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         Op::CompositeExtract => {
-            let whole = t.regs(it.id(0)?)?;
-            let (start, count) = part(t, t.type_of(it.id(0)?)?, &it.numbers(1))?;
+            let whole = t.regs(instruction.id(0)?)?;
+            let (start, count) = part(t, t.type_of(instruction.id(0)?)?, &instruction.numbers(1))?;
             t.emit.charge_budget(count)?;
-            t.define(it, whole[start..start + count].to_vec())
+            t.define(instruction, whole[start..start + count].to_vec())
         }
         Op::CompositeInsert => {
-            let (object, whole) = (t.regs(it.id(0)?)?, t.regs(it.id(1)?)?);
-            let (start, count) = part(t, t.type_of(it.id(1)?)?, &it.numbers(2))?;
+            let (object, whole) = (t.regs(instruction.id(0)?)?, t.regs(instruction.id(1)?)?);
+            let (start, count) = part(t, t.type_of(instruction.id(1)?)?, &instruction.numbers(2))?;
             if object.len() != count {
                 return malformed("the object doesn't fit its place");
             }
             t.emit.charge_budget(whole.len())?;
             let mut regs = whole.to_vec();
             regs[start..start + count].copy_from_slice(&object);
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         Op::CopyLogical => {
-            let regs = t.regs(it.id(0)?)?;
+            let regs = t.regs(instruction.id(0)?)?;
             t.emit.charge_budget(regs.len())?;
-            t.define(it, regs.to_vec())
+            t.define(instruction, regs.to_vec())
         }
         Op::VectorShuffle => {
-            let (a, b) = (t.regs(it.id(0)?)?, t.regs(it.id(1)?)?);
+            let (a, b) = (t.regs(instruction.id(0)?)?, t.regs(instruction.id(1)?)?);
             let mut regs = Vec::new();
-            for index in it.numbers(2).into_iter().take(4) {
+            for index in instruction.numbers(2).into_iter().take(4) {
                 let both = a.iter().chain(b.iter()).copied();
                 let picked = both.clone().nth(index as usize);
                 // All ones means an undefined component.
@@ -91,10 +91,10 @@ pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
                     None => return malformed(format!("there is no component {index}")),
                 }
             }
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         Op::VectorExtractDynamic => {
-            let (vector, index) = (t.regs(it.id(0)?)?, t.reg(it.id(1)?)?);
+            let (vector, index) = (t.regs(instruction.id(0)?)?, t.reg(instruction.id(1)?)?);
             let Some((first, rest)) = vector.split_first() else {
                 return malformed("the operand has no components");
             };
@@ -105,11 +105,11 @@ pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
                 let this = t.emit.op(Ir::IEq, &[index, element]);
                 found = t.emit.select(this, *reg, found);
             }
-            t.define(it, vec![found])
+            t.define(instruction, vec![found])
         }
         Op::VectorInsertDynamic => {
-            let vector = t.regs(it.id(0)?)?;
-            let (object, index) = (t.reg(it.id(1)?)?, t.reg(it.id(2)?)?);
+            let vector = t.regs(instruction.id(0)?)?;
+            let (object, index) = (t.reg(instruction.id(1)?)?, t.reg(instruction.id(2)?)?);
             t.emit.charge_budget(2 * vector.len())?;
             let mut regs = Vec::with_capacity(vector.len());
             for (element, reg) in (0..).zip(vector.iter()) {
@@ -117,12 +117,12 @@ pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
                 let this = t.emit.op(Ir::IEq, &[index, element]);
                 regs.push(t.emit.select(this, object, *reg));
             }
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         _ => {
-            let matrix = matrix(t, it.id(0)?)?;
+            let matrix = matrix(t, instruction.id(0)?)?;
             let regs = matrix.transposed().regs;
-            t.define(it, regs.to_vec())
+            t.define(instruction, regs.to_vec())
         }
     }
 }
@@ -145,10 +145,10 @@ pub fn matrix(t: &mut Translator, id: u32) -> Result<Matrix> {
 }
 
 /// Translates `OpDot` and products with matrices.
-pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let contract = !t.module.has(it.result()?, Decoration::NoContraction);
-    let (first, second) = (it.id(0)?, it.id(1)?);
-    let regs = match it.opcode {
+pub fn linear_algebra(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let contract = !t.module.has(instruction.result()?, Decoration::NoContraction);
+    let (first, second) = (instruction.id(0)?, instruction.id(1)?);
+    let regs = match instruction.opcode {
         Op::Dot => {
             let (scalar, a) = t.vector(first)?;
             let b = t.regs(second)?;
@@ -156,12 +156,12 @@ pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
         Op::VectorTimesScalar | Op::MatrixTimesScalar => {
             let (a, b) = (t.regs(first)?, t.reg(second)?);
-            let scalar = result_scalar(t, it)?;
+            let scalar = result_scalar(t, instruction)?;
             let mut regs = Vec::with_capacity(a.len());
             for a in a.iter() {
                 let product = t.emit.mul(scalar, *a, b);
                 if contract && scalar != (Scalar::Float { width: 16 }) {
-                    t.emit.set_product(product, (*a, b));
+                    t.emit.set_product(product, [*a, b]);
                 }
                 regs.push(product);
             }
@@ -169,19 +169,19 @@ pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
         Op::MatrixTimesVector => {
             let (matrix, vector) = (matrix(t, first)?, t.regs(second)?);
-            let scalar = result_scalar(t, it)?;
+            let scalar = result_scalar(t, instruction)?;
             (0..matrix.rows).map(|row| dot(t, scalar, &matrix.row(row), &vector, contract)).collect::<Result<_>>()?
         }
         Op::VectorTimesMatrix => {
             let (vector, matrix) = (t.regs(first)?, matrix(t, second)?);
-            let scalar = result_scalar(t, it)?;
+            let scalar = result_scalar(t, instruction)?;
             (0..matrix.columns)
                 .map(|column| dot(t, scalar, &vector, matrix.column(column), contract))
                 .collect::<Result<_>>()?
         }
         Op::MatrixTimesMatrix => {
             let (a, b) = (matrix(t, first)?, matrix(t, second)?);
-            let scalar = result_scalar(t, it)?;
+            let scalar = result_scalar(t, instruction)?;
             let mut regs = Vec::with_capacity(a.rows * b.columns);
             for column in 0..b.columns {
                 for row in 0..a.rows {
@@ -192,7 +192,7 @@ pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
         _ => {
             let (a, b) = (t.regs(first)?, t.regs(second)?);
-            let scalar = result_scalar(t, it)?;
+            let scalar = result_scalar(t, instruction)?;
             let mut regs = Vec::with_capacity(a.len() * b.len());
             t.emit.charge_budget(a.len() * b.len())?;
             for b in b.iter() {
@@ -201,12 +201,12 @@ pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
             regs
         }
     };
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// The scalar of a result that is a scalar, vector or matrix.
-fn result_scalar(t: &Translator, it: &Instruction) -> Result<Scalar> {
-    let ty = it.ty()?;
+fn result_scalar(t: &Translator, instruction: &Instruction) -> Result<Scalar> {
+    let ty = instruction.ty()?;
     match t.globals.types.matrix(ty) {
         Ok((_, _, _, scalar)) => Ok(scalar),
         Err(_) => Ok(t.globals.types.vector(ty)?.0),

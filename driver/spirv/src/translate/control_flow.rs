@@ -12,7 +12,7 @@ use isa::op::Op as Ir;
 use spirv::Op;
 
 use super::emitter::Emitter;
-use super::instruction::instruction;
+use super::instruction;
 use super::structurize::{Case, Construct, Edge, Jump, MergePoint, Node, Tree};
 use super::translator::Translator;
 use super::value::{Pointer, Value};
@@ -88,12 +88,12 @@ impl<'a> ControlFlow<'a> {
     }
 
     /// Translates `OpFunctionCall`.
-    fn call(&mut self, it: &Instruction) -> Result<()> {
-        let Some(function) = self.t.module.functions.get(&it.id(0)?).copied() else {
+    fn call(&mut self, instruction: &Instruction) -> Result<()> {
+        let Some(function) = self.t.module.functions.get(&instruction.id(0)?).copied() else {
             return malformed("there is no such function");
         };
         let parameters = &self.t.module.sections.functions[function].parameters;
-        let arguments = it.ids(1);
+        let arguments = instruction.ids(1);
         if parameters.len() != arguments.len() {
             return malformed("the number of arguments is wrong");
         }
@@ -116,7 +116,7 @@ impl<'a> ControlFlow<'a> {
             self.t.types.insert(id, ty);
         }
         match self.inline(function)? {
-            Some(regs) => self.t.define(it, regs.to_vec()),
+            Some(regs) => self.t.define(instruction, regs.to_vec()),
             None => Ok(()),
         }
     }
@@ -224,14 +224,14 @@ impl<'a> ControlFlow<'a> {
         let Some((_, body)) = self.block(index)?.instructions.split_last() else {
             return malformed("a block is empty");
         };
-        for it in body {
-            if !matches!(it.opcode, Op::Phi | Op::LoopMerge | Op::SelectionMerge) {
-                match it.opcode {
-                    Op::FunctionCall => self.call(it),
-                    _ => instruction(&mut self.t, it),
+        for instruction in body {
+            if !matches!(instruction.opcode, Op::Phi | Op::LoopMerge | Op::SelectionMerge) {
+                match instruction.opcode {
+                    Op::FunctionCall => self.call(instruction),
+                    _ => instruction::translate(&mut self.t, instruction),
                 }
-                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
-                self.t.emit.charge_budget(0).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+                .map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
+                self.t.emit.charge_budget(0).map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
             }
         }
         Ok(())
@@ -429,17 +429,21 @@ impl<'a> ControlFlow<'a> {
     /// Creates variables of the IR for a function's phis.
     fn declare_phis(&mut self, function: usize) -> Result<()> {
         let blocks = &self.t.module.sections.functions[function].blocks;
-        for it in blocks.iter().flat_map(|block| &block.instructions) {
-            if it.opcode != Op::Phi {
+        for instruction in blocks.iter().flat_map(|block| &block.instructions) {
+            if instruction.opcode != Op::Phi {
                 continue;
             }
-            let scalars =
-                self.t.globals.types.flatten(it.ty()?).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            let scalars = self
+                .t
+                .globals
+                .types
+                .flatten(instruction.ty()?)
+                .map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
             self.t.emit.charge_budget(scalars.len())?;
             let regs: Rc<[Reg]> =
                 scalars.iter().map(|scalar| self.t.emit.builder.variable(scalar.register())).collect();
-            self.phis.insert(it.result()?, regs.clone());
-            self.t.define(it, regs.to_vec())?;
+            self.phis.insert(instruction.result()?, regs.clone());
+            self.t.define(instruction, regs.to_vec())?;
         }
         Ok(())
     }
@@ -448,23 +452,23 @@ impl<'a> ControlFlow<'a> {
     fn phi_pairs(&mut self, edge: &Edge) -> Result<Vec<(Reg, Reg)>> {
         let from = self.block(edge.from)?.label;
         let mut pairs = Vec::new();
-        for it in &self.block(edge.to)?.instructions {
-            if it.opcode != Op::Phi {
+        for instruction in &self.block(edge.to)?.instructions {
+            if instruction.opcode != Op::Phi {
                 break;
             }
-            let ids = it.ids(0);
+            let ids = instruction.ids(0);
             let source = ids.chunks_exact(2).find(|pair| Some(pair[1]) == from);
             let Some(source) = source.map(|pair| pair[0]) else {
                 let diagnostic = Diagnostic::Malformed("a predecessor is missing".into());
-                return Err(diagnostic.locate(it.reference()).into());
+                return Err(diagnostic.locate(instruction.reference()).into());
             };
-            let regs = self.t.regs(source).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
-            let Some(variables) = self.phis.get(&it.result()?) else {
+            let regs = self.t.regs(source).map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
+            let Some(variables) = self.phis.get(&instruction.result()?) else {
                 return malformed("a phi isn't declared");
             };
             if variables.len() != regs.len() {
                 let diagnostic = Diagnostic::Malformed(format!("%{source} is of another type"));
-                return Err(diagnostic.locate(it.reference()).into());
+                return Err(diagnostic.locate(instruction.reference()).into());
             }
             pairs.extend(variables.iter().copied().zip(regs.iter().copied()));
         }

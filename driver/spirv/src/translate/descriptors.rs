@@ -133,8 +133,8 @@ pub fn resource(t: &mut Translator, binding: Binding, class: StorageClass, ty: u
 }
 
 /// Records that a place in memory may be written.
-pub fn mark_written(t: &mut Translator, place: &MemoryRef) {
-    match place.space {
+pub fn mark_written(t: &mut Translator, memory: &MemoryRef) {
+    match memory.space {
         Space::Buffer(binding) => mark_binding_written(t, binding),
         Space::Global => t.interface.has_side_effects = true,
         _ => {}

@@ -162,10 +162,10 @@ impl Elementwise {
     }
 
     /// Applies the operation to the operands of an instruction, from a position on.
-    fn apply(&self, t: &mut Translator, it: &Instruction, first: usize) -> Result<()> {
-        let (result, _) = t.globals.types.vector(it.ty()?)?;
+    fn apply(&self, t: &mut Translator, instruction: &Instruction, first: usize) -> Result<()> {
+        let (result, _) = t.globals.types.vector(instruction.ty()?)?;
         let count = self.narrow.signature().operands.len();
-        each(t, it, first, count, |t, scalars, src| {
+        each(t, instruction, first, count, |t, scalars, src| {
             let mut src = extend(t, self.extension, scalars, src);
             if self.exchange {
                 src.reverse();
@@ -198,11 +198,11 @@ fn extend(t: &mut Translator, extension: Extension, scalars: &[Scalar], src: &[R
 type Operands = (Vec<Scalar>, Vec<Rc<[Reg]>>);
 
 /// `count` operands of an instruction, from a position on.
-pub fn operands(t: &mut Translator, it: &Instruction, first: usize, count: usize) -> Result<Operands> {
+pub fn operands(t: &mut Translator, instruction: &Instruction, first: usize, count: usize) -> Result<Operands> {
     let mut scalars = Vec::with_capacity(count);
     let mut all: Vec<Rc<[Reg]>> = Vec::with_capacity(count);
     for index in first..first + count {
-        let (scalar, regs) = t.vector(it.id(index)?)?;
+        let (scalar, regs) = t.vector(instruction.id(index)?)?;
         if all.first().is_some_and(|first| first.len() != regs.len()) {
             return malformed("the operands differ in size");
         }
@@ -215,12 +215,12 @@ pub fn operands(t: &mut Translator, it: &Instruction, first: usize, count: usize
 /// Applies a function to each component of operands. The function also gets their scalar types.
 fn each(
     t: &mut Translator,
-    it: &Instruction,
+    instruction: &Instruction,
     first: usize,
     count: usize,
     mut function: impl FnMut(&mut Translator, &[Scalar], &[Reg]) -> Reg,
 ) -> Result<()> {
-    let (scalars, operands) = operands(t, it, first, count)?;
+    let (scalars, operands) = operands(t, instruction, first, count)?;
     let components = operands.first().map_or(0, |regs| regs.len());
     let regs = (0..components)
         .map(|component| {
@@ -228,51 +228,51 @@ fn each(
             function(t, &scalars, &src)
         })
         .collect();
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// Translates everything that works component by component, except conversions.
-pub fn elementwise(t: &mut Translator, it: &Instruction) -> Result<()> {
-    match it.opcode {
-        Op::FAdd => add(t, it),
-        Op::FMul => multiply(t, it),
-        Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended => extended_arithmetic(t, it),
-        Op::ShiftLeftLogical | Op::ShiftRightLogical | Op::ShiftRightArithmetic => shift(t, it),
+pub fn elementwise(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    match instruction.opcode {
+        Op::FAdd => add(t, instruction),
+        Op::FMul => multiply(t, instruction),
+        Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended => extended_arithmetic(t, instruction),
+        Op::ShiftLeftLogical | Op::ShiftRightLogical | Op::ShiftRightArithmetic => shift(t, instruction),
         Op::BitReverse | Op::BitCount | Op::BitFieldInsert | Op::BitFieldSExtract | Op::BitFieldUExtract => {
-            bit_operation(t, it)
+            bit_operation(t, instruction)
         }
-        Op::Any => fold_bools(t, it, Ir::BOr),
-        Op::All => fold_bools(t, it, Ir::BAnd),
-        Op::Select => select(t, it),
+        Op::Any => fold_bools(t, instruction, Ir::BOr),
+        Op::All => fold_bools(t, instruction, Ir::BAnd),
+        Op::Select => select(t, instruction),
         op => match Elementwise::of(op) {
-            Some(row) => row.apply(t, it, 0),
+            Some(row) => row.apply(t, instruction, 0),
             None => unsupported(format!("Op{op:?}")),
         },
     }
 }
 
 /// Translates `a * b`, which an addition may fuse later if that is allowed.
-fn multiply(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let contract = t.may_contract(it);
-    each(t, it, 0, 2, |t, scalars, src| {
+fn multiply(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let contract = t.may_contract(instruction);
+    each(t, instruction, 0, 2, |t, scalars, src| {
         let scalar = scalars[0];
         let product = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), src);
         if contract && scalar != (Scalar::Float { width: 16 }) {
-            t.emit.set_product(product, (src[0], src[1]));
+            t.emit.set_product(product, [src[0], src[1]]);
         }
         t.emit.wrap_to_width(scalar, product)
     })
 }
 
 /// Translates `a + b`, fused if one operand is a product.
-fn add(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let contract = t.may_contract(it);
-    each(t, it, 0, 2, |t, scalars, src| {
+fn add(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let contract = t.may_contract(instruction);
+    each(t, instruction, 0, 2, |t, scalars, src| {
         let (scalar, a, b) = (scalars[0], src[0], src[1]);
         let find = |reg, other| Some((t.emit.product(reg)?, other));
         let fused = find(a, b).or_else(|| find(b, a)).filter(|_| contract);
         let sum = match fused {
-            Some(((x, y), z)) => t.emit.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[x, y, z]),
+            Some(([x, y], z)) => t.emit.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[x, y, z]),
             None => t.emit.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]),
         };
         t.emit.wrap_to_width(scalar, sum)
@@ -280,8 +280,8 @@ fn add(t: &mut Translator, it: &Instruction) -> Result<()> {
 }
 
 /// The derivative along an axis, or the sum of absolute values along both.
-pub fn derivative(t: &mut Translator, it: &Instruction, axes: &[Axis], fine: bool) -> Result<()> {
-    each(t, it, 0, 1, |t, scalars, src| {
+pub fn derivative(t: &mut Translator, instruction: &Instruction, axes: &[Axis], fine: bool) -> Result<()> {
+    each(t, instruction, 0, 1, |t, scalars, src| {
         let along = |t: &mut Translator, axis| t.emit.builder.derivative(src[0], axis, fine);
         let reg = match axes {
             [one] => along(t, *one),
@@ -296,28 +296,28 @@ pub fn derivative(t: &mut Translator, it: &Instruction, axes: &[Axis], fine: boo
 }
 
 /// Translates `OpSelect`, with a condition for each component or one for all.
-fn select(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let conditions = t.regs(it.id(0)?)?;
-    let (a, b) = (t.regs(it.id(1)?)?, t.regs(it.id(2)?)?);
+fn select(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let conditions = t.regs(instruction.id(0)?)?;
+    let (a, b) = (t.regs(instruction.id(1)?)?, t.regs(instruction.id(2)?)?);
     if a.len() != b.len() || (conditions.len() != 1 && conditions.len() != a.len()) {
         return malformed("the operands differ in size");
     }
     t.emit.charge_budget(a.len())?;
     let condition = |index: usize| conditions[index % conditions.len()];
     let regs = (0..a.len()).map(|index| t.emit.select(condition(index), a[index], b[index])).collect();
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
-fn fold_bools(t: &mut Translator, it: &Instruction, op: Ir) -> Result<()> {
-    let regs = t.regs(it.id(0)?)?;
+fn fold_bools(t: &mut Translator, instruction: &Instruction, op: Ir) -> Result<()> {
+    let regs = t.regs(instruction.id(0)?)?;
     let folded = regs.iter().copied().reduce(|a, b| t.emit.op(op, &[a, b]));
-    t.define(it, folded.into_iter().collect())
+    t.define(instruction, folded.into_iter().collect())
 }
 
 /// Translates operations with two results: the low half, then the carry or the high half.
-fn extended_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (scalar, a) = t.vector(it.id(0)?)?;
-    let (_, b) = t.vector(it.id(1)?)?;
+fn extended_arithmetic(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (scalar, a) = t.vector(instruction.id(0)?)?;
+    let (_, b) = t.vector(instruction.id(1)?)?;
     let Scalar::Int { width, .. } = scalar else {
         return malformed("the operands aren't integers");
     };
@@ -327,15 +327,15 @@ fn extended_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (mut low, mut high) = (Vec::with_capacity(2 * a.len()), Vec::new());
     for (a, b) in a.iter().zip(b.iter()) {
         let halves = match width {
-            64 => wide_halves(t, it.opcode, *a, *b),
-            32 => word_halves(t, it.opcode, *a, *b),
-            _ => narrow_halves(t, it.opcode, scalar, width, *a, *b),
+            64 => wide_halves(t, instruction.opcode, *a, *b),
+            32 => word_halves(t, instruction.opcode, *a, *b),
+            _ => narrow_halves(t, instruction.opcode, scalar, width, *a, *b),
         };
         low.push(halves.low);
         high.push(halves.high);
     }
     low.append(&mut high);
-    t.define(it, low)
+    t.define(instruction, low)
 }
 
 /// The two results of extended arithmetic.
@@ -432,12 +432,12 @@ fn wide_product_high(t: &mut Translator, a: Reg, b: Reg) -> Reg {
     t.emit.op(Ir::IAdd64, &[highest, second_high])
 }
 
-fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (result, _) = t.globals.types.vector(it.ty()?)?;
-    each(t, it, 0, 2, |t, scalars, src| {
+fn shift(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (result, _) = t.globals.types.vector(instruction.ty()?)?;
+    each(t, instruction, 0, 2, |t, scalars, src| {
         let scalar = scalars[0];
         let by = if scalars[1].is_wide() { t.emit.op(Ir::Low32, &[src[1]]) } else { src[1] };
-        let (narrow, wide, a) = match it.opcode {
+        let (narrow, wide, a) = match instruction.opcode {
             Op::ShiftLeftLogical => (Ir::Shl, Ir::Shl64, src[0]),
             Op::ShiftRightLogical => (Ir::UShr, Ir::UShr64, t.emit.zero_extend(scalar, src[0])),
             _ => (Ir::SShr, Ir::SShr64, t.emit.sign_extend(scalar, src[0])),
@@ -448,17 +448,17 @@ fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
 }
 
 /// Translates operations on the bits of integers of any width.
-fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (scalar, base) = t.vector(it.id(0)?)?;
+fn bit_operation(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (scalar, base) = t.vector(instruction.id(0)?)?;
     let Scalar::Int { width, .. } = scalar else {
         return malformed("the operand isn't an integer");
     };
-    let (result, _) = t.globals.types.vector(it.ty()?)?;
-    let opcode = it.opcode;
+    let (result, _) = t.globals.types.vector(instruction.ty()?)?;
+    let opcode = instruction.opcode;
     let mut next = 1;
     let insert = if opcode == Op::BitFieldInsert {
         next += 1;
-        Some(t.regs(it.id(1)?)?)
+        Some(t.regs(instruction.id(1)?)?)
     } else {
         None
     };
@@ -468,7 +468,10 @@ fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
     let field = match opcode {
         Op::BitReverse | Op::BitCount => None,
         // Offset and count are one for all components.
-        _ => Some(BitField { offset: bit_number(t, it.id(next)?)?, count: bit_number(t, it.id(next + 1)?)? }),
+        _ => Some(BitField {
+            offset: bit_number(t, instruction.id(next)?)?,
+            count: bit_number(t, instruction.id(next + 1)?)?,
+        }),
     };
     let mut regs = Vec::with_capacity(base.len());
     for (index, base) in base.iter().enumerate() {
@@ -482,7 +485,7 @@ fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
         };
         regs.push(t.emit.wrap_to_width(result, reg));
     }
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// A range of bits; both members are registers of 32 bits.
@@ -578,30 +581,30 @@ fn wide_bit_field(
 }
 
 /// Translates an extended instruction of GLSL.std.450 that works component by component.
-pub fn glsl_elementwise(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
+pub fn glsl_elementwise(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
     if let Some(row) = Elementwise::of_glsl(op) {
-        return row.apply(t, it, 2);
+        return row.apply(t, instruction, 2);
     }
     match op {
-        G::InverseSqrt => glsl_each(t, it, 1, |t, scalar, src| inverse_sqrt(t, scalar, src[0])),
-        G::Radians => scaled(t, it, std::f64::consts::PI / 180.0),
-        G::Degrees => scaled(t, it, 180.0 / std::f64::consts::PI),
-        G::FClamp | G::NClamp => glsl_each(t, it, 3, |t, scalar, src| {
+        G::InverseSqrt => glsl_each(t, instruction, 1, |t, scalar, src| inverse_sqrt(t, scalar, src[0])),
+        G::Radians => scaled(t, instruction, std::f64::consts::PI / 180.0),
+        G::Degrees => scaled(t, instruction, 180.0 / std::f64::consts::PI),
+        G::FClamp | G::NClamp => glsl_each(t, instruction, 3, |t, scalar, src| {
             let low = t.emit.op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &src[..2]);
             t.emit.op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[low, src[2]])
         }),
-        G::SClamp => clamp_integers(t, it, Extension::Sign),
-        G::UClamp => clamp_integers(t, it, Extension::Zero),
-        G::FMix => glsl_each(t, it, 3, mix),
-        G::Step => glsl_each(t, it, 2, |t, scalar, src| {
+        G::SClamp => clamp_integers(t, instruction, Extension::Sign),
+        G::UClamp => clamp_integers(t, instruction, Extension::Zero),
+        G::FMix => glsl_each(t, instruction, 3, mix),
+        G::Step => glsl_each(t, instruction, 2, |t, scalar, src| {
             let below = t.emit.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[src[1], src[0]]);
             let (one, zero) = (t.emit.float(scalar, 1.0), t.emit.float(scalar, 0.0));
             t.emit.select(below, zero, one)
         }),
-        G::SmoothStep => glsl_each(t, it, 3, smooth_step),
-        G::FindILsb => find_bit(t, it, Ir::FindLsb, Extension::Zero),
-        G::FindSMsb => find_bit(t, it, Ir::FindSMsb, Extension::Sign),
-        G::FindUMsb => find_bit(t, it, Ir::FindUMsb, Extension::Zero),
+        G::SmoothStep => glsl_each(t, instruction, 3, smooth_step),
+        G::FindILsb => find_bit(t, instruction, Ir::FindLsb, Extension::Zero),
+        G::FindSMsb => find_bit(t, instruction, Ir::FindSMsb, Extension::Sign),
+        G::FindUMsb => find_bit(t, instruction, Ir::FindUMsb, Extension::Zero),
         other => unsupported(format!("GLSL.std.450 {other:?}")),
     }
 }
@@ -609,19 +612,19 @@ pub fn glsl_elementwise(t: &mut Translator, it: &Instruction, op: G) -> Result<(
 /// Applies a function of GLSL to each component; results are brought into the range of the operands' type.
 fn glsl_each(
     t: &mut Translator,
-    it: &Instruction,
+    instruction: &Instruction,
     count: usize,
     mut function: impl FnMut(&mut Translator, Scalar, &[Reg]) -> Reg,
 ) -> Result<()> {
-    each(t, it, 2, count, |t, scalars, src| {
+    each(t, instruction, 2, count, |t, scalars, src| {
         let reg = function(t, scalars[0], src);
         t.emit.wrap_to_width(scalars[0], reg)
     })
 }
 
-fn clamp_integers(t: &mut Translator, it: &Instruction, extension: Extension) -> Result<()> {
-    let (result, _) = t.globals.types.vector(it.ty()?)?;
-    each(t, it, 2, 3, |t, scalars, src| {
+fn clamp_integers(t: &mut Translator, instruction: &Instruction, extension: Extension) -> Result<()> {
+    let (result, _) = t.globals.types.vector(instruction.ty()?)?;
+    each(t, instruction, 2, 3, |t, scalars, src| {
         let src = extend(t, extension, scalars, src);
         let (max, min) = match (extension, scalars[0].is_wide()) {
             (Extension::Sign, false) => (Ir::SMax, Ir::SMin),
@@ -635,13 +638,13 @@ fn clamp_integers(t: &mut Translator, it: &Instruction, extension: Extension) ->
     })
 }
 
-fn find_bit(t: &mut Translator, it: &Instruction, find: Ir, extension: Extension) -> Result<()> {
-    let (scalar, _) = t.vector(it.id(2)?)?;
+fn find_bit(t: &mut Translator, instruction: &Instruction, find: Ir, extension: Extension) -> Result<()> {
+    let (scalar, _) = t.vector(instruction.id(2)?)?;
     if scalar.is_wide() {
         return unsupported("this on 64-bit integers");
     }
-    let (result, _) = t.globals.types.vector(it.ty()?)?;
-    each(t, it, 2, 1, |t, scalars, src| {
+    let (result, _) = t.globals.types.vector(instruction.ty()?)?;
+    each(t, instruction, 2, 1, |t, scalars, src| {
         let src = extend(t, extension, scalars, src);
         let reg = t.emit.op(find, &src);
         t.emit.wrap_to_width(result, reg)
@@ -658,8 +661,8 @@ pub fn inverse_sqrt(t: &mut Translator, scalar: Scalar, reg: Reg) -> Reg {
     }
 }
 
-fn scaled(t: &mut Translator, it: &Instruction, factor: f64) -> Result<()> {
-    glsl_each(t, it, 1, |t, scalar, src| {
+fn scaled(t: &mut Translator, instruction: &Instruction, factor: f64) -> Result<()> {
+    glsl_each(t, instruction, 1, |t, scalar, src| {
         let factor = t.emit.float(scalar, factor);
         t.emit.mul(scalar, src[0], factor)
     })
@@ -687,20 +690,21 @@ fn smooth_step(t: &mut Translator, scalar: Scalar, src: &[Reg]) -> Reg {
 }
 
 /// Translates conversions, `OpBitcast`, and conversions between addresses and integers.
-pub fn conversion(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let opcode = it.opcode;
+pub fn conversion(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let opcode = instruction.opcode;
     if matches!(opcode, Op::Bitcast | Op::ConvertPtrToU | Op::ConvertUToPtr) {
-        return bitcast(t, it);
+        return bitcast(t, instruction);
     }
-    let (to, _) = t.globals.types.vector(it.ty()?)?;
-    let (from, regs) = t.vector(it.id(0)?)?;
-    let truncates =
-        opcode == Op::FConvert && to == (Scalar::Float { width: 16 }) && t.module.rounds_towards_zero(it.result()?);
+    let (to, _) = t.globals.types.vector(instruction.ty()?)?;
+    let (from, regs) = t.vector(instruction.id(0)?)?;
+    let truncates = opcode == Op::FConvert
+        && to == (Scalar::Float { width: 16 })
+        && t.module.rounds_towards_zero(instruction.result()?);
     let regs = regs
         .iter()
         .map(|reg| if truncates { Ok(truncate_to_half(t, from, *reg)) } else { convert(t, opcode, from, to, *reg) })
         .collect::<Result<_>>()?;
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// A float rounded towards zero to binary16.
@@ -807,19 +811,19 @@ fn quantize(t: &mut Translator, reg: Reg) -> Reg {
 }
 
 /// Translates a bitcast. The type with fewer components has wider ones.
-fn bitcast(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let from = match t.globals.types.vector(t.type_of(it.id(0)?)?) {
+fn bitcast(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let from = match t.globals.types.vector(t.type_of(instruction.id(0)?)?) {
         Ok((scalar, _)) => scalar,
         Err(_) => return unsupported("this pointer"),
     };
-    let regs = t.regs(it.id(0)?)?;
-    let (to, count) = t.globals.types.vector(it.ty()?)?;
+    let regs = t.regs(instruction.id(0)?)?;
+    let (to, count) = t.globals.types.vector(instruction.ty()?)?;
     let (from_bits, to_bits) = (from.bits(), to.bits());
     if from_bits * regs.len() as u32 != to_bits * count || from_bits == 0 {
         return malformed("the types differ in size");
     }
     if from == to {
-        return t.define(it, regs.to_vec());
+        return t.define(instruction, regs.to_vec());
     }
     if from_bits == to_bits {
         let regs = regs.iter().map(|reg| {
@@ -827,11 +831,11 @@ fn bitcast(t: &mut Translator, it: &Instruction) -> Result<()> {
             typed_bits(t, to, raw)
         });
         let regs = regs.collect();
-        return t.define(it, regs);
+        return t.define(instruction, regs);
     }
     let words = pack_words(t, from, &regs);
     let regs = unpack_words(t, to, count, &words);
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// A scalar's own bits, zero-extended: 32 of them, or 64 if it is wide.

@@ -24,7 +24,7 @@ pub struct Emitter {
     /// Bits of the registers that hold constants.
     constants: HashMap<Reg, u64>,
     /// Factors of products that may be fused with an addition.
-    products: HashMap<Reg, (Reg, Reg)>,
+    products: HashMap<Reg, [Reg; 2]>,
     /// Instructions emitted so far, including those that callers counted.
     statements: u64,
 }
@@ -136,7 +136,7 @@ impl Emitter {
     }
 
     /// Quotient and remainder by a constant.
-    pub fn divided(&mut self, reg: Reg, by: u32) -> (Reg, Reg) {
+    pub fn div_rem(&mut self, reg: Reg, by: u32) -> (Reg, Reg) {
         if by.is_power_of_two() {
             let (shift, mask) = (self.u32(by.trailing_zeros()), self.u32(by - 1));
             (self.op(Ir::UShr, &[reg, shift]), self.op(Ir::And, &[reg, mask]))
@@ -204,12 +204,12 @@ impl Emitter {
     }
 
     /// Records that a register is a product that may be fused with an addition.
-    pub fn set_product(&mut self, product: Reg, factors: (Reg, Reg)) {
+    pub fn set_product(&mut self, product: Reg, factors: [Reg; 2]) {
         self.products.insert(product, factors);
     }
 
     /// The factors of a product that may be fused with an addition.
-    pub fn product(&self, reg: Reg) -> Option<(Reg, Reg)> {
+    pub fn product(&self, reg: Reg) -> Option<[Reg; 2]> {
         self.products.get(&reg).copied()
     }
 }

@@ -15,15 +15,15 @@ use crate::instruction::Instruction;
 use crate::types::Scalar;
 
 /// Translates `OpExtInst` of GLSL.std.450.
-pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let Some(op) = G::from_u32(it.number(1)?) else {
-        return malformed(format!("GLSL.std.450 has no instruction {}", it.number(1)?));
+pub fn glsl(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let Some(op) = G::from_u32(instruction.number(1)?) else {
+        return malformed(format!("GLSL.std.450 has no instruction {}", instruction.number(1)?));
     };
     match op {
-        G::Modf | G::ModfStruct | G::Frexp | G::FrexpStruct => split_float(t, it, op),
+        G::Modf | G::ModfStruct | G::Frexp | G::FrexpStruct => split_float(t, instruction, op),
         G::Ldexp => {
-            let (scalar, a) = t.vector(it.id(2)?)?;
-            let (exponent, b) = t.vector(it.id(3)?)?;
+            let (scalar, a) = t.vector(instruction.id(2)?)?;
+            let (exponent, b) = t.vector(instruction.id(3)?)?;
             if a.len() != b.len() {
                 return malformed("the operands don't fit each other");
             }
@@ -33,35 +33,35 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
                 let reg = t.emit.op(op_for_width(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
                 regs.push(t.emit.wrap_to_width(scalar, reg));
             }
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         G::Determinant | G::MatrixInverse => {
-            let ty = t.type_of(it.id(2)?)?;
+            let ty = t.type_of(instruction.id(2)?)?;
             let (_, _, _, scalar) = t.globals.types.matrix(ty)?;
-            let matrix = matrix(t, it.id(2)?)?;
+            let matrix = matrix(t, instruction.id(2)?)?;
             let regs = match op {
                 G::Determinant => vec![determinant(t, scalar, &matrix)?],
                 _ => inverse(t, scalar, &matrix)?,
             };
-            t.define(it, regs)
+            t.define(instruction, regs)
         }
         G::Length | G::Distance | G::Normalize | G::Cross | G::FaceForward | G::Reflect | G::Refract => {
-            geometric(t, it, op)
+            geometric(t, instruction, op)
         }
         G::PackSnorm4x8
         | G::PackUnorm4x8
         | G::PackSnorm2x16
         | G::PackUnorm2x16
         | G::PackHalf2x16
-        | G::PackDouble2x32 => pack(t, it, op),
+        | G::PackDouble2x32 => pack(t, instruction, op),
         G::UnpackSnorm4x8
         | G::UnpackUnorm4x8
         | G::UnpackSnorm2x16
         | G::UnpackUnorm2x16
         | G::UnpackHalf2x16
-        | G::UnpackDouble2x32 => unpack(t, it, op),
-        G::InterpolateAtCentroid | G::InterpolateAtSample | G::InterpolateAtOffset => interpolate(t, it, op),
-        _ => glsl_elementwise(t, it, op),
+        | G::UnpackDouble2x32 => unpack(t, instruction, op),
+        G::InterpolateAtCentroid | G::InterpolateAtSample | G::InterpolateAtOffset => interpolate(t, instruction, op),
+        _ => glsl_elementwise(t, instruction, op),
     }
 }
 
@@ -77,8 +77,8 @@ fn ldexp_exponent(t: &mut Translator, scalar: Scalar, exponent: Reg) -> Reg {
     t.emit.op(Ir::Low32, &[exponent])
 }
 
-fn split_float(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
-    let (scalar, x) = t.vector(it.id(2)?)?;
+fn split_float(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
+    let (scalar, x) = t.vector(instruction.id(2)?)?;
     let (mut first, mut second) = (Vec::new(), Vec::new());
     for x in x.iter() {
         if matches!(op, G::Modf | G::ModfStruct) {
@@ -96,12 +96,12 @@ fn split_float(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
         }
     }
     if matches!(op, G::Modf | G::Frexp) {
-        let pointer = t.pointer(it.id(3)?)?;
+        let pointer = t.pointer(instruction.id(3)?)?;
         store_to(t, &pointer, &second)?;
     } else {
         first.extend(second);
     }
-    t.define(it, first)
+    t.define(instruction, first)
 }
 
 fn length(t: &mut Translator, scalar: Scalar, x: &[Reg]) -> Result<Reg> {
@@ -112,13 +112,13 @@ fn length(t: &mut Translator, scalar: Scalar, x: &[Reg]) -> Result<Reg> {
     Ok(t.emit.op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[square]))
 }
 
-fn geometric(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
+fn geometric(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
     let count = match op {
         G::Length | G::Normalize => 1,
         G::FaceForward => 3,
         _ => 2,
     };
-    let (scalars, operands) = operands(t, it, 2, count)?;
+    let (scalars, operands) = operands(t, instruction, 2, count)?;
     let scalar = scalars[0];
     let x = &operands[0];
     let regs = match op {
@@ -167,14 +167,14 @@ fn geometric(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
                 })
                 .collect()
         }
-        _ => refract(t, it, scalar, x, &operands[1])?,
+        _ => refract(t, instruction, scalar, x, &operands[1])?,
     };
     let regs = regs.into_iter().map(|reg| t.emit.wrap_to_width(scalar, reg)).collect();
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
-fn refract(t: &mut Translator, it: &Instruction, scalar: Scalar, i: &[Reg], n: &[Reg]) -> Result<Vec<Reg>> {
-    let eta = t.reg(it.id(4)?)?;
+fn refract(t: &mut Translator, instruction: &Instruction, scalar: Scalar, i: &[Reg], n: &[Reg]) -> Result<Vec<Reg>> {
+    let eta = t.reg(instruction.id(4)?)?;
     let (zero, one) = (t.emit.float(scalar, 0.0), t.emit.float(scalar, 1.0));
     let along = dot(t, scalar, n, i, true)?;
     let (along_2, eta_2) = (t.emit.mul(scalar, along, along), t.emit.mul(scalar, eta, eta));
@@ -195,14 +195,14 @@ fn refract(t: &mut Translator, it: &Instruction, scalar: Scalar, i: &[Reg], n: &
         .collect())
 }
 
-fn pack(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
-    let x = t.regs(it.id(2)?)?;
+fn pack(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
+    let x = t.regs(instruction.id(2)?)?;
     if op == G::PackDouble2x32 {
         let [low, high] = *x else {
             return malformed("the operand doesn't have two components");
         };
         let joined = t.emit.op(Ir::Join64, &[low, high]);
-        return t.define(it, vec![joined]);
+        return t.define(instruction, vec![joined]);
     }
     let (count, bits, scale, least) = match op {
         G::PackSnorm4x8 => (4, 8, 127.0, -1.0),
@@ -235,14 +235,14 @@ fn pack(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
             None => placed,
         });
     }
-    t.define(it, word.into_iter().collect())
+    t.define(instruction, word.into_iter().collect())
 }
 
-fn unpack(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
-    let x = t.reg(it.id(2)?)?;
+fn unpack(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
+    let x = t.reg(instruction.id(2)?)?;
     if op == G::UnpackDouble2x32 {
         let halves = [Ir::Low32, Ir::High32].map(|half| t.emit.op(half, &[x]));
-        return t.define(it, halves.to_vec());
+        return t.define(instruction, halves.to_vec());
     }
     let (count, bits, scale) = match op {
         G::UnpackSnorm4x8 => (4, 8, 127.0),
@@ -271,5 +271,5 @@ fn unpack(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
             value
         });
     }
-    t.define(it, regs)
+    t.define(instruction, regs)
 }

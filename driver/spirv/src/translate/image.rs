@@ -67,28 +67,28 @@ impl SampleOp {
 }
 
 /// Translates image instructions.
-pub fn image(t: &mut Translator, it: &Instruction) -> Result<()> {
-    match it.opcode {
+pub fn image(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    match instruction.opcode {
         Op::SampledImage => {
-            let (image, image_type) = image_operand(t, it.id(0)?)?;
-            let Value::Sampler(sampler) = t.value(it.id(1)?)? else {
+            let (image, image_type) = image_operand(t, instruction.id(0)?)?;
+            let Value::Sampler(sampler) = t.value(instruction.id(1)?)? else {
                 return malformed("the second operand isn't a sampler");
             };
-            t.define_as(it, Value::SampledImage(image, image_type, sampler))
+            t.define_as(instruction, Value::SampledImage(image, image_type, sampler))
         }
         Op::Image => {
-            let (image, image_type) = image_operand(t, it.id(0)?)?;
-            t.define_as(it, Value::Image(image, image_type))
+            let (image, image_type) = image_operand(t, instruction.id(0)?)?;
+            t.define_as(instruction, Value::Image(image, image_type))
         }
-        Op::ImageTexelPointer => texel_pointer(t, it),
-        Op::ImageFetch | Op::ImageRead => read_image(t, it),
-        Op::ImageWrite => write_image(t, it),
+        Op::ImageTexelPointer => texel_pointer(t, instruction),
+        Op::ImageFetch | Op::ImageRead => read_image(t, instruction),
+        Op::ImageWrite => write_image(t, instruction),
         Op::ImageQuerySizeLod
         | Op::ImageQuerySize
         | Op::ImageQueryLod
         | Op::ImageQueryLevels
-        | Op::ImageQuerySamples => query_image(t, it),
-        op => sample(t, it, &SampleOp::of(op)),
+        | Op::ImageQuerySamples => query_image(t, instruction),
+        op => sample(t, instruction, &SampleOp::of(op)),
     }
 }
 
@@ -101,15 +101,15 @@ fn image_operand(t: &mut Translator, id: u32) -> Result<(Binding, ImageType)> {
 }
 
 /// Reads the optional operands from a position on.
-fn image_operands(t: &mut Translator, it: &Instruction, from: usize) -> Result<ImageOperands> {
+fn image_operands(t: &mut Translator, instruction: &Instruction, from: usize) -> Result<ImageOperands> {
     let mut image_operands = ImageOperands::default();
-    let Some(mask) = it.enumerant(from, ImageOperandMask::from_bits) else {
+    let Some(mask) = instruction.enumerant(from, ImageOperandMask::from_bits) else {
         return Ok(image_operands);
     };
     let mut next = from + 1;
     let mut take = |t: &mut Translator| {
         next += 1;
-        t.regs(it.id(next - 1)?)
+        t.regs(instruction.id(next - 1)?)
     };
     let one = |regs: &[Reg]| match regs {
         [reg] => Ok(*reg),
@@ -156,31 +156,31 @@ fn texels(t: &mut Translator, count: usize) -> [Option<Reg>; 4] {
 }
 
 /// Defines the result of a read or sample, rounded if its type requires it.
-fn define_texel(t: &mut Translator, it: &Instruction, regs: impl Iterator<Item = Reg>) -> Result<()> {
-    let (scalar, count) = t.globals.types.vector(it.ty()?)?;
+fn define_texel(t: &mut Translator, instruction: &Instruction, regs: impl Iterator<Item = Reg>) -> Result<()> {
+    let (scalar, count) = t.globals.types.vector(instruction.ty()?)?;
     let regs = regs.take(count as usize).map(|reg| t.emit.wrap_to_width(scalar, reg));
     let regs = regs.collect();
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
-fn sample(t: &mut Translator, it: &Instruction, sample_op: &SampleOp) -> Result<()> {
-    let Value::SampledImage(image, image_type, sampler) = t.value(it.id(0)?)? else {
+fn sample(t: &mut Translator, instruction: &Instruction, sample_op: &SampleOp) -> Result<()> {
+    let Value::SampledImage(image, image_type, sampler) = t.value(instruction.id(0)?)? else {
         return malformed("the first operand isn't a sampled image");
     };
     let shape = image_type.shape()?;
     let count = shape.coordinates();
-    let mut coordinate = coordinate(t, it.id(1)?, count + usize::from(sample_op.projective))?;
+    let mut coordinate = coordinate(t, instruction.id(1)?, count + usize::from(sample_op.projective))?;
     let mut compare = None;
     let mut component = 0;
     let mut next = 2;
     if sample_op.compare {
-        compare = Some(t.reg(it.id(next)?)?);
+        compare = Some(t.reg(instruction.id(next)?)?);
         next += 1;
     } else if sample_op.gather {
-        component = t.literal(it.id(next)?)?;
+        component = t.literal(instruction.id(next)?)?;
         next += 1;
     }
-    let image_operands = image_operands(t, it, next)?;
+    let image_operands = image_operands(t, instruction, next)?;
     if sample_op.projective
         && let Some(divisor) = coordinate.pop()
     {
@@ -215,12 +215,12 @@ fn sample(t: &mut Translator, it: &Instruction, sample_op: &SampleOp) -> Result<
             t.emit.builder.statement(make([None, None, None, Some(dst)], offset.to_vec()));
             regs.push(dst);
         }
-        return define_texel(t, it, regs.into_iter());
+        return define_texel(t, instruction, regs.into_iter());
     }
     let offset = image_operands.offset.get(..axes).unwrap_or_default().to_vec();
     let dst = texels(t, if sample_op.compare && !sample_op.gather { 1 } else { 4 });
     t.emit.builder.statement(make(dst, offset));
-    define_texel(t, it, dst.into_iter().flatten())
+    define_texel(t, instruction, dst.into_iter().flatten())
 }
 
 fn lod(t: &mut Translator, sample_op: &SampleOp, image_operands: &ImageOperands, shape: ImageShape) -> Result<Lod> {
@@ -246,16 +246,16 @@ fn lod(t: &mut Translator, sample_op: &SampleOp, image_operands: &ImageOperands,
     Ok(Lod::Implicit { bias: image_operands.bias, minimum: image_operands.minimum })
 }
 
-fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (image, image_type) = image_operand(t, it.id(0)?)?;
+fn read_image(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (image, image_type) = image_operand(t, instruction.id(0)?)?;
     let shape = image_type.shape()?;
     let is_input = image_type.dim == Dim::DimSubpassData;
     let count = if is_input { 2 } else { shape.coordinates() };
-    let mut coordinate = coordinate(t, it.id(1)?, count)?;
+    let mut coordinate = coordinate(t, instruction.id(1)?, count)?;
     if is_input {
         coordinate = pixel(t, &coordinate)?;
     }
-    let image_operands = image_operands(t, it, 2)?;
+    let image_operands = image_operands(t, instruction, 2)?;
     if let Some(offset) = image_operands.offset.get(..shape.dimension.coordinates()) {
         for (reg, offset) in coordinate.iter_mut().zip(offset) {
             *reg = t.emit.op(Ir::IAdd, &[*reg, *offset]);
@@ -270,7 +270,7 @@ fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
         level: image_operands.lod,
         sample: image_operands.sample,
     })));
-    define_texel(t, it, dst.into_iter().flatten())
+    define_texel(t, instruction, dst.into_iter().flatten())
 }
 
 /// The position at which an input attachment is read: the current pixel plus an offset, and its layer.
@@ -285,16 +285,16 @@ fn pixel(t: &mut Translator, offset: &[Reg]) -> Result<Vec<Reg>> {
     Ok(coordinate)
 }
 
-fn write_image(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (image, image_type) = image_operand(t, it.id(0)?)?;
+fn write_image(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (image, image_type) = image_operand(t, instruction.id(0)?)?;
     let shape = image_type.shape()?;
-    let coordinate = coordinate(t, it.id(1)?, shape.coordinates())?;
-    let (scalar, regs) = t.vector(it.id(2)?)?;
+    let coordinate = coordinate(t, instruction.id(1)?, shape.coordinates())?;
+    let (scalar, regs) = t.vector(instruction.id(2)?)?;
     if scalar.is_wide() {
         return unsupported("texels of 64-bit components");
     }
     let zero = t.emit.u32(0);
-    let image_operands = image_operands(t, it, 3)?;
+    let image_operands = image_operands(t, instruction, 3)?;
     mark_binding_written(t, image);
     t.emit.builder.statement(Statement::ImageWrite(Box::new(ImageWrite {
         image,
@@ -306,36 +306,37 @@ fn write_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     Ok(())
 }
 
-fn texel_pointer(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let Pointer::Resource { binding, ty, .. } = t.pointer(it.id(0)?)? else {
+fn texel_pointer(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let Pointer::Resource { binding, ty, .. } = t.pointer(instruction.id(0)?)? else {
         return malformed("the first operand isn't a pointer to an image");
     };
     let image_type = match t.globals.types.get(ty)? {
         Type::Image(image_type) => *image_type,
         _ => return malformed("the first operand isn't a pointer to an image"),
     };
-    let coordinate = coordinate(t, it.id(1)?, image_type.shape()?.coordinates())?;
-    let sample = t.reg(it.id(2)?)?;
+    let coordinate = coordinate(t, instruction.id(1)?, image_type.shape()?.coordinates())?;
+    let sample = t.reg(instruction.id(2)?)?;
     let pointer = Pointer::Texel { image: binding, image_type, coordinate, sample };
-    t.define_as(it, Value::Pointer(pointer.into()))
+    t.define_as(instruction, Value::Pointer(pointer.into()))
 }
 
-fn query_image(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (image, image_type) = image_operand(t, it.id(0)?)?;
+fn query_image(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (image, image_type) = image_operand(t, instruction.id(0)?)?;
     let shape = image_type.shape()?;
-    let query = match it.opcode {
-        Op::ImageQuerySizeLod => ImageQuery::Size { level: Some(t.reg(it.id(1)?)?) },
+    let query = match instruction.opcode {
+        Op::ImageQuerySizeLod => ImageQuery::Size { level: Some(t.reg(instruction.id(1)?)?) },
         Op::ImageQuerySize => ImageQuery::Size { level: None },
         Op::ImageQueryLevels => ImageQuery::Levels,
         Op::ImageQuerySamples => ImageQuery::Samples,
-        _ => match t.value(it.id(0)?)? {
-            Value::SampledImage(_, _, sampler) => {
-                ImageQuery::Lod { sampler, coordinate: coordinate(t, it.id(1)?, shape.dimension.coordinates())? }
-            }
+        _ => match t.value(instruction.id(0)?)? {
+            Value::SampledImage(_, _, sampler) => ImageQuery::Lod {
+                sampler,
+                coordinate: coordinate(t, instruction.id(1)?, shape.dimension.coordinates())?,
+            },
             _ => return malformed("the first operand isn't a sampled image"),
         },
     };
-    let (_, count) = t.globals.types.vector(it.ty()?)?;
+    let (_, count) = t.globals.types.vector(instruction.ty()?)?;
     let dst: Vec<Reg> = (0..count).map(|_| t.emit.builder.value(IrType::B32)).collect();
     let is_size = matches!(query, ImageQuery::Size { .. });
     t.emit.builder.statement(Statement::ImageQuery { dst: dst.clone(), image, shape, query });
@@ -349,5 +350,5 @@ fn query_image(t: &mut Translator, it: &Instruction) -> Result<()> {
         let six = t.emit.u32(6);
         *layers = t.emit.op(Ir::UDiv, &[*layers, six]);
     }
-    t.define(it, regs)
+    t.define(instruction, regs)
 }

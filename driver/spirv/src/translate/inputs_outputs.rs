@@ -340,7 +340,7 @@ impl<'a> InputsOutputs<'a> {
             // A patch has a lane for each output vertex.
             Spirv::InvocationId if self.stage == Stage::TessellationControl => {
                 let lane = emit.builder.lane_index();
-                emit.divided(lane, self.output_vertices.max(1)).1
+                emit.div_rem(lane, self.output_vertices.max(1)).1
             }
             Spirv::LocalInvocationId => self.local_id(emit, axis),
             Spirv::GlobalInvocationId => {
@@ -357,7 +357,7 @@ impl<'a> InputsOutputs<'a> {
             Spirv::NumSubgroups => emit.u32(invocations.div_ceil(size.max(1))),
             Spirv::SubgroupId => {
                 let lane = emit.builder.lane_index();
-                emit.divided(lane, size).0
+                emit.div_rem(lane, size).0
             }
             Spirv::SubgroupLocalInvocationId => self.subgroup_lane(emit),
             Spirv::SubgroupEqMask
@@ -372,7 +372,7 @@ impl<'a> InputsOutputs<'a> {
     /// The lane's index within its subgroup.
     pub fn subgroup_lane(&mut self, emit: &mut Emitter) -> Reg {
         let lane = emit.builder.lane_index();
-        emit.divided(lane, self.subgroup_size).1
+        emit.div_rem(lane, self.subgroup_size).1
     }
 
     fn local_id(&mut self, emit: &mut Emitter, axis: usize) -> Reg {
@@ -384,11 +384,11 @@ impl<'a> InputsOutputs<'a> {
         if x * y * z == [x, y, z][axis] {
             return lane;
         }
-        let (rest, column) = emit.divided(lane, x);
+        let (rest, column) = emit.div_rem(lane, x);
         match axis {
             0 => column,
-            1 => emit.divided(rest, y).1,
-            _ => emit.divided(rest, y).0,
+            1 => emit.div_rem(rest, y).1,
+            _ => emit.div_rem(rest, y).0,
         }
     }
 

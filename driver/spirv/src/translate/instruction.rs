@@ -66,28 +66,28 @@ fn is_subgroup(op: Op) -> bool {
 }
 
 /// Translates an instruction within a block that is neither a phi nor a terminator.
-pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
-    match it.opcode {
+pub fn translate(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    match instruction.opcode {
         Op::Nop => Ok(()),
         Op::Undef => {
-            let undefined = t.undefined(it.ty()?)?;
-            t.define_as(it, undefined)
+            let undefined = t.undefined(instruction.ty()?)?;
+            t.define_as(instruction, undefined)
         }
-        Op::Variable => local_variable(t, it),
-        Op::Load => load(t, it),
-        Op::Store => store(t, it),
-        Op::CopyMemory => copy_memory(t, it),
+        Op::Variable => local_variable(t, instruction),
+        Op::Load => load(t, instruction),
+        Op::Store => store(t, instruction),
+        Op::CopyMemory => copy_memory(t, instruction),
         Op::AccessChain | Op::InBoundsAccessChain | Op::PtrAccessChain | Op::InBoundsPtrAccessChain => {
-            access_chain(t, it)
+            access_chain(t, instruction)
         }
-        Op::ArrayLength => array_length(t, it),
-        Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff => compare_pointers(t, it),
-        Op::ExtInst => extended(t, it),
+        Op::ArrayLength => array_length(t, instruction),
+        Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff => compare_pointers(t, instruction),
+        Op::ExtInst => extended(t, instruction),
         Op::CopyObject => {
-            let value = t.value(it.id(0)?)?;
+            let value = t.value(instruction.id(0)?)?;
             match value {
-                Value::Regs(regs) => t.define(it, regs.to_vec()),
-                other => t.define_as(it, other),
+                Value::Regs(regs) => t.define(instruction, regs.to_vec()),
+                other => t.define_as(instruction, other),
             }
         }
         Op::VectorExtractDynamic
@@ -97,14 +97,14 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::CompositeExtract
         | Op::CompositeInsert
         | Op::CopyLogical
-        | Op::Transpose => composite(t, it),
+        | Op::Transpose => composite(t, instruction),
         Op::VectorTimesScalar
         | Op::MatrixTimesScalar
         | Op::VectorTimesMatrix
         | Op::MatrixTimesVector
         | Op::MatrixTimesMatrix
         | Op::OuterProduct
-        | Op::Dot => linear_algebra(t, it),
+        | Op::Dot => linear_algebra(t, instruction),
         Op::ConvertFToU
         | Op::ConvertFToS
         | Op::ConvertSToF
@@ -115,17 +115,17 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::QuantizeToF16
         | Op::Bitcast
         | Op::ConvertPtrToU
-        | Op::ConvertUToPtr => conversion(t, it),
-        Op::DPdx | Op::DPdxCoarse => derivative(t, it, &[Axis::X], false),
-        Op::DPdxFine => derivative(t, it, &[Axis::X], true),
-        Op::DPdy | Op::DPdyCoarse => derivative(t, it, &[Axis::Y], false),
-        Op::DPdyFine => derivative(t, it, &[Axis::Y], true),
-        Op::Fwidth | Op::FwidthCoarse => derivative(t, it, &[Axis::X, Axis::Y], false),
-        Op::FwidthFine => derivative(t, it, &[Axis::X, Axis::Y], true),
+        | Op::ConvertUToPtr => conversion(t, instruction),
+        Op::DPdx | Op::DPdxCoarse => derivative(t, instruction, &[Axis::X], false),
+        Op::DPdxFine => derivative(t, instruction, &[Axis::X], true),
+        Op::DPdy | Op::DPdyCoarse => derivative(t, instruction, &[Axis::Y], false),
+        Op::DPdyFine => derivative(t, instruction, &[Axis::Y], true),
+        Op::Fwidth | Op::FwidthCoarse => derivative(t, instruction, &[Axis::X, Axis::Y], false),
+        Op::FwidthFine => derivative(t, instruction, &[Axis::X, Axis::Y], true),
         Op::EmitVertex => emit_vertex(t, 0),
         Op::EndPrimitive => end_primitive(t, 0),
-        Op::EmitStreamVertex => emit_stream_vertex(t, it),
-        Op::EndStreamPrimitive => end_stream_primitive(t, it),
+        Op::EmitStreamVertex => emit_stream_vertex(t, instruction),
+        Op::EndStreamPrimitive => end_stream_primitive(t, instruction),
         Op::ControlBarrier => {
             t.emit.builder.barrier();
             Ok(())
@@ -139,9 +139,9 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
         Op::IsHelperInvocationEXT => {
             let helper = t.emit.builder.is_helper();
-            t.define(it, vec![helper])
+            t.define(instruction, vec![helper])
         }
-        Op::ReadClockKHR => read_clock(t, it),
+        Op::ReadClockKHR => read_clock(t, instruction),
         Op::AtomicLoad
         | Op::AtomicStore
         | Op::AtomicExchange
@@ -159,28 +159,30 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::AtomicXor
         | Op::AtomicFAddEXT
         | Op::AtomicFMinEXT
-        | Op::AtomicFMaxEXT => atomic(t, it),
-        Op::SDot | Op::UDot | Op::SUDot | Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => integer_dot(t, it),
-        op if is_image(op) => image(t, it),
-        op if is_subgroup(op) => subgroup(t, it),
-        _ => elementwise(t, it),
+        | Op::AtomicFMaxEXT => atomic(t, instruction),
+        Op::SDot | Op::UDot | Op::SUDot | Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => {
+            integer_dot(t, instruction)
+        }
+        op if is_image(op) => image(t, instruction),
+        op if is_subgroup(op) => subgroup(t, instruction),
+        _ => elementwise(t, instruction),
     }
 }
 
 /// Reads the clock, which is the same for a subgroup and for the device, as a number of 64 bits or as its two words.
-fn read_clock(t: &mut Translator, it: &Instruction) -> Result<()> {
+fn read_clock(t: &mut Translator, instruction: &Instruction) -> Result<()> {
     let time = t.emit.builder.clock();
-    let (_, count) = t.globals.types.vector(it.ty()?)?;
+    let (_, count) = t.globals.types.vector(instruction.ty()?)?;
     if count == 1 {
-        return t.define(it, vec![time]);
+        return t.define(instruction, vec![time]);
     }
     let words = [Ir::Low32, Ir::High32].map(|word| t.emit.op(word, &[time]));
-    t.define(it, words.to_vec())
+    t.define(instruction, words.to_vec())
 }
 
-fn extended(t: &mut Translator, it: &Instruction) -> Result<()> {
-    match t.module.extended_sets.get(&it.id(0)?) {
-        Some(ExtendedSet::Glsl) => glsl(t, it),
+fn extended(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    match t.module.extended_sets.get(&instruction.id(0)?) {
+        Some(ExtendedSet::Glsl) => glsl(t, instruction),
         Some(ExtendedSet::NonSemantic) => Ok(()),
         _ => unsupported("an unknown set of extended instructions"),
     }

@@ -31,18 +31,18 @@ impl Signs {
 
 /// Translates `OpSDot`, `OpUDot`, `OpSUDot`, and their forms with an accumulator, to which the sum is added with
 /// saturation.
-pub fn integer_dot(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let signs = Signs::of(it.opcode);
-    let accumulates = matches!(it.opcode, Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat);
-    let (result, count) = t.globals.types.vector(it.ty()?)?;
+pub fn integer_dot(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let signs = Signs::of(instruction.opcode);
+    let accumulates = matches!(instruction.opcode, Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat);
+    let (result, count) = t.globals.types.vector(instruction.ty()?)?;
     let Scalar::Int { width, .. } = result else {
         return malformed("the result isn't an integer");
     };
     if count != 1 {
         return malformed("the result isn't a scalar");
     }
-    let a = factors(t, it.id(0)?, signs.left)?;
-    let b = factors(t, it.id(1)?, signs.right)?;
+    let a = factors(t, instruction.id(0)?, signs.left)?;
+    let b = factors(t, instruction.id(1)?, signs.right)?;
     if a.len() != b.len() || a.is_empty() {
         return malformed("the operands differ in size");
     }
@@ -58,7 +58,7 @@ pub fn integer_dot(t: &mut Translator, it: &Instruction) -> Result<()> {
         return malformed("the operands are empty");
     };
     let sum = if accumulates {
-        let (scalar, accumulator) = t.vector(it.id(2)?)?;
+        let (scalar, accumulator) = t.vector(instruction.id(2)?)?;
         let [accumulator] = *accumulator else {
             return malformed("the accumulator isn't a scalar");
         };
@@ -73,7 +73,7 @@ pub fn integer_dot(t: &mut Translator, it: &Instruction) -> Result<()> {
         let low = t.emit.op(Ir::Low32, &[sum]);
         t.emit.wrap_to_width(result, low)
     };
-    t.define(it, vec![reg])
+    t.define(instruction, vec![reg])
 }
 
 /// The components of an operand, each extended to 64 bits; for a single word, its four bytes.

@@ -60,25 +60,25 @@ struct Interpolant<'a> {
 
 /// Translates interpolation at another point of the pixel. At the centroid it is a separate input; at a sample or an
 /// offset it is computed from the derivatives of the attribute divided by w, which are constant over the primitive.
-pub fn interpolate(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
-    let pointer = t.pointer(it.id(2)?)?;
+pub fn interpolate(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
+    let pointer = t.pointer(instruction.id(2)?)?;
     let Some(interpolant) = interpolant(t, &pointer) else {
         return unsupported("interpolation of what isn't an input");
     };
     let point = match op {
         G::InterpolateAtCentroid => Point::Centroid,
-        G::InterpolateAtOffset => match *t.regs(it.id(3)?)? {
+        G::InterpolateAtOffset => match *t.regs(instruction.id(3)?)? {
             [dx, dy] => Point::Offset(from_own_point(t, [dx, dy])?),
             _ => return malformed("the offset doesn't have two components"),
         },
         _ => {
-            let sample = t.reg(it.id(3)?)?;
+            let sample = t.reg(instruction.id(3)?)?;
             let offset = sample_offset(t, sample);
             Point::Offset(from_own_point(t, offset)?)
         }
     };
     let regs = interpolated(t, interpolant, point)?;
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// An offset from the pixel's centre, converted to one from the point at which the fragment evaluates its inputs: the

@@ -24,8 +24,8 @@ struct ContiguousAccess {
 }
 
 /// Translates `OpLoad`.
-pub fn load(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let pointer = t.pointer(it.id(0)?)?;
+pub fn load(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let pointer = t.pointer(instruction.id(0)?)?;
     if let Pointer::Resource { binding, ty, .. } = pointer {
         let value = match t.globals.types.get(ty)? {
             Type::Image(image) => Value::Image(binding, *image),
@@ -36,22 +36,22 @@ pub fn load(t: &mut Translator, it: &Instruction) -> Result<()> {
             },
             _ => return malformed("an array of descriptors can't be loaded"),
         };
-        return t.define_as(it, value);
+        return t.define_as(instruction, value);
     }
     let regs = load_from(t, &pointer)?;
-    t.define(it, regs)
+    t.define(instruction, regs)
 }
 
 /// Translates `OpStore`.
-pub fn store(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let pointer = t.pointer(it.id(0)?)?;
-    let regs = t.regs(it.id(1)?)?;
+pub fn store(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let pointer = t.pointer(instruction.id(0)?)?;
+    let regs = t.regs(instruction.id(1)?)?;
     store_to(t, &pointer, &regs)
 }
 
 /// Translates `OpCopyMemory`.
-pub fn copy_memory(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (target, source) = (t.pointer(it.id(0)?)?, t.pointer(it.id(1)?)?);
+pub fn copy_memory(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (target, source) = (t.pointer(instruction.id(0)?)?, t.pointer(instruction.id(1)?)?);
     let regs = load_from(t, &source)?;
     store_to(t, &target, &regs)
 }
@@ -84,14 +84,14 @@ pub fn store_to(t: &mut Translator, pointer: &Pointer, regs: &[Reg]) -> Result<(
     }
 }
 
-fn load_place(t: &mut Translator, place: &MemoryRef) -> Result<Vec<Reg>> {
-    let scalars: Rc<[Scalar]> = t.globals.types.flatten(place.ty)?.into();
+fn load_place(t: &mut Translator, memory: &MemoryRef) -> Result<Vec<Reg>> {
+    let scalars: Rc<[Scalar]> = t.globals.types.flatten(memory.ty)?.into();
     t.emit.charge_budget(scalars.len())?;
     let mut loaded = vec![None; scalars.len()];
-    for run in runs(t, place, &scalars)? {
-        let regs = t.emit.builder.load(place.at(run.offset), run.format, run.places.len());
+    for run in runs(t, memory, &scalars)? {
+        let regs = t.emit.builder.load(memory.at(run.offset), run.format, run.places.len());
         for (reg, index) in regs.into_iter().zip(run.places) {
-            loaded[index] = Some(loaded_scalar(t, scalars[index], place.layout, reg));
+            loaded[index] = Some(loaded_scalar(t, scalars[index], memory.layout, reg));
         }
     }
     match loaded.into_iter().collect() {
@@ -100,25 +100,25 @@ fn load_place(t: &mut Translator, place: &MemoryRef) -> Result<Vec<Reg>> {
     }
 }
 
-fn store_place(t: &mut Translator, place: &MemoryRef, regs: &[Reg]) -> Result<()> {
-    let scalars: Rc<[Scalar]> = t.globals.types.flatten(place.ty)?.into();
+fn store_place(t: &mut Translator, memory: &MemoryRef, regs: &[Reg]) -> Result<()> {
+    let scalars: Rc<[Scalar]> = t.globals.types.flatten(memory.ty)?.into();
     if scalars.len() != regs.len() {
         return malformed("the object doesn't fit the pointer");
     }
     t.emit.charge_budget(scalars.len())?;
-    mark_written(t, place);
-    for run in runs(t, place, &scalars)? {
+    mark_written(t, memory);
+    for run in runs(t, memory, &scalars)? {
         let src: Vec<Reg> =
-            run.places.iter().map(|index| stored_scalar(t, scalars[*index], place.layout, regs[*index])).collect();
-        t.emit.builder.store(place.at(run.offset), run.format, &src);
+            run.places.iter().map(|index| stored_scalar(t, scalars[*index], memory.layout, regs[*index])).collect();
+        t.emit.builder.store(memory.at(run.offset), run.format, &src);
     }
     Ok(())
 }
 
 /// The scalars of a value in memory, grouped into runs of adjacent ones.
-fn runs(t: &Translator, place: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<ContiguousAccess>> {
+fn runs(t: &Translator, memory: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<ContiguousAccess>> {
     let mut offsets = Vec::with_capacity(scalars.len());
-    add_offsets(t, place.ty, place.layout, 0, &mut offsets)?;
+    add_offsets(t, memory.ty, memory.layout, 0, &mut offsets)?;
     if offsets.len() != scalars.len() {
         return malformed("the type has no layout");
     }
@@ -126,7 +126,7 @@ fn runs(t: &Translator, place: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<Con
     order.sort_by_key(|index| offsets[*index]);
     let mut runs: Vec<ContiguousAccess> = Vec::new();
     for index in order {
-        let format = scalar_format(scalars[index], place.layout);
+        let format = scalar_format(scalars[index], memory.layout);
         let offset = offsets[index];
         match runs.last_mut() {
             Some(run)

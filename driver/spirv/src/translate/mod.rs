@@ -128,10 +128,11 @@ fn translate_here(
 fn execution_modes(module: &Module, globals: &Globals, entry: u32, stage: Stage) -> Result<Interface, Error> {
     let mut interface = empty_interface(stage);
     let mut is_early_and_late = false;
-    for it in &module.sections.execution_modes {
-        if it.id(0).ok() == Some(entry) {
-            execution_mode(globals, it, &mut interface).map_err(|diagnostic| diagnostic.locate(it.reference()))?;
-            let mode = it.enumerant(1, ExecutionMode::from_u32);
+    for instruction in &module.sections.execution_modes {
+        if instruction.id(0).ok() == Some(entry) {
+            execution_mode(globals, instruction, &mut interface)
+                .map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
+            let mode = instruction.enumerant(1, ExecutionMode::from_u32);
             is_early_and_late |= mode == Some(ExecutionMode::EarlyAndLateFragmentTestsAMD);
         }
     }
@@ -160,20 +161,20 @@ fn built_in_workgroup_size(module: &Module, globals: &Globals) -> Option<[u32; 3
     }
 }
 
-fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface) -> Result<()> {
+fn execution_mode(globals: &Globals, instruction: &Instruction, interface: &mut Interface) -> Result<()> {
     let constant = |index| {
-        let id = it.id(index)?;
+        let id = instruction.id(index)?;
         match globals.constant_u32(id) {
             Some(value) => Ok(value),
             None => unsupported(format!("%{id} isn't a constant")),
         }
     };
-    let Some(mode) = it.enumerant(1, ExecutionMode::from_u32) else {
+    let Some(mode) = instruction.enumerant(1, ExecutionMode::from_u32) else {
         return malformed("there is no mode");
     };
     match mode {
         ExecutionMode::LocalSize => {
-            interface.workgroup_size = [it.number(2)?, it.number(3)?, it.number(4)?];
+            interface.workgroup_size = [instruction.number(2)?, instruction.number(3)?, instruction.number(4)?];
         }
         ExecutionMode::LocalSizeId => {
             interface.workgroup_size = [constant(2)?, constant(3)?, constant(4)?];
@@ -189,13 +190,18 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
             return unsupported("an origin at the lower left");
         }
         ExecutionMode::Xfb => interface.transform_feedback = Some(TransformFeedback::default()),
-        _ => return primitive_mode(it, mode, interface.stage, &mut interface.modes),
+        _ => return primitive_mode(instruction, mode, interface.stage, &mut interface.modes),
     }
     Ok(())
 }
 
 /// An execution mode of tessellation and geometry stages.
-fn primitive_mode(it: &Instruction, mode: ExecutionMode, stage: Stage, modes: &mut PrimitiveModes) -> Result<()> {
+fn primitive_mode(
+    instruction: &Instruction,
+    mode: ExecutionMode,
+    stage: Stage,
+    modes: &mut PrimitiveModes,
+) -> Result<()> {
     match mode {
         ExecutionMode::Triangles if stage == Stage::Geometry => {
             modes.input = Some(InputPrimitive::Triangles);
@@ -209,8 +215,8 @@ fn primitive_mode(it: &Instruction, mode: ExecutionMode, stage: Stage, modes: &m
         ExecutionMode::VertexOrderCw => modes.clockwise = Some(true),
         ExecutionMode::VertexOrderCcw => modes.clockwise = Some(false),
         ExecutionMode::PointMode => modes.point_mode = true,
-        ExecutionMode::OutputVertices => modes.output_vertices = Some(it.number(2)?),
-        ExecutionMode::Invocations => modes.invocations = Some(it.number(2)?),
+        ExecutionMode::OutputVertices => modes.output_vertices = Some(instruction.number(2)?),
+        ExecutionMode::Invocations => modes.invocations = Some(instruction.number(2)?),
         ExecutionMode::InputPoints => modes.input = Some(InputPrimitive::Points),
         ExecutionMode::InputLines => modes.input = Some(InputPrimitive::Lines),
         ExecutionMode::InputLinesAdjacency => modes.input = Some(InputPrimitive::LinesAdjacency),
@@ -279,12 +285,12 @@ fn find_entry<'a>(module: &'a Module, name: &str, stage: Stage) -> Result<&'a In
 
 /// Refuses modules that declare unsupported capabilities.
 fn check_capabilities(module: &Module) -> Result<(), Error> {
-    for it in &module.sections.capabilities {
-        if let Some(capability) = it.enumerant(0, Capability::from_u32)
+    for instruction in &module.sections.capabilities {
+        if let Some(capability) = instruction.enumerant(0, Capability::from_u32)
             && !is_supported(capability)
         {
             let diagnostic = Diagnostic::Unsupported(format!("capability {capability:?}"));
-            return Err(diagnostic.locate(it.reference()));
+            return Err(diagnostic.locate(instruction.reference()));
         }
     }
     let model = module.sections.memory_model.as_ref();

@@ -20,18 +20,18 @@ enum Index {
 }
 
 /// Translates `OpAccessChain` and its variants.
-pub fn access_chain(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let by_element = matches!(it.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
-    let mut pointer = t.pointer(it.id(0)?)?;
+pub fn access_chain(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let by_element = matches!(instruction.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
+    let mut pointer = t.pointer(instruction.id(0)?)?;
     if by_element {
-        let element = index(t, it.id(1)?)?;
-        pointer = next_element(t, pointer, t.type_of(it.id(0)?)?, element)?;
+        let element = index(t, instruction.id(1)?)?;
+        pointer = next_element(t, pointer, t.type_of(instruction.id(0)?)?, element)?;
     }
-    for id in it.ids(1 + usize::from(by_element)) {
+    for id in instruction.ids(1 + usize::from(by_element)) {
         let index = index(t, id)?;
         pointer = pointer_to_part(t, pointer, index)?;
     }
-    t.define_as(it, Value::Pointer(pointer.into()))
+    t.define_as(instruction, Value::Pointer(pointer.into()))
 }
 
 fn index(t: &mut Translator, id: u32) -> Result<Index> {
@@ -106,9 +106,9 @@ fn elements(t: &Translator, ty: u32) -> Result<(u32, u32)> {
     }
 }
 
-fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Result<MemoryRef> {
+fn place_of_part(t: &mut Translator, mut memory: MemoryRef, index: Index) -> Result<MemoryRef> {
     let types = &t.globals.types;
-    match types.get(place.ty)? {
+    match types.get(memory.ty)? {
         Type::Struct(members) => {
             let Index::Constant(number) = index else {
                 return malformed("the index of a member isn't a constant");
@@ -116,8 +116,8 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
             let Some(member) = members.get(number as usize) else {
                 return malformed(format!("there is no member {number}"));
             };
-            let offset = if place.layout.explicit {
-                place.layout.matrix = member.matrix_stride.map(|stride| (stride, member.row_major));
+            let offset = if memory.layout.explicit {
+                memory.layout.matrix = member.matrix_stride.map(|stride| (stride, member.row_major));
                 match member.offset {
                     Some(offset) => offset,
                     None => return malformed(format!("member {number} has no offset")),
@@ -129,13 +129,13 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
                 }
                 u32::try_from(before).unwrap_or(u32::MAX)
             };
-            place.offset = place.offset.saturating_add(offset);
-            place.ty = member.ty;
-            Ok(place)
+            memory.offset = memory.offset.saturating_add(offset);
+            memory.ty = member.ty;
+            Ok(memory)
         }
         Type::Array { element, stride, .. } | Type::RuntimeArray { element, stride } => {
             let (element, stride) = (*element, *stride);
-            let stride = if place.layout.explicit {
+            let stride = if memory.layout.explicit {
                 match stride {
                     Some(stride) => stride,
                     None => return malformed("the array has no stride"),
@@ -143,78 +143,78 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
             } else {
                 u32::try_from(types.tight_size(element)?).unwrap_or(u32::MAX)
             };
-            place.ty = element;
-            moved(t, place, index, stride)
+            memory.ty = element;
+            moved(t, memory, index, stride)
         }
         Type::Matrix { column, .. } => {
             let column = *column;
             let (scalar, rows) = types.vector(column)?;
-            place.ty = column;
-            let bytes = scalar_bytes(scalar, place.layout);
-            let stride = match place.layout {
+            memory.ty = column;
+            let bytes = scalar_bytes(scalar, memory.layout);
+            let stride = match memory.layout {
                 MemoryLayout { explicit: false, .. } => bytes * rows,
                 MemoryLayout { matrix: Some((stride, row_major)), .. } => {
-                    place.layout.component_stride = row_major.then_some(stride);
+                    memory.layout.component_stride = row_major.then_some(stride);
                     if row_major { bytes } else { stride }
                 }
                 _ => return malformed("the matrix has no stride"),
             };
-            moved(t, place, index, stride)
+            moved(t, memory, index, stride)
         }
         Type::Vector { element, .. } => {
             let element = *element;
             let (scalar, _) = types.vector(element)?;
-            place.ty = element;
-            let stride = place.layout.component_stride;
-            let stride = stride.unwrap_or(scalar_bytes(scalar, place.layout));
-            moved(t, place, index, stride)
+            memory.ty = element;
+            let stride = memory.layout.component_stride;
+            let stride = stride.unwrap_or(scalar_bytes(scalar, memory.layout));
+            moved(t, memory, index, stride)
         }
         _ => malformed("an index into what has no parts"),
     }
 }
 
 /// A place moved by `index * stride` bytes.
-fn moved(t: &mut Translator, mut place: MemoryRef, index: Index, stride: u32) -> Result<MemoryRef> {
+fn moved(t: &mut Translator, mut memory: MemoryRef, index: Index, stride: u32) -> Result<MemoryRef> {
     match index {
         Index::Constant(index) => {
             let bytes = i64::from(index.cast_signed()) * i64::from(stride);
-            let bytes = bytes.saturating_add(i64::from(place.offset));
-            match (u32::try_from(bytes), place.base) {
-                (Ok(bytes), _) => place.offset = bytes,
-                (Err(_), Some(base)) if place.space == Space::Global => {
+            let bytes = bytes.saturating_add(i64::from(memory.offset));
+            match (u32::try_from(bytes), memory.base) {
+                (Ok(bytes), _) => memory.offset = bytes,
+                (Err(_), Some(base)) if memory.space == Space::Global => {
                     let bytes = t.emit.u64(bytes.cast_unsigned());
-                    place.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
-                    place.offset = 0;
+                    memory.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
+                    memory.offset = 0;
                 }
                 // Back from what the base points to. The sum wraps around.
                 (Err(_), Some(base)) if i32::try_from(bytes).is_ok() => {
                     let bytes = t.emit.u32((bytes as i32).cast_unsigned());
-                    place.base = Some(t.emit.op(Ir::IAdd, &[base, bytes]));
-                    place.offset = 0;
+                    memory.base = Some(t.emit.op(Ir::IAdd, &[base, bytes]));
+                    memory.offset = 0;
                 }
                 // Beyond all memory.
-                _ => place.offset = u32::MAX,
+                _ => memory.offset = u32::MAX,
             }
         }
-        Index::Dynamic { reg, scalar } if place.space == Space::Global => {
+        Index::Dynamic { reg, scalar } if memory.space == Space::Global => {
             let signed = matches!(scalar, Scalar::Int { signed: true, .. });
             let widen = if signed { Ir::SToS64 } else { Ir::UToU64 };
             let wide = t.emit.op(widen, &[reg]);
             let stride = t.emit.u64(u64::from(stride));
             let bytes = t.emit.op(Ir::IMul64, &[wide, stride]);
-            let base = place.base.unwrap_or(bytes);
-            place.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
+            let base = memory.base.unwrap_or(bytes);
+            memory.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
         }
         Index::Dynamic { reg, .. } => {
             let stride = t.emit.u32(stride);
             let bytes = t.emit.op(Ir::IMul, &[reg, stride]);
-            place.base = Some(match place.base {
+            memory.base = Some(match memory.base {
                 Some(base) => t.emit.op(Ir::IAdd, &[base, bytes]),
                 None => bytes,
             });
         }
     }
-    Ok(place)
+    Ok(memory)
 }
 
 /// Selects one element, of `each` descriptors, of an array of descriptors.
@@ -239,9 +239,9 @@ fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) 
 }
 
 /// Translates `OpArrayLength`.
-pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let pointer = t.pointer(it.id(0)?)?;
-    let member = it.number(1)?;
+pub fn array_length(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let pointer = t.pointer(instruction.id(0)?)?;
+    let member = instruction.number(1)?;
     let Pointer::Memory(MemoryRef { space: Space::Buffer(buffer), offset: before, base, ty, .. }) = pointer else {
         return malformed("the operand isn't a pointer to a buffer");
     };
@@ -262,5 +262,5 @@ pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
     let end = t.emit.op(Ir::UMax, &[size, offset]);
     let bytes = t.emit.op(Ir::ISub, &[end, offset]);
     let length = t.emit.op(Ir::UDiv, &[bytes, stride]);
-    t.define(it, vec![length])
+    t.define(instruction, vec![length])
 }

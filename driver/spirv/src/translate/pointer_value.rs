@@ -9,13 +9,13 @@ use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 
 /// Translates `OpPtrEqual`, `OpPtrNotEqual` and `OpPtrDiff`.
-pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (a, b) = (t.pointer_regs(it.id(0)?)?, t.pointer_regs(it.id(1)?)?);
+pub fn compare_pointers(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (a, b) = (t.pointer_regs(instruction.id(0)?)?, t.pointer_regs(instruction.id(1)?)?);
     if a.len() != b.len() {
         return malformed("the pointers are of different storage classes");
     }
-    if it.opcode == Op::PtrDiff {
-        return pointer_difference(t, it, &a, &b);
+    if instruction.opcode == Op::PtrDiff {
+        return pointer_difference(t, instruction, &a, &b);
     }
     let mut equal = None;
     for (a, b) in a.iter().zip(b.iter()) {
@@ -32,15 +32,15 @@ pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
     let Some(equal) = equal else {
         return malformed("the pointers have no values");
     };
-    let result = if it.opcode == Op::PtrEqual { equal } else { t.emit.op(Ir::BNot, &[equal]) };
-    t.define(it, vec![result])
+    let result = if instruction.opcode == Op::PtrEqual { equal } else { t.emit.op(Ir::BNot, &[equal]) };
+    t.define(instruction, vec![result])
 }
 
 /// The number of elements from one pointer to another into the same array.
-fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]) -> Result<()> {
-    let ty = t.type_of(it.id(0)?)?;
+fn pointer_difference(t: &mut Translator, instruction: &Instruction, a: &[Reg], b: &[Reg]) -> Result<()> {
+    let ty = t.type_of(instruction.id(0)?)?;
     let stride = element_stride(t, ty)?;
-    let (result, _) = t.globals.types.vector(it.ty()?)?;
+    let (result, _) = t.globals.types.vector(instruction.ty()?)?;
     let elements = match (a, b) {
         ([.., a], [.., b]) if t.emit.builder.type_of(*a) == isa::ir::Type::B32 => {
             let bytes = t.emit.op(Ir::ISub, &[*a, *b]);
@@ -51,7 +51,7 @@ fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]
     };
     let elements =
         if result.is_wide() { t.emit.op(Ir::SToS64, &[elements]) } else { t.emit.wrap_to_width(result, elements) };
-    t.define(it, vec![elements])
+    t.define(instruction, vec![elements])
 }
 
 /// The bytes between elements of the array into which a pointer of a type points; never zero.

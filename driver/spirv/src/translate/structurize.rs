@@ -31,6 +31,13 @@ pub enum Jump {
     Continue(Construct),
 }
 
+/// The jump with which a branch leaves a construct, and the merge point that it reaches.
+#[derive(Clone, Copy, Debug)]
+struct JumpTarget {
+    jump: Jump,
+    merge_point: MergePoint,
+}
+
 /// A branch from one block to another.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
@@ -291,9 +298,9 @@ impl Structurizer<'_> {
     }
 
     /// The jump to a block from anywhere within the enclosing constructs.
-    fn jump(&self, to: usize) -> Option<(Jump, MergePoint)> {
-        let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match merge {
-            Some((block, merge_point)) if *block == to => Some((Jump::Break(construct), *merge_point)),
+    fn jump(&self, to: usize) -> Option<JumpTarget> {
+        let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match *merge {
+            Some((block, merge_point)) if block == to => Some(JumpTarget { jump: Jump::Break(construct), merge_point }),
             _ => None,
         };
         let innermost = self.frames.len().saturating_sub(1);
@@ -306,7 +313,7 @@ impl Structurizer<'_> {
                 leave(merge, *construct)
             }
             Frame::LoopBody { construct, continues, .. } if continues.0 == to => {
-                Some((Jump::Continue(*construct), continues.1))
+                Some(JumpTarget { jump: Jump::Continue(*construct), merge_point: continues.1 })
             }
             Frame::LoopBody { construct, merge, .. } => leave(merge, *construct),
         })
@@ -317,7 +324,8 @@ impl Structurizer<'_> {
         self.end_of_construct(block).is_some() || self.jump(block).is_some()
     }
 
-    fn edge(&mut self, from: usize, to: usize, (jump, merge_point): (Jump, MergePoint)) -> Node {
+    fn edge(&mut self, from: usize, to: usize, target: JumpTarget) -> Node {
+        let JumpTarget { jump, merge_point } = target;
         self.edges[merge_point] += 1;
         if let Jump::Break(construct) = jump {
             self.broken.insert(construct);
@@ -328,7 +336,7 @@ impl Structurizer<'_> {
 
     /// Adds a branch at the end of a list.
     fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
-        let end = self.end_of_construct(to).map(|merge_point| (Jump::None, merge_point));
+        let end = self.end_of_construct(to).map(|merge_point| JumpTarget { jump: Jump::None, merge_point });
         if let Some(leaving) = end.or_else(|| self.jump(to)) {
             let edge = self.edge(from, to, leaving);
             nodes.push(edge);

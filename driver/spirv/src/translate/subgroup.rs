@@ -34,8 +34,8 @@ fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
 }
 
 /// Translates `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
-pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let opcode = it.opcode;
+pub fn subgroup(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let opcode = instruction.opcode;
     // The newer instructions have a scope operand first.
     let khr = matches!(
         opcode,
@@ -50,12 +50,12 @@ pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
     match opcode {
         Op::GroupNonUniformElect => {
             let elected = t.emit.builder.subgroup(SubgroupOp::Elect, None, None);
-            t.define(it, vec![elected])
+            t.define(instruction, vec![elected])
         }
-        Op::GroupNonUniformAll | Op::SubgroupAllKHR => vote(t, it, SubgroupOp::All, first),
-        Op::GroupNonUniformAny | Op::SubgroupAnyKHR => vote(t, it, SubgroupOp::Any, first),
+        Op::GroupNonUniformAll | Op::SubgroupAllKHR => vote(t, instruction, SubgroupOp::All, first),
+        Op::GroupNonUniformAny | Op::SubgroupAnyKHR => vote(t, instruction, SubgroupOp::Any, first),
         Op::GroupNonUniformAllEqual | Op::SubgroupAllEqualKHR => {
-            let regs = t.regs(it.id(first)?)?;
+            let regs = t.regs(instruction.id(first)?)?;
             let mut all = None;
             for reg in regs.iter() {
                 let equal = t.emit.builder.subgroup(SubgroupOp::AllEqual, Some(*reg), None);
@@ -64,67 +64,75 @@ pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
                     None => equal,
                 });
             }
-            t.define(it, all.into_iter().collect())
+            t.define(instruction, all.into_iter().collect())
         }
         Op::GroupNonUniformBroadcastFirst | Op::SubgroupFirstInvocationKHR => {
-            move_lanes(t, it, SubgroupOp::BroadcastFirst, first, None)
+            move_lanes(t, instruction, SubgroupOp::BroadcastFirst, first, None)
         }
         Op::GroupNonUniformBroadcast | Op::GroupNonUniformShuffle | Op::SubgroupReadInvocationKHR => {
-            move_lanes(t, it, SubgroupOp::Shuffle, first, Some(first + 1))
+            move_lanes(t, instruction, SubgroupOp::Shuffle, first, Some(first + 1))
         }
-        Op::GroupNonUniformShuffleXor => move_lanes(t, it, SubgroupOp::ShuffleXor, first, Some(first + 1)),
-        Op::GroupNonUniformShuffleUp => move_lanes(t, it, SubgroupOp::ShuffleUp, first, Some(first + 1)),
-        Op::GroupNonUniformShuffleDown => move_lanes(t, it, SubgroupOp::ShuffleDown, first, Some(first + 1)),
-        Op::GroupNonUniformQuadBroadcast => move_lanes(t, it, SubgroupOp::QuadBroadcast, first, Some(first + 1)),
+        Op::GroupNonUniformShuffleXor => move_lanes(t, instruction, SubgroupOp::ShuffleXor, first, Some(first + 1)),
+        Op::GroupNonUniformShuffleUp => move_lanes(t, instruction, SubgroupOp::ShuffleUp, first, Some(first + 1)),
+        Op::GroupNonUniformShuffleDown => move_lanes(t, instruction, SubgroupOp::ShuffleDown, first, Some(first + 1)),
+        Op::GroupNonUniformQuadBroadcast => {
+            move_lanes(t, instruction, SubgroupOp::QuadBroadcast, first, Some(first + 1))
+        }
         Op::GroupNonUniformQuadSwap => {
-            let direction = t.literal(it.id(2)?)?;
+            let direction = t.literal(instruction.id(2)?)?;
             let across = t.emit.u32(direction.min(2) + 1);
-            let regs = t.regs(it.id(1)?)?;
+            let regs = t.regs(instruction.id(1)?)?;
             let op = SubgroupOp::QuadSwap;
             let moved = regs.iter().map(|reg| t.emit.builder.subgroup(op, Some(*reg), Some(across))).collect();
-            t.define(it, moved)
+            t.define(instruction, moved)
         }
         Op::GroupNonUniformBallot | Op::SubgroupBallotKHR => {
-            let value = t.reg(it.id(first)?)?;
+            let value = t.reg(instruction.id(first)?)?;
             let words = t.emit.builder.ballot(value);
-            t.define(it, words.to_vec())
+            t.define(instruction, words.to_vec())
         }
         Op::GroupNonUniformInverseBallot => {
-            let words = ballot_operand(t, it, 1)?;
+            let words = ballot_operand(t, instruction, 1)?;
             let lane = t.io.subgroup_lane(&mut t.emit);
             let bit = ballot_bit(t, &words, lane);
-            t.define(it, vec![bit])
+            t.define(instruction, vec![bit])
         }
         Op::GroupNonUniformBallotBitExtract => {
-            let words = ballot_operand(t, it, 1)?;
-            let index = t.reg(it.id(2)?)?;
+            let words = ballot_operand(t, instruction, 1)?;
+            let index = t.reg(instruction.id(2)?)?;
             let bit = ballot_bit(t, &words, index);
-            t.define(it, vec![bit])
+            t.define(instruction, vec![bit])
         }
-        Op::GroupNonUniformBallotBitCount => ballot_count(t, it),
-        Op::GroupNonUniformBallotFindLSB | Op::GroupNonUniformBallotFindMSB => ballot_find(t, it),
-        _ => group_arithmetic(t, it),
+        Op::GroupNonUniformBallotBitCount => ballot_count(t, instruction),
+        Op::GroupNonUniformBallotFindLSB | Op::GroupNonUniformBallotFindMSB => ballot_find(t, instruction),
+        _ => group_arithmetic(t, instruction),
     }
 }
 
-fn vote(t: &mut Translator, it: &Instruction, op: SubgroupOp, operand: usize) -> Result<()> {
-    let value = t.reg(it.id(operand)?)?;
+fn vote(t: &mut Translator, instruction: &Instruction, op: SubgroupOp, operand: usize) -> Result<()> {
+    let value = t.reg(instruction.id(operand)?)?;
     let reg = t.emit.builder.subgroup(op, Some(value), None);
-    t.define(it, vec![reg])
+    t.define(instruction, vec![reg])
 }
 
-fn move_lanes(t: &mut Translator, it: &Instruction, op: SubgroupOp, value: usize, index: Option<usize>) -> Result<()> {
-    let regs = t.regs(it.id(value)?)?;
+fn move_lanes(
+    t: &mut Translator,
+    instruction: &Instruction,
+    op: SubgroupOp,
+    value: usize,
+    index: Option<usize>,
+) -> Result<()> {
+    let regs = t.regs(instruction.id(value)?)?;
     let index = match index {
-        Some(index) => Some(t.reg(it.id(index)?)?),
+        Some(index) => Some(t.reg(instruction.id(index)?)?),
         None => None,
     };
     let moved = regs.iter().map(|reg| t.emit.builder.subgroup(op, Some(*reg), index)).collect();
-    t.define(it, moved)
+    t.define(instruction, moved)
 }
 
-fn ballot_operand(t: &mut Translator, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
-    match *t.regs(it.id(index)?)? {
+fn ballot_operand(t: &mut Translator, instruction: &Instruction, index: usize) -> Result<[Reg; 4]> {
+    match *t.regs(instruction.id(index)?)? {
         [a, b, c, d] => Ok([a, b, c, d]),
         _ => malformed("a ballot has four words"),
     }
@@ -146,8 +154,8 @@ fn ballot_bit(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
 }
 
 /// A ballot's words without the bits above the subgroup's.
-fn ballot_of_subgroup(t: &mut Translator, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
-    let mut words = ballot_operand(t, it, index)?;
+fn ballot_of_subgroup(t: &mut Translator, instruction: &Instruction, index: usize) -> Result<[Reg; 4]> {
+    let mut words = ballot_operand(t, instruction, index)?;
     for (first, word) in (0..).step_by(32).zip(&mut words) {
         let bits = t.options.subgroup_size.saturating_sub(first).min(32);
         if bits < 32 {
@@ -158,11 +166,11 @@ fn ballot_of_subgroup(t: &mut Translator, it: &Instruction, index: usize) -> Res
     Ok(words)
 }
 
-fn ballot_count(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
+fn ballot_count(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let Some(group) = instruction.enumerant(1, GroupOperation::from_u32) else {
         return malformed("there is no group operation");
     };
-    let words = ballot_of_subgroup(t, it, 2)?;
+    let words = ballot_of_subgroup(t, instruction, 2)?;
     let mut sum = t.emit.u32(0);
     for (index, word) in (0..).zip(words) {
         let mask = match group {
@@ -181,12 +189,12 @@ fn ballot_count(t: &mut Translator, it: &Instruction) -> Result<()> {
         let count = t.emit.op(Ir::BitCount, &[word]);
         sum = t.emit.op(Ir::IAdd, &[sum, count]);
     }
-    t.define(it, vec![sum])
+    t.define(instruction, vec![sum])
 }
 
-fn ballot_find(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let lowest = it.opcode == Op::GroupNonUniformBallotFindLSB;
-    let words = ballot_of_subgroup(t, it, 1)?;
+fn ballot_find(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let lowest = instruction.opcode == Op::GroupNonUniformBallotFindLSB;
+    let words = ballot_of_subgroup(t, instruction, 1)?;
     let zero = t.emit.u32(0);
     let mut found = t.emit.u32(u32::MAX);
     let order: [u32; 4] = if lowest { [3, 2, 1, 0] } else { [0, 1, 2, 3] };
@@ -199,16 +207,16 @@ fn ballot_find(t: &mut Translator, it: &Instruction) -> Result<()> {
         let any = t.emit.op(Ir::INe, &[word, zero]);
         found = t.emit.select(any, bit, found);
     }
-    t.define(it, vec![found])
+    t.define(instruction, vec![found])
 }
 
 /// Translates reductions and scans.
-fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (scalar, regs) = t.vector(it.id(2)?)?;
-    let Some(op) = group_op(it.opcode, scalar).filter(|op| is_reducible(*op)) else {
-        return unsupported(format!("Op{:?}", it.opcode));
+fn group_arithmetic(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let (scalar, regs) = t.vector(instruction.id(2)?)?;
+    let Some(op) = group_op(instruction.opcode, scalar).filter(|op| is_reducible(*op)) else {
+        return unsupported(format!("Op{:?}", instruction.opcode));
     };
-    let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
+    let Some(group) = instruction.enumerant(1, GroupOperation::from_u32) else {
         return malformed("there is no group operation");
     };
     let operation = match group {
@@ -217,7 +225,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
         GroupOperation::ExclusiveScan => SubgroupOp::ExclusiveScan(op),
         GroupOperation::ClusteredReduce => SubgroupOp::Reduce {
             op,
-            cluster: match t.literal(it.id(3)?)? {
+            cluster: match t.literal(instruction.id(3)?)? {
                 cluster if cluster.is_power_of_two() => cluster,
                 _ => return malformed("the cluster size isn't a power of two"),
             },
@@ -239,7 +247,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
             t.emit.wrap_to_width(scalar, reg)
         })
         .collect();
-    t.define(it, reduced)
+    t.define(instruction, reduced)
 }
 
 /// The identity of a minimum or maximum of narrow integers: the 32-bit identity clamped to the type's range.

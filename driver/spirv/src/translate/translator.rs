@@ -150,8 +150,8 @@ impl Translator<'_> {
     }
 
     /// Sets the registers of an instruction's result, which must fit its type.
-    pub fn define(&mut self, it: &Instruction, regs: Vec<Reg>) -> Result<()> {
-        let (id, ty) = (it.result()?, it.ty()?);
+    pub fn define(&mut self, instruction: &Instruction, regs: Vec<Reg>) -> Result<()> {
+        let (id, ty) = (instruction.result()?, instruction.ty()?);
         self.emit.charge_budget(regs.len())?;
         let scalars = self.globals.types.flatten(ty)?;
         let fits = scalars.len() == regs.len()
@@ -159,16 +159,16 @@ impl Translator<'_> {
         if !fits {
             return malformed("the operands don't fit the result type");
         }
-        self.define_as(it, Value::Regs(regs.into()))?;
+        self.define_as(instruction, Value::Regs(regs.into()))?;
         self.types.insert(id, ty);
         Ok(())
     }
 
     /// Sets the meaning of an instruction's result.
-    pub fn define_as(&mut self, it: &Instruction, value: Value) -> Result<()> {
-        let id = it.result()?;
+    pub fn define_as(&mut self, instruction: &Instruction, value: Value) -> Result<()> {
+        let id = instruction.result()?;
         self.values.insert(id, value);
-        self.types.insert(id, it.ty()?);
+        self.types.insert(id, instruction.ty()?);
         Ok(())
     }
 
@@ -185,8 +185,8 @@ impl Translator<'_> {
     }
 
     /// Reports whether an instruction's product and sum may be fused.
-    pub fn may_contract(&self, it: &Instruction) -> bool {
-        let id = it.result_id.unwrap_or(0);
+    pub fn may_contract(&self, instruction: &Instruction) -> bool {
+        let id = instruction.result_id.unwrap_or(0);
         !self.module.has(id, Decoration::NoContraction)
     }
 
@@ -252,11 +252,11 @@ fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Point
 }
 
 /// Refuses a variable pointer whose type doesn't determine the layout of its target.
-fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
-    if place.layout.component_stride.is_some() {
+fn check_layout(t: &Translator, memory: &MemoryRef) -> Result<()> {
+    if memory.layout.component_stride.is_some() {
         return unsupported("a variable pointer into a matrix whose rows are in order");
     }
-    pointee_layout(t, place.ty, place.layout).map(|_| ())
+    pointee_layout(t, memory.ty, memory.layout).map(|_| ())
 }
 
 /// The layout of the target of a variable pointer, of which only the type is known: all members of a matrix type must
@@ -272,14 +272,14 @@ fn pointee_layout(t: &Translator, pointee: u32, layout: MemoryLayout) -> Result<
 }
 
 /// The 64-bit address of a place.
-fn address(t: &mut Translator, place: &MemoryRef) -> Result<Reg> {
-    let Some(base) = place.base else {
+fn address(t: &mut Translator, memory: &MemoryRef) -> Result<Reg> {
+    let Some(base) = memory.base else {
         return malformed("the pointer has no address");
     };
-    if place.offset == 0 {
+    if memory.offset == 0 {
         return Ok(base);
     }
-    let offset = t.emit.u64(u64::from(place.offset));
+    let offset = t.emit.u64(u64::from(memory.offset));
     Ok(t.emit.op(Ir::IAdd64, &[base, offset]))
 }
 
@@ -298,9 +298,9 @@ fn slot_number(t: &mut Translator, binding: Binding) -> Reg {
 }
 
 /// The number of bytes from the start of a place's memory to the place, plus `more`.
-fn bytes_before(t: &mut Translator, place: &MemoryRef, more: u32) -> Reg {
-    let constant = t.emit.u32(place.offset.saturating_add(more));
-    match place.base {
+fn bytes_before(t: &mut Translator, memory: &MemoryRef, more: u32) -> Reg {
+    let constant = t.emit.u32(memory.offset.saturating_add(more));
+    match memory.base {
         Some(base) => t.emit.op(Ir::IAdd, &[base, constant]),
         None => constant,
     }

@@ -109,9 +109,9 @@ fn private_variable(t: &mut Translator, id: u32, pointee: u32) -> Result<Pointer
 }
 
 /// Translates `OpVariable` in a function.
-pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let id = it.result()?;
-    let (class, pointee) = t.globals.types.pointer(it.ty()?)?;
+pub fn local_variable(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let id = instruction.result()?;
+    let (class, pointee) = t.globals.types.pointer(instruction.ty()?)?;
     if class != StorageClass::Function {
         return unsupported(format!("a variable of storage class {class:?} in a function"));
     }
@@ -123,11 +123,11 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
         t.promoted.bind(id, variable);
         Pointer::PromotedVariable { variable, start: 0, indices: Vec::new(), ty: pointee }
     };
-    if let Ok(initializer) = it.id(1) {
+    if let Ok(initializer) = instruction.id(1) {
         let regs = t.regs(initializer)?;
         store_to(t, &pointer, &regs)?;
     }
-    t.define_as(it, Value::Pointer(pointer.into()))
+    t.define_as(instruction, Value::Pointer(pointer.into()))
 }
 
 /// The place of the blocks in workgroup memory, which they all share.

@@ -194,7 +194,7 @@ fn begin_batch(t: &mut Translator, inputs: &mut Region, outputs: &mut Region, ve
         Stage::Geometry => t.emit.builder.lane_index(),
         Stage::TessellationControl => {
             let lane = t.emit.builder.lane_index();
-            t.emit.divided(lane, vertices).0
+            t.emit.div_rem(lane, vertices).0
         }
         _ => {
             let number = ScalarType::Uint { width: 32 };
@@ -244,22 +244,22 @@ fn streams(t: &Translator) -> usize {
 }
 
 /// The stream that an instruction names.
-fn stream(t: &Translator, it: &Instruction) -> Result<u32> {
-    match t.globals.constant_u32(it.id(0)?) {
+fn stream(t: &Translator, instruction: &Instruction) -> Result<u32> {
+    match t.globals.constant_u32(instruction.id(0)?) {
         Some(stream) if (stream as usize) < streams(t) => Ok(stream),
         _ => malformed("the stream isn't a constant that there is"),
     }
 }
 
 /// Translates `OpEmitStreamVertex`.
-pub fn emit_stream_vertex(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let stream = stream(t, it)?;
+pub fn emit_stream_vertex(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let stream = stream(t, instruction)?;
     emit_vertex(t, stream)
 }
 
 /// Translates `OpEndStreamPrimitive`.
-pub fn end_stream_primitive(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let stream = stream(t, it)?;
+pub fn end_stream_primitive(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let stream = stream(t, instruction)?;
     end_primitive(t, stream)
 }
 

@@ -41,8 +41,8 @@ fn rendering(packet: Packet) -> Rendering {
     }
 }
 
-fn is_view(resolved: &(image::ImageView, ResolveMode), view: &ImageView) -> bool {
-    Arc::ptr_eq(&resolved.0.image, &view.view.image)
+fn is_view(resolve: &AttachmentResolve, view: &ImageView) -> bool {
+    Arc::ptr_eq(&resolve.view.image, &view.view.image)
 }
 
 const COLOR: Format = Format::R8G8B8A8Unorm;
@@ -66,10 +66,10 @@ fn attachments_are_resolved_aspect_by_aspect() {
     let packet = begun(views.clone(), vec![subpass]).subpass(0).unwrap();
     let found = rendering(packet);
     let color = found.color[1].as_ref().unwrap().resolve.as_ref().unwrap();
-    assert!(is_view(color, &views[1]) && color.1 == ResolveMode::Average);
+    assert!(is_view(color, &views[1]) && color.mode == ResolveMode::Average);
     assert!(found.depth.unwrap().resolve.is_none());
     let stencil = found.stencil.unwrap().resolve.unwrap();
-    assert!(is_view(&stencil, &views[3]) && stencil.1 == ResolveMode::Max);
+    assert!(is_view(&stencil, &views[3]) && stencil.mode == ResolveMode::Max);
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn suspended_rendering_is_resolved_where_it_ends() {
         load: vk::AttachmentLoadOp::DONT_CARE,
         store: vk::AttachmentStoreOp::DONT_CARE,
         clear_value: vk::ClearValue::default(),
-        resolve: Some((view(COLOR, 1), ResolveMode::Average)),
+        resolve: Some(ResolveTo { target: view(COLOR, 1), mode: ResolveMode::Average }),
     };
     let resolves = |flags| {
         let dynamic =

@@ -46,22 +46,22 @@ pub(crate) fn bindings(
 }
 
 /// Binds the descriptors of one variable of a program.
-fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, bindings: &mut Bindings) {
+fn bind(shader_binding: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, bindings: &mut Bindings) {
     let held = bound.set.lock();
     // A set may have fewer descriptors of its last binding than the layout.
     let held = held.get(binding.first..).unwrap_or_default();
-    let count = (used.count.min(binding.count) as usize).min(held.len());
+    let count = (shader_binding.count.min(binding.count) as usize).min(held.len());
     for (element, descriptor) in held[..count].iter().enumerate() {
-        let slot = used.slot as usize + element;
+        let slot = shader_binding.slot as usize + element;
         let dynamic = binding.first_dynamic.map(|first| first + element);
         let offset = dynamic.and_then(|index| bound.dynamic_offsets.get(index));
-        place(used, slot, descriptor, offset.copied(), bindings);
+        place(shader_binding, slot, descriptor, offset.copied(), bindings);
     }
 }
 
 /// Binds a descriptor to a resource slot.
 fn place(
-    used: &ShaderBinding,
+    shader_binding: &ShaderBinding,
     slot: usize,
     descriptor: &Descriptor,
     dynamic_offset: Option<u32>,
@@ -71,18 +71,18 @@ fn place(
         Descriptor::Empty => {}
         Descriptor::Buffer(buffer) => {
             let range = buffer.range(dynamic_offset.unwrap_or(0));
-            mark_written(used, &range.memory, bindings);
+            mark_written(shader_binding, &range.memory, bindings);
             *element(&mut bindings.buffers, slot) = Some(range);
         }
         Descriptor::TexelBuffer(view) => {
-            mark_written(used, &view.range.memory, bindings);
+            mark_written(shader_binding, &view.range.memory, bindings);
             *element(&mut bindings.images, slot) =
                 ImageBinding::TexelBuffer(TexelBuffer { range: view.range.clone(), format: view.format });
         }
         Descriptor::Image { view, sampler } => {
             if let Some(view) = view {
-                mark_written(used, &view.view.image.memory, bindings);
-                *element(&mut bindings.images, slot) = image(used.kind, view);
+                mark_written(shader_binding, &view.view.image.memory, bindings);
+                *element(&mut bindings.images, slot) = image(shader_binding.kind, view);
             }
             if let Some(sampler) = sampler {
                 *element(&mut bindings.samplers, slot) = Some(sampler.state);
@@ -101,8 +101,8 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     }
 }
 
-fn mark_written(used: &ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
-    if used.writable {
+fn mark_written(shader_binding: &ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+    if shader_binding.writable {
         keep_written(memory, bindings);
     }
 }

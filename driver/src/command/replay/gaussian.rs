@@ -11,10 +11,11 @@ use crate::pipeline::gaussian::{
     CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource, HarmonicsSource,
 };
 use crate::pipeline::state::AttributeSource;
+use simdevice::BufferRange;
 use simdevice::Packet;
 use simdevice::packet::{
-    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage,
-    ModelAttributes, PrimitiveBindings,
+    AttributeStream, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
+    PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState};
@@ -154,14 +155,14 @@ fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), Draw
         return Err(DrawError::CameraModel(camera.model));
     }
     let state = &gaussian.state;
-    let is_seen = match camera.model {
+    let is_supported = match camera.model {
         CameraModel::Pinhole | CameraModel::Orthographic => true,
         CameraModel::Fisheye => state.geometry == GaussianGeometry::Volume,
         CameraModel::Equirectangular => {
             state.geometry == GaussianGeometry::Volume && state.precision == GaussianPrecision::Float32
         }
     };
-    match is_seen {
+    match is_supported {
         true => Ok(()),
         false => Err(DrawError::ModeOfCameraModel(camera.model)),
     }

@@ -14,7 +14,7 @@ use crate::instance::Instance;
 use crate::pipeline::PipelineKind;
 use ash::vk;
 use simdevice::command_processor::ExecutionError;
-use simdevice::transform_feedback::{CounterWords, TransformFeedback};
+use simdevice::transform_feedback::{CounterBuffers, TransformFeedback};
 use simdevice::{CommandProcessor, Packet};
 use std::sync::Arc;
 
@@ -163,12 +163,12 @@ fn execute(command: &Command, state: &mut State, execution: &mut Execution<'_>) 
         Command::BeginTransformFeedback(counters) => {
             let feedback = Arc::new(TransformFeedback::new(state.captured_buffers.clone()));
             state.transform_feedback = Some(Arc::clone(&feedback));
-            let counters = CounterWords::clone(counters);
+            let counters = CounterBuffers::clone(counters);
             execution.execute(&Packet::BeginTransformFeedback { feedback, counters })?;
         }
         Command::EndTransformFeedback(counters) => {
             if let Some(feedback) = state.transform_feedback.take() {
-                let counters = CounterWords::clone(counters);
+                let counters = CounterBuffers::clone(counters);
                 execution.execute(&Packet::EndTransformFeedback { feedback, counters })?;
             }
         }

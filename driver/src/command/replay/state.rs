@@ -12,7 +12,7 @@ use crate::pipeline::parts::VertexInput;
 use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
-use simdevice::transform_feedback::{CounterWords, TransformFeedback};
+use simdevice::transform_feedback::{CounterBuffers, TransformFeedback};
 use std::sync::Arc;
 
 /// Bound state. All of it is undefined, which is `None`, when a command buffer begins.
@@ -52,7 +52,7 @@ pub(crate) struct State {
     /// The buffer of spherical harmonics.
     pub(crate) harmonics: Option<HarmonicsBuffer>,
     /// The buffers that transform feedback writes.
-    pub(crate) captured_buffers: CounterWords,
+    pub(crate) captured_buffers: CounterBuffers,
     /// Transform feedback, while it is active.
     pub(crate) transform_feedback: Option<Arc<TransformFeedback>>,
     /// True where draws, dispatches and clears of attachments are not executed.

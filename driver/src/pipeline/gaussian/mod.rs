@@ -143,10 +143,10 @@ impl CameraModels {
 
 impl GaussianPipeline {
     /// Validates and converts the Gaussian part of a pipeline.
-    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, graphics: &GraphicsState) -> Result<Self, Error> {
         let features = device.features();
-        require(features, TOPOLOGY, "the topology is the Gaussian list")?;
-        let Some(gaussian) = &info.pre_rasterization.gaussian else {
+        require(features, &TOPOLOGY, "the topology is the Gaussian list")?;
+        let Some(gaussian) = &graphics.pre_rasterization.gaussian else {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
                 format!(
@@ -156,21 +156,21 @@ impl GaussianPipeline {
                 ),
             ));
         };
-        let view_mask = info.pre_rasterization.view_mask;
+        let view_mask = graphics.pre_rasterization.view_mask;
         if view_mask != 0 {
-            require(features, MULTIVIEW, "the view mask is not 0")?;
+            require(features, &MULTIVIEW, "the view mask is not 0")?;
         }
-        let gaussian = &without_dynamic(info, gaussian);
-        let allowed = Modes::new(info, gaussian);
+        let gaussian = &without_dynamic(graphics, gaussian);
+        let allowed = Modes::new(graphics, gaussian);
         allowed.check()?;
-        stages(info, gaussian, features)?;
+        stages(graphics, gaussian, features)?;
         modes(gaussian, features)?;
         numbers(gaussian)?;
-        let approximation = approximation(info)?;
-        let footprint = footprint(info, features)?;
-        fixed_state(info, features)?;
-        let mut fragments = FixedFunctionState::of_gaussians(info)?;
-        let taken = info.dynamic.iter().copied();
+        let approximation = approximation(graphics)?;
+        let footprint = footprint(graphics, features)?;
+        fixed_state(graphics, features)?;
+        let mut fragments = FixedFunctionState::of_gaussians(graphics)?;
+        let taken = graphics.dynamic.iter().copied();
         let taken = taken.filter(|&state| {
             // Gaussians that a vertex shader projects have no harmonics.
             let is_ignored = vk::DynamicState::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE == state;
@@ -180,25 +180,27 @@ impl GaussianPipeline {
         require_modes(features, &state)?;
         fragments.gaussian = Some(Box::new(state.clone()));
         Ok(Self {
-            source: source(device, info, gaussian)?,
-            resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
+            source: source(device, graphics, gaussian)?,
+            resolve: ResolveStage::new(device, graphics, gaussian, &fragments)?,
             dynamic_rules: DynamicRules::new(allowed, features, state.sh_degree),
             state: Arc::new(state),
             dynamic: taken.collect(),
             fixed: fragments,
             viewport: fixed(
                 "viewport",
-                info.is_dynamic(vk::DynamicState::VIEWPORT) || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
-                &info.pre_rasterization.viewports,
+                graphics.is_dynamic(vk::DynamicState::VIEWPORT)
+                    || graphics.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
+                &graphics.pre_rasterization.viewports,
             )?
             .map(convert::viewport),
             scissor: fixed(
                 "scissor",
-                info.is_dynamic(vk::DynamicState::SCISSOR) || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
-                &info.pre_rasterization.scissors,
+                graphics.is_dynamic(vk::DynamicState::SCISSOR)
+                    || graphics.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
+                &graphics.pre_rasterization.scissors,
             )?
             .map(convert::rect),
-            camera: camera_source(info, gaussian, features)?,
+            camera: camera_source(graphics, gaussian, features)?,
             view_mask,
             camera_models: CameraModels::of(features),
         })
@@ -208,11 +210,11 @@ impl GaussianPipeline {
 /// The source of Gaussians.
 fn source(
     device: &Device,
-    info: &GraphicsState,
+    graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
 ) -> Result<GaussianSource, Error> {
     if is_shaded(gaussian) {
-        let projection = VertexProjection::new(device, info, gaussian)?;
+        let projection = VertexProjection::new(device, graphics, gaussian)?;
         return Ok(GaussianSource::VertexShader(projection));
     }
     let locations = &gaussian.attribute_locations;
@@ -220,7 +222,7 @@ fn source(
         [("firstModelMatrix", locations.first_model_matrix), ("modelOpacity", locations.model_opacity)]
     {
         if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
-            require(device.features(), INSTANCING, &format!("{name} is used"))?;
+            require(device.features(), &INSTANCING, &format!("{name} is used"))?;
         }
     }
     let degree = gaussian.spherical_harmonics_degree;
@@ -228,7 +230,7 @@ fn source(
     let in_buffer = gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
     if in_buffer {
         let what = "flags has SPHERICAL_HARMONICS_BUFFER";
-        require(device.features(), HARMONICS_BUFFER, what)?;
+        require(device.features(), &HARMONICS_BUFFER, what)?;
     }
     distinct_locations(locations, if in_buffer { 0 } else { coefficients })?;
     let first = locations.first_spherical_harmonics;
@@ -237,16 +239,16 @@ fn source(
         _ => 3,
     };
     Ok(GaussianSource::Attributes(GaussianAttributeSources {
-        position: attribute(info, "position", locations.position, 3)?,
-        scale: attribute(info, "scale", locations.scale, scales)?,
-        rotation: attribute(info, "rotation", locations.rotation, 4)?,
-        opacity: attribute(info, "opacity", locations.opacity, 1)?,
+        position: attribute(graphics, "position", locations.position, 3)?,
+        scale: attribute(graphics, "scale", locations.scale, scales)?,
+        rotation: attribute(graphics, "rotation", locations.rotation, 4)?,
+        opacity: attribute(graphics, "opacity", locations.opacity, 1)?,
         spherical_harmonics: if in_buffer {
             HarmonicsSource::Buffer
         } else {
             let all = (0..coefficients).map(|k| {
                 let name = format!("spherical harmonics coefficient {k}");
-                attribute(info, &name, first.saturating_add(k), 3)
+                attribute(graphics, &name, first.saturating_add(k), 3)
             });
             HarmonicsSource::Attributes(all.collect::<Result<_, _>>()?)
         },
@@ -257,13 +259,13 @@ fn source(
         model_matrix: match locations.first_model_matrix {
             GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
             first => {
-                let row = |k| attribute(info, "a model matrix's row", first.saturating_add(k), 4);
+                let row = |k| attribute(graphics, "a model matrix's row", first.saturating_add(k), 4);
                 Some([row(0)?, row(1)?, row(2)?])
             }
         },
         model_opacity: match locations.model_opacity {
             GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
-            location => Some(attribute(info, "modelOpacity", location, 1)?),
+            location => Some(attribute(graphics, "modelOpacity", location, 1)?),
         },
     }))
 }
@@ -318,7 +320,7 @@ fn state(gaussian: &PipelineGaussianStateCreateInfoGAURAST, fragments: DrawState
 
 /// The source of draws' camera.
 fn camera_source(
-    info: &GraphicsState,
+    graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
 ) -> Result<CameraSource, Error> {
@@ -328,9 +330,9 @@ fn camera_source(
         GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
         other => return Err(unknown("cameraSource", &other)),
     }
-    require(features, UNIFORM_BUFFER_CAMERA, "cameraSource is UNIFORM_BUFFER")?;
+    require(features, &UNIFORM_BUFFER_CAMERA, "cameraSource is UNIFORM_BUFFER")?;
     let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
-    let is_there = info.layout.as_ref().is_some_and(|layout| {
+    let is_there = graphics.layout.as_ref().is_some_and(|layout| {
         let found = layout.set_layout(set).ok();
         found.and_then(|set| set.binding(binding)).is_some_and(holds_camera)
     });
@@ -344,14 +346,14 @@ fn camera_source(
         ));
     }
     let count = gaussian.camera_count;
-    let views = u32::BITS - info.pre_rasterization.view_mask.leading_zeros();
+    let views = u32::BITS - graphics.pre_rasterization.view_mask.leading_zeros();
     if count == 0 || count > 1 && count < views {
         return Err(Error::usage(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026",
             format!(
                 "{STRUCTURE}: cameraCount is {count}, but must be 1, for all views, or greater than the greatest view \
                  index of view mask {:#b}",
-                info.pre_rasterization.view_mask
+                graphics.pre_rasterization.view_mask
             ),
         ));
     }

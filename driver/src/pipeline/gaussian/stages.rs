@@ -39,20 +39,20 @@ impl VertexProjection {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(
         device: &Device,
-        info: &GraphicsState,
+        graphics: &GraphicsState,
         state: &PipelineGaussianStateCreateInfoGAURAST,
     ) -> Result<Self, Error> {
-        let stage = find(info, vk::ShaderStageFlags::VERTEX).ok_or_else(|| {
+        let stage = find(graphics, vk::ShaderStageFlags::VERTEX).ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
                 "projectionMode is VERTEX_SHADER, and there is no vertex stage",
             )
         })?;
         // A vertex stage doesn't depend on samples.
-        let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
+        let vertex = stages::translate(device, layout(graphics)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
         let locations = vertex.interface.locations_read();
-        let attributes = stages::attributes(&info.vertex_input.input, &locations)?;
+        let attributes = stages::attributes(&graphics.vertex_input.input, &locations)?;
         let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;
@@ -84,25 +84,25 @@ impl ResolveStage {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(
         device: &Device,
-        info: &GraphicsState,
+        graphics: &GraphicsState,
         state: &PipelineGaussianStateCreateInfoGAURAST,
         fixed: &FixedFunctionState,
     ) -> Result<Option<Self>, Error> {
         let draw = &fixed.draw;
-        let Some(stage) = find(info, vk::ShaderStageFlags::FRAGMENT) else {
+        let Some(stage) = find(graphics, vk::ShaderStageFlags::FRAGMENT) else {
             let is_needed = draw.alpha_to_coverage || draw.alpha_to_one;
             return is_needed.then(|| Self::passing(device, fixed)).transpose();
         };
-        let fragment = stages::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
+        let fragment = stages::translate(device, layout(graphics)?, stage, Stage::Fragment, draw.samples)?;
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
         let resources = ProgramResources::new(device, &fragment.interface);
-        let color = live_color_outputs(info, fixed);
+        let color = live_color_outputs(graphics, fixed);
         let live_outputs = LiveOutputs {
             color: &color,
-            second_source: info.fragment_output.blend.iter().any(reads_second_source),
+            second_source: graphics.fragment_output.blend.iter().any(reads_second_source),
             points: false,
-            views: info.pre_rasterization.view_mask != 0,
+            views: graphics.pre_rasterization.view_mask != 0,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs);
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
@@ -168,22 +168,22 @@ fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, 
         ("nearestGaussian", locations.nearest_gaussian, resolve::NEAREST_GAUSSIAN, 2),
         ("firstCamera", locations.first_camera, resolve::CAMERA, 4 * resolve::CAMERA_LOCATIONS),
     ];
-    let mut places = Varyings::new();
+    let mut varyings = Varyings::new();
     for (name, first, number, count) in inputs {
         if first == GAUSSIAN_LOCATION_UNUSED_GAURAST {
             continue;
         }
         for at in 0..count {
-            let place = (first.saturating_add(at / 4), at % 4);
-            if places.insert(place, number + at).is_some() {
+            let place = InterfaceComponent { location: first.saturating_add(at / 4), component: at % 4 };
+            if varyings.insert(place, number + at).is_some() {
                 return Err(Error::usage(
                     RESOLVE_INPUTS,
-                    format!("{name} has location {}, as another input of the resolve shader has", place.0),
+                    format!("{name} has location {}, as another input of the resolve shader has", place.location),
                 ));
             }
         }
     }
-    Ok(places)
+    Ok(varyings)
 }
 
 /// Refuses inputs and outputs that a resolve shader can't have.
@@ -192,7 +192,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
         let InputSource::Location { location, component, .. } = input.source else {
             continue;
         };
-        let wanted = varyings.get(&(location, component)).map(|number| {
+        let wanted = varyings.get(&InterfaceComponent { location, component }).map(|number| {
             if (resolve::MEDIAN_GAUSSIAN..resolve::CAMERA).contains(number) {
                 ScalarType::Uint { width: 32 }
             } else {
@@ -224,15 +224,16 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
     Ok(())
 }
 
-fn layout(info: &GraphicsState) -> Result<&Arc<PipelineLayout>, Error> {
-    info.layout
+fn layout(graphics: &GraphicsState) -> Result<&Arc<PipelineLayout>, Error> {
+    graphics
+        .layout
         .as_ref()
         .ok_or_else(|| Error::usage("VUID-VkGraphicsPipelineCreateInfo-layout-06602", "the pipeline has no layout"))
 }
 
 /// A pipeline's stage of a kind.
-fn find(info: &GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&ShaderStage> {
-    let mut stages = info.stages();
+fn find(graphics: &GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&ShaderStage> {
+    let mut stages = graphics.stages();
     let (_, stage) = stages.find(|(stage, _)| *stage == wanted)?;
     Some(stage)
 }
@@ -262,12 +263,12 @@ fn components(
         if location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
             return refuse(format!("{name} is unused, but the pipeline reads it"));
         }
-        if components.iter().any(|&(taken, _)| taken == location) {
+        if components.iter().any(|taken| taken.location == location) {
             return refuse(format!("{name} is location {location}, as another output is"));
         }
         let count = if first == gaussian::OPACITY || is_key { 1 } else { 3 };
         for component in 0..count {
-            let place = (location, component);
+            let place = InterfaceComponent { location, component };
             if !writes_float(interface, place) {
                 return refuse(format!(
                     "{name} is location {location}, where the vertex shader writes no component \
@@ -283,7 +284,7 @@ fn components(
 fn writes_float(interface: &Interface, place: InterfaceComponent) -> bool {
     interface.outputs.iter().any(|output| {
         let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
-            if (location, component) == place);
+            if InterfaceComponent { location, component } == place);
         is_there && output.numeric == ScalarType::Float { width: 32 }
     })
 }

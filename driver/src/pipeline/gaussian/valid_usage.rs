@@ -21,128 +21,137 @@ use std::ops::Range;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
-/// A feature of the extension: its value, its name, and the id of the rule that requires it.
-pub(super) type Feature = (fn(&Features) -> bool, &'static str, &'static str);
+/// A feature of the extension.
+pub(super) struct Feature {
+    is_enabled: fn(&Features) -> bool,
+    name: &'static str,
+    /// The id of the rule that requires it.
+    vuid: &'static str,
+}
 
-pub(super) const TOPOLOGY: Feature = (
-    |features| features.gaussian_primitive_topology,
-    "gaussianPrimitiveTopology",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032",
-);
-pub(super) const VERTEX_SHADER_PROJECTION: Feature = (
-    |features| features.vertex_shader_projection,
-    "vertexShaderProjection",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-vertexShaderProjection-90033",
-);
-pub(super) const RESOLVE_FRAGMENT_SHADER: Feature = (
-    |features| features.resolve_fragment_shader,
-    "resolveFragmentShader",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveFragmentShader-90034",
-);
-pub(super) const RADIAL_DISTANCE_ORDER: Feature = (
-    |features| features.radial_distance_order,
-    "radialDistanceOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-radialDistanceOrder-90035",
-);
-pub(super) const PRIMITIVE_ORDER: Feature = (
-    |features| features.primitive_order,
-    "primitiveOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-90036",
-);
-pub(super) const PER_PIXEL_ORDER: Feature = (
-    |features| features.per_pixel_order,
-    "perPixelOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-perPixelOrder-90037",
-);
-pub(super) const RASTERIZATION_FLOAT16: Feature = (
-    |features| features.rasterization_float16,
-    "rasterizationFloat16",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-rasterizationFloat16-90038",
-);
-pub(super) const OPACITY_COMPENSATION: Feature = (
-    |features| features.opacity_compensation,
-    "opacityCompensation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensation-90039",
-);
-pub(super) const UNSCENTED_PROJECTION: Feature = (
-    |features| features.unscented_projection,
-    "unscentedProjection",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-90040",
-);
-pub(super) const GAUSSIAN_2D: Feature =
-    (|features| features.gaussian_2d, "gaussian2D", "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-90041");
-pub(super) const UNIFORM_BUFFER_CAMERA: Feature = (
-    |features| features.uniform_buffer_camera,
-    "uniformBufferCamera",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-90042",
-);
-pub(super) const INSTANCING: Feature = (
-    |features| features.gaussian_instancing,
-    "gaussianInstancing",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-90043",
-);
-pub(super) const DEPTH_STENCIL: Feature = (
-    |features| features.gaussian_depth_stencil,
-    "gaussianDepthStencil",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044",
-);
-pub(super) const MULTISAMPLE: Feature = (
-    |features| features.gaussian_multisample,
-    "gaussianMultisample",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-90045",
-);
-pub(super) const APPROXIMATION: Feature = (
-    |features| features.gaussian_approximation,
-    "gaussianApproximation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-90050",
-);
+pub(super) const TOPOLOGY: Feature = Feature {
+    is_enabled: |features| features.gaussian_primitive_topology,
+    name: "gaussianPrimitiveTopology",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032",
+};
+pub(super) const VERTEX_SHADER_PROJECTION: Feature = Feature {
+    is_enabled: |features| features.vertex_shader_projection,
+    name: "vertexShaderProjection",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-vertexShaderProjection-90033",
+};
+pub(super) const RESOLVE_FRAGMENT_SHADER: Feature = Feature {
+    is_enabled: |features| features.resolve_fragment_shader,
+    name: "resolveFragmentShader",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveFragmentShader-90034",
+};
+pub(super) const RADIAL_DISTANCE_ORDER: Feature = Feature {
+    is_enabled: |features| features.radial_distance_order,
+    name: "radialDistanceOrder",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-radialDistanceOrder-90035",
+};
+pub(super) const PRIMITIVE_ORDER: Feature = Feature {
+    is_enabled: |features| features.primitive_order,
+    name: "primitiveOrder",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-90036",
+};
+pub(super) const PER_PIXEL_ORDER: Feature = Feature {
+    is_enabled: |features| features.per_pixel_order,
+    name: "perPixelOrder",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-perPixelOrder-90037",
+};
+pub(super) const RASTERIZATION_FLOAT16: Feature = Feature {
+    is_enabled: |features| features.rasterization_float16,
+    name: "rasterizationFloat16",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-rasterizationFloat16-90038",
+};
+pub(super) const OPACITY_COMPENSATION: Feature = Feature {
+    is_enabled: |features| features.opacity_compensation,
+    name: "opacityCompensation",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensation-90039",
+};
+pub(super) const UNSCENTED_PROJECTION: Feature = Feature {
+    is_enabled: |features| features.unscented_projection,
+    name: "unscentedProjection",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-90040",
+};
+pub(super) const GAUSSIAN_2D: Feature = Feature {
+    is_enabled: |features| features.gaussian_2d,
+    name: "gaussian2D",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-90041",
+};
+pub(super) const UNIFORM_BUFFER_CAMERA: Feature = Feature {
+    is_enabled: |features| features.uniform_buffer_camera,
+    name: "uniformBufferCamera",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-90042",
+};
+pub(super) const INSTANCING: Feature = Feature {
+    is_enabled: |features| features.gaussian_instancing,
+    name: "gaussianInstancing",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-90043",
+};
+pub(super) const DEPTH_STENCIL: Feature = Feature {
+    is_enabled: |features| features.gaussian_depth_stencil,
+    name: "gaussianDepthStencil",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044",
+};
+pub(super) const MULTISAMPLE: Feature = Feature {
+    is_enabled: |features| features.gaussian_multisample,
+    name: "gaussianMultisample",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-90045",
+};
+pub(super) const APPROXIMATION: Feature = Feature {
+    is_enabled: |features| features.gaussian_approximation,
+    name: "gaussianApproximation",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-90050",
+};
 
-pub(super) const MULTIVIEW: Feature = (
-    |features| features.gaussian_multiview,
-    "gaussianMultiview",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049",
-);
+pub(super) const MULTIVIEW: Feature = Feature {
+    is_enabled: |features| features.gaussian_multiview,
+    name: "gaussianMultiview",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049",
+};
 
-pub(super) const HARMONICS_BUFFER: Feature = (
-    |features| features.spherical_harmonics_buffer,
-    "sphericalHarmonicsBuffer",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsBuffer-90047",
-);
-pub(super) const ATTRIBUTE_ACTIVATION: Feature = (
-    |features| features.attribute_activation,
-    "attributeActivation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-90046",
-);
-pub(super) const RESOLVE_INDICES: Feature = (
-    |features| features.resolve_gaussian_indices,
-    "resolveGaussianIndices",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveGaussianIndices-90073",
-);
-pub(super) const CUT_OFF: Feature = (
-    |features| features.gaussian_cut_off,
-    "gaussianCutOff",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
-);
-pub(super) const COMPENSATION_FLOOR: Feature = (
-    |features| features.opacity_compensation_floor,
-    "opacityCompensationFloor",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
-);
-pub(super) const DYNAMIC_STATE: Feature = (
-    |features| features.gaussian_dynamic_state,
-    "gaussianDynamicState",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
-);
+pub(super) const HARMONICS_BUFFER: Feature = Feature {
+    is_enabled: |features| features.spherical_harmonics_buffer,
+    name: "sphericalHarmonicsBuffer",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsBuffer-90047",
+};
+pub(super) const ATTRIBUTE_ACTIVATION: Feature = Feature {
+    is_enabled: |features| features.attribute_activation,
+    name: "attributeActivation",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-90046",
+};
+pub(super) const RESOLVE_INDICES: Feature = Feature {
+    is_enabled: |features| features.resolve_gaussian_indices,
+    name: "resolveGaussianIndices",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveGaussianIndices-90073",
+};
+pub(super) const CUT_OFF: Feature = Feature {
+    is_enabled: |features| features.gaussian_cut_off,
+    name: "gaussianCutOff",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
+};
+pub(super) const COMPENSATION_FLOOR: Feature = Feature {
+    is_enabled: |features| features.opacity_compensation_floor,
+    name: "opacityCompensationFloor",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
+};
+pub(super) const DYNAMIC_STATE: Feature = Feature {
+    is_enabled: |features| features.gaussian_dynamic_state,
+    name: "gaussianDynamicState",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
+};
 
 /// Refuses `what` unless its feature is enabled. A feature that the device lacks can't be enabled.
-pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Result<(), Error> {
-    if feature.0(features) {
+pub(super) fn require(features: &Features, feature: &Feature, what: &str) -> Result<(), Error> {
+    if (feature.is_enabled)(features) {
         return Ok(());
     }
     Err(not_enabled(feature, what))
 }
 
-fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
+fn not_enabled(feature: &Feature, what: &str) -> Error {
+    let Feature { name, vuid, .. } = feature;
     Error::FeatureNotEnabled { vuid, message: format!("{STRUCTURE}: {what}, but the feature {name} is not enabled") }
 }
 
@@ -160,8 +169,8 @@ pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
     Error::usage(vuid, format!("{STRUCTURE}: {field} has the unknown value {value:?}"))
 }
 
-pub(super) fn has_fragment_stage(info: &GraphicsState) -> bool {
-    let mut stages = info.stages();
+pub(super) fn has_fragment_stage(graphics: &GraphicsState) -> bool {
+    let mut stages = graphics.stages();
     stages.any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT)
 }
 
@@ -192,9 +201,9 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub(super) fn new(info: &GraphicsState, gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Self {
+    pub(super) fn new(graphics: &GraphicsState, gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Self {
         let is_used = |location: u32| location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-        let (resolves, inputs) = (has_fragment_stage(info), gaussian.resolve_input_locations);
+        let (resolves, inputs) = (has_fragment_stage(graphics), gaussian.resolve_input_locations);
         Self {
             // An invalid value is refused where it is converted.
             order: values::order(gaussian.order).unwrap_or(GaussianOrder::ViewDepth),
@@ -210,7 +219,7 @@ impl Modes {
                     .into_iter()
                     .any(is_used),
             reads_camera: resolves && is_used(inputs.first_camera),
-            is_cut: info
+            is_cut: graphics
                 .pre_rasterization
                 .footprint
                 .is_some_and(|footprint| footprint.cut_off != GaussianCutOffGAURAST::NONE),
@@ -318,19 +327,19 @@ impl DynamicRules {
 pub(super) fn require_modes(features: &Features, state: &GaussianState) -> Result<(), Error> {
     if state.opacity_compensated {
         let what = "antialiasing is OPACITY_COMPENSATED";
-        require(features, OPACITY_COMPENSATION, what)?;
+        require(features, &OPACITY_COMPENSATION, what)?;
     }
     match state.order {
         GaussianOrder::ViewDepth => {}
         GaussianOrder::RadialDistance => {
-            require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
+            require(features, &RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
         }
-        GaussianOrder::Primitive => require(features, PRIMITIVE_ORDER, "order is PRIMITIVE")?,
-        GaussianOrder::PerPixel => require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?,
+        GaussianOrder::Primitive => require(features, &PRIMITIVE_ORDER, "order is PRIMITIVE")?,
+        GaussianOrder::PerPixel => require(features, &PER_PIXEL_ORDER, "order is PER_PIXEL")?,
     }
     if state.approximation != GaussianApproximation::default() {
         let what = "exponentialError or contributionBudget is not 0";
-        require(features, APPROXIMATION, what)?;
+        require(features, &APPROXIMATION, what)?;
     }
     Ok(())
 }
@@ -347,15 +356,15 @@ fn ceiling_over_floor(floor: f32, ceiling: f32) -> Result<(), Error> {
 
 /// The create info with the members of dynamic states replaced by values that break no rule.
 pub(super) fn without_dynamic<'a>(
-    info: &GraphicsState,
+    graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST<'a>,
 ) -> PipelineGaussianStateCreateInfoGAURAST<'a> {
     use vk::DynamicState as S;
     let mut own = *gaussian;
-    if info.is_dynamic(S::GAUSSIAN_ORDER) {
+    if graphics.is_dynamic(S::GAUSSIAN_ORDER) {
         own.order = GaussianOrderGAURAST::VIEW_DEPTH;
     }
-    if info.is_dynamic(S::GAUSSIAN_ANTIALIASING) {
+    if graphics.is_dynamic(S::GAUSSIAN_ANTIALIASING) {
         own.antialiasing = GaussianAntialiasingGAURAST::DILATE;
     }
     for (state, member, value) in [
@@ -364,7 +373,7 @@ pub(super) fn without_dynamic<'a>(
         (S::GAUSSIAN_ALPHA_CEILING, &mut own.alpha_ceiling, 1.0),
         (S::GAUSSIAN_TRANSMITTANCE_FLOOR, &mut own.transmittance_floor, 0.0),
     ] {
-        if info.is_dynamic(state) {
+        if graphics.is_dynamic(state) {
             *member = value;
         }
     }
@@ -372,7 +381,7 @@ pub(super) fn without_dynamic<'a>(
 }
 
 pub(super) fn stages(
-    info: &GraphicsState,
+    graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
 ) -> Result<(), Error> {
@@ -380,25 +389,25 @@ pub(super) fn stages(
         GaussianProjectionModeGAURAST::FIXED_FUNCTION => {}
         GaussianProjectionModeGAURAST::VERTEX_SHADER => {
             let what = "projectionMode is VERTEX_SHADER";
-            require(features, VERTEX_SHADER_PROJECTION, what)?;
+            require(features, &VERTEX_SHADER_PROJECTION, what)?;
         }
         other => return Err(unknown("projectionMode", &other)),
     }
-    if has_fragment_stage(info) {
+    if has_fragment_stage(graphics) {
         let inputs = &gaussian.resolve_input_locations;
         let indices = [inputs.median_gaussian, inputs.nearest_gaussian];
         if indices != [GAUSSIAN_LOCATION_UNUSED_GAURAST; 2] {
             let what = "medianGaussian or nearestGaussian is used";
-            require(features, RESOLVE_INDICES, what)?;
+            require(features, &RESOLVE_INDICES, what)?;
         }
         let what = "the pipeline has a fragment stage";
-        require(features, RESOLVE_FRAGMENT_SHADER, what)?;
+        require(features, &RESOLVE_FRAGMENT_SHADER, what)?;
     }
     let shaded = is_shaded(gaussian);
-    let of = |wanted| info.stages().filter(move |(stage, _)| *stage == wanted);
+    let of = |wanted| graphics.stages().filter(move |(stage, _)| *stage == wanted);
     let known = vk::ShaderStageFlags::FRAGMENT
         | if shaded { vk::ShaderStageFlags::VERTEX } else { vk::ShaderStageFlags::empty() };
-    let unwanted = info.stages().find(|(stage, _)| !known.contains(*stage));
+    let unwanted = graphics.stages().find(|(stage, _)| !known.contains(*stage));
     let wrong = if let Some((stage, _)) = unwanted {
         Some(format!("must not have a stage {stage:?}"))
     } else if of(vk::ShaderStageFlags::VERTEX).count() != usize::from(shaded) {
@@ -414,7 +423,7 @@ pub(super) fn stages(
             format!("projectionMode is {:?}, so the pipeline {wrong}", gaussian.projection_mode),
         ));
     }
-    if info.vertex_input.primitive_restart {
+    if graphics.vertex_input.primitive_restart {
         return Err(Error::usage(
             "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
             "primitiveRestartEnable is VK_TRUE, but the Gaussian list has no primitive restart",
@@ -428,14 +437,14 @@ fn projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features: &Feat
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
-            require(features, GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
+            require(features, &GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
         }
         other => return Err(unknown("geometry", &other)),
     }
     match gaussian.linearization {
         GaussianLinearizationGAURAST::JACOBIAN => {}
         GaussianLinearizationGAURAST::UNSCENTED => {
-            require(features, UNSCENTED_PROJECTION, "linearization is UNSCENTED")?;
+            require(features, &UNSCENTED_PROJECTION, "linearization is UNSCENTED")?;
         }
         other => return Err(unknown("linearization", &other)),
     }
@@ -449,7 +458,7 @@ pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features:
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
         GaussianPrecisionGAURAST::FLOAT16 => {
-            require(features, RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
+            require(features, &RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
         }
         other => return Err(unknown("precision", &other)),
     }
@@ -459,7 +468,7 @@ pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features:
     }
     if gaussian.flags.intersects(activations) && !is_shaded(gaussian) {
         let what = "flags has LOG_SCALE or LOGIT_OPACITY";
-        require(features, ATTRIBUTE_ACTIVATION, what)?;
+        require(features, &ATTRIBUTE_ACTIVATION, what)?;
     }
     Ok(())
 }
@@ -522,45 +531,45 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
 }
 
 /// Refuses fixed-function state that a Gaussian pipeline doesn't support.
-pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(), Error> {
+pub(super) fn fixed_state(graphics: &GraphicsState, features: &Features) -> Result<(), Error> {
     use vk::DynamicState as S;
-    let depth_stencil = info.depth_stencil().copied().unwrap_or_default();
+    let depth_stencil = graphics.depth_stencil().copied().unwrap_or_default();
     let tests = [
         (depth_stencil.depth_test_enable, S::DEPTH_TEST_ENABLE),
         (depth_stencil.depth_bounds_test_enable, S::DEPTH_BOUNDS_TEST_ENABLE),
         (depth_stencil.stencil_test_enable, S::STENCIL_TEST_ENABLE),
     ];
-    if tests.iter().any(|&(enable, state)| enable != vk::FALSE || info.is_dynamic(state)) {
-        require(features, DEPTH_STENCIL, "the pipeline has a depth, depth bounds or stencil test")?;
+    if tests.iter().any(|&(enable, state)| enable != vk::FALSE || graphics.is_dynamic(state)) {
+        require(features, &DEPTH_STENCIL, "the pipeline has a depth, depth bounds or stencil test")?;
     }
-    let multisample = &info.fragment_output.multisample;
+    let multisample = &graphics.fragment_output.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
-        require(features, MULTISAMPLE, "the pipeline has several samples per pixel")?;
+        require(features, &MULTISAMPLE, "the pipeline has several samples per pixel")?;
     }
-    if info.pre_rasterization.rasterization.rasterizer_discard_enable != vk::FALSE {
+    if graphics.pre_rasterization.rasterization.rasterizer_discard_enable != vk::FALSE {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
             "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE with Gaussians",
         ));
     }
-    if info.dynamic.iter().copied().any(is_of_gaussians) {
+    if graphics.dynamic.iter().copied().any(is_of_gaussians) {
         let what = "a dynamic state of Gaussians is used";
-        require(features, DYNAMIC_STATE, what)?;
+        require(features, &DYNAMIC_STATE, what)?;
     }
-    let shades = has_fragment_stage(info);
-    if let Some(state) = info.dynamic.iter().find(|state| !may_gaussians_have(**state)) {
+    let shades = has_fragment_stage(graphics);
+    if let Some(state) = graphics.dynamic.iter().find(|state| !may_gaussians_have(**state)) {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
             format!("{state:?} must not be dynamic in a Gaussian pipeline"),
         ));
     }
-    if !shades && info.fragment_output.blend.iter().any(reads_second_source) {
+    if !shades && graphics.fragment_output.blend.iter().any(reads_second_source) {
         return Err(Error::FeatureNotPresent(
             "a second source of blending (feature dualSrcBlend) with Gaussians and no fragment stage".into(),
         ));
     }
-    if info.pre_rasterization.viewport_count > 1 {
+    if graphics.pre_rasterization.viewport_count > 1 {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
             "viewportCount is greater than 1, but Gaussians go to one viewport",
@@ -570,8 +579,8 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
 }
 
 /// Validates and converts the chain's structure of footprints, if it has one.
-pub(super) fn footprint(info: &GraphicsState, features: &Features) -> Result<GaussianFootprint, Error> {
-    let Some(given) = info.pre_rasterization.footprint else {
+pub(super) fn footprint(graphics: &GraphicsState, features: &Features) -> Result<GaussianFootprint, Error> {
+    let Some(given) = graphics.pre_rasterization.footprint else {
         return Ok(GaussianFootprint::default());
     };
     let cut_off = values::cut_off(given.cut_off).ok_or_else(|| {
@@ -581,7 +590,7 @@ pub(super) fn footprint(info: &GraphicsState, features: &Features) -> Result<Gau
         )
     })?;
     if cut_off != GaussianCutOff::None {
-        require(features, CUT_OFF, "cutOff is not NONE")?;
+        require(features, &CUT_OFF, "cutOff is not NONE")?;
         values::CUT_OFF_DEVIATIONS.check(
             given.cut_off_deviations,
             "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
@@ -592,7 +601,7 @@ pub(super) fn footprint(info: &GraphicsState, features: &Features) -> Result<Gau
         "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
     )?;
     if given.compensation_floor != 0.0 {
-        require(features, COMPENSATION_FLOOR, "compensationFloor is not 0")?;
+        require(features, &COMPENSATION_FLOOR, "compensationFloor is not 0")?;
     }
     Ok(GaussianFootprint {
         cut_off,
@@ -602,16 +611,16 @@ pub(super) fn footprint(info: &GraphicsState, features: &Features) -> Result<Gau
 }
 
 /// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.
-pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximation, Error> {
+pub(super) fn approximation(graphics: &GraphicsState) -> Result<GaussianApproximation, Error> {
     use vk::DynamicState as S;
-    let given = info.pre_rasterization.approximation.unwrap_or_default();
+    let given = graphics.pre_rasterization.approximation.unwrap_or_default();
     let mut own = GaussianApproximation::default();
-    if !info.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
+    if !graphics.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
         let vuid = "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051";
         values::EXPONENTIAL_ERROR.check(given.exponential_error, vuid)?;
         own.exponential_error = given.exponential_error;
     }
-    if !info.is_dynamic(S::GAUSSIAN_CONTRIBUTION_BUDGET) {
+    if !graphics.is_dynamic(S::GAUSSIAN_CONTRIBUTION_BUDGET) {
         let vuid = "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052";
         values::CONTRIBUTION_BUDGET.check(given.contribution_budget, vuid)?;
         own.contribution_budget = given.contribution_budget;

@@ -1,6 +1,5 @@
 //! Builds programs: a cursor in a tree of blocks, with a method for each statement.
 
-mod contract;
 mod loop_exits;
 
 use std::collections::HashMap;
@@ -11,7 +10,6 @@ use crate::ir::{
     Address, AtomicOp, Axis, Binding, Block, Case, Constant, Format, Input, Label, MAX_NESTING, Output, Program, Rate,
     Reg, Register, Role, Statement, SubgroupOp, Type,
 };
-use contract::Products;
 
 /// Builds a [`Program`], statement by statement.
 ///
@@ -42,8 +40,6 @@ pub struct Builder {
     constants: HashMap<(Type, u64), Reg>,
     open: Vec<Frame>,
     labels: u32,
-    /// Products that sums may be fused with.
-    products: Products,
     misuse: Option<InvalidProgram>,
 }
 
@@ -52,6 +48,12 @@ pub struct Builder {
 struct Frame {
     before: Block,
     construct: Construct,
+}
+
+/// A construct that was closed, with the block that was built in it last.
+struct Closed {
+    frame: Frame,
+    block: Block,
 }
 
 #[derive(Debug)]
@@ -100,11 +102,6 @@ impl Builder {
     /// The type of a register of this builder; `B32` for one that isn't.
     pub fn type_of(&self, reg: Reg) -> Type {
         self.program.registers.get(reg.0 as usize).map_or(Type::B32, |register| register.ty)
-    }
-
-    /// The constant that a register holds, if it is one: its bits.
-    pub fn constant_bits(&self, reg: Reg) -> Option<u64> {
-        self.program.constants.iter().find(|constant| constant.reg == reg).map(|constant| constant.bits)
     }
 
     /// A constant of any type; see [`Constant::bits`]. Equal constants share a register.
@@ -179,54 +176,19 @@ impl Builder {
 
     /// Appends a statement unchanged.
     pub fn statement(&mut self, statement: Statement) {
-        if matches!(statement, Statement::Assign { .. }) {
-            self.products.end_segment();
-        }
         self.program.body.push(statement);
     }
 
     /// Appends `op(src...)` and returns its value.
     pub fn compute(&mut self, op: Op, src: &[Reg]) -> Reg {
-        let dst = self.value(op.signature().result);
+        let dst = self.value(op.signature().result_type);
         self.statement(Statement::Compute { op, dst, src: src.to_vec() });
         dst
-    }
-
-    /// Like [`Builder::compute`], where fusing is allowed (not under SPIR-V's `NoContraction`): `FAdd` and `FSub` of a
-    /// product that was itself computed by this method become `FFma`, `FMulSub` or `FNegMulAdd`. The product is removed
-    /// if nothing else uses it.
-    pub fn compute_contracted(&mut self, op: Op, src: &[Reg]) -> Reg {
-        if let Some((fused, operands)) = self.products.fuse(&self.program.registers, op, src) {
-            return self.compute(fused, &operands);
-        }
-        let result = self.compute(op, src);
-        if let (Op::FMul, &[x, y]) = (op, src) {
-            self.products.insert(result, [x, y]);
-        }
-        result
     }
 
     /// `dst = src` in the active lanes.
     pub fn assign(&mut self, dst: Reg, src: Reg) {
         self.statement(Statement::Assign { dst, src });
-    }
-
-    /// Parallel assignments: every source is read before any destination is written. (Phis of one block.)
-    pub fn assign_parallel(&mut self, pairs: &[(Reg, Reg)]) {
-        let mut pairs: Vec<(Reg, Reg)> = pairs.iter().copied().filter(|(dst, src)| dst != src).collect();
-        while !pairs.is_empty() {
-            let free = pairs.iter().position(|(dst, _)| !pairs.iter().any(|(_, src)| src == dst));
-            if let Some(free) = free {
-                let (dst, src) = pairs.swap_remove(free);
-                self.assign(dst, src);
-            } else {
-                // Only cycles are left: a copy breaks one.
-                let held = pairs[0].1;
-                let copy = self.variable(self.type_of(held));
-                self.assign(copy, held);
-                pairs[0].1 = copy;
-            }
-        }
     }
 
     /// The lane's index in the batch.
@@ -321,10 +283,10 @@ impl Builder {
     /// Closes the branch of lanes with true and opens that of lanes with false. Optional.
     pub fn begin_else(&mut self) {
         match self.pop() {
-            Some((before, Construct::Then { condition }, then)) => {
+            Some(Closed { frame: Frame { before, construct: Construct::Then { condition } }, block: then }) => {
                 self.open.push(Frame { before, construct: Construct::Else { condition, then } });
             }
-            other => self.put_back(other, "else without an open if"),
+            other => self.reopen(other, "else without an open if"),
         }
     }
 
@@ -338,10 +300,10 @@ impl Builder {
     /// Closes the body and opens what is done before the next iteration. Optional.
     pub fn begin_continuing(&mut self) {
         match self.pop() {
-            Some((before, Construct::LoopBody { label }, body)) => {
+            Some(Closed { frame: Frame { before, construct: Construct::LoopBody { label } }, block: body }) => {
                 self.open.push(Frame { before, construct: Construct::LoopContinuing { label, body } });
             }
-            other => self.put_back(other, "continuing without an open loop body"),
+            other => self.reopen(other, "continuing without an open loop body"),
         }
     }
 
@@ -355,12 +317,15 @@ impl Builder {
     /// Closes the previous case, if any, and opens one for these values, and for all others if `default`.
     pub fn begin_case(&mut self, values: &[u32], default: bool) {
         match self.pop() {
-            Some((before, Construct::Switch { label, selector, mut cases }, body)) => {
+            Some(Closed {
+                frame: Frame { before, construct: Construct::Switch { label, selector, mut cases } },
+                block: body,
+            }) => {
                 close_case(&mut cases, body);
                 cases.push(Case { values: values.to_vec(), default, body: Vec::new(), fallthrough: false });
                 self.open.push(Frame { before, construct: Construct::Switch { label, selector, cases } });
             }
-            other => self.put_back(other, "case without an open switch"),
+            other => self.reopen(other, "case without an open switch"),
         }
     }
 
@@ -384,7 +349,7 @@ impl Builder {
 
     /// Closes the innermost open construct.
     pub fn end(&mut self) {
-        let Some((before, construct, block)) = self.pop() else {
+        let Some(Closed { frame: Frame { before, construct }, block }) = self.pop() else {
             self.misuse("end without an open construct");
             return;
         };
@@ -472,22 +437,21 @@ impl Builder {
             self.misuse("constructs are nested too deeply");
             return;
         }
-        self.products.end_segment();
         let before = std::mem::take(&mut self.program.body);
         self.open.push(Frame { before, construct });
     }
 
-    /// Closes the innermost frame: what was before it, what it is, and the block built in it.
-    fn pop(&mut self) -> Option<(Block, Construct, Block)> {
-        self.products.end_segment();
-        let Frame { before, construct } = self.open.pop()?;
-        Some((before, construct, std::mem::take(&mut self.program.body)))
+    /// Closes the innermost construct.
+    fn pop(&mut self) -> Option<Closed> {
+        let frame = self.open.pop()?;
+        Some(Closed { frame, block: std::mem::take(&mut self.program.body) })
     }
 
-    fn put_back(&mut self, popped: Option<(Block, Construct, Block)>, problem: &'static str) {
+    /// Reports a misuse, and opens a construct again that was closed.
+    fn reopen(&mut self, closed: Option<Closed>, problem: &'static str) {
         self.misuse(problem);
-        if let Some((before, construct, block)) = popped {
-            self.open.push(Frame { before, construct });
+        if let Some(Closed { frame, block }) = closed {
+            self.open.push(frame);
             self.program.body = block;
         }
     }

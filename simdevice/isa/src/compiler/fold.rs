@@ -79,7 +79,7 @@ impl Folding {
     fn replacement(&mut self, op: Op, dst: Reg, src: &[Reg]) -> Option<Reg> {
         let known: Option<Vec<u64>> = src.iter().map(|reg| self.known.get(reg).copied()).collect();
         if let Some(operands) = known {
-            return Some(self.constant(op.signature().result, evaluate(self.level, op, &operands)));
+            return Some(self.constant(op.signature().result_type, evaluate(self.level, op, &operands)));
         }
         if let Some(same) = self.identity(op, src) {
             return Some(same);

@@ -52,7 +52,7 @@ pub struct Signature {
     /// The operands' types.
     pub operands: &'static [Type],
     /// The result's type.
-    pub result: Type,
+    pub result_type: Type,
 }
 
 macro_rules! type_of {
@@ -84,7 +84,7 @@ macro_rules! operations {
             /// Its operand and result types.
             pub fn signature(self) -> Signature {
                 match self {
-                    $(Self::$op => Signature { operands: &[$(type_of!($operand)),*], result: type_of!($result) },)*
+                    $(Self::$op => Signature { operands: &[$(type_of!($operand)),*], result_type: type_of!($result) },)*
                 }
             }
 

@@ -216,7 +216,7 @@ impl Checker<'_> {
                 let signature = op.signature();
                 require(src.len() == signature.operands.len(), || "wrong number of operands".into())?;
                 src.iter().zip(signature.operands).try_for_each(|(reg, ty)| self.expect(*reg, *ty))?;
-                self.expect(*dst, signature.result)
+                self.expect(*dst, signature.result_type)
             }
             Statement::Assign { dst, src } => self.expect(*src, self.type_of(*dst)?),
             Statement::LaneIndex { dst } => self.expect(*dst, Type::B32),
@@ -362,7 +362,7 @@ impl Checker<'_> {
             }
             SubgroupOp::Reduce { op, .. } | SubgroupOp::InclusiveScan(op) | SubgroupOp::ExclusiveScan(op) => {
                 require(is_reducible(op), || format!("{} doesn't reduce", op.name()))?;
-                is(op.signature().result)?;
+                is(op.signature().result_type)?;
                 source
             }
             _ => source,

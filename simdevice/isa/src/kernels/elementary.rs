@@ -350,14 +350,14 @@ fn atan<S: Simd>(x: F<S>) -> F<S> {
 #[inline(always)]
 fn atan2<S: Simd>(y: F<S>, x: F<S>) -> F<S> {
     let (ax, ay) = (x.abs(), y.abs());
-    let steep = ay.simd_gt(ax);
-    let (small, large) = (steep.select(ax, ay), steep.select(ay, ax));
+    let is_y_larger = ay.simd_gt(ax);
+    let (small, large) = (is_y_larger.select(ax, ay), is_y_larger.select(ay, ax));
     let equal = small.simd_eq(large);
     let zero = large.simd_eq(splat(x, 0.0));
     // 0/0 and infinity/infinity have an angle, too.
     let ratio = equal.select(zero.select(splat(x, 0.0), splat(x, 1.0)), small / large);
     let angle = atan_positive(ratio);
-    let angle = steep.select(splat(x, FRAC_PI_2) - angle, angle);
+    let angle = is_y_larger.select(splat(x, FRAC_PI_2) - angle, angle);
     let angle = x.is_sign_negative().select(splat(x, PI) - angle, angle);
     let angle = with_sign(angle, y);
     (x.is_nan() | y.is_nan()).select(splat(x, f32::NAN), angle)

@@ -25,7 +25,7 @@ pub fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
         file.set_constant(src[index], *ty, *bits);
     }
     dispatch!(level, simd => arithmetic::kernel(op)(simd, &file, place(0), &src));
-    match signature.result {
+    match signature.result_type {
         Type::Bool => u64::from(file.first::<bool>(place(0))),
         Type::B32 => u64::from(file.first::<u32>(place(0))),
         Type::B64 => file.first(place(0)),

@@ -85,7 +85,7 @@ fn run_steps<S: Simd>(
                     kernel(simd, &batch.file, *dst, src);
                 } else {
                     kernel(simd, &batch.file, *temporary, src);
-                    batch.assign(simd, *dst, *temporary, op.signature().result);
+                    batch.assign(simd, *dst, *temporary, op.signature().result_type);
                 }
             }
             Step::Assign { dst, src, ty } => batch.assign(simd, *dst, *src, *ty),

@@ -98,7 +98,7 @@ fn same(op: Op, got: u64, expected: u64) -> bool {
         return true;
     }
     let name = op.name();
-    match op.signature().result {
+    match op.signature().result_type {
         Type::B32 if name.starts_with('F') || name.ends_with('F') || op == Op::RoundToF16 => {
             let (a, b) = (f32::from_bits(got as u32), f32::from_bits(expected as u32));
             let half = op == Op::FToF16 && got & 0x7fff > 0x7c00 && expected & 0x7fff > 0x7c00;
@@ -132,7 +132,7 @@ fn check(case: &Case, op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
         .map(|(slot, (ty, rate))| b.input(slot as u32, *ty, *rate))
         .collect();
     let result = b.compute(op, &src);
-    let out = b.output(0, signature.result);
+    let out = b.output(0, signature.result_type);
     b.assign(out, result);
     let program = b.finish().expect("a valid program");
     let mut machine = machine(&program, level, LANES);
@@ -154,7 +154,7 @@ fn check(case: &Case, op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
         for lane in 0..LANES {
             let operands: Vec<u64> = (0..src.len()).map(|index| operand(lane, index)).collect();
             let expected = apply(op, &operands, fuses(name));
-            let got = match signature.result {
+            let got = match signature.result_type {
                 Type::B64 => machine.output64(0, lane),
                 _ => u64::from(machine.output(0, lane)),
             };
@@ -215,7 +215,7 @@ fn folding_gives_what_running_gives(case: &Case) {
         let as_bool = |bits: u64| u64::from(bits != 0);
         let folded = crate::kernels::evaluate(level, op, &operands);
         let expected = apply(op, &operands, fuses(name));
-        let expected = if op.signature().result == Type::Bool { as_bool(expected) } else { expected };
+        let expected = if op.signature().result_type == Type::Bool { as_bool(expected) } else { expected };
         assert!(same(op, folded, expected), "{} of {operands:x?} at {name}", op.name());
     }
 }

@@ -183,7 +183,10 @@ impl Grower {
             self.b.assign(dst, src);
         } else if self.random.once_in(4) {
             let [a, c] = [self.integer_variables[0], self.integer_variables[1]];
-            self.b.assign_parallel(&[(a, c), (c, a)]);
+            let held = self.b.variable(Type::B32);
+            self.b.assign(held, a);
+            self.b.assign(a, c);
+            self.b.assign(c, held);
         } else {
             let (dst, src) = (self.random.pick(&self.integer_variables), self.integer());
             self.b.assign(dst, src);

@@ -160,32 +160,3 @@ fn nothing_is_kept_that_nobody_reads() {
     assert_eq!(work.instructions.iter().sum::<u64>(), 2, "a product, and a sum that goes to the output");
     assert_eq!(work.occupancy(), 0.75);
 }
-
-#[gaurast_runner::test]
-fn contraction_fuses_products_unless_their_factors_have_changed() {
-    let fused = |change: bool, op: Op, product_first: bool| {
-        let mut b = Builder::new();
-        let [x, y, z] = [0, 1, 2].map(|slot| b.input(slot, Type::B32, Rate::Varying));
-        let held = b.variable(Type::B32);
-        b.assign(held, x);
-        let product = b.compute_contracted(Op::FMul, &[held, y]);
-        if change {
-            b.assign(held, z);
-        }
-        let operands = if product_first { [product, z] } else { [z, product] };
-        let sum = b.compute_contracted(op, &operands);
-        let out = b.output(0, Type::B32);
-        b.assign(out, sum);
-        let program = b.finish().expect("a valid program");
-        let mut machine = super::machine(&program, Level::new(), 16);
-        [3f32, 5.0, 7.0].iter().enumerate().for_each(|(slot, value)| machine.fill_input(slot as u32, value.to_bits()));
-        super::run(&mut machine, 16, &Resources::default());
-        let kinds = ["FFma", "FMulSub", "FNegMulAdd"];
-        (f32::from_bits(machine.output(0, 0)), kinds.iter().any(|kind| program.to_string().contains(kind)))
-    };
-    assert_eq!(fused(false, Op::FAdd, true), (22.0, true));
-    assert_eq!(fused(false, Op::FAdd, false), (22.0, true));
-    assert_eq!(fused(false, Op::FSub, true), (8.0, true));
-    assert_eq!(fused(false, Op::FSub, false), (-8.0, true));
-    assert_eq!(fused(true, Op::FAdd, true), (22.0, false));
-}

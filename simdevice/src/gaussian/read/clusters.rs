@@ -261,8 +261,9 @@ impl Cluster {
 mod tests {
     use super::*;
     use crate::format::Format;
-    use crate::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
+    use crate::packet::{AttributeStream, GaussianAttributes, ModelAttributes};
     use devmem::Allocation;
+    use devmem::BufferRange;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;

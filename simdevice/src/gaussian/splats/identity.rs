@@ -78,8 +78,8 @@ impl Origins {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packet::BufferRange;
     use devmem::Allocation;
+    use devmem::BufferRange;
 
     #[gaurast_runner::test]
     fn numbers_become_vertices_and_instances_of_their_draws() {

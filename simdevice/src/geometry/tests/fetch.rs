@@ -2,9 +2,10 @@
 
 use super::scene::*;
 use crate::format::{Channel, Format};
-use crate::packet::{AttributeStream, BufferRange};
+use crate::packet::AttributeStream;
 use crate::program::interface::{DrawPrograms, VertexInput, VertexOutput};
 use crate::state::Topology;
+use devmem::BufferRange;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

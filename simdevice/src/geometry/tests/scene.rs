@@ -8,7 +8,8 @@ use crate::program::vertex::DrawPipeline;
 use crate::runtime::Config;
 
 use crate::packet::*;
-use crate::packet::{AttributeStream, BufferRange, IndexStream};
+use crate::packet::{AttributeStream, IndexStream};
+use devmem::BufferRange;
 
 use crate::program::interface::{
     DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput, VertexOutput,

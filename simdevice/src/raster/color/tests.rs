@@ -52,7 +52,7 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations(case: &Case) {
     let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(19);
     for equation in [PREMULTIPLIED, STRAIGHT] {
-        let state = BlendState { equations: Some((equation, equation)), write_mask: 0xF };
+        let state = BlendState { equations: Some(BlendEquations::both(equation)), write_mask: 0xF };
         let kernel = ColorOutput::new(&state, None, [0.0; 4], Format::B8G8R8A8Unorm).unwrap();
         assert!(kernel.over.is_some());
         let general = ColorOutput { over: None, ..kernel.clone() };
@@ -81,7 +81,7 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations(case: &Case) {
 fn whole_blocks_of_wide_texels_are_what_their_lanes_are(case: &Case) {
     let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
-    for equations in [None, Some((PREMULTIPLIED, STRAIGHT))] {
+    for equations in [None, Some(BlendEquations { color: PREMULTIPLIED, alpha: STRAIGHT })] {
         let state = BlendState { equations, write_mask: 0xF };
         let format = Format::R32G32B32A32Sfloat;
         let output = ColorOutput::new(&state, None, [0.0; 4], format).unwrap();

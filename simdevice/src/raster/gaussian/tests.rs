@@ -20,6 +20,7 @@ use crate::stats::optimizations::Optimizations;
 use crate::stats::recorder::TileWork;
 use crate::{level_of, token_of};
 use devmem::Allocation;
+use devmem::BufferRange;
 use fearless_simd::f32x16;
 use gaurast_runner::{Case, simd_levels};
 use rand::{Rng, SeedableRng};

@@ -2,13 +2,12 @@
 
 use crate::format::Format;
 use crate::raster::color::clamp_range;
-use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use crate::state::{BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState};
 
 /// The blending of one attachment, prepared for many fragments.
 #[derive(Clone, Debug)]
 pub struct Blender {
-    /// The equations of colour and of alpha.
-    equations: Option<(BlendEquation, BlendEquation)>,
+    equations: Option<BlendEquations>,
     constants: [f32; 4],
     /// The range to which sources, destinations and constants are clamped.
     range: Option<(f32, f32)>,
@@ -37,7 +36,7 @@ impl Blender {
     pub fn blend_dual(&self, source: [f32; 4], second: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
         let blended = match self.equations {
             None => source,
-            Some((color, alpha)) => {
+            Some(BlendEquations { color, alpha }) => {
                 let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
                 let second = clamp(second, self.range);
                 let [r, g, b, _] = evaluate(color, s, second, d, self.constants);
@@ -181,7 +180,7 @@ mod tests {
     }
 
     fn blender(color: BlendEquation, alpha: BlendEquation, format: Format) -> Blender {
-        let state = BlendState { equations: Some((color, alpha)), write_mask: 0xF };
+        let state = BlendState { equations: Some(BlendEquations { color, alpha }), write_mask: 0xF };
         Blender::new(&state, CONSTANTS, format)
     }
 
@@ -231,7 +230,7 @@ mod tests {
     #[gaurast_runner::test]
     fn masked_components_and_zero_factors_keep_nothing_they_should_not() {
         let replace = BlendEquation { source: BlendFactor::One, destination: BlendFactor::Zero, op: BlendOp::Add };
-        let state = BlendState { equations: Some((replace, replace)), write_mask: 0b0101 };
+        let state = BlendState { equations: Some(BlendEquations::both(replace)), write_mask: 0b0101 };
         let blender = Blender::new(&state, CONSTANTS, Format::R32G32B32A32Sfloat);
         let blended = blender.blend([1.0, 2.0, 3.0, 4.0], [f32::INFINITY, 6.0, f32::NAN, 8.0]);
         assert_eq!(blended, [1.0, 6.0, 3.0, 8.0]);

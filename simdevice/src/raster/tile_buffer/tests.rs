@@ -135,7 +135,7 @@ fn means_of_bytes_are_those_of_the_format(case: &Case) {
     let mut plane = TileBuffer::new(32, Some(&target));
     for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
         plane.load_or_clear(&target, 0, &tile);
-        plane.resolve(level, &target, (&resolve, ResolveMode::Average), 0, &tile);
+        plane.resolve(level, &target, &resolve, ResolveMode::Average, 0, &tile);
     }
     for y in 0..17 {
         for x in 3..20 {

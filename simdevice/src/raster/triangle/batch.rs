@@ -423,8 +423,8 @@ impl Batch {
     ) -> bool {
         let perspective =
             interface.varyings.iter().any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
-        let divided = perspective && !self.affine;
-        if divided {
+        let divides = perspective && !self.affine;
+        if divides {
             self.divide(simd);
         }
         let at_centers = samples.positions.len() == 1 || samples.each_shaded;
@@ -437,20 +437,19 @@ impl Batch {
                     if interpolation != Interpolation::Flat && (at_centers || sampling != Sampling::Centroid) =>
                 {
                     let barycentrics = match interpolation {
-                        Interpolation::Perspective if divided => &self.perspective,
+                        Interpolation::Perspective if divides => &self.perspective,
                         _ => &self.barycentrics,
                     };
                     self.interpolate(simd, place, interface.varyings.len(), barycentrics, lanes);
                 }
                 _ => {
                     for (chunk, lanes) in lanes.iter_mut().enumerate() {
-                        let input = (kind, place);
-                        *lanes = Vector(self.input(simd, input, chunk, interface, samples));
+                        *lanes = Vector(self.input(simd, kind, place, chunk, interface, samples));
                     }
                 }
             }
         }
-        perspective && !divided
+        perspective && !divides
     }
 
     /// Interpolates a varying for all chunks of `out`.
@@ -495,7 +494,7 @@ impl Batch {
     fn perspective_at<S: Simd>(&self, simd: S, chunk: usize, [b1, b2, inverse_w]: [f32x16<S>; 3]) -> [f32x16<S>; 2] {
         let w1 = self.of_records(simd, chunk, |record| record.weights[0]);
         let w2 = self.of_records(simd, chunk, |record| record.weights[1]);
-        divided(simd, [b1, b2], inverse_w, [w1, w2])
+        perspective_correct(simd, [b1, b2], inverse_w, [w1, w2])
     }
 
     /// The barycentrics and 1 / w of each lane at a covered sample, or at the centre if all samples are covered.
@@ -526,7 +525,8 @@ impl Batch {
     fn input<S: Simd>(
         &self,
         simd: S,
-        (kind, place): (FragmentInput, usize),
+        kind: FragmentInput,
+        place: usize,
         chunk: usize,
         interface: &Interface,
         samples: Samples,
@@ -621,7 +621,7 @@ pub fn varying<S: Simd>([a, da, db]: [f32x16<S>; 3], [b1, b2]: [f32x16<S>; 2]) -
 
 /// Perspective-correct barycentrics, from the linear ones, 1 / w at the same place, and 1 / w at corners 1 and 2.
 #[inline(always)]
-pub fn divided<S: Simd>(
+pub fn perspective_correct<S: Simd>(
     simd: S,
     [b1, b2]: [f32x16<S>; 2],
     inverse_w: f32x16<S>,

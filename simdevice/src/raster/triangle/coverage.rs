@@ -66,7 +66,7 @@ impl<const N: usize> Coverage<N> {
         let (left, top) = (part.x - x, part.y - y);
         let (right, bottom) = (left + part.width as i32, top + part.height as i32);
         let mut crossings = [Crossing { edge: &setup.edges()[0], values: [0; N] }; 4];
-        let (mut count, mut steep) = (0, false);
+        let (mut count, mut is_wide) = (0, false);
         for edge in setup.edges() {
             let at = edge.a * i64::from(x) + edge.b * i64::from(y);
             let mut values = [0; N];
@@ -83,7 +83,7 @@ impl<const N: usize> Coverage<N> {
             if least + last * (edge.a.min(0) + edge.b.min(0)) < 0 {
                 crossings[count] = Crossing { edge, values };
                 count += 1;
-                steep |= edge.a.abs() + edge.b.abs() >= MAX_SLOPE;
+                is_wide |= edge.a.abs() + edge.b.abs() >= MAX_SLOPE;
             }
         }
         let crossings = &crossings[..count];
@@ -95,7 +95,7 @@ impl<const N: usize> Coverage<N> {
         }
         if count == 0 {
             self.lanes = [[u16::MAX; N]; 16];
-        } else if steep {
+        } else if is_wide {
             self.evaluate_wide(crossings);
         } else if self.blocks.count_ones() > 3 {
             self.evaluate_blocks(simd, crossings);
@@ -194,7 +194,7 @@ impl<const N: usize> Coverage<N> {
         }
     }
 
-    /// Evaluates every lane in 64 bits, for edges too steep for 32 bits.
+    /// Evaluates every lane in 64 bits, for edges whose slopes need more than 32 bits.
     #[cold]
     fn evaluate_wide(&mut self, crossings: &[Crossing<'_, N>]) {
         for block in bits(self.blocks) {

@@ -46,7 +46,7 @@ pub struct TriangleTileDraw<'a> {
     pub(super) draw: &'a PrimitiveDraw,
     /// The fragment program, if it must run.
     pub(super) stage: Option<&'a FragmentStage>,
-    pub(super) bindings: BoundResources<'a>,
+    pub(super) bound: BoundResources<'a>,
     pub(super) targets: Targets<'a>,
     pub(super) colors: Vec<Option<ColorOutput>>,
     pub(super) path: Path,
@@ -114,7 +114,7 @@ impl<'a> TriangleTileDraw<'a> {
         Self {
             draw,
             stage,
-            bindings: draw.bindings.bind(runtime.level()),
+            bound: draw.bindings.bind(runtime.level()),
             targets,
             colors,
             path,

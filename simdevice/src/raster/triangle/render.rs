@@ -125,6 +125,15 @@ struct PlacedTile {
     corner: [i32; 2],
 }
 
+/// A block of a tile of the macro-tile.
+#[derive(Clone, Copy)]
+struct PlacedBlock {
+    /// The index of the tile in the macro-tile.
+    tile: usize,
+    /// The index of the block in the tile.
+    block: usize,
+}
+
 /// A primitive during rasterization.
 struct RasterPrimitive<'p> {
     primitive: &'p Primitive,
@@ -169,7 +178,7 @@ impl Renderer<'_, '_> {
                 if !setup.prepare(simd, primitive, draw.samples.positions, clip.1, needs) {
                     continue;
                 }
-                let mut current = RasterPrimitive {
+                let mut raster = RasterPrimitive {
                     primitive,
                     varyings: &segment.varyings,
                     setup: &setup,
@@ -179,7 +188,7 @@ impl Renderer<'_, '_> {
                     range: self.depth_range(primitive),
                 };
                 let corner = [whole.x, whole.y];
-                self.primitive(simd, &mut current, &mut coverage, deferred, corner)?;
+                self.primitive(simd, &mut raster, &mut coverage, deferred, corner)?;
             }
         }
         if N == 1 && matches!(draw.path, Path::Deferred { .. }) {
@@ -202,12 +211,12 @@ impl Renderer<'_, '_> {
     fn primitive<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         coverage: &mut Coverage<N>,
         deferred: &mut DeferredTiles,
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
-        let bounds = current.setup.bounds;
+        let bounds = raster.setup.bounds;
         let first = [(bounds.x - corner[0]) / SIDE as i32, (bounds.y - corner[1]) / SIDE as i32];
         let last = [
             (bounds.x + bounds.width as i32 - 1 - corner[0]) / SIDE as i32,
@@ -219,14 +228,14 @@ impl Renderer<'_, '_> {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
                 let tile = (row as u32 * side + column as u32) as usize;
-                let found = coverage.find(simd, current.setup, x, y);
+                let found = coverage.find(simd, raster.setup, x, y);
                 if let Some(work) = &mut self.work {
                     let blocks = if found { coverage.blocks.count_ones() } else { 0 };
                     work.list(tile, blocks);
                 }
                 if found {
                     let tile = PlacedTile { index: tile, corner: [x, y] };
-                    self.tile(simd, current, coverage, deferred, tile)?;
+                    self.tile(simd, raster, coverage, deferred, tile)?;
                 }
             }
         }
@@ -238,7 +247,7 @@ impl Renderer<'_, '_> {
     fn tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         coverage: &Coverage<N>,
         deferred: &mut DeferredTiles,
         tile: PlacedTile,
@@ -249,7 +258,7 @@ impl Renderer<'_, '_> {
         }
         if let Some(tests) = &draw.early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
-            && self.is_hidden(simd, tests, current, tile)
+            && self.is_hidden(simd, tests, raster, tile)
         {
             if let Some(work) = &mut self.work {
                 work.hide(tile.index, coverage.blocks.count_ones());
@@ -258,16 +267,16 @@ impl Renderer<'_, '_> {
         }
         match draw.path {
             Path::Deferred { .. } | Path::WholeTiles if N == 1 && coverage.is_whole() => {
-                return self.whole_tile(simd, current, coverage, deferred, tile);
+                return self.whole_tile(simd, raster, coverage, deferred, tile);
             }
             Path::Deferred { .. } if N == 1 && deferred.is_deferred(tile.index) => {
                 self.shade_deferred(simd, deferred, tile.index)?;
                 // The batch may have been emptied.
-                current.record = None;
+                raster.record = None;
             }
             _ => {}
         }
-        self.blocks(simd, current, coverage, tile)
+        self.blocks(simd, raster, coverage, tile)
     }
 
     /// Processes a primitive's covered blocks of a tile: early tests, then the batch.
@@ -275,7 +284,7 @@ impl Renderer<'_, '_> {
     fn blocks<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         coverage: &Coverage<N>,
         tile: PlacedTile,
     ) -> Result<(), Stopped> {
@@ -293,14 +302,14 @@ impl Renderer<'_, '_> {
                     }
                 }
             }
-            let setup = current.setup;
+            let setup = raster.setup;
             let [x, y] = block_corner(tile.corner, block);
             let bases = setup.barycentrics(x, y);
             let needs_depth = draw.early.is_some() || draw.needs.depth;
             let mut values = BlockValues::of_depth(simd, setup, bases, needs_depth);
             if let Some(tests) = &draw.early {
                 let depth = values.depth;
-                self.test(simd, tests, current, depth, &mut lanes, (tile.index, block));
+                self.test(simd, tests, raster, depth, &mut lanes, PlacedBlock { tile: tile.index, block });
             }
             if let Some(work) = &mut self.work {
                 work.test(tile.index, &coverage.lanes[block], &lanes);
@@ -328,9 +337,9 @@ impl Renderer<'_, '_> {
             }
             let quad = Quad { tile: tile.index as u8, place: (block * 16) as u8, ..Quad::default() };
             if draw.samples.each_shaded {
-                self.append_samples(current, quad, &lanes, &values)?;
+                self.append_samples(raster, quad, &lanes, &values)?;
             } else {
-                self.append(current, quad, &lanes, &values)?;
+                self.append(raster, quad, &lanes, &values)?;
             }
         }
         Ok(())
@@ -340,7 +349,7 @@ impl Renderer<'_, '_> {
     #[inline(always)]
     fn append_samples<S: Simd, const N: usize>(
         &mut self,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         quad: Quad,
         lanes: &[u16; N],
         values: &BlockValues<S>,
@@ -351,8 +360,8 @@ impl Renderer<'_, '_> {
                 only[sample] = covered;
                 let quad = Quad { sample: sample as u8, ..quad };
                 let position = self.draw.samples.positions[sample];
-                let values = at_sample(values, current.setup, position);
-                self.append(current, quad, &only, &values)?;
+                let values = at_sample(values, raster.setup, position);
+                self.append(raster, quad, &only, &values)?;
             }
         }
         Ok(())
@@ -363,15 +372,15 @@ impl Renderer<'_, '_> {
     #[inline(always)]
     fn append<S: Simd, const N: usize>(
         &mut self,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         quad: Quad,
         lanes: &[u16; N],
         values: &BlockValues<S>,
     ) -> Result<(), Stopped> {
         if N == 1 && lanes[0] == u16::MAX && self.batch.count + 4 <= QUADS {
-            let record = match current.record {
+            let record = match raster.record {
                 Some(record) => record,
-                None => self.record(current),
+                None => self.record(raster),
             };
             let mut quads = [Quad { record, cover: 15, ..quad }; 4];
             for (number, quad) in quads.iter_mut().enumerate() {
@@ -393,11 +402,11 @@ impl Renderer<'_, '_> {
             }
             if self.batch.count == QUADS {
                 self.flush()?;
-                current.record = None;
+                raster.record = None;
             }
-            let record = match current.record {
+            let record = match raster.record {
                 Some(record) => record,
-                None => self.record(current),
+                None => self.record(raster),
             };
             let quad = Quad { place: quad.place + 4 * number as u8, record, cover, ..quad };
             self.batch.add(quad, number, &values);
@@ -405,12 +414,12 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    fn record(&mut self, current: &mut RasterPrimitive<'_>) -> u16 {
+    fn record(&mut self, raster: &mut RasterPrimitive<'_>) -> u16 {
         let Some(stage) = self.draw.stage else {
             return 0;
         };
-        let record = self.batch.add_primitive(current.primitive, current.setup, &stage.interface, current.varyings);
-        current.record = Some(record);
+        let record = self.batch.add_primitive(raster.primitive, raster.setup, &stage.interface, raster.varyings);
+        raster.record = Some(record);
         record
     }
 
@@ -420,12 +429,13 @@ impl Renderer<'_, '_> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &RasterPrimitive<'_>,
+        raster: &RasterPrimitive<'_>,
         at_centers: f32x16<S>,
         lanes: &mut [u16; N],
-        (tile, block): (usize, usize),
+        place: PlacedBlock,
     ) {
         let draw = self.draw;
+        let PlacedBlock { tile, block } = place;
         for (sample, lanes) in lanes.iter_mut().enumerate() {
             if *lanes == 0 {
                 continue;
@@ -433,20 +443,20 @@ impl Renderer<'_, '_> {
             let mut depth = at_centers;
             if N != 1 {
                 let [x, y] = draw.samples.positions[sample];
-                let [dx, dy] = current.setup.depth_slopes;
+                let [dx, dy] = raster.setup.depth_slopes;
                 depth += dx * offset(x) + dy * offset(y);
             }
-            let code = tests.code.encode(simd, depth, current.range);
+            let code = tests.code.encode(simd, depth, raster.range);
             let first = (tile * N + sample) * AREA + 16 * block;
             let quads = QuadAddresses::block(first);
-            *lanes = test(simd, tests, *lanes, current.primitive.front, code, &quads, self.buffers);
+            *lanes = test(simd, tests, *lanes, raster.primitive.front, code, &quads, self.buffers);
         }
     }
 
     /// True if a primitive fails the depth test in all of a tile. False if the mode or the optimizations do not allow
     /// this test.
     #[inline(always)]
-    fn is_hidden<S: Simd>(&mut self, simd: S, tests: &Tests, current: &RasterPrimitive<'_>, tile: PlacedTile) -> bool {
+    fn is_hidden<S: Simd>(&mut self, simd: S, tests: &Tests, raster: &RasterPrimitive<'_>, tile: PlacedTile) -> bool {
         let looks = tests.stencil.is_none()
             && self.draw.optimizations.has(Optimization::HierarchicalDepth)
             && tests.depth.is_some();
@@ -454,8 +464,8 @@ impl Renderer<'_, '_> {
             return false;
         }
         let [x, y] = tile.corner;
-        let bounds = current.setup.depth_bounds(x, y);
-        let (low, high) = current.range;
+        let bounds = raster.setup.depth_bounds(x, y);
+        let (low, high) = raster.range;
         let code = |depth: f32| tests.code.encode_one(depth.max(low).min(high));
         let stored = self.buffers.depth.range(simd, tile.index);
         let hidden = tests.hides(both(bounds, code), stored);
@@ -480,7 +490,7 @@ impl Renderer<'_, '_> {
         ));
         self.counters.add(Counter::BatchesAffine, affine.into());
         let watchdog = Watchdog { limit: draw.limit, cancel: Some(self.cancel) };
-        machine.run(&batch.active, &batch.helpers, &draw.bindings.resources(), watchdog)?;
+        machine.run(&batch.active, &batch.helpers, &draw.bound.resources(), watchdog)?;
         let lanes = (4 * batch.count - batch.helpers.count()) as u64;
         self.counters.add(Counter::FragmentInvocations, lanes);
         let killed = if stage.interface.discards { machine.killed() } else { isa::machine::LaneMask::none() };
@@ -574,7 +584,7 @@ impl Renderer<'_, '_> {
     fn whole_tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         coverage: &Coverage<N>,
         deferred: &mut DeferredTiles,
         tile: PlacedTile,
@@ -585,11 +595,11 @@ impl Renderer<'_, '_> {
             passed = 0;
             for (block, lanes) in lanes.iter_mut().enumerate() {
                 let [x, y] = block_corner(tile.corner, block);
-                let bases = current.setup.barycentrics(x, y);
-                let depth = BlockValues::of_depth(simd, current.setup, bases, true).depth;
+                let bases = raster.setup.barycentrics(x, y);
+                let depth = BlockValues::of_depth(simd, raster.setup, bases, true).depth;
                 let mut only = [*lanes];
-                let place = (tile.index, block);
-                self.test(simd, &draw.tests, current, depth, &mut only, place);
+                let place = PlacedBlock { tile: tile.index, block };
+                self.test(simd, &draw.tests, raster, depth, &mut only, place);
                 *lanes = only[0];
                 passed += u64::from(lanes.count_ones());
             }
@@ -597,7 +607,7 @@ impl Renderer<'_, '_> {
         self.samples_passed += passed;
         if passed == AREA as u64 {
             if matches!(draw.path, Path::Deferred { .. }) {
-                self.defer(current, deferred, tile.index);
+                self.defer(raster, deferred, tile.index);
                 return Ok(());
             }
             self.load_colors(tile.index, coverage);
@@ -605,20 +615,20 @@ impl Renderer<'_, '_> {
         if deferred.is_deferred(tile.index) {
             self.shade_deferred(simd, deferred, tile.index)?;
             // The batch may have been emptied.
-            current.record = None;
+            raster.record = None;
         }
-        self.shade_tile(simd, current, tile, &lanes)
+        self.shade_tile(simd, raster, tile, &lanes)
     }
 
     /// Defers a tile of a primitive whose samples all pass.
     #[inline(always)]
-    fn defer(&mut self, current: &mut RasterPrimitive<'_>, deferred: &mut DeferredTiles, tile: usize) {
+    fn defer(&mut self, raster: &mut RasterPrimitive<'_>, deferred: &mut DeferredTiles, tile: usize) {
         self.mark_colors_overwritten(tile);
-        let slot = match current.slot {
+        let slot = match raster.slot {
             Some(slot) => slot,
             None => {
-                let (segment, primitive) = current.place;
-                *current.slot.insert(deferred.add(current.setup, segment, primitive))
+                let (segment, primitive) = raster.place;
+                *raster.slot.insert(deferred.add(raster.setup, segment, primitive))
             }
         };
         if deferred.defer(tile, slot) {
@@ -634,7 +644,7 @@ impl Renderer<'_, '_> {
         let draw = self.draw;
         let segment = &draw.draw.segments[waiting.segment];
         let primitive = &segment.primitives[waiting.primitive as usize];
-        let mut current = RasterPrimitive {
+        let mut raster = RasterPrimitive {
             primitive,
             varyings: &segment.varyings,
             setup: &waiting.setup,
@@ -650,7 +660,7 @@ impl Renderer<'_, '_> {
         let tile = PlacedTile { index: tile, corner };
         simd.vectorize(
             #[inline(always)]
-            || self.shade_tile(simd, &mut current, tile, &[u16::MAX; BLOCKS]),
+            || self.shade_tile(simd, &mut raster, tile, &[u16::MAX; BLOCKS]),
         )
     }
 
@@ -659,13 +669,13 @@ impl Renderer<'_, '_> {
     fn shade_tile<S: Simd>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         tile: PlacedTile,
         lanes: &[u16; BLOCKS],
     ) -> Result<(), Stopped> {
         if self.draw.path.batches_tiles() && *lanes == [u16::MAX; BLOCKS] {
             self.load_colors_written(tile.index);
-            return self.shade_full_tile(simd, current, tile);
+            return self.shade_full_tile(simd, raster, tile);
         }
         let needs = self.draw.needs;
         let mut loaded = false;
@@ -675,13 +685,13 @@ impl Renderer<'_, '_> {
                 continue;
             }
             let corner = block_corner(tile.corner, block);
-            let values = BlockValues::new(simd, current.setup, corner, needs);
+            let values = BlockValues::new(simd, raster.setup, corner, needs);
             if !loaded {
                 self.load_colors_written(tile.index);
                 loaded = true;
             }
             let quad = Quad { tile: tile.index as u8, place: (block * 16) as u8, ..Quad::default() };
-            self.append(current, quad, &[lanes], &values)?;
+            self.append(raster, quad, &[lanes], &values)?;
         }
         Ok(())
     }
@@ -691,7 +701,7 @@ impl Renderer<'_, '_> {
     fn shade_full_tile<S: Simd>(
         &mut self,
         simd: S,
-        current: &mut RasterPrimitive<'_>,
+        raster: &mut RasterPrimitive<'_>,
         tile: PlacedTile,
     ) -> Result<(), Stopped> {
         let draw = self.draw;
@@ -701,17 +711,17 @@ impl Renderer<'_, '_> {
         // Earlier fragments of the tile are shaded first.
         if self.batch.has_tile(tile.index) {
             self.flush()?;
-            current.record = None;
+            raster.record = None;
         }
         let interface = &stage.interface;
         let full = &mut *self.full;
         full.attributes.clear();
-        let (primitive, varyings) = (current.primitive, current.varyings);
+        let (primitive, varyings) = (raster.primitive, raster.varyings);
         add_attributes(primitive, interface, varyings, &mut full.attributes);
-        let divides = draw.needs.inverse_w && !current.setup.affine;
+        let divides = draw.needs.inverse_w && !raster.setup.affine;
         if draw.needs.barycentrics {
             let needs = Needs { inverse_w: divides, ..draw.needs };
-            full.find_barycentrics(simd, current.setup, tile.corner, needs);
+            full.find_barycentrics(simd, raster.setup, tile.corner, needs);
         }
         let Some(machines) = self.machines.as_mut() else {
             return Ok(());
@@ -727,7 +737,7 @@ impl Renderer<'_, '_> {
         let undivided = draw.needs.inverse_w && !divides;
         self.counters.add(Counter::BatchesAffine, undivided.into());
         let watchdog = Watchdog { limit: draw.limit, cancel: Some(self.cancel) };
-        let resources = draw.bindings.resources();
+        let resources = draw.bound.resources();
         machine.run(&full.all, &full.none, &resources, watchdog)?;
         self.counters.add(Counter::FragmentInvocations, AREA as u64);
         for (index, output) in draw.colors.iter().enumerate() {

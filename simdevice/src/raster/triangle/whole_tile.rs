@@ -2,7 +2,7 @@
 //! may overwrite such a tile, it is deferred, and the earlier primitive is then never shaded there. If the only inputs
 //! of fragments are varyings, the tile is a batch that needs no list of quads.
 
-use super::batch::{BlockValues, LANES, divided, varying};
+use super::batch::{BlockValues, LANES, perspective_correct, varying};
 use super::setup::{Needs, TriangleSetup};
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::program::interface::Interpolation;
@@ -51,7 +51,7 @@ impl FullTile {
             }
             if needs.inverse_w {
                 let weights = both(setup.weights, |weight| f32x16::splat(simd, weight));
-                let [p1, p2] = divided(simd, values.barycentrics, values.inverse_w, weights);
+                let [p1, p2] = perspective_correct(simd, values.barycentrics, values.inverse_w, weights);
                 p1.store_slice(&mut self.perspective[0][pixels.clone()]);
                 p2.store_slice(&mut self.perspective[1][pixels]);
             }

@@ -1,7 +1,7 @@
 //! Tests of fetches, storage images, texel buffers and queries.
 
 use super::*;
-use crate::packet::BufferRange;
+use devmem::BufferRange;
 use isa::ir::AtomicOp;
 
 /// An access at these coordinates, lane by lane. Only as many lanes as coordinates are active.

@@ -1,11 +1,12 @@
 //! Sets of Gaussians in every mode, drawn with and without optimizations.
 
 use crate::common::{HEIGHT, OVER, WIDTH, attachment, bytes, clear, gaussians, gaussians_in, image, rendering, single};
+use simdevice::BufferRange;
 use simdevice::format::ClearValue;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::packet::{
-    AttachmentClear, AttributeStream, BufferRange, Draw, GaussianBegin, LoadOp, ModelAttributes, PrimitiveBindings,
+    AttachmentClear, AttributeStream, Draw, GaussianBegin, LoadOp, ModelAttributes, PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{

@@ -2,8 +2,9 @@
 
 use super::drawing::{draw_as_without_skips, programs};
 use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
+use simdevice::BufferRange;
 use simdevice::format::ClearValue;
-use simdevice::packet::{AttributeStream, BufferRange, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp};
+use simdevice::packet::{AttributeStream, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp};
 use simdevice::program::bindings::Bindings;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::resolve;

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 /// The margins around the axes in pixels: left, top, right, bottom.
-const ROOM: [f64; 4] = [62.0, 14.0, 14.0, 48.0];
+const MARGINS: [f64; 4] = [62.0, 14.0, 14.0, 48.0];
 /// The height of a line of the legend in pixels; below, the approximate width of a letter.
 const LINE: f64 = 16.0;
 const LETTER: f64 = 6.5;
@@ -58,7 +58,7 @@ pub struct Chart {
     /// Marks.
     pub marks: Vec<Mark>,
     /// The legend's place.
-    pub legend: Corner,
+    pub legend_corner: Corner,
 }
 
 /// Charts next to each other, as SVG.
@@ -100,7 +100,7 @@ impl Chart {
 
     /// The position of a step and a value, in pixels.
     fn place(&self, step: f64, value: f64) -> [f64; 2] {
-        let [left, top, right, bottom] = ROOM;
+        let [left, top, right, bottom] = MARGINS;
         let [width, height] = self.size.map(f64::from);
         let last = self.steps.len().saturating_sub(1) as f64;
         let across = (step + MARGIN) / (last + 2.0 * MARGIN);
@@ -118,7 +118,7 @@ impl Chart {
     }
 
     fn write_axes(&self, out: &mut String) -> std::fmt::Result {
-        let [left, top, right, bottom] = ROOM;
+        let [left, top, right, bottom] = MARGINS;
         let [width, height] = self.size.map(f64::from);
         let (base, end) = (height - bottom, width - right);
         let step = round_step(self.top());
@@ -170,8 +170,8 @@ impl Chart {
         let entries: Vec<_> = curves.chain(marks).collect();
         let longest = entries.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
         let [width, height] = [longest as f64 * LETTER + 40.0, entries.len() as f64 * LINE + 8.0];
-        let [left, top, right, bottom] = ROOM;
-        let [x, y] = match self.legend {
+        let [left, top, right, bottom] = MARGINS;
+        let [x, y] = match self.legend_corner {
             Corner::UpperLeft => [left + 8.0, top + 4.0],
             Corner::LowerRight => {
                 [f64::from(self.size[0]) - right - width - 8.0, f64::from(self.size[1]) - bottom - height - 8.0]
@@ -204,7 +204,7 @@ mod tests {
             steps: ["1", "2", "4"].map(str::to_owned).into(),
             curves: vec![Curve { label: "raster", color: "red", values: vec![0.0, 10.0, f64::NAN] }],
             marks: vec![Mark { label: "paper", color: "gray", step: 1 }],
-            legend: Corner::UpperLeft,
+            legend_corner: Corner::UpperLeft,
         }
     }
 
@@ -212,9 +212,9 @@ mod tests {
     fn values_are_where_the_axes_say() {
         let chart = chart();
         let [_, base] = chart.place(0.0, 0.0);
-        assert_eq!(base, 300.0 - ROOM[3]);
+        assert_eq!(base, 300.0 - MARGINS[3]);
         let [right, top] = chart.place(2.0 + MARGIN, 11.0);
-        assert!((right - (400.0 - ROOM[2])).abs() < 1e-9 && (top - ROOM[1]).abs() < 1e-9);
+        assert!((right - (400.0 - MARGINS[2])).abs() < 1e-9 && (top - MARGINS[1]).abs() < 1e-9);
         let text = svg(&[chart.clone(), chart]);
         // The third value is not a number.
         assert_eq!(text.matches("<circle").count(), 2 * 2);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 /// The margins around the axes in pixels: left, top, right, bottom.
-const ROOM: [f64; 4] = [68.0, 16.0, 24.0, 48.0];
+const MARGINS: [f64; 4] = [68.0, 16.0, 24.0, 48.0];
 /// The approximate number of marks on a linear axis.
 const MARKS: f64 = 6.0;
 
@@ -80,8 +80,8 @@ impl Axis {
             let mark = |power: i32| (f64::from(power), decade(power));
             return Scale { range, marks: decades.map(mark).collect() };
         }
-        let room = ((high - low) * 0.05).max(high.abs() * 1e-3).max(1e-9);
-        let (low, high) = (low - room, high + room);
+        let margin = ((high - low) * 0.05).max(high.abs() * 1e-3).max(1e-9);
+        let (low, high) = (low - margin, high + margin);
         let rough = (high - low) / MARKS;
         let power = 10f64.powf(rough.log10().floor());
         let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * power >= rough);
@@ -191,7 +191,7 @@ impl Plot {
             points.chain(lines.map(move |place| place[axis]))
         };
         let scales = [self.axes[0].scale(values(0)), self.axes[1].scale(values(1))];
-        let [left, top, right, bottom] = ROOM;
+        let [left, top, right, bottom] = MARGINS;
         let (base, end) = (height - bottom, width - right);
         let share = |axis: usize, place: f64| {
             let [low, high] = scales[axis].range;

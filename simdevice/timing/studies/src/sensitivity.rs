@@ -84,7 +84,7 @@ impl Sweep {
                 curve("whole frame", "#d66027", |result| result.speedup),
             ],
             marks: marks.into_iter().flatten().collect(),
-            legend: Corner::LowerRight,
+            legend_corner: Corner::LowerRight,
         }])
     }
 }

@@ -30,7 +30,7 @@ pub fn transform(
             points.push(std::array::from_fn(|k| t[k] + sign * (N + lambda).sqrt() * axis[k]));
         }
     }
-    if !points[1..].iter().all(|&point| is_seen(camera, t, point)) {
+    if !points[1..].iter().all(|&point| is_sigma_point_visible(camera, t, point)) {
         return None;
     }
     let center = mean_and_jacobian(camera, rules, t).0;
@@ -65,7 +65,7 @@ pub fn transform(
 /// True if a sigma point of a Gaussian at `t` is visible together with it. It must be beyond the near plane. For a
 /// fisheye it must be less than a right angle away, and the backward axis must be outside the cone of that angle about
 /// `t`. For a panorama the poles must be outside that cone.
-fn is_seen(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
+fn is_sigma_point_visible(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
     let cosine = dot(t, point);
     let sine = length(cross(t, point));
     let apart = sine.atan2(cosine);

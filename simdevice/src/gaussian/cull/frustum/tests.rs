@@ -12,12 +12,12 @@ use crate::gaussian::read::harmonics::{CoefficientReader, Harmonics};
 use crate::gaussian::splats::group::ProjectedGroup;
 use crate::gaussian::splats::surfel::Surfel;
 use crate::gaussian::view::visible::Visible;
-use crate::packet::{AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes};
+use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, ModelAttributes};
 use crate::runtime::SimdLevel;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState};
 use crate::stats::optimizations::Optimizations;
-use devmem::{Allocation, dispatch};
+use devmem::{Allocation, BufferRange, dispatch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::gaussian::splats::ray_depth::ordered_key;
+use crate::raster::gaussian::by_block::per_pixel::HELD;
 
 /// As [`naive_sample`](super::naive_sample), in the per-pixel order.
 pub(super) fn naive_sample(
@@ -73,7 +74,7 @@ fn it_equals_its_twin(case: &Case) {
     }
     // Everything contributes everywhere, in several passes.
     let state = GaussianState { alpha_floor: 0.0, transmittance_floor: 0.0, low_pass_variance: 0.0, ..state };
-    check(case, 23, 3 * by_block::per_pixel::HELD as u32, &state, WHOLE);
+    check(case, 23, 3 * HELD as u32, &state, WHOLE);
 }
 
 #[gaurast_runner::test]

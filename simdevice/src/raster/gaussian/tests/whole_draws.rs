@@ -10,7 +10,8 @@ use crate::raster::depth_stencil::apply;
 use crate::raster::tests::blender::Blender;
 use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
 use crate::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect, StencilFace, StencilOp,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
+    StencilFace, StencilOp,
 };
 use crate::stats::recorder::Recorder;
 use rand::seq::IndexedRandom;
@@ -102,7 +103,7 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
             stencil: rng.random_bool(0.5).then(|| [face(rng), face(rng)]),
         },
         blend: vec![BlendState {
-            equations: rng.random_bool(0.7).then_some((over, over)),
+            equations: rng.random_bool(0.7).then_some(BlendEquations::both(over)),
             write_mask: one_of(rng, &[0xF, 0xF, 0b0101]),
         }],
         ..defaults()

@@ -2,7 +2,7 @@
 //! be, or else the comparison would prove nothing.
 
 use super::*;
-use crate::compare::{Limits, Verdict, verdict};
+use crate::compare::{Accuracy, Limits};
 use crate::oracle::project::project;
 use crate::oracle::render_bounded;
 use crate::oracle::splat::Splat;
@@ -140,7 +140,7 @@ fn rotation(quaternion: [f32; 4]) -> [[f32; 3]; 3] {
 }
 
 /// Judges a binary32 rendering with the default state.
-fn judge(scene: &SceneBuffers, camera: &OracleCamera, carelessness: Carelessness) -> Verdict {
+fn accuracy_of(scene: &SceneBuffers, camera: &OracleCamera, carelessness: Carelessness) -> Accuracy {
     let state = OracleState::default();
     let input = scene.as_oracle();
     let mut records: Vec<Record> = (0..input.len())
@@ -169,7 +169,7 @@ fn judge(scene: &SceneBuffers, camera: &OracleCamera, carelessness: Carelessness
         })
         .collect();
     let reference = render_bounded(&input, camera, &state);
-    verdict(&image, &reference, Limits::ENVELOPE_ONLY)
+    Accuracy::of(&image, &reference, Limits::ENVELOPE_ONLY)
 }
 
 /// Long thin Gaussians in all directions, most of whose length may be outside the picture.
@@ -220,20 +220,20 @@ fn the_model_bounds_what_binary32_does() {
 fn careful_binary32_lies_within_the_envelope() {
     for seed in 0..4 {
         let camera = scenes::camera(96, 64);
-        let judged = judge(&scenes::cloud(seed, 1500, 0), &camera, Carelessness::None);
-        assert!(judged.holds(), "{judged}");
-        let judged = judge(&needles(seed), &camera, Carelessness::None);
-        assert!(judged.holds(), "{judged}");
+        let accuracy = accuracy_of(&scenes::cloud(seed, 1500, 0), &camera, Carelessness::None);
+        assert!(accuracy.holds(), "{accuracy}");
+        let accuracy = accuracy_of(&needles(seed), &camera, Carelessness::None);
+        assert!(accuracy.holds(), "{accuracy}");
     }
 }
 
 #[test]
 fn a_projection_in_binary32_is_enough_unless_there_are_needles() {
     let camera = scenes::camera(96, 64);
-    let judged = judge(&scenes::cloud(1, 1500, 0), &camera, Carelessness::Projection);
-    assert!(judged.holds(), "{judged}");
-    let judged = judge(&needles(2), &camera, Carelessness::Projection);
-    assert!(!judged.holds(), "{judged}");
+    let accuracy = accuracy_of(&scenes::cloud(1, 1500, 0), &camera, Carelessness::Projection);
+    assert!(accuracy.holds(), "{accuracy}");
+    let accuracy = accuracy_of(&needles(2), &camera, Carelessness::Projection);
+    assert!(!accuracy.holds(), "{accuracy}");
 }
 
 #[test]
@@ -245,15 +245,15 @@ fn a_mean_in_one_number_does_not() {
         position[1] *= 0.001;
         *scale = scale.map(|s| s / 100.0);
     }
-    let careful = judge(&scene, &camera, Carelessness::None);
+    let careful = accuracy_of(&scene, &camera, Carelessness::None);
     assert!(careful.holds(), "{careful}");
-    let careless = judge(&scene, &camera, Carelessness::Mean);
+    let careless = accuracy_of(&scene, &camera, Carelessness::Mean);
     assert!(!careless.holds(), "{careless}");
 }
 
 #[test]
 fn a_determinant_that_cancels_does_not() {
     let camera = scenes::camera(96, 64);
-    let careless = judge(&needles(1), &camera, Carelessness::Determinant);
+    let careless = accuracy_of(&needles(1), &camera, Carelessness::Determinant);
     assert!(!careless.holds(), "{careless}");
 }

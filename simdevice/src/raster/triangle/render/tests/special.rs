@@ -2,7 +2,8 @@
 //! end.
 
 use super::*;
-use crate::packet::{Attachment, BufferRange, Rendering};
+use crate::packet::{Attachment, AttachmentResolve, Rendering};
+use devmem::BufferRange;
 use isa::ir::{Address, AtomicOp, Binding, Format as Element, Space};
 use isa::machine::Stopped;
 use std::time::Duration;
@@ -116,7 +117,7 @@ fn centroids_lie_within_the_primitive() {
 fn primitives_go_to_their_layer_and_samples_are_resolved() {
     let (target, resolved) = (image(Format::R8G8B8A8Unorm, 4, 2), image(Format::R8G8B8A8Unorm, 1, 2));
     let mut color_attachment = attachment(&target, ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
-    color_attachment.resolve = Some((resolved.clone(), ResolveMode::Average));
+    color_attachment.resolve = Some(AttachmentResolve { view: resolved.clone(), mode: ResolveMode::Average });
     let pass = Rendering { layer_count: 2, view_mask: 0, ..rendering(vec![color_attachment]) };
     let corners = [[0, 0], [9000, 100], [100, 9000]];
     run(&single(), &pass, |device| {

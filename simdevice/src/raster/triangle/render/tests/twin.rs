@@ -156,7 +156,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
             height: rng.random_range(40..100),
         }];
         state.blend = vec![BlendState {
-            equations: rng.random_bool(0.6).then(|| (equation(rng), equation(rng))),
+            equations: rng.random_bool(0.6).then(|| BlendEquations { color: equation(rng), alpha: equation(rng) }),
             write_mask: one_of(rng, &[0xF, 0xF, 0xF, 0b0101, 0b1110, 0]),
         }];
         let count = rng.random_range(1..40);

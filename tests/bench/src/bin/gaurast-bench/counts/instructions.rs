@@ -86,7 +86,7 @@ pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), C
 
 /// Compares the instructions of a Gaussian frame through the Vulkan loader with those of the embedded driver.
 /// `manifest` is the path of the driver's JSON manifest.
-pub(super) fn compare_doors(report: &mut Report, manifest: &Path) -> Result<(), CountsError> {
+pub(super) fn compare_loader(report: &mut Report, manifest: &Path) -> Result<(), CountsError> {
     let workload = Workload::GaussiansSynthetic;
     let embedded = count(workload, None)?;
     let loaded = count(workload, Some(manifest))?;

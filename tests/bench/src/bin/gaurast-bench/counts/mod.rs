@@ -65,7 +65,7 @@ pub fn run(arguments: &CountsArguments) -> Result<(), CountsError> {
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     if let Some(manifest) = &arguments.loader {
         if can_count(instructions::obstacle_to_the_loader())? {
-            instructions::compare_doors(&mut report, manifest)?;
+            instructions::compare_loader(&mut report, manifest)?;
         }
     } else {
         if is_wanted(Part::Sizes) {

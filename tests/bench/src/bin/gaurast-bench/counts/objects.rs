@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast_render::device::Device;
+use gaurast_render::device::{Device, MemoryPreference};
 use gaurast_render::{During, RenderError};
 
 /// Objects of one device. They exist until no submission uses any of them.
@@ -52,10 +52,12 @@ impl Objects {
         self.images.push((image, vk::ImageView::null()));
         // SAFETY: the image is the device's.
         let requirements = unsafe { raw.get_image_memory_requirements(image) };
-        let none = vk::MemoryPropertyFlags::empty();
-        let wishes = [(vk::MemoryPropertyFlags::DEVICE_LOCAL, none), (none, none)];
-        let memory_type =
-            self.device.memory_type(requirements.memory_type_bits, &wishes).ok_or(RenderError::NoMemory("device"))?;
+        let preferences =
+            [vk::MemoryPropertyFlags::DEVICE_LOCAL, vk::MemoryPropertyFlags::empty()].map(MemoryPreference::having);
+        let memory_type = self
+            .device
+            .memory_type(requirements.memory_type_bits, &preferences)
+            .ok_or(RenderError::NoMemory("device"))?;
         let allocate_info =
             vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(memory_type);
         // SAFETY: the structure is valid.

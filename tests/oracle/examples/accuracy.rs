@@ -1,11 +1,11 @@
-//! A verdict on a picture of a scene: `verdict SCENE PICTURE.exr`. The picture holds premultiplied floats, as `gaurast SCENE -o
+//! The accuracy of a picture of a scene: `accuracy SCENE PICTURE.exr`. The picture holds premultiplied floats, as `gaurast SCENE -o
 //! PICTURE.exr` or another renderer writes them, and is seen by the camera that the `gaurast` command chooses.
 
 use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
-use gaurast_oracle::compare::{Limits, verdict};
+use gaurast_oracle::compare::{Accuracy, Limits};
 use gaurast_oracle::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_oracle::scenes::SceneBuffers;
 use gaurast_scene::camera::DEFAULT_FOV;
@@ -23,7 +23,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let buffers = SceneBuffers::from(&scene);
     // The state of the picture: 3DGS's defaults, in the order of view depth.
     let reference = render_bounded(&buffers.as_oracle(), &camera, &OracleState::default());
-    let verdict = verdict(&picture.pixels, &reference, Limits::CONTRACT);
-    println!("{verdict}");
-    Ok(if verdict.holds() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let accuracy = Accuracy::of(&picture.pixels, &reference, Limits::CONTRACT);
+    println!("{accuracy}");
+    Ok(if accuracy.holds() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

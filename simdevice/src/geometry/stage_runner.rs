@@ -36,19 +36,19 @@ impl<'a> StageRunner<'a> {
 
     /// Sets the vertices of primitive or patch number `group` of the batch, and the values of the patch. Each vertex has
     /// its values by number.
-    pub(super) fn take<'v>(&mut self, group: usize, vertices: impl Iterator<Item = &'v [u32]>, patch: &[u32]) {
-        let takes = &self.stage.takes;
-        let first = takes.start as usize + group * takes.stride as usize;
+    pub(super) fn set_vertices<'v>(&mut self, group: usize, vertices: impl Iterator<Item = &'v [u32]>, patch: &[u32]) {
+        let memory = &self.stage.input_memory;
+        let first = memory.start as usize + group * memory.stride as usize;
         let of = |values: &[u32], number: u32| values.get(number as usize).copied().unwrap_or(0);
         for (number, vertex) in vertices.enumerate() {
-            for value in &takes.values {
+            for value in &memory.values {
                 if let Some(stride) = value.vertex_stride {
                     let byte = first + value.offset as usize + number * stride as usize;
                     self.machine.set_workgroup_word(byte / 4, of(vertex, value.number));
                 }
             }
         }
-        let of_patch = takes.values.iter().filter(|value| value.vertex_stride.is_none());
+        let of_patch = memory.values.iter().filter(|value| value.vertex_stride.is_none());
         for value in of_patch {
             let byte = first + value.offset as usize;
             self.machine.set_workgroup_word(byte / 4, of(patch, value.number));
@@ -72,8 +72,8 @@ impl<'a> StageRunner<'a> {
         self.machine.run(&LaneMask::first(lanes), &LaneMask::none(), self.resources, self.environment.watchdog)
     }
 
-    /// A word that the program gave, by its first byte.
-    pub(super) fn given(&self, byte: u32) -> u32 {
+    /// A word of the program's output, by its first byte.
+    pub(super) fn output_word(&self, byte: u32) -> u32 {
         self.machine.workgroup_word(byte as usize / 4)
     }
 }

@@ -3,7 +3,7 @@
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::for_levels::ForLevels;
 use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target};
-use gaurast_tests::compare::{Limits, assert_contract, verdict};
+use gaurast_tests::compare::{Accuracy, Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_binary16, render_bounded};
 
 use super::scenes::{Stress, all};
@@ -53,8 +53,8 @@ fn every_scene_keeps_its_limit(case: &Case) {
         let image = draw(&gpu, &stress);
         let name = format!("{}, {}", stress.name, case.variant());
         assert_sane(&name, &image);
-        let judged = std::panic::catch_unwind(|| assert_contract(&name, &image, &reference, limits));
-        if judged.is_err() {
+        let result = std::panic::catch_unwind(|| assert_contract(&name, &image, &reference, limits));
+        if result.is_err() {
             failures.push(format!("{name}, since {}", stress.reason));
         }
     }
@@ -76,9 +76,9 @@ fn binary16_is_as_defined(case: &Case) {
             render_binary16(&stress.scene.as_oracle(), &camera, &state)
         });
         let limits = Limits { distance: 0.0, ..Limits::ENVELOPE_ONLY };
-        let judged = verdict(&draw(&gpu, &stress), &reference, limits);
-        if !judged.holds() || judged.exhausted > 0 {
-            failures.push(format!("{}: {judged}", stress.name));
+        let accuracy = Accuracy::of(&draw(&gpu, &stress), &reference, limits);
+        if !accuracy.holds() || accuracy.exhausted > 0 {
+            failures.push(format!("{}: {accuracy}", stress.name));
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");

@@ -1,4 +1,4 @@
-//! The accuracy contract as a judgement: an image keeps it or does not.
+//! The accuracy contract: an image keeps its limits or does not.
 
 use std::fmt;
 use std::path::Path;
@@ -27,10 +27,10 @@ impl Limits {
     pub const ENVELOPE_ONLY: Self = Self { other_branch: 1.0, undecidable: 1.0, ..Self::CONTRACT };
 }
 
-/// The result of judging an image by a reference.
+/// The accuracy of an image, measured against a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
-    /// The limits by which it was judged.
+pub struct Accuracy {
+    /// The limits that it is held to.
     pub limits: Limits,
     /// Pixels of the image.
     pub pixels: usize,
@@ -51,7 +51,41 @@ pub struct Verdict {
     pub exhausted: usize,
 }
 
-impl Verdict {
+impl Accuracy {
+    /// The accuracy of `image`, which has as many pixels as `reference`.
+    pub fn of(image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Self {
+        assert_eq!(image.len(), reference.nominal.len(), "the sizes differ");
+        let mut accuracy = Self {
+            limits,
+            pixels: image.len(),
+            max_distance: 0.0,
+            worst_pixel: [0, 0],
+            outside: 0,
+            other_branch: 0,
+            between_branches: 0,
+            undecidable: reference.alternatives.len(),
+            exhausted: reference.exhausted,
+        };
+        for (index, rgba) in image.iter().enumerate() {
+            let distance = distance_from_envelope(*rgba, reference, index);
+            if distance > accuracy.max_distance {
+                accuracy.max_distance = distance;
+                let index = index as u32;
+                accuracy.worst_pixel = [index % reference.width, index / reference.width];
+            }
+            if distance > limits.distance {
+                accuracy.outside += 1;
+            } else if took_other_branch(*rgba, reference, index, limits.distance) {
+                accuracy.other_branch += 1;
+                let matches = |outcome: &[f64; 4]| distance_between(*rgba, *outcome) <= limits.distance;
+                if !reference.outcomes(index).any(matches) {
+                    accuracy.between_branches += 1;
+                }
+            }
+        }
+        accuracy
+    }
+
     /// True if the image keeps all limits.
     pub fn holds(&self) -> bool {
         let share = |count: usize| count as f64 / self.pixels as f64;
@@ -61,7 +95,7 @@ impl Verdict {
     }
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for Accuracy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |count: usize| 100.0 * count as f64 / self.pixels as f64;
         let [x, y] = self.worst_pixel;
@@ -87,54 +121,20 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Judges `image`, which has as many pixels as `reference`.
-pub fn verdict(image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Verdict {
-    assert_eq!(image.len(), reference.nominal.len(), "the sizes differ");
-    let mut verdict = Verdict {
-        limits,
-        pixels: image.len(),
-        max_distance: 0.0,
-        worst_pixel: [0, 0],
-        outside: 0,
-        other_branch: 0,
-        between_branches: 0,
-        undecidable: reference.alternatives.len(),
-        exhausted: reference.exhausted,
-    };
-    for (index, rgba) in image.iter().enumerate() {
-        let distance = distance_from_envelope(*rgba, reference, index);
-        if distance > verdict.max_distance {
-            verdict.max_distance = distance;
-            let index = index as u32;
-            verdict.worst_pixel = [index % reference.width, index / reference.width];
-        }
-        if distance > limits.distance {
-            verdict.outside += 1;
-        } else if took_other_branch(*rgba, reference, index, limits.distance) {
-            verdict.other_branch += 1;
-            let matches = |outcome: &[f64; 4]| distance_between(*rgba, *outcome) <= limits.distance;
-            if !reference.outcomes(index).any(matches) {
-                verdict.between_branches += 1;
-            }
-        }
-    }
-    verdict
-}
-
-/// Panics with the verdict unless the image keeps the limits, and leaves a picture of the
+/// Panics with the accuracy unless the image keeps the limits, and leaves a picture of the
 /// difference in `target/differences/<name>.png`.
 #[track_caller]
-pub fn assert_contract(name: &str, image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Verdict {
-    let verdict = verdict(image, reference, limits);
-    if !verdict.holds() {
+pub fn assert_contract(name: &str, image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Accuracy {
+    let accuracy = Accuracy::of(image, reference, limits);
+    if !accuracy.holds() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/differences").join(format!("{name}.png"));
         let picture = match write_difference(&path, image, reference, limits.distance) {
             Ok(()) => format!("see {}", path.display()),
             Err(error) => format!("no picture: {error}"),
         };
-        panic!("{name} {verdict}; {picture}");
+        panic!("{name} {accuracy}; {picture}");
     }
-    verdict
+    accuracy
 }
 
 #[cfg(test)]
@@ -159,10 +159,10 @@ mod tests {
     #[test]
     fn the_same_image_holds() {
         let reference = reference();
-        let verdict = verdict(&reference.to_f32(), &reference, Limits::CONTRACT);
-        assert!(verdict.holds(), "{verdict}");
-        assert_eq!((verdict.max_distance, verdict.outside), (0.0, 0));
-        assert_eq!((verdict.other_branch, verdict.undecidable), (0, 1));
+        let accuracy = Accuracy::of(&reference.to_f32(), &reference, Limits::CONTRACT);
+        assert!(accuracy.holds(), "{accuracy}");
+        assert_eq!((accuracy.max_distance, accuracy.outside), (0.0, 0));
+        assert_eq!((accuracy.other_branch, accuracy.undecidable), (0, 1));
     }
 
     #[test]
@@ -171,10 +171,10 @@ mod tests {
         for (value, holds) in [(0.500004, true), (0.500006, false), (0.499994, false), (f32::NAN, false)] {
             let mut image = reference.to_f32();
             image[123][2] = value;
-            let verdict = verdict(&image, &reference, Limits::CONTRACT);
-            assert_eq!(verdict.holds(), holds, "{verdict}");
-            assert_eq!(verdict.worst_pixel, [23, 1]);
-            assert_eq!(verdict.outside, usize::from(!holds));
+            let accuracy = Accuracy::of(&image, &reference, Limits::CONTRACT);
+            assert_eq!(accuracy.holds(), holds, "{accuracy}");
+            assert_eq!(accuracy.worst_pixel, [23, 1]);
+            assert_eq!(accuracy.outside, usize::from(!holds));
         }
     }
 
@@ -184,13 +184,13 @@ mod tests {
         for (rgba, between) in [([0.25, 0.5, 0.25, 0.25], 0), ([0.4, 0.5, 0.4, 0.4], 1)] {
             let mut image = reference.to_f32();
             image[7] = rgba;
-            let verdict = verdict(&image, &reference, Limits::CONTRACT);
-            assert!(verdict.holds(), "{verdict}");
-            assert_eq!((verdict.other_branch, verdict.between_branches), (1, between));
+            let accuracy = Accuracy::of(&image, &reference, Limits::CONTRACT);
+            assert!(accuracy.holds(), "{accuracy}");
+            assert_eq!((accuracy.other_branch, accuracy.between_branches), (1, between));
         }
         let mut image = reference.to_f32();
         image[7] = [0.2; 4];
-        assert!(!verdict(&image, &reference, Limits::ENVELOPE_ONLY).holds());
+        assert!(!Accuracy::of(&image, &reference, Limits::ENVELOPE_ONLY).holds());
     }
 
     #[test]
@@ -201,20 +201,20 @@ mod tests {
         }
         // 1.01 % undecidable.
         let image = reference.to_f32();
-        assert!(!verdict(&image, &reference, Limits::CONTRACT).holds());
-        assert!(verdict(&image, &reference, Limits::ENVELOPE_ONLY).holds());
+        assert!(!Accuracy::of(&image, &reference, Limits::CONTRACT).holds());
+        assert!(Accuracy::of(&image, &reference, Limits::ENVELOPE_ONLY).holds());
         // 0.03 % on another branch.
         reference.alternatives.retain(|&index, _| index < 50);
         let mut image = reference.to_f32();
         image[10..13].fill([0.25; 4]);
-        let judged = verdict(&image, &reference, Limits::CONTRACT);
-        assert_eq!(judged.other_branch, 3);
-        assert!(!judged.holds());
+        let accuracy = Accuracy::of(&image, &reference, Limits::CONTRACT);
+        assert_eq!(accuracy.other_branch, 3);
+        assert!(!accuracy.holds());
     }
 
     #[test]
     #[should_panic(expected = "fails")]
-    fn assert_contract_panics_with_the_verdict() {
+    fn assert_contract_panics_with_the_accuracy() {
         let reference = reference();
         let mut image = reference.to_f32();
         image[0][0] = 1.0;
