@@ -150,8 +150,8 @@ impl CommandProcessor {
                 let views = pass.views().enumerate();
                 self.gaussians = views
                     .map(|(number, view)| {
-                        let view = (number, view.unwrap_or(0));
-                        GaussianSet::begin_view(begin, view, area, depth)
+                        let layer = view.unwrap_or(0);
+                        GaussianSet::begin_view(begin, number, layer, area, depth)
                     })
                     .collect();
                 Ok(())
@@ -166,9 +166,9 @@ impl CommandProcessor {
                 sets.iter_mut().for_each(|set| set.append_draw(draw));
                 Ok(())
             }
-            Packet::GaussianFragmentStage(shader) => {
+            Packet::GaussianFragmentStage(fragment_stage) => {
                 let sets = self.gaussian_set()?;
-                sets.iter_mut().for_each(|set| set.shade_fragments(shader));
+                sets.iter_mut().for_each(|set| set.shade_fragments(fragment_stage));
                 Ok(())
             }
             Packet::GaussianEnd => {

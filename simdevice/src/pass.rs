@@ -401,10 +401,10 @@ impl Flush<'_> {
                 }
                 Ready::Gaussians(draw) if layer == draw.layer() => {
                     let buffers = &mut worker.buffers;
-                    let fragments = worker.gaussians.get_or_insert_default();
+                    let gaussian_tile = worker.gaussians.get_or_insert_default();
                     for tile in tiles() {
                         let counters = &mut worker.counters;
-                        draw.render(&tile, buffers, fragments, counters, &self.cancel)?;
+                        draw.render(&tile, buffers, gaussian_tile, counters, &self.cancel)?;
                     }
                 }
                 Ready::Gaussians(_) => {}

@@ -1,23 +1,45 @@
 //! Vectors and matrices of three dimensions in binary64, without fused operations.
 
+/// A map of space: a matrix, and the translation after it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Affine {
+    pub(crate) linear: Linear,
+    pub(crate) translation: [f64; 3],
+}
+
+/// The inverse of a matrix.
+pub(crate) struct Inverse {
+    pub(crate) matrix: Linear,
+    /// The condition number: the product of both matrices' Frobenius norms.
+    pub(crate) condition: f64,
+}
+
 /// The rows of a matrix without its translation.
 pub(crate) type Linear = [[f64; 3]; 3];
 
 /// A matrix is singular if its determinant is not greater than this times the product of its rows' lengths.
 const SINGULAR: f64 = 1.0 / (1u64 << 40) as f64;
 
+/// The dot product.
+#[inline]
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The cross product.
+#[inline]
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// The length of a vector.
+#[inline]
 pub(crate) fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// True if a matrix is singular, or almost.
+#[inline]
 pub(crate) fn is_singular(a: Linear) -> bool {
     let determinant = dot(a[0], cofactors(a)[0]).abs();
     let lengths = a.map(|row| dot(row, row).sqrt());
@@ -25,22 +47,24 @@ pub(crate) fn is_singular(a: Linear) -> bool {
     !regular
 }
 
-/// The inverse of a matrix and its condition number, the product of both matrices' Frobenius norms. Neither is finite
-/// for a matrix of determinant zero.
-pub(crate) fn inverse(a: Linear) -> (Linear, f64) {
+/// The inverse of a matrix. Neither it nor its condition number is finite for a matrix of determinant zero.
+#[inline]
+pub(crate) fn inverse(a: Linear) -> Inverse {
     let columns = cofactors(a);
     let determinant = dot(a[0], columns[0]);
     let inverse = [0, 1, 2].map(|row| columns.map(|column| column[row] / determinant));
     let norm = |a: Linear| a.map(|row| dot(row, row)).iter().sum::<f64>().sqrt();
-    (inverse, norm(a) * norm(inverse))
+    Inverse { matrix: inverse, condition: norm(a) * norm(inverse) }
 }
 
 /// The columns of the inverse, times the determinant.
+#[inline]
 pub(crate) fn cofactors(a: Linear) -> Linear {
     [cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])]
 }
 
 /// The axes of a quaternion's rotation in the world: the columns of its matrix.
+#[inline]
 pub(crate) fn axes(rotation: [f64; 4]) -> [[f64; 3]; 3] {
     let largest = rotation.iter().fold(0.0f64, |a, c| a.max(c.abs()));
     let scaled = rotation.map(|c| c / largest);

@@ -58,7 +58,7 @@ pub(crate) fn preprocess(
             optimizations,
         )
     };
-    let preprocessor = Preprocessor { runtime, constants: &constants, is_flat: set.is_flat() };
+    let preprocessor = Preprocessor { runtime, constants: &constants, is_surfel: set.has_surfels() };
     let mut by_device = Counters::default();
     let map = preprocessor.occlusion(set, clusters);
     let tasks = group_tasks(set, clusters, &constants, map.as_ref(), &mut by_device)?;
@@ -93,7 +93,7 @@ fn counted(groups: &[ProjectedGroup]) -> Counters {
 struct Preprocessor<'a> {
     runtime: &'a Runtime,
     constants: &'a ViewConstants,
-    is_flat: bool,
+    is_surfel: bool,
 }
 
 impl Preprocessor<'_> {
@@ -127,16 +127,16 @@ impl Preprocessor<'_> {
     /// Reads, culls and projects one group.
     fn task(&self, worker: &mut Worker, task: &GroupTask<'_>) -> ProjectedGroup {
         let Worker { fetcher, attributes, matrices, scratch } = worker;
-        let mut out = ProjectedGroup::default();
+        let mut projected = ProjectedGroup::default();
         let constants = self.constants;
-        let group = task.source.read(fetcher, attributes, matrices, self.is_flat);
+        let group = task.source.read(fetcher, attributes, matrices, self.is_surfel);
         let frustum = task.frustum_of(&group, constants);
         let sequence = task.source.sequence();
         dispatch!(self.runtime.level(), simd => {
-            let kept = cull(constants, simd, &group, frustum.as_deref(), &mut out.counters);
-            project(constants, simd, &group, &kept, scratch, sequence, &mut out);
+            let kept = cull(constants, simd, &group, frustum.as_deref(), &mut projected.counters);
+            project(constants, simd, &group, &kept, scratch, sequence, &mut projected);
         });
-        out
+        projected
     }
 }
 

@@ -72,7 +72,7 @@ impl Key {
             bounds: set.bounds,
             layer: set.layer,
             depth: set.depth.as_ref().map(|_| set.depth_format),
-            is_resolved: set.resolve.is_some(),
+            is_resolved: set.fragment_stage.is_some(),
             is_tracked: set.is_tracked(),
         })
     }
@@ -89,11 +89,11 @@ impl Key {
         view(self) == view(other)
             && self.state == other.state
             && all(&self.streams, &other.streams)
-            && self.has_same_batches(other)
+            && self.has_same_appends(other)
     }
 
     /// True if both have the same appends with the same clusters.
-    fn has_same_batches(&self, other: &Self) -> bool {
+    fn has_same_appends(&self, other: &Self) -> bool {
         let mut clusters = self.clusters.iter().zip(&other.clusters);
         let same = self.ranges == other.ranges && self.activations == other.activations;
         same && clusters.all(|(a, b)| a.ptr_eq(b))

@@ -22,7 +22,7 @@ pub struct GaussianSet {
     pub(crate) depth: Option<CenterDepth>,
     /// The format to which depths are rounded.
     pub(crate) depth_format: Format,
-    pub(crate) resolve: Option<GaussianFragmentStage>,
+    pub(crate) fragment_stage: Option<GaussianFragmentStage>,
     pub(crate) appends: Vec<GaussianAppend>,
     /// The draws that a vertex program projects. They come after the appends.
     pub(crate) draws: Vec<Draw>,
@@ -74,15 +74,15 @@ impl GaussianSet {
                 .filter(|_| begin.state.depth_stencil.depth.is_some())
                 .map(|format| center_depth(begin, format)),
             depth_format: depth.unwrap_or(Format::D32Sfloat),
-            resolve: None,
+            fragment_stage: None,
             appends: Vec::new(),
             draws: Vec::new(),
         }
     }
 
-    /// Starts the set of view `layer`, with the camera of the pass's view number `number`.
-    pub fn begin_view(begin: &GaussianBegin, (number, layer): (usize, u32), area: Rect, depth: Option<Format>) -> Self {
-        let own = number.checked_sub(1);
+    /// Starts the set that is drawn to `layer`, with the camera of the pass's view number `view`.
+    pub fn begin_view(begin: &GaussianBegin, view: usize, layer: u32, area: Rect, depth: Option<Format>) -> Self {
+        let own = view.checked_sub(1);
         let camera = own.and_then(|number| begin.further_cameras.get(number));
         let begin = GaussianBegin {
             camera: camera.copied().unwrap_or(begin.camera),
@@ -100,17 +100,17 @@ impl GaussianSet {
     }
 
     /// Lets a fragment program compute the colours of the set's fragments.
-    pub fn shade_fragments(&mut self, shader: &GaussianFragmentStage) {
-        if shader.program.reads_depth() {
+    pub fn shade_fragments(&mut self, fragment_stage: &GaussianFragmentStage) {
+        if fragment_stage.program.reads_depth() {
             self.depth = Some(center_depth(&self.begin, self.depth_format));
         }
-        self.resolve = Some(shader.clone());
+        self.fragment_stage = Some(fragment_stage.clone());
     }
 
     /// Adds Gaussians that a vertex program projects.
     pub fn append_draw(&mut self, draw: &Draw) {
         if draw.count > 0 && draw.instance_count > 0 {
-            self.draws.push(draw.clone());
+            host::push(&mut self.draws, draw.clone());
         }
     }
 
@@ -127,12 +127,12 @@ impl GaussianSet {
 
     /// True if a fragment program reads indices of Gaussians, or depth variables.
     pub(crate) fn is_tracked(&self) -> bool {
-        let shader = self.resolve.as_ref();
-        shader.is_some_and(|shader| shader.program.is_tracking())
+        let stage = self.fragment_stage.as_ref();
+        stage.is_some_and(|stage| stage.program.is_tracking())
     }
 
     /// True if the set is of 2D Gaussians.
-    pub(crate) fn is_flat(&self) -> bool {
+    pub(crate) fn has_surfels(&self) -> bool {
         self.begin.state.geometry == GaussianGeometry::Surfel
     }
 }

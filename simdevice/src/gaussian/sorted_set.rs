@@ -28,7 +28,7 @@ const LEAST_GROUPS: usize = 64;
 /// A set after projection, sort and binning. Rasterization does not change it.
 #[derive(Debug)]
 pub(crate) struct SortedSet {
-    /// The splats by group; [`locate`](super::splat::locate) takes an index apart.
+    /// The splats by group; see [`SplatIndex`](super::splats::splat::SplatIndex).
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
     /// The 2D Gaussians by group, in the order of the splats, if the set has them.
@@ -54,7 +54,7 @@ pub struct BinnedDraw {
     /// The optimizations that are enabled in its tiles.
     pub(crate) optimizations: Optimizations,
     /// The fragment program that computes colours, if there is one.
-    pub(crate) resolve: Option<GaussianFragmentStage>,
+    pub(crate) fragment_stage: Option<GaussianFragmentStage>,
     /// The encoding of depths.
     pub(crate) depth_unit: DepthEncoding,
     /// The trend of depths along a tile's list.
@@ -90,7 +90,7 @@ impl SortedSet {
             })
             .unzip_into_vecs(&mut splats, &mut others);
         let surfels = others.iter_mut().map(|others| std::mem::take(&mut others.0));
-        let surfels = set.is_flat().then(|| host::collect(surfels));
+        let surfels = set.has_surfels().then(|| host::collect(surfels));
         let is_per_pixel = set.begin.state.order == GaussianOrder::PerPixel;
         let identities = others.iter_mut().map(|others| std::mem::take(&mut others.2));
         let identities = set.is_tracked().then(|| host::collect(identities));
@@ -135,7 +135,7 @@ impl BinnedDraw {
                 _ => DepthTrend::None,
             },
             depth_unit: set.depth.map_or(DepthEncoding::Float, |depth| depth.unit()),
-            resolve: set.resolve,
+            fragment_stage: set.fragment_stage,
             half_period: period(&begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
             rays: PixelRays::new(&begin.camera, &begin.viewport),
             state: begin.state,
@@ -164,8 +164,8 @@ impl BinnedDraw {
 
     /// The depths that pixels sort by, if each pixel sorts for itself.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
-        let of = self.sorted.ray_depths.as_ref()?;
-        Some(RayDepths { of, rays: self.rays })
+        let by_group = self.sorted.ray_depths.as_ref()?;
+        Some(RayDepths { by_group, rays: self.rays })
     }
 
     /// True if it may touch a pixel of `rect`.

@@ -2,12 +2,16 @@
 
 use crate::gaussian::splats::footprint::{TileFootprint, TileSpan};
 use crate::gaussian::splats::group::ProjectedGroup;
-use crate::gaussian::splats::splat::locate;
+use crate::gaussian::splats::splat::SplatIndex;
 use devmem::host;
 use rayon::prelude::*;
 
 /// A primitive and its footprint.
-type Reaching = (u32, TileFootprint);
+#[derive(Clone, Copy, Debug)]
+struct Walked {
+    primitive: u32,
+    footprint: TileFootprint,
+}
 
 /// The least number of primitives per task in gathering the sorted sequence.
 const RUN: usize = 4096;
@@ -15,7 +19,7 @@ const RUN: usize = 4096;
 /// The primitives in depth order with their footprints. Each tile searches them for its own.
 #[derive(Debug)]
 pub(crate) struct SortedWalk {
-    sorted: Vec<Reaching>,
+    sorted: Vec<Walked>,
     /// The spans of each group's footprints.
     spans: Vec<Vec<TileSpan>>,
     pub(super) pairs: u64,
@@ -23,21 +27,21 @@ pub(crate) struct SortedWalk {
 
 impl SortedWalk {
     pub(super) fn new(groups: &mut [ProjectedGroup], order: &[(u32, u32)]) -> Self {
-        let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
+        let mut sorted: Vec<Walked> = host::with_capacity(order.len());
         let seen = &*groups;
         // It writes into the reserved capacity.
         order
             .par_iter()
             .with_min_len(RUN)
             .map(|&(_, primitive)| {
-                let (group, place) = locate(primitive);
-                (primitive, seen[group].reaches[place])
+                let index = SplatIndex::new(primitive);
+                Walked { primitive, footprint: seen[index.group].reaches[index.place] }
             })
             .collect_into_vec(&mut sorted);
         let taken = groups.iter_mut().map(|group| std::mem::take(&mut group.spans));
         let spans = host::collect(taken);
-        let tiles = |(primitive, reach): &Reaching| {
-            let spans = reach.spans(&spans[locate(*primitive).0]);
+        let tiles = |walked: &Walked| {
+            let spans = walked.footprint.spans(&spans[SplatIndex::new(walked.primitive).group]);
             let lengths = spans.map(|(_, span)| u64::from(span.end - span.first));
             lengths.sum::<u64>()
         };
@@ -48,13 +52,13 @@ impl SortedWalk {
     /// advances `from`. `list` is empty if there are no more.
     pub(crate) fn next(&self, [x, y]: [u32; 2], from: &mut usize, most: usize, list: &mut Vec<u32>) {
         list.clear();
-        while let Some((primitive, reach)) = self.sorted.get(*from) {
+        while let Some(&Walked { primitive, footprint }) = self.sorted.get(*from) {
             if list.len() == most {
                 break;
             }
             *from += 1;
-            if reach.covers(&self.spans[locate(*primitive).0], x, y) {
-                host::push(list, *primitive);
+            if footprint.covers(&self.spans[SplatIndex::new(primitive).group], x, y) {
+                host::push(list, primitive);
             }
         }
     }

@@ -11,7 +11,7 @@
 
 use super::row_band::{RowBand, TileCounts};
 use super::sorted_walk::SortedWalk;
-use super::tile_runs::{Groups, MOST_BAND_TILES, Rows, TileRuns};
+use super::tile_runs::{Groups, MOST_BAND_TILES, RowPlace, Rows, TileRuns};
 use crate::gaussian::splats::group::ProjectedGroup;
 use crate::limits::TILE_SIZE;
 use crate::state::Rect;
@@ -56,10 +56,10 @@ impl TileLists {
         let most_rows = (MOST_BAND_TILES / columns).max(1);
         let band_rows = rows.div_ceil(threads as u32).min(most_rows);
         let bands = rows.div_ceil(band_rows) as usize;
-        let places = |row: u32| (row / band_rows, row % band_rows * columns);
+        let place = |row: u32| RowPlace { band: row / band_rows, first_tile: row % band_rows * columns };
         let grid = Rows {
             first: first_row,
-            places: host::collect((0..rows).map(places).chain([(bands as u32 - 1, 0)])),
+            places: host::collect((0..rows).map(place).chain([RowPlace { band: bands as u32 - 1, first_tile: 0 }])),
             columns,
         };
         // Each run has at least one pair.

@@ -2,7 +2,7 @@
 //! reach, separately for each band of rows of tiles.
 
 use crate::gaussian::splats::footprint::{FIRST_TILE_BITS, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
-use crate::gaussian::splats::splat::locate;
+use crate::gaussian::splats::splat::SplatIndex;
 use devmem::host;
 
 /// The footprints of each group, and their spans.
@@ -14,11 +14,18 @@ pub(crate) struct Groups<'a> {
 /// The rows of tiles that a draw may touch.
 pub(crate) struct Rows {
     pub(super) first: u32,
-    /// The band of each row, and the number in the band of the row's first tile. One more element stands for all other
-    /// rows.
-    pub(super) places: Vec<(u32, u32)>,
+    /// The place of each row. One more element stands for all other rows.
+    pub(super) places: Vec<RowPlace>,
     /// The number of tiles in a row.
     pub(super) columns: u32,
+}
+
+/// The place of a row of tiles in its band.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RowPlace {
+    pub(super) band: u32,
+    /// The number in the band of the row's first tile.
+    pub(super) first_tile: u32,
 }
 
 /// Consecutive tiles of a row, and a primitive that reaches them.
@@ -76,10 +83,10 @@ impl Rows {
         allow: impl Fn(u64) -> bool,
     ) -> Option<Vec<TileRuns>> {
         let about = part.len() * RUNS_PER_PRIMITIVE / bands;
-        let mut runs = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
+        let mut runs = host::collect((0..bands).map(|_| TileRuns::with_capacity(about)));
         let reach_of = |&(_, primitive): &(u32, u32)| {
-            let (group, place) = locate(primitive);
-            &groups.reaches[group][place]
+            let index = SplatIndex::new(primitive);
+            &groups.reaches[index.group][index.place]
         };
         let Some(first) = part.first() else {
             return Some(runs);
@@ -126,7 +133,7 @@ impl Rows {
             if let Some((row, spans)) = reach.held() {
                 runs.push_rows(row_start(row), spans, self.columns, primitive);
             } else {
-                let others = groups.spans[locate(primitive).0];
+                let others = groups.spans[SplatIndex::new(primitive).group];
                 for (row, span) in reach.spans(others) {
                     runs.push(row_start(row), span, primitive);
                 }
@@ -147,17 +154,17 @@ impl Rows {
         let place = |row: u32| self.places[(row.wrapping_sub(self.first) as usize).min(others)];
         for (&(_, primitive), reach) in some.iter().zip(reaches) {
             if let Some((row, spans)) = reach.held() {
-                let (band, row_start) = place(row);
-                if band == place(row + HELD_ROWS as u32 - 1).0 {
+                let RowPlace { band, first_tile } = place(row);
+                if band == place(row + HELD_ROWS as u32 - 1).band {
                     let runs = &mut runs[band as usize];
-                    runs.push_rows(row_start, spans, self.columns, primitive);
+                    runs.push_rows(first_tile, spans, self.columns, primitive);
                     continue;
                 }
             }
-            let others = groups.spans[locate(primitive).0];
+            let others = groups.spans[SplatIndex::new(primitive).group];
             for (row, span) in reach.spans(others) {
-                let (band, row_start) = place(row);
-                runs[band as usize].push(row_start, span, primitive);
+                let RowPlace { band, first_tile } = place(row);
+                runs[band as usize].push(first_tile, span, primitive);
             }
         }
     }
@@ -170,7 +177,7 @@ fn written(runs: &[TileRuns]) -> usize {
 
 impl TileRuns {
     /// Makes an empty list with capacity for about `count` runs.
-    fn with_room(count: usize) -> Self {
+    fn with_capacity(count: usize) -> Self {
         Self { runs: host::with_capacity(count), waiting: Box::new([TileRun::default(); WAITING]), len: 0 }
     }
 
@@ -181,11 +188,11 @@ impl TileRuns {
         if self.len > WAITING - HELD_ROWS {
             self.settle();
         }
-        let room = &mut self.waiting[self.len..self.len + HELD_ROWS];
+        let slots = &mut self.waiting[self.len..self.len + HELD_ROWS];
         let mut len = 0;
         for span in spans {
             // A run without tiles is overwritten by the next.
-            room[len] = TileRun::new(row_start, span, primitive);
+            slots[len] = TileRun::new(row_start, span, primitive);
             len += usize::from(!span.is_empty());
             row_start = row_start.wrapping_add(columns);
         }

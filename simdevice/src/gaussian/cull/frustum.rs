@@ -1,9 +1,9 @@
 //! The frustum: planes that bound the part of space that a picture can show. A few operations show that a Gaussian, or
 //! a cluster of them, is off the screen. The test is conservative: whatever is not certainly outside counts as inside.
 
-use super::sides::{Plane, sides};
+use super::sides::{Plane, Sides, sides};
 use crate::gaussian::lanes::{Bits, F32_LANES};
-use crate::gaussian::linear_algebra::{Linear, dot, inverse};
+use crate::gaussian::linear_algebra::{Affine, Inverse, Linear, dot, inverse};
 use crate::gaussian::read::attributes::Attributes;
 use crate::gaussian::read::clusters::Bounds;
 use crate::gaussian::view::constants::ViewConstants;
@@ -23,8 +23,8 @@ const MAX_CONDITION: f64 = 1e5;
 #[derive(Clone, Debug)]
 pub(crate) struct Frustum {
     eye: [f64; 3],
-    /// The camera's axis and the least and greatest depths along it; `None` if depths are distances from the eye.
-    depth: Option<([f64; 3], f32, f32)>,
+    /// The depths along the camera's axis; `None` if depths are distances from the eye.
+    depth: Option<DepthRange>,
     /// The left, right, top and bottom planes; empty if no plane bounds the picture.
     sides: Vec<Plane>,
     /// A plane outside of which Gaussians are small enough for the sides to hold, if they do not hold for all
@@ -35,6 +35,15 @@ pub(crate) struct Frustum {
     rounding: f64,
     /// The rounding error of a length that is independent of it.
     displacement: f64,
+}
+
+/// The depths that a picture shows.
+#[derive(Clone, Copy, Debug)]
+struct DepthRange {
+    /// The camera's axis, along which depths are measured.
+    forward: [f64; 3],
+    near: f32,
+    far: f32,
 }
 
 /// A bound of binary64's rounding of a few operations, relative to their operands.
@@ -69,13 +78,13 @@ impl Frustum {
     /// The frustum of Gaussians whose opacities are at most `opacity`.
     pub(crate) fn new(projection: &ViewConstants, opacity: f32) -> Self {
         let r = &projection.rotation;
-        let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
+        let depth = DepthRange { forward: [r[6], r[7], r[8]], near: projection.near, far: projection.far };
         let is_along_axis = !matches!(projection.model, CameraModel::Fisheye | CameraModel::Equirectangular);
-        let (sides, small) = sides(projection, opacity);
+        let Sides { planes, small } = sides(projection, opacity);
         Self {
             eye: projection.eye,
             depth: is_along_axis.then_some(depth),
-            sides,
+            sides: planes,
             small,
             alpha_floor: projection.alpha_floor,
             rounding: ROUNDING,
@@ -83,10 +92,11 @@ impl Frustum {
         }
     }
 
-    /// The same frustum in the space of Gaussians that a matrix and a translation place in the world; `None` if the
+    /// The same frustum in the space of Gaussians that a map places in the world; `None` if the
     /// matrix is so ill-conditioned that rounding makes the result uncertain.
-    pub(crate) fn within(&self, (a, b): (Linear, [f64; 3])) -> Option<Self> {
-        let (inverse, condition) = inverse(a);
+    pub(crate) fn within(&self, map: Affine) -> Option<Self> {
+        let Affine { linear: a, translation: b } = map;
+        let Inverse { matrix: inverse, condition } = inverse(a);
         if condition.is_nan() || condition > MAX_CONDITION {
             return None;
         }
@@ -102,7 +112,7 @@ impl Frustum {
         };
         Some(Self {
             eye: multiply(inverse, [0, 1, 2].map(|axis| self.eye[axis] - b[axis])),
-            depth: self.depth.map(|(forward, near, far)| (multiply(transposed, forward), near, far)),
+            depth: self.depth.map(|depth| DepthRange { forward: multiply(transposed, depth.forward), ..depth }),
             sides: self.sides.iter().map(place).collect(),
             small: self.small.as_ref().map(place),
             alpha_floor: self.alpha_floor,
@@ -126,7 +136,7 @@ impl Frustum {
         let size = magnitude(middle) + magnitude(half);
         let slack = self.rounding * size + self.displacement;
         let rise = |normal: [f64; 3]| dot(normal.map(f64::abs), half) + magnitude(normal) * slack;
-        if let Some((forward, near, far)) = self.depth {
+        if let Some(DepthRange { forward, near, far }) = self.depth {
             let (depth, rise) = (dot(forward, middle), rise(forward));
             if depth + rise <= f64::from(near) {
                 return Some(Outside::Near);
@@ -150,7 +160,7 @@ impl Frustum {
     pub(crate) fn lanes_outside<S: Simd>(&self, simd: S, attributes: &Attributes, len: usize) -> OutsideLanes {
         let number = |value: f64| S::f32s::splat(simd, value as f32);
         let mut outside = OutsideLanes::default();
-        let Some((forward, near, far)) = self.depth else {
+        let Some(DepthRange { forward, near, far }) = self.depth else {
             return outside;
         };
         // The eye is split into two binary32 parts, so that little precision is lost far from the origin.

@@ -79,17 +79,17 @@ fn may_hide(set: &GaussianSet, view: &ViewConstants) -> bool {
         && state.order == GaussianOrder::ViewDepth
         && state.geometry == GaussianGeometry::Volume
         && state.precision == GaussianPrecision::Float32
-        // What is cut off takes no light there.
+        // What is cut off takes no transmittance there.
         && state.footprint.cut_off == GaussianCutOff::None
-        && least_light(state) > 0.0
+        && least_transmittance(state) > 0.0
         // With depth or stencil tests an occluder may be rejected.
         && state.depth_stencil == DepthStencil::default()
-        && set.resolve.is_none()
+        && set.fragment_stage.is_none()
         && !set.bounds.is_empty()
 }
 
 /// The transmittance below which nothing more is drawn.
-pub(crate) fn least_light(state: &GaussianState) -> f32 {
+pub(crate) fn least_transmittance(state: &GaussianState) -> f32 {
     let budget = state.approximation.contribution_budget;
     state.transmittance_floor.max(budget)
 }

@@ -5,7 +5,7 @@
 //! picture stays the same.
 
 use super::frustum::Frustum;
-use super::occluders::{least_light, reaches_far};
+use super::occluders::{least_transmittance, reaches_far};
 use crate::gaussian::read::clusters::{Bounds, Cluster, Clusters};
 use crate::gaussian::set::GaussianSet;
 use crate::gaussian::sort::radix;
@@ -66,7 +66,7 @@ impl OcclusionMap {
         splats: &[ProjectedGroup],
     ) -> Option<Self> {
         let mut transmittance = TileTransmittance::new(set.bounds, &set.begin.state);
-        transmittance.pass(splats);
+        transmittance.blend(splats);
         transmittance.occlusion(view, clusters)
     }
 
@@ -105,13 +105,13 @@ impl TileTransmittance {
             count,
             left: host::filled(1.0, tiles),
             depth: host::filled(f32::INFINITY, tiles),
-            floor: f64::from(least_light(state)) * (1.0 - MARGIN),
+            floor: f64::from(least_transmittance(state)) * (1.0 - MARGIN),
             alphas: [f64::from(state.alpha_ceiling), LEAST_ALPHA.max(f64::from(state.alpha_floor) * (1.0 + MARGIN))],
         }
     }
 
     /// Blends occluders front to back.
-    fn pass(&mut self, groups: &[ProjectedGroup]) {
+    fn blend(&mut self, groups: &[ProjectedGroup]) {
         let mut order = Vec::new();
         for (number, group) in groups.iter().enumerate() {
             for (place, &[key, _]) in group.keys.iter().enumerate() {

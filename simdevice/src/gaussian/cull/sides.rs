@@ -39,19 +39,25 @@ struct ScreenExtent {
     greatest: f64,
 }
 
-/// The sides of a camera's frustum for Gaussians whose opacities are at most `opacity`, and the plane outside of which
-/// Gaussians are small enough for the sides to hold. No sides if nothing bounds the picture; no plane if the sides hold
-/// for all Gaussians.
-pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
-    let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
+/// The sides of a camera's frustum.
+pub(crate) struct Sides {
+    /// The left, right, top and bottom planes; empty if nothing bounds the picture.
+    pub(crate) planes: Vec<Plane>,
+    /// The plane outside of which Gaussians are small enough for the sides to hold; `None` if they hold for all Gaussians.
+    pub(crate) small: Option<Plane>,
+}
+
+/// The sides of a camera's frustum for Gaussians whose opacities are at most `opacity`.
+pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> Sides {
+    let log2_range = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
-    let reach = if is_half {
-        ScreenExtent::in_half(room, projection.low_pass)
+    let extent = if is_half {
+        ScreenExtent::in_half(log2_range, projection.low_pass)
     } else {
-        Some(ScreenExtent::exact(room, projection.low_pass))
+        Some(ScreenExtent::exact(log2_range, projection.low_pass))
     };
-    let none = (Vec::new(), None);
-    let Some(reach) = reach else { return none };
+    let none = Sides { planes: Vec::new(), small: None };
+    let Some(extent) = extent else { return none };
     let is_linear = match projection.model {
         CameraModel::Pinhole => !projection.unscented,
         CameraModel::Orthographic => true,
@@ -61,22 +67,22 @@ pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Op
         return none;
     }
     let ends = [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)];
-    let ends = ends.map(|(axis, sign)| Side::new(projection, axis, sign, &reach));
+    let ends = ends.map(|(axis, sign)| Side::new(projection, axis, sign, &extent));
     if is_linear {
         let deviations = ends.iter().map(|side| side.deviation);
         let deviation = deviations.fold(0.0, f64::max);
-        let small = is_half.then(|| small_deviations(projection, deviation, &reach));
-        return (ends.iter().map(|side| side.plane(&reach)).collect(), small);
+        let small = is_half.then(|| small_deviations(projection, deviation, &extent));
+        return Sides { planes: ends.iter().map(|side| side.plane(&extent)).collect(), small };
     }
-    let sides = ends.iter().map(|side| side.unscented(projection, &reach));
-    let small = Points::new(projection, &reach).small(projection);
-    (sides.collect(), Some(small))
+    let sides = ends.iter().map(|side| side.unscented(projection, &extent));
+    let small = Points::new(projection, &extent).small(projection);
+    Sides { planes: sides.collect(), small: Some(small) }
 }
 
 impl ScreenExtent {
-    fn exact(room: f64, low_pass: f64) -> Self {
+    fn exact(log2_range: f64, low_pass: f64) -> Self {
         // Wider than the ellipse with the tile engine's margins.
-        let sigmas = (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt();
+        let sigmas = (2.0 * LN_2 * (1.01 * log2_range + 2e-3)).sqrt();
         Self {
             // The low-pass variance and the scale's variance add up, and the sum of their deviations is no less.
             pixels: sigmas * low_pass.sqrt(),
@@ -86,7 +92,7 @@ impl ScreenExtent {
     }
 
     /// The extent in binary16; `None` if it has no bound.
-    fn in_half(room: f64, low_pass: f64) -> Option<Self> {
+    fn in_half(log2_range: f64, low_pass: f64) -> Option<Self> {
         let filter = low_pass.sqrt();
         let greatest = GREATEST_HALF_DEVIATION;
         // The factor of a Gaussian decreases with its deviation, so the greatest deviation has the least factor.
@@ -96,11 +102,11 @@ impl ScreenExtent {
         }
         // The ratio of the factors of the binary16 form is at most the ratio of deviation and filter, so that the
         // extent is a convex function of the deviation, and a chord is above it.
-        let reach_of = |deviation: f64| {
-            let room = binary16_headroom([1.0, deviation / filter, 1.0], room);
-            (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt() * (deviation + filter)
+        let extent_of = |deviation: f64| {
+            let log2_range = binary16_headroom([1.0, deviation / filter, 1.0], log2_range);
+            (2.0 * LN_2 * (1.01 * log2_range + 2e-3)).sqrt() * (deviation + filter)
         };
-        let (least, most) = (reach_of(0.0), reach_of(greatest));
+        let (least, most) = (extent_of(0.0), extent_of(greatest));
         Some(Self { pixels: least, per_deviation: (most - least) / greatest, greatest })
     }
 }
@@ -121,12 +127,12 @@ struct Side {
 
 impl Side {
     /// The side along `axis` at the lower (`sign` 1) or the higher coordinates (`sign` -1).
-    fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &ScreenExtent) -> Self {
+    fn new(projection: &ViewConstants, axis: usize, sign: f64, extent: &ScreenExtent) -> Self {
         let (across, forward) = (row(projection, axis), row(projection, 2));
         let focal = projection.focal[axis];
         let [first, end] = projection.visible_range(axis);
         let from_edge = sign * (projection.center[axis] - if sign > 0.0 { first } else { end });
-        let edge = from_edge + reach.pixels;
+        let edge = from_edge + extent.pixels;
         let normal = |depth: f64| add(across, sign * focal, forward, depth);
         let steepness = |slope: f64| length(add(across, 1.0, forward, -slope));
         let (normal, offset, deviation) = match (projection.model, projection.geometry) {
@@ -144,10 +150,10 @@ impl Side {
     }
 
     /// The plane for Gaussians that are linearized, and for discs.
-    fn plane(&self, reach: &ScreenExtent) -> Plane {
+    fn plane(&self, extent: &ScreenExtent) -> Plane {
         Plane {
             normal: self.normal,
-            per_scale: reach.per_deviation * self.deviation * (1.0 + MARGIN),
+            per_scale: extent.per_deviation * self.deviation * (1.0 + MARGIN),
             offset: self.offset + self.offset.abs() * MARGIN,
         }
     }
@@ -160,9 +166,9 @@ impl Side {
     /// variance the middle point contributes at most `2 D^2` and the other points at most `D^2`. The Gaussian's
     /// extent times z is at most `reach (f r + Q f |u| z)`. Since `f |u| z <= |A| + |c| z`, that is at most
     /// `f r reach + share (|A| + |c| z)` with `share = Q reach`. The Gaussian is outside if that is less than `|A|`.
-    fn unscented(&self, projection: &ViewConstants, reach: &ScreenExtent) -> Plane {
-        let points = Points::new(projection, reach);
-        let straight = self.plane(reach);
+    fn unscented(&self, projection: &ViewConstants, extent: &ScreenExtent) -> Plane {
+        let points = Points::new(projection, extent);
+        let straight = self.plane(extent);
         let of_points = self.focal * points.reach * points.per_scale * (1.0 + MARGIN);
         let depth = UNSCENTED_SHARE * self.edge.abs();
         Plane {
@@ -185,9 +191,9 @@ struct Points {
 }
 
 impl Points {
-    fn new(projection: &ViewConstants, reach: &ScreenExtent) -> Self {
+    fn new(projection: &ViewConstants, extent: &ScreenExtent) -> Self {
         let growth = (0..3).map(|axis| length(row(projection, axis)));
-        let of_places = 1.0 + 3.0f64.sqrt() * reach.per_deviation;
+        let of_places = 1.0 + 3.0f64.sqrt() * extent.per_deviation;
         let nearness = UNSCENTED_SHARE / (of_places + UNSCENTED_SHARE);
         Self {
             per_scale: POINT_DISTANCE * growth.fold(0.0, f64::max) * (1.0 + MARGIN),
@@ -206,12 +212,12 @@ impl Points {
     }
 }
 
-/// The plane outside of which a Gaussian's deviation in the picture is at most `reach.greatest`. Deviations are at most
+/// The plane outside of which a Gaussian's deviation in the picture is at most `extent.greatest`. Deviations are at most
 /// `deviation` per unit of scale.
-fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &ScreenExtent) -> Plane {
+fn small_deviations(projection: &ViewConstants, deviation: f64, extent: &ScreenExtent) -> Plane {
     let (normal, offset) = match projection.model {
-        CameraModel::Orthographic => ([0.0; 3], -reach.greatest),
-        _ => (row(projection, 2).map(|forward| -reach.greatest * forward), 0.0),
+        CameraModel::Orthographic => ([0.0; 3], -extent.greatest),
+        _ => (row(projection, 2).map(|forward| -extent.greatest * forward), 0.0),
     };
     Plane { normal, per_scale: deviation * (1.0 + MARGIN), offset }
 }

@@ -9,8 +9,8 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// The vectors from the eye to the means of the kept Gaussians, in the axes of the Gaussians' own space.
 pub(crate) fn toward<'a>(group: &GroupAttributes<'_>, scratch: &'a Scratch) -> &'a [GroupF64; 3] {
-    match &scratch.placed {
-        Some(placed) if group.matrices.is_some() => &placed.toward,
+    match &scratch.models {
+        Some(models) if group.matrices.is_some() => &models.toward,
         _ => &scratch.offset,
     }
 }

@@ -10,14 +10,14 @@ use super::unscented;
 use crate::gaussian::lanes::{GROUP, GroupF64};
 use crate::gaussian::linear_algebra::{cofactors, dot};
 use crate::gaussian::read::group::GroupAttributes;
-use crate::gaussian::view::camera;
+use crate::gaussian::view::camera::{self, Linearization};
 use crate::gaussian::view::constants::ViewConstants;
 use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
 
 /// Computes mean, covariance and opacity in the picture for the kept Gaussians.
 #[inline(always)]
-pub(crate) fn flatten<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAttributes<'_>, scratch: &mut Scratch) {
+pub(crate) fn to_screen<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAttributes<'_>, scratch: &mut Scratch) {
     let by_matrices = group.matrices.is_some();
     if by_matrices {
         place_by_matrices(view, scratch);
@@ -36,7 +36,7 @@ pub(crate) fn flatten<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAttri
     let number = |value: f64| S::f64s::splat(simd, value);
     let load = |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
-    let flat = &mut *scratch.flat;
+    let screen = &mut *scratch.screen;
     let r = view.rotation;
     let (one, two) = (number(1.0), number(2.0));
     for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
@@ -66,7 +66,7 @@ pub(crate) fn flatten<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAttri
             let [kx, ky, kz] = if is_pinhole {
                 let slope = load(&scratch.camera[axis], at) * per_depth;
                 let focal = number(view.focal[axis]);
-                store(slope * focal + view.center[axis], &mut flat.mean[axis]);
+                store(slope * focal + view.center[axis], &mut screen.mean[axis]);
                 let clamped = slope.max(view.slope_min[axis]).min(view.slope_max[axis]);
                 let to_screen = focal * per_depth;
                 [
@@ -95,7 +95,7 @@ pub(crate) fn flatten<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAttri
             covariance = [load(&moments[0], at), load(&moments[1], at), load(&moments[2], at)];
             area2 = load(&moments[3], at);
         }
-        shape(view, simd, at, covariance, area2, load(opacity, at), flat);
+        shape(view, simd, at, covariance, area2, load(opacity, at), screen);
     }
 }
 
@@ -127,14 +127,14 @@ fn place<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch) {
 
 /// Computes the positions of the kept Gaussians in camera space, and the viewing directions in their own space.
 pub(crate) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
-    let Some(placed) = &mut scratch.placed else {
+    let Some(models) = &mut scratch.models else {
         return;
     };
     let r = &view.rotation;
     for at in 0..scratch.lanes.len().min(GROUP) {
-        let a = placed.linear(at);
+        let a = models.linear(at);
         let p = scratch.position.each_ref().map(|lanes| lanes[at]);
-        let d = [0, 1, 2].map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - view.eye[axis]));
+        let d = [0, 1, 2].map(|axis| dot(a[axis], p) + (models.matrix[axis][3][at] - view.eye[axis]));
         let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
         // The columns of the inverse, times the determinant. Only its sign matters for directions.
         let columns = cofactors(a);
@@ -143,7 +143,7 @@ pub(crate) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
             scratch.offset[axis][at] = d[axis];
             scratch.camera[axis][at] = t[axis];
             let sum = d[0] * columns[0][axis] + d[1] * columns[1][axis] + d[2] * columns[2][axis];
-            placed.toward[axis][at] = sign * sum;
+            models.toward[axis][at] = sign * sum;
         }
         scratch.depth[at] = t[2];
     }
@@ -152,19 +152,19 @@ pub(crate) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
 /// Computes depths, means and Jacobians of the kept Gaussians, for all modes but a pinhole without models.
 pub(crate) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
     let [x, y, z] = &*scratch.camera;
-    let placed = scratch.placed.as_deref().filter(|_| by_matrices);
+    let models = scratch.models.as_deref().filter(|_| by_matrices);
     let r = &view.rotation;
     for at in 0..scratch.lanes.len().min(GROUP) {
         let t = [x[at], y[at], z[at]];
         scratch.depth[at] = camera::depth(view.model, t);
-        let (place, rows) = camera::linearize(view.model, view.slopes(), t);
-        for (axis, row) in rows.iter().enumerate() {
-            scratch.flat.mean[axis][at] = place[axis] * view.focal[axis] + view.center[axis];
+        let Linearization { place, jacobian } = camera::linearize(view.model, view.slopes(), t);
+        for (axis, row) in jacobian.iter().enumerate() {
+            scratch.screen.mean[axis][at] = place[axis] * view.focal[axis] + view.center[axis];
             let j = row.map(|element| element * view.focal[axis]);
             let of_column = |column| j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
             let mut row = [0, 1, 2].map(of_column);
-            if let Some(placed) = placed {
-                row = placed.row_from_world(at, row);
+            if let Some(models) = models {
+                row = models.row_from_world(at, row);
             }
             for (lanes, element) in scratch.jacobian[axis].iter_mut().zip(row) {
                 lanes[at] = element;

@@ -2,7 +2,7 @@
 //! are read only for Gaussians that reach a tile.
 
 use super::color::{ColoredLane, color, normalize, normalize_wide, toward};
-use super::covariance::flatten;
+use super::covariance::to_screen;
 use super::keys::find_keys;
 use super::panorama;
 use super::scratch::Scratch;
@@ -21,7 +21,7 @@ use crate::stats::counters::Counter;
 use crate::stats::optimizations::Optimization;
 use fearless_simd::Simd;
 
-/// Projects the `kept` Gaussians of a group and appends the result to `out`.
+/// Projects the `kept` Gaussians of a group and appends the result to `projected`.
 #[inline(always)]
 pub(crate) fn project<S: Simd>(
     view: &ViewConstants,
@@ -30,7 +30,7 @@ pub(crate) fn project<S: Simd>(
     kept: &Bits,
     scratch: &mut Scratch,
     sequence: Sequence<'_>,
-    out: &mut ProjectedGroup,
+    projected: &mut ProjectedGroup,
 ) {
     // In simple modes lanes that were culled are projected, too: that is cheap, and the results are not used.
     let is_plain = view.model == CameraModel::Pinhole
@@ -42,11 +42,11 @@ pub(crate) fn project<S: Simd>(
     if let Some(matrices) = group.matrices {
         scratch.gather_matrices(matrices);
     }
-    flatten(view, simd, group, scratch);
-    emit(view, simd, group, scratch, sequence, out);
+    to_screen(view, simd, group, scratch);
+    emit(view, simd, group, scratch, sequence, projected);
 }
 
-/// Finds the tiles and colours of the kept Gaussians and appends those that reach a tile to `out`.
+/// Finds the tiles and colours of the kept Gaussians and appends those that reach a tile to `projected`.
 #[inline(always)]
 pub(crate) fn emit<S: Simd>(
     view: &ViewConstants,
@@ -54,10 +54,10 @@ pub(crate) fn emit<S: Simd>(
     group: &GroupAttributes<'_>,
     scratch: &mut Scratch,
     sequence: Sequence<'_>,
-    out: &mut ProjectedGroup,
+    projected: &mut ProjectedGroup,
 ) {
-    out.reserve(scratch.lanes.len());
-    find_tiles(view, simd, scratch, out);
+    projected.reserve(scratch.lanes.len());
+    find_tiles(view, simd, scratch, projected);
     find_keys(view, sequence, scratch);
     let degree = view.sh_degree;
     let toward = toward(group, scratch);
@@ -85,56 +85,56 @@ pub(crate) fn emit<S: Simd>(
             _ => color::<S, MAX_COEFFICIENTS>(simd, group, lanes, batch, &bases, &mut read),
         };
         let uncolored = batch.len() - colored.all().len();
-        out.counters.add(Counter::SkippedNonFinite, uncolored as u64);
+        projected.counters.add(Counter::SkippedNonFinite, uncolored as u64);
         let Some(period) = view.period else {
-            append(view, colored.all(), scratch, out);
+            append(view, colored.all(), scratch, projected);
             continue;
         };
         for one in colored.all() {
-            append(view, std::slice::from_ref(one), scratch, out);
-            panorama::copy_last(one.at, period, &mut copies, out);
+            append(view, std::slice::from_ref(one), scratch, projected);
+            panorama::copy_last(one.at, period, &mut copies, projected);
         }
     }
-    let counters = &mut out.counters;
-    counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
+    let counters = &mut projected.counters;
+    counters.add(Counter::GaussiansDrawn, projected.splats.len() as u64);
     if view.optimizations.has(Optimization::Harmonics) {
         let unread = group.vertices.len - scratch.reached.len();
         counters.add(Counter::HarmonicsUnread, unread as u64);
     }
 }
 
-/// Appends kept lanes and their colours to `out`.
+/// Appends kept lanes and their colours to `projected`.
 #[inline(always)]
-fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, out: &mut ProjectedGroup) {
+fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, projected: &mut ProjectedGroup) {
     // Iterators of known length append without checking the capacity each time.
     let [keys, sequences] = &*scratch.keys;
     let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
-    out.keys.extend(keys);
+    projected.keys.extend(keys);
     let splats = lanes.iter().map(
         #[inline(always)]
         |one| splat(view, one, scratch),
     );
     match view.period {
-        None => out.splats.extend(splats),
-        Some(period) => out.splats.extend(lanes.iter().zip(splats).map(|(one, splat)| {
-            let wide = 2.0 * scratch.flat.ellipse(one.at).half[0] >= period;
+        None => projected.splats.extend(splats),
+        Some(period) => projected.splats.extend(lanes.iter().zip(splats).map(|(one, splat)| {
+            let wide = 2.0 * scratch.screen.ellipse(one.at).half[0] >= period;
             Splat { needs_f64: wide || splat.needs_f64, exceeds_period: wide, ..splat }
         })),
     }
     let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
-    out.reaches.extend(reaches);
+    projected.reaches.extend(reaches);
     if view.geometry == GaussianGeometry::Surfel {
-        let surfels = lanes.iter().map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).0);
-        out.surfels.extend(surfels);
+        let surfels = lanes.iter().map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).surfel);
+        projected.surfels.extend(surfels);
     }
     if view.order == GaussianOrder::PerPixel {
         let depths = lanes.iter().map(|one| ray_depth(view, one.at, scratch));
-        out.ray_depths.extend(depths);
+        projected.ray_depths.extend(depths);
     }
     if view.is_tracked {
         let identities =
             lanes.iter().map(|one| Identity { z: scratch.depth[one.at] as f32, sequence: sequences[one.at] });
-        out.identities.extend(identities);
+        projected.identities.extend(identities);
     }
 }
 
@@ -143,7 +143,7 @@ fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, out: &
 fn splat(view: &ViewConstants, lane: &ColoredLane, scratch: &Scratch) -> Splat {
     let [red, green, blue, _] = lane.color;
     let depth = center_depth(view, lane.at, scratch);
-    scratch.flat.splat(lane.at, [red, green, blue], depth)
+    scratch.screen.splat(lane.at, [red, green, blue], depth)
 }
 
 /// A kept lane's depth in the encoding of the depth attachment.

@@ -5,9 +5,10 @@
 //! than the period ensure that themselves. Wider ones are marked ([`Splat::exceeds_period`]) and cut off by the tile
 //! engine.
 //!
-//! [`Splat::exceeds_period`]: super::splat::Splat::exceeds_period
+//! [`Splat::exceeds_period`]: crate::gaussian::splats::splat::Splat::exceeds_period
 
 use super::ellipse::Ellipse;
+use super::scratch::PanoramaCopy;
 use crate::gaussian::splats::footprint::TileFootprint;
 use crate::gaussian::splats::group::ProjectedGroup;
 use crate::gaussian::view::visible::Visible;
@@ -25,55 +26,52 @@ fn near(visible: &Visible, x: f64, period: f64) -> Visible {
 }
 
 /// The tiles that a Gaussian and its copies reach, or `None` if there are none. Copies that reach tiles are added to
-/// `copies` as Gaussian, side and footprint. If only copies reach tiles, the Gaussian's own footprint is empty.
+/// `copies`. If only copies reach tiles, the Gaussian's own footprint is empty.
 pub(crate) fn reach(
     at: usize,
     ellipse: &Ellipse,
     period: f64,
     visible: &Visible,
-    copies: &mut Vec<(usize, usize, TileFootprint)>,
-    out: &mut ProjectedGroup,
+    copies: &mut Vec<PanoramaCopy>,
+    projected: &mut ProjectedGroup,
     mut beside: Option<&mut u64>,
 ) -> Option<TileFootprint> {
-    out.copies.resize_with(SIDES.len(), ProjectedGroup::default);
+    projected.copies.resize_with(SIDES.len(), ProjectedGroup::default);
     let [x, y] = ellipse.mean;
     let before = copies.len();
     for (side, direction) in SIDES.into_iter().enumerate() {
         let x = x + direction * period;
         let copy = Ellipse { mean: [x, y], ..*ellipse };
-        let spans = &mut out.copies[side].spans;
+        let spans = &mut projected.copies[side].spans;
         let visible = near(visible, x, period);
         if let Some(reach) = copy.reach(&visible, spans, beside.as_deref_mut()) {
-            copies.push((at, side, reach));
+            copies.push(PanoramaCopy { at, side, footprint: reach });
         }
     }
-    let reach = ellipse.reach(&near(visible, x, period), &mut out.spans, beside);
+    let reach = ellipse.reach(&near(visible, x, period), &mut projected.spans, beside);
     let by_copies = (copies.len() > before).then(TileFootprint::default);
     reach.or(by_copies)
 }
 
-/// Appends the copies of the kept Gaussian `at`, the last one of `out`, and removes them from `copies`. Copies of
+/// Appends the copies of the kept Gaussian `at`, the last one of `projected`, and removes them from `copies`. Copies of
 /// Gaussians that were skipped before it are removed, too.
-pub(crate) fn copy_last(
-    at: usize,
-    period: f64,
-    copies: &mut &[(usize, usize, TileFootprint)],
-    out: &mut ProjectedGroup,
-) {
-    while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
+pub(crate) fn copy_last(at: usize, period: f64, copies: &mut &[PanoramaCopy], projected: &mut ProjectedGroup) {
+    while let Some((&PanoramaCopy { at: of, side, footprint }, rest)) =
+        copies.split_first().filter(|(copy, _)| copy.at <= at)
+    {
         *copies = rest;
-        let last = out.splats.last().zip(out.keys.last());
+        let last = projected.splats.last().zip(projected.keys.last());
         let Some((mut splat, &key)) = last.map(|(splat, key)| (*splat, key)).filter(|_| of == at) else {
             continue;
         };
         splat.mean[0] += SIDES[side] * period;
-        let to = &mut out.copies[side];
+        let to = &mut projected.copies[side];
         to.splats.push(splat);
         // A copy has the same depth along a pixel's ray.
-        to.ray_depths.extend(out.ray_depths.last().copied());
-        to.identities.extend(out.identities.last().copied());
+        to.ray_depths.extend(projected.ray_depths.last().copied());
+        to.identities.extend(projected.identities.last().copied());
         to.keys.push(key);
-        to.reaches.push(reach);
+        to.reaches.push(footprint);
     }
 }
 
@@ -98,18 +96,18 @@ mod tests {
     fn tiles(x: f64, half: f64) -> [Vec<u32>; 3] {
         let ellipse =
             Ellipse { mean: [x, 20.0], half: [half, 2.0], slope: 0.0, narrowing: (half / 2.0).powi(2), peak: 0.0 };
-        let (mut out, mut copies) = (ProjectedGroup::default(), Vec::new());
-        let reach = reach(0, &ellipse, 100.0, &VISIBLE, &mut copies, &mut out, Some(&mut 0));
+        let (mut projected, mut copies) = (ProjectedGroup::default(), Vec::new());
+        let reach = reach(0, &ellipse, 100.0, &VISIBLE, &mut copies, &mut projected, Some(&mut 0));
         let columns = |reach: &TileFootprint, spans: &[_]| {
             let spans = reach.spans(spans);
             spans.flat_map(|(_, span)| span.first.into()..span.end.into()).collect::<Vec<u32>>()
         };
         let mut found: [Vec<u32>; 3] = Default::default();
         if let Some(reach) = reach {
-            found[0] = columns(&reach, &out.spans);
+            found[0] = columns(&reach, &projected.spans);
         }
-        for (_, side, reach) in copies {
-            found[1 + side] = columns(&reach, &out.copies[side].spans);
+        for PanoramaCopy { side, footprint, .. } in copies {
+            found[1 + side] = columns(&footprint, &projected.copies[side].spans);
         }
         found
     }

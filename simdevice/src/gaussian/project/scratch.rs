@@ -31,6 +31,16 @@ impl TileFootprints {
     }
 }
 
+/// A copy of an element a period to the right or to the left.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PanoramaCopy {
+    /// The element.
+    pub(crate) at: usize,
+    /// The side, as [`ProjectedGroup::copies`](crate::gaussian::splats::group::ProjectedGroup::copies) has them.
+    pub(crate) side: usize,
+    pub(crate) footprint: TileFootprint,
+}
+
 /// The intermediate results of a group's kept Gaussians, densely packed, as structures of arrays.
 pub(crate) struct Scratch {
     /// The lanes of the group that the arrays below hold, in their order.
@@ -48,18 +58,18 @@ pub(crate) struct Scratch {
     /// The depth variable.
     pub(crate) depth: Box<GroupF64>,
     /// The model matrices and the directions in model space, if there are any.
-    pub(crate) placed: Option<Box<KeptModels>>,
+    pub(crate) models: Option<Box<KeptModels>>,
     /// The Jacobian's rows in the axes of the Gaussians' space. Unused for a pinhole without models.
     pub(crate) jacobian: Box<[[GroupF64; 3]; 2]>,
     /// The covariances in the picture from the unscented transform: xx, xy, yy and the determinant.
     pub(crate) moments: Box<[GroupF64; 4]>,
-    pub(crate) flat: Box<ScreenGaussians>,
+    pub(crate) screen: Box<ScreenGaussians>,
     /// The elements that reach tiles.
     pub(crate) reached: Vec<usize>,
     /// The footprints of those that reach tiles.
     pub(crate) reaches: Box<TileFootprints>,
-    /// The footprints of their copies a period away: element, side (0 or 1), footprint. Elements ascend.
-    pub(crate) copies: Vec<(usize, usize, TileFootprint)>,
+    /// The copies of those a period away. Elements ascend.
+    pub(crate) copies: Vec<PanoramaCopy>,
     /// The sort key of each element, and its number in the set.
     pub(crate) keys: Box<[[u32; GROUP]; 2]>,
 }
@@ -77,10 +87,10 @@ impl Scratch {
             offset: Box::new([NO_GROUP_F64; 3]),
             camera: Box::new([NO_GROUP_F64; 3]),
             depth: Box::new(NO_GROUP_F64),
-            placed: None,
+            models: None,
             jacobian: Box::new([[NO_GROUP_F64; 3]; 2]),
             moments: Box::new([NO_GROUP_F64; 4]),
-            flat: Box::default(),
+            screen: Box::default(),
             reached: Vec::with_capacity(GROUP),
             reaches: Box::default(),
             copies: Vec::new(),
@@ -128,10 +138,10 @@ impl Scratch {
 
     /// Packs the kept lanes' matrices densely.
     pub(crate) fn gather_matrices(&mut self, matrices: &Matrices) {
-        let placed = self
-            .placed
+        let models = self
+            .models
             .get_or_insert_with(|| Box::new(KeptModels { matrix: [[NO_GROUP_F64; 4]; 3], toward: [NO_GROUP_F64; 3] }));
-        let to = placed.matrix.as_flattened_mut().iter_mut();
+        let to = models.matrix.as_flattened_mut().iter_mut();
         for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
             for (to, &lane) in to.iter_mut().zip(&self.lanes) {
                 *to = from[lane % GROUP].into();

@@ -13,11 +13,11 @@ pub(crate) const LN_2: f64 = std::f64::consts::LN_2;
 
 /// The greatest base-2 logarithm of the opacity for which exponents are computed in binary32. Their rounding error
 /// grows with it.
-const STEEP_LOG2_OPACITY: f64 = 4.0;
+const GREATEST_F32_LOG2_OPACITY: f64 = 4.0;
 
 /// The greatest factor, in 1/px, for which exponents are computed in binary32. Pixels are up to 1.5 px from a block's
 /// middle. A low-pass variance of 0.3 px^2 keeps all factors below 1.6.
-const STEEP_FACTOR: f64 = 8.0;
+const GREATEST_F32_FACTOR: f64 = 8.0;
 
 /// Gaussians in the picture: the output of projection.
 pub(crate) struct ScreenGaussians {
@@ -25,8 +25,8 @@ pub(crate) struct ScreenGaussians {
     pub(crate) determinant: GroupF64,
     pub(crate) log2_opacity: GroupF64,
     /// The elements whose exponents must be computed in binary64.
-    pub(crate) steep: Bits,
-    /// The factors of the exponent: see [`Splat::factor`](super::splat::Splat::factor).
+    pub(crate) needs_f64: Bits,
+    /// The factors of the exponent: see [`Splat::factor`](Splat::factor).
     pub(crate) factor: [GroupF64; 3],
     /// The covariance in the picture: xx, xy and yy in px^2.
     pub(crate) covariance: [GroupF64; 3],
@@ -41,7 +41,7 @@ impl Default for ScreenGaussians {
             mean: [NO_GROUP_F64; 2],
             determinant: NO_GROUP_F64,
             log2_opacity: NO_GROUP_F64,
-            steep: Bits::default(),
+            needs_f64: Bits::default(),
             factor: [NO_GROUP_F64; 3],
             covariance: [NO_GROUP_F64; 3],
             extent: NO_GROUP_F64,
@@ -58,7 +58,7 @@ impl ScreenGaussians {
             factor: [self.factor[0][at], self.factor[1][at], self.factor[2][at]],
             log2_opacity: self.log2_opacity[at] as f32,
             look: SplatLook { color, depth },
-            needs_f64: self.steep.has(at),
+            needs_f64: self.needs_f64.has(at),
             exceeds_period: false,
         }
     }
@@ -90,7 +90,7 @@ pub(crate) fn shape<S: Simd>(
     [xx, xy, yy]: [S::f64s; 3],
     area2: S::f64s,
     mut o: S::f64s,
-    flat: &mut ScreenGaussians,
+    screen: &mut ScreenGaussians,
 ) {
     let number = |value: f64| S::f64s::splat(simd, value);
     let store = |value: S::f64s, lanes: &mut GroupF64| {
@@ -98,7 +98,7 @@ pub(crate) fn shape<S: Simd>(
     };
     let low_pass = number(view.low_pass);
     let determinant = low_pass.mul_add(xx + yy, area2) + low_pass * low_pass;
-    store(determinant, &mut flat.determinant);
+    store(determinant, &mut screen.determinant);
     if view.compensated {
         let mut ratio = area2 / determinant;
         if view.compensation_floor > 0.0 {
@@ -107,7 +107,7 @@ pub(crate) fn shape<S: Simd>(
         o *= ratio.sqrt();
     }
     let log2_opacity = log2(simd, o);
-    store(log2_opacity, &mut flat.log2_opacity);
+    store(log2_opacity, &mut screen.log2_opacity);
 
     let (a, b, c) = (xx + low_pass, xy, yy + low_pass);
     // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
@@ -116,36 +116,36 @@ pub(crate) fn shape<S: Simd>(
     let per_a = number(1.0) / a;
     let vertical = (a / determinant).sqrt() * unit;
     let factor = [per_a.sqrt() * unit, -(b * per_a) * vertical, vertical];
-    store(factor[0], &mut flat.factor[0]);
-    store(factor[1], &mut flat.factor[1]);
-    store(factor[2], &mut flat.factor[2]);
+    store(factor[0], &mut screen.factor[0]);
+    store(factor[1], &mut screen.factor[1]);
+    store(factor[2], &mut screen.factor[2]);
     if at == 0 {
-        flat.steep = Bits::default();
+        screen.needs_f64 = Bits::default();
     }
-    flat.steep.set(at, are_steep::<S>(factor, log2_opacity));
+    screen.needs_f64.set(at, need_f64::<S>(factor, log2_opacity));
     // The tile engine evaluates the exponent in binary32. A margin wider than its error keeps every pixel that it would
     // accept. Gaussians that still cannot reach the floor have a negative extent.
-    let room = log2_opacity - view.log2_floor;
-    let mut extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+    let log2_range = log2_opacity - view.log2_floor;
+    let mut extent = (log2_range + log2_range.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
     if view.precision == GaussianPrecision::Float16 {
         for lane in at..at + S::f64s::LEN {
-            let factor = [0, 1, 2].map(|element| flat.factor[element][lane]);
-            let room = flat.log2_opacity[lane] - view.log2_floor;
-            flat.extent[lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
+            let factor = [0, 1, 2].map(|element| screen.factor[element][lane]);
+            let log2_range = screen.log2_opacity[lane] - view.log2_floor;
+            screen.extent[lane] = binary16_headroom(factor, log2_range) * (2.0 * LN_2);
         }
-        extent = S::f64s::from_slice(simd, &flat.extent[at..at + S::f64s::LEN]);
+        extent = S::f64s::from_slice(simd, &screen.extent[at..at + S::f64s::LEN]);
     }
-    store(extent, &mut flat.extent);
-    for (element, lanes) in [a, b, c].into_iter().zip(&mut flat.covariance) {
+    store(extent, &mut screen.extent);
+    for (element, lanes) in [a, b, c].into_iter().zip(&mut screen.covariance) {
         store(element, lanes);
     }
 }
 
 /// The Gaussians whose exponents must be computed in binary64. The result depends on each Gaussian alone.
 #[inline(always)]
-pub(crate) fn are_steep<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
+pub(crate) fn need_f64<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
     // The first and the last factor are never negative. NaN compares as not greater.
     let [a, b, c] = factor;
-    (a.simd_gt(STEEP_FACTOR) | b.abs().simd_gt(STEEP_FACTOR))
-        | (c.simd_gt(STEEP_FACTOR) | log2_opacity.simd_gt(STEEP_LOG2_OPACITY))
+    (a.simd_gt(GREATEST_F32_FACTOR) | b.abs().simd_gt(GREATEST_F32_FACTOR))
+        | (c.simd_gt(GREATEST_F32_FACTOR) | log2_opacity.simd_gt(GREATEST_F32_LOG2_OPACITY))
 }

@@ -90,7 +90,8 @@ fn ellipse(surfel: &Surfel, mean: [f64; 2], extent: f64) -> Ellipse {
 fn reach(
     surfel: &mut Surfel,
     mean: [f64; 2],
-    (extent, low_pass): (f64, f64),
+    extent: f64,
+    low_pass: f64,
     visible: &Visible,
     others: &mut Vec<TileSpan>,
 ) -> Option<TileFootprint> {
@@ -135,13 +136,19 @@ fn reach(
     Some(reach)
 }
 
-/// The surfel of a kept Gaussian, and the tiles that it reaches, if there are any.
+/// A surfel, and the tiles that it reaches, if there are any.
+pub(crate) struct ProjectedSurfel {
+    pub(crate) surfel: Surfel,
+    pub(crate) footprint: Option<TileFootprint>,
+}
+
+/// The surfel of a kept Gaussian.
 pub(crate) fn surfel_of(
     view: &ViewConstants,
     at: usize,
     scratch: &Scratch,
     spans: &mut Vec<TileSpan>,
-) -> (Surfel, Option<TileFootprint>) {
+) -> ProjectedSurfel {
     let [w, x, y, z] = &*scratch.rotation;
     let axes = axes([w[at], x[at], y[at], z[at]]);
     let r = &view.rotation;
@@ -158,13 +165,13 @@ pub(crate) fn surfel_of(
         centre: [x[at], y[at], z[at]],
     };
     let mut surfel = disc.surfel();
-    let flat = &*scratch.flat;
+    let screen = &*scratch.screen;
     // The same margin as for volumes, in [`shape`](super::screen::shape).
-    let room = flat.log2_opacity[at] - view.log2_floor;
-    let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
-    let mean = [flat.mean[0][at], flat.mean[1][at]];
-    let footprint = reach(&mut surfel, mean, (extent, view.low_pass), &view.visible, spans);
-    (surfel, footprint)
+    let log2_range = screen.log2_opacity[at] - view.log2_floor;
+    let extent = (log2_range + log2_range.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+    let mean = [screen.mean[0][at], screen.mean[1][at]];
+    let footprint = reach(&mut surfel, mean, extent, view.low_pass, &view.visible, spans);
+    ProjectedSurfel { surfel, footprint }
 }
 
 #[cfg(test)]
@@ -218,7 +225,7 @@ mod tests {
                 let placed = Disc { model, focal, near: 0.2, axes, centre: t };
                 let mut surfel = placed.surfel();
                 let mut others = Vec::new();
-                let footprint = reach(&mut surfel, mean, (extent, LOW_PASS), &VISIBLE, &mut others);
+                let footprint = reach(&mut surfel, mean, extent, LOW_PASS, &VISIBLE, &mut others);
                 let mut listed = std::collections::BTreeSet::new();
                 for (row, span) in footprint.iter().flat_map(|footprint| footprint.spans(&others)) {
                     listed.extend((span.first..span.end).map(|column| (u32::from(column), row)));

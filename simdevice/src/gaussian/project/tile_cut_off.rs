@@ -8,11 +8,11 @@ use crate::gaussian::view::cut_off::TileCutOff;
 /// Takes the device's tiles that the cut-off leaves out from what lanes reach, and lanes that reach no other from `reached`.
 /// Spans that are not held by footprints lie in `others`.
 pub(crate) fn clip(cut_off: &TileCutOff, scratch: &mut Scratch, others: &mut [TileSpan], reached: &mut Bits) {
-    let flat = &*scratch.flat;
+    let screen = &*scratch.screen;
     let mut left = Bits::default();
     reached.for_each(|at| {
-        let mean = [flat.mean[0][at], flat.mean[1][at]];
-        let factor = [0, 1, 2].map(|element| flat.factor[element][at]);
+        let mean = [screen.mean[0][at], screen.mean[1][at]];
+        let factor = [0, 1, 2].map(|element| screen.factor[element][at]);
         let [columns, rows] = cut_off.device_tiles(mean, factor);
         let mut reach = scratch.reaches.get(at);
         let spans: Vec<(u32, TileSpan)> = reach.spans(others).collect();

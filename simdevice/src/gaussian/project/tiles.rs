@@ -99,13 +99,13 @@ struct Shapes<S: Simd> {
 impl<S: Simd> Shapes<S> {
     /// The shapes that `load` finds in the arrays of all lanes.
     #[inline(always)]
-    fn new(flat: &ScreenGaussians, load: impl Fn(&GroupF64) -> S::f32s) -> Self {
-        let ([x, y], [xx, xy, yy]) = (&flat.mean, &flat.covariance);
+    fn new(screen: &ScreenGaussians, load: impl Fn(&GroupF64) -> S::f32s) -> Self {
+        let ([x, y], [xx, xy, yy]) = (&screen.mean, &screen.covariance);
         Self {
             mean: [load(x), load(y)],
             covariance: [load(xx), load(xy), load(yy)],
-            determinant: load(&flat.determinant),
-            extent: load(&flat.extent),
+            determinant: load(&screen.determinant),
+            extent: load(&screen.extent),
         }
     }
 }
@@ -131,6 +131,13 @@ struct Ellipses<S: Simd> {
     exists: S::mask32s,
     /// True if the bound of the errors holds.
     is_moderate: S::mask32s,
+}
+
+/// The columns that ellipses reach in a row of tiles.
+struct RowColumns<S: Simd> {
+    range: Range<S>,
+    /// True if the row belongs to the ellipse and the ellipse reaches a pixel centre there.
+    within: S::mask32s,
 }
 
 impl<S: Simd> Ellipses<S> {
@@ -165,11 +172,10 @@ impl<S: Simd> Ellipses<S> {
         }
     }
 
-    /// The columns that each ellipse reaches in a row of tiles. The mask is true if the row belongs to the ellipse and
-    /// the ellipse reaches a pixel centre there. The steps are those of
+    /// The columns that each ellipse reaches in a row of tiles. The steps are those of
     /// [`Ellipse::reach`](super::footprint::Ellipse::reach).
     #[inline(always)]
-    fn row(&self, simd: S, row: S::f32s) -> (Range<S>, S::mask32s) {
+    fn row(&self, simd: S, row: S::f32s) -> RowColumns<S> {
         let number = |value: f32| S::f32s::splat(simd, value);
         let (zero, tile) = (number(0.0), TILE_SIZE as f32);
         let [x, y] = self.mean;
@@ -187,7 +193,7 @@ impl<S: Simd> Ellipses<S> {
         let high = x + (self.slope * to_right + width(to_right));
         let range = Range::new(low, high, self.columns);
         let within = range.any & row.simd_le(self.along.last);
-        (range, within)
+        RowColumns { range, within }
     }
 }
 
@@ -206,11 +212,16 @@ fn last_rounded_to(value: f32) -> f64 {
 
 /// Finds the kept Gaussians that reach a tile, and their footprints.
 #[inline(always)]
-pub(crate) fn find_tiles<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch, out: &mut ProjectedGroup) {
+pub(crate) fn find_tiles<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    scratch: &mut Scratch,
+    projected: &mut ProjectedGroup,
+) {
     let by_lanes = view.optimizations.has(Optimization::Ellipse)
         && view.period.is_none()
         && view.geometry == GaussianGeometry::Volume;
-    find_tiles_by(view, simd, by_lanes, scratch, out);
+    find_tiles_by(view, simd, by_lanes, scratch, projected);
 }
 
 /// The body of [`find_tiles`]. If `by_lanes` is false, it searches one Gaussian at a time.
@@ -220,9 +231,9 @@ fn find_tiles_by<S: Simd>(
     simd: S,
     by_lanes: bool,
     scratch: &mut Scratch,
-    out: &mut ProjectedGroup,
+    projected: &mut ProjectedGroup,
 ) {
-    let drawn = find_drawn(view, simd, scratch, &mut out.counters);
+    let drawn = find_drawn(view, simd, scratch, &mut projected.counters);
     let mut beside = 0;
     let found = if by_lanes {
         reach_in_lanes(view, simd, &drawn, scratch, &mut beside)
@@ -233,29 +244,29 @@ fn find_tiles_by<S: Simd>(
     tall.for_each(
         #[inline(always)]
         |at| {
-            let spans = &mut out.spans;
+            let spans = &mut projected.spans;
             if let Some(reach) = reach_by_rows(view, simd, at, scratch, spans, &mut beside) {
                 scratch.reaches.set(at, &reach);
                 reached.set_one(at, true);
             }
         },
     );
-    out.counters.add(Counter::TilesFoundWide, left.count());
+    projected.counters.add(Counter::TilesFoundWide, left.count());
     scratch.copies.clear();
     left.for_each(|at| {
-        if let Some(reach) = reach_of_one(view, at, scratch, out, &mut beside) {
+        if let Some(reach) = reach_of_one(view, at, scratch, projected, &mut beside) {
             scratch.reaches.set(at, &reach);
             reached.set_one(at, true);
         }
     });
     if let Some(cut_off) = &view.list_cut_off {
-        clip(cut_off, scratch, &mut out.spans, &mut reached);
+        clip(cut_off, scratch, &mut projected.spans, &mut reached);
     }
     scratch.reached.clear();
     reached.for_each(|at| scratch.reached.push(at));
     let off_screen = drawn.without(&reached).count();
-    out.counters.add(Counter::SkippedOffScreen, off_screen);
-    out.counters.add(Counter::TilesBesideEllipse, beside);
+    projected.counters.add(Counter::SkippedOffScreen, off_screen);
+    projected.counters.add(Counter::TilesBesideEllipse, beside);
 }
 
 /// The lanes that are between the near and far planes and have a positive definite covariance. Counts the reasons to
@@ -267,18 +278,18 @@ fn find_drawn<S: Simd>(view: &ViewConstants, simd: S, scratch: &Scratch, counter
     let near = number(last_rounded_to(view.near));
     let before_far = number(last_rounded_to(view.far.next_down()));
     let (least, greatest) = (number(0.0), number(f64::MAX));
-    let is_flat = view.geometry == GaussianGeometry::Surfel;
+    let is_surfel = view.geometry == GaussianGeometry::Surfel;
     let [mut beyond_near, mut beyond_far, mut definite] = [Bits::default(); 3];
     for at in (0..len).step_by(S::f64s::LEN) {
         let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
         let depth = load(&scratch.depth);
-        let determinant = load(&scratch.flat.determinant);
+        let determinant = load(&scratch.screen.determinant);
         // Comparisons with NaN are false.
         beyond_near.set(at, depth.simd_gt(near));
         beyond_far.set(at, depth.simd_gt(before_far));
         definite.set(at, determinant.simd_gt(least) & determinant.simd_le(greatest));
     }
-    if is_flat {
+    if is_surfel {
         definite = Bits::first(len);
     }
     let kept = scratch.kept;
@@ -310,7 +321,7 @@ fn reach_in_lanes<S: Simd>(
             let half = |at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
             half(at).narrow(half(at + S::f64s::LEN))
         };
-        let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.flat, load));
+        let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.screen, load));
         let drawn = S::mask32s::from_bitmask(simd, drawn.group(at, S::f32s::LEN));
         let drawn = drawn & ellipses.exists;
         let (across, along) = (&ellipses.across, &ellipses.along);
@@ -335,7 +346,7 @@ fn reach_in_lanes<S: Simd>(
             if !(told & row.simd_le(along.last)).any_true() {
                 break;
             }
-            let (across_row, within) = ellipses.row(simd, row);
+            let RowColumns { range: across_row, within } = ellipses.row(simd, row);
             let mut first = within.select(across_row.first, zero);
             let mut tiles = within.select(across_row.tiles(), zero);
             if number == 0 {
@@ -385,7 +396,7 @@ fn reach_by_rows<S: Simd>(
 ) -> Option<TileFootprint> {
     let number = |value: f32| S::f32s::splat(simd, value);
     let load = |lanes: &GroupF64| number(lanes[at] as f32);
-    let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.flat, load));
+    let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.screen, load));
     let along = &ellipses.along;
     let whole = |value: S::f32s| value.as_slice()[0] as u64;
     let (first, count) = (whole(along.first), whole(along.tiles()) as usize);
@@ -395,7 +406,7 @@ fn reach_by_rows<S: Simd>(
     let mut row = along.first + S::f32s::from_slice(simd, &NUMBERS[..S::f32s::LEN]);
     let mut reached = zero;
     for of_rows in others[first_span..].chunks_mut(S::f32s::LEN) {
-        let (across_row, within) = ellipses.row(simd, row);
+        let RowColumns { range: across_row, within } = ellipses.row(simd, row);
         let tiles = within.select(across_row.tiles(), zero);
         let bits = spans(simd, within.select(across_row.first, zero), tiles);
         for (span, &bits) in of_rows.iter_mut().zip(bits.as_slice()) {
@@ -416,23 +427,23 @@ fn reach_of_one(
     view: &ViewConstants,
     at: usize,
     scratch: &mut Scratch,
-    out: &mut ProjectedGroup,
+    projected: &mut ProjectedGroup,
     beside: &mut u64,
 ) -> Option<TileFootprint> {
     if view.geometry == GaussianGeometry::Surfel {
-        return surfel_of(view, at, scratch, &mut out.spans).1;
+        return surfel_of(view, at, scratch, &mut projected.spans).footprint;
     }
-    let ellipse = scratch.flat.ellipse(at);
+    let ellipse = scratch.screen.ellipse(at);
     // The square root of a negative extent is NaN.
     if ellipse.half[1].is_nan() {
         return None;
     }
     let beside = view.optimizations.has(Optimization::Ellipse).then_some(beside);
     match view.period {
-        None => ellipse.reach(&view.visible, &mut out.spans, beside),
+        None => ellipse.reach(&view.visible, &mut projected.spans, beside),
         Some(period) => {
             let (visible, copies) = (&view.visible, &mut scratch.copies);
-            panorama::reach(at, &ellipse, period, visible, copies, out, beside)
+            panorama::reach(at, &ellipse, period, visible, copies, projected, beside)
         }
     }
 }

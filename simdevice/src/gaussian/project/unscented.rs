@@ -24,10 +24,16 @@ const OTHER: f64 = 1.0 / 6.0;
 /// The number of points of a Gaussian.
 const POINTS: usize = 7;
 
-/// The mean of a Gaussian in the picture, and the elements and determinant of its covariance.
+/// The mean and the covariance of a Gaussian in the picture.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
     mean: [f64; 2],
+    covariance: Covariance,
+}
+
+/// The elements of a covariance, and its determinant.
+#[derive(Clone, Copy, Debug)]
+struct Covariance {
     xx: f64,
     xy: f64,
     yy: f64,
@@ -38,7 +44,7 @@ struct Moments {
 /// used, which must be computed already.
 pub(crate) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
     let r = &view.rotation;
-    let placed = scratch.placed.as_deref().filter(|_| by_matrices);
+    let models = scratch.models.as_deref().filter(|_| by_matrices);
     let [fx, fy] = view.focal;
     for at in 0..scratch.lanes.len().min(GROUP) {
         let quaternion = scratch.rotation.each_ref().map(|lanes| lanes[at]);
@@ -47,7 +53,7 @@ pub(crate) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut S
         let rows = scratch.jacobian.each_ref().map(|row| row.each_ref().map(|lanes| lanes[at]));
         let t = scratch.camera.each_ref().map(|lanes| lanes[at]);
         let to_camera = |axis: [f64; 3]| {
-            let axis = placed.map_or(axis, |placed| placed.to_world(at, axis));
+            let axis = models.map_or(axis, |models| models.to_world(at, axis));
             [0, 3, 6].map(|row| r[row] * axis[0] + r[row + 1] * axis[1] + r[row + 2] * axis[2])
         };
         let has_place = !rows[0][0].is_nan();
@@ -56,18 +62,14 @@ pub(crate) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut S
         let moments = match seen {
             Some(moments) => {
                 for (axis, place) in moments.mean.into_iter().enumerate() {
-                    scratch.flat.mean[axis][at] = place * view.focal[axis] + view.center[axis];
+                    scratch.screen.mean[axis][at] = place * view.focal[axis] + view.center[axis];
                 }
-                [
-                    fx * fx * moments.xx,
-                    fx * fy * moments.xy,
-                    fy * fy * moments.yy,
-                    fx * fx * fy * fy * moments.determinant,
-                ]
+                let Covariance { xx, xy, yy, determinant } = moments.covariance;
+                [fx * fx * xx, fx * fy * xy, fy * fy * yy, fx * fx * fy * fy * determinant]
             }
             None => {
                 let deviations = own.map(|axis| rows.map(|row| dot(row, axis)));
-                let (xx, xy, yy, determinant) = sums(&deviations);
+                let Covariance { xx, xy, yy, determinant } = Covariance::new(&deviations);
                 [xx, xy, yy, determinant]
             }
         };
@@ -91,7 +93,7 @@ fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) ->
     for (axis, pair) in axes.iter().zip(places[1..].as_chunks_mut::<2>().0) {
         for (sign, to) in [DISTANCE, -DISTANCE].into_iter().zip(pair) {
             let point = [0, 1, 2].map(|k| t[k] + sign * axis[k]);
-            if !is_seen(model, near, t, point) {
+            if !projects_continuously(model, near, t, point) {
                 return None;
             }
             *to = place(model, point);
@@ -108,35 +110,36 @@ fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) ->
         let weight = if point == 0 { CENTER } else { OTHER };
         [0, 1].map(|axis| weight.sqrt() * (places[point][axis] - mean[axis]))
     });
-    let (xx, xy, yy, determinant) = sums(&deviations);
-    Some(Moments { mean, xx, xy, yy, determinant })
+    Some(Moments { mean, covariance: Covariance::new(&deviations) })
 }
 
-/// The sums xx, xy and yy of squares and products, and the determinant of their matrix. The determinant is itself
-/// summed from squares, so that no digits cancel where deviations are almost on a line.
-fn sums(deviations: &[[f64; 2]]) -> (f64, f64, f64, f64) {
-    let (mut xx, mut xy, mut yy, mut determinant) = (0.0, 0.0, 0.0, 0.0);
-    for (number, &[x, y]) in deviations.iter().enumerate() {
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-        for &[earlier_x, earlier_y] in &deviations[..number] {
-            let area = earlier_x * y - earlier_y * x;
-            determinant += area * area;
+impl Covariance {
+    /// The sums of squares and products of weighted deviations. The determinant is itself summed from squares, so that no
+    /// digits cancel where deviations are almost on a line.
+    fn new(deviations: &[[f64; 2]]) -> Self {
+        let (mut xx, mut xy, mut yy, mut determinant) = (0.0, 0.0, 0.0, 0.0);
+        for (number, &[x, y]) in deviations.iter().enumerate() {
+            xx += x * x;
+            xy += x * y;
+            yy += y * y;
+            for &[earlier_x, earlier_y] in &deviations[..number] {
+                let area = earlier_x * y - earlier_y * x;
+                determinant += area * area;
+            }
         }
+        Self { xx, xy, yy, determinant }
     }
-    (xx, xy, yy, determinant)
 }
 
 fn place(model: CameraModel, t: [f64; 3]) -> [f64; 2] {
     let unbounded = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
-    linearize(model, unbounded, t).0
+    linearize(model, unbounded, t).place
 }
 
 /// True if the camera sees `point` of a Gaussian at `t`, and the projection is continuous between them. A pinhole sees
 /// points beyond the near plane. Cameras that see all around accept points at less than a right angle from `t`, with no
 /// singularity of the projection as near as that.
-fn is_seen(model: CameraModel, near: f64, t: [f64; 3], point: [f64; 3]) -> bool {
+fn projects_continuously(model: CameraModel, near: f64, t: [f64; 3], point: [f64; 3]) -> bool {
     let angle = || length(cross(t, point)).atan2(dot(t, point));
     let [x, y, z] = t;
     match model {
@@ -176,7 +179,8 @@ mod tests {
         let moments = of_points(CameraModel::Orthographic, 0.2, t, AXES).unwrap();
         assert_eq!(moments.mean, [1.0, 2.0]);
         let expected = [0.01, 0.0, 0.04, 0.0004];
-        let found = [moments.xx, moments.xy, moments.yy, moments.determinant];
+        let Covariance { xx, xy, yy, determinant } = moments.covariance;
+        let found = [xx, xy, yy, determinant];
         let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15);
         assert!(close, "{found:?}");
     }
@@ -199,7 +203,7 @@ mod tests {
             let t = [0.0, 0.2, 2.0 * sign];
             of_points(CameraModel::Equirectangular, 0.2, t, AXES).unwrap()
         });
-        assert!((behind.xx - ahead.xx).abs() < 1e-12);
+        assert!((behind.covariance.xx - ahead.covariance.xx).abs() < 1e-12);
         assert!((behind.mean[0].abs() - PI).abs() < 1e-12);
     }
 }

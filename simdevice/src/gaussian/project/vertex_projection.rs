@@ -153,13 +153,13 @@ fn project(set: &GaussianSet, draw: &Draw, sequence: u32, runtime: &Runtime) -> 
 impl Worker<'_> {
     /// Shades and projects the Gaussians of a group up to `end`.
     fn run(&mut self, task: &ShaderTask, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
-        let mut out = ProjectedGroup::default();
+        let mut projected = ProjectedGroup::default();
         let (shading, outputs, scratch) = (&self.shading, &mut *self.outputs, &mut self.scratch);
-        self.shader.shade(task.instance, task.first, end, &mut out.counters)?;
-        shading.keep(&self.shader, outputs, scratch, &mut out);
-        dispatch!(level, simd => shading.flatten(simd, outputs, scratch));
-        shading.emit(level, outputs, scratch, task.sequence, &mut out);
-        Ok(out)
+        self.shader.shade(task.instance, task.first, end, &mut projected.counters)?;
+        shading.keep(&self.shader, outputs, scratch, &mut projected);
+        dispatch!(level, simd => shading.to_screen(simd, outputs, scratch));
+        shading.emit(level, outputs, scratch, task.sequence, &mut projected);
+        Ok(projected)
     }
 }
 
@@ -198,9 +198,15 @@ impl Shading {
     }
 
     /// Packs the Gaussians that no test culls, and counts the others by the first reason to skip them.
-    fn keep(&self, shader: &PointShader<'_>, kept: &mut Outputs, scratch: &mut Scratch, out: &mut ProjectedGroup) {
+    fn keep(
+        &self,
+        shader: &PointShader<'_>,
+        kept: &mut Outputs,
+        scratch: &mut Scratch,
+        projected: &mut ProjectedGroup,
+    ) {
         scratch.lanes.clear();
-        let counters = &mut out.counters;
+        let counters = &mut projected.counters;
         for (lane, (position, varyings)) in shader.points().enumerate() {
             counters.add(Counter::GaussiansRead, 1);
             let value = |number: u32| {
@@ -247,9 +253,9 @@ impl Shading {
 
     /// Computes mean, covariance and opacity in the picture for the kept Gaussians.
     #[inline(always)]
-    fn flatten<S: Simd>(&self, simd: S, kept: &Outputs, scratch: &mut Scratch) {
+    fn to_screen<S: Simd>(&self, simd: S, kept: &Outputs, scratch: &mut Scratch) {
         let count = scratch.lanes.len();
-        let (flat, depth) = (&mut *scratch.flat, &mut scratch.depth);
+        let (screen, depth) = (&mut *scratch.screen, &mut scratch.depth);
         let zero = S::f64s::splat(simd, 0.0);
         for at in (0..count).step_by(S::f64s::LEN) {
             let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
@@ -259,7 +265,7 @@ impl Shading {
             let w = load(&kept.position[3]);
             for axis in 0..2 {
                 let place = load(&kept.position[axis]) / w;
-                store(place * self.half[axis] + self.middle[axis], &mut flat.mean[axis]);
+                store(place * self.half[axis] + self.middle[axis], &mut screen.mean[axis]);
             }
             let [xx, xy, yy] = &kept.covariance;
             let (xx, xy, yy) = (load(xx), load(xy), load(yy));
@@ -267,21 +273,21 @@ impl Shading {
             // negative. Its square root is then NaN, and `log2` gives negative infinity.
             let area2 = xx * yy - xy * xy;
             let constants = &self.constants;
-            shape(constants, simd, at, [xx, xy, yy], area2, load(&kept.opacity), flat);
-            let determinant = load(&flat.determinant);
+            shape(constants, simd, at, [xx, xy, yy], area2, load(&kept.opacity), screen);
+            let determinant = load(&screen.determinant);
             // If the determinant is positive, the diagonal elements have the same sign.
             let definite = (xx + constants.low_pass).simd_gt(zero);
-            store(definite.select(determinant, zero), &mut flat.determinant);
+            store(definite.select(determinant, zero), &mut screen.determinant);
             // The planes that remain are at infinity.
             store(zero, depth);
         }
     }
 
-    /// Finds the tiles of the kept Gaussians and appends those that reach some to `out`.
-    fn emit(&self, level: Level, kept: &Outputs, scratch: &mut Scratch, sequence: u32, out: &mut ProjectedGroup) {
-        out.reserve(scratch.lanes.len());
+    /// Finds the tiles of the kept Gaussians and appends those that reach some to `projected`.
+    fn emit(&self, level: Level, kept: &Outputs, scratch: &mut Scratch, sequence: u32, projected: &mut ProjectedGroup) {
+        projected.reserve(scratch.lanes.len());
         let constants = &self.constants;
-        dispatch!(level, simd => find_tiles(constants, simd, scratch, out));
+        dispatch!(level, simd => find_tiles(constants, simd, scratch, projected));
         for &at in &scratch.reached {
             let at = at % GROUP;
             let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);
@@ -291,16 +297,16 @@ impl Shading {
             };
             let [_, _, z, w] = &kept.position;
             let depth = self.depth.map_or(0, |depth| depth.encode(z[at] / w[at]));
-            out.keys.push([key, sequence]);
-            let splat = scratch.flat.splat(at, kept.color[at], depth);
-            out.splats.push(splat);
-            out.reaches.push(scratch.reaches.get(at));
+            projected.keys.push([key, sequence]);
+            let splat = scratch.screen.splat(at, kept.color[at], depth);
+            projected.splats.push(splat);
+            projected.reaches.push(scratch.reaches.get(at));
             if constants.is_tracked {
                 let z = w[at] as f32;
-                out.identities.push(Identity { z, sequence });
+                projected.identities.push(Identity { z, sequence });
             }
         }
-        let drawn = out.splats.len() as u64;
-        out.counters.add(Counter::GaussiansDrawn, drawn);
+        let drawn = projected.splats.len() as u64;
+        projected.counters.add(Counter::GaussiansDrawn, drawn);
     }
 }

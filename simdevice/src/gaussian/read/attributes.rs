@@ -124,13 +124,9 @@ fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
     indices.into_iter().map(vertex).collect()
 }
 
-/// The bytes of an attribute of this format, and true if its components are 32-bit floats.
-pub(super) fn layout(format: Format) -> (usize, bool) {
-    let floats = matches!(
-        format,
-        Format::R32Sfloat | Format::R32G32Sfloat | Format::R32G32B32Sfloat | Format::R32G32B32A32Sfloat
-    );
-    (format.texel_size(), floats)
+/// True if the components of an attribute of this format are 32-bit floats.
+fn is_of_floats(format: Format) -> bool {
+    matches!(format, Format::R32Sfloat | Format::R32G32Sfloat | Format::R32G32B32Sfloat | Format::R32G32B32A32Sfloat)
 }
 
 /// Reads attributes. It owns the bytes that a read needs in between.
@@ -147,7 +143,7 @@ impl Fetcher {
         group: &GroupVertices<'_>,
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
-        let (size, floats) = layout(stream.format);
+        let (size, floats) = (stream.format.texel_size(), is_of_floats(stream.format));
         if stream.instance_divisor.is_some() && group.len > 0 {
             let element = self.read_element(stream, group.element(stream, 0), size);
             let value = stream.format.decode(element);

@@ -30,7 +30,7 @@ struct Entry {
     first: u32,
     count: u32,
     /// True for 2D Gaussians, whose third scale is ignored.
-    is_flat: bool,
+    is_surfel: bool,
     /// The value of [`Entries::now`] when it was last drawn.
     used: u64,
     /// The clusters of the draw, if they were built. The memory of the positions owns them.
@@ -53,7 +53,7 @@ struct Entries {
 pub(crate) struct ClusterCache(Mutex<Entries>);
 
 impl Entry {
-    fn new(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
+    fn new(append: &GaussianAppend, is_surfel: bool, with_harmonics: bool) -> Self {
         let attributes = &append.attributes;
         let harmonics = attributes.spherical_harmonics.iter();
         let shapes = shapes(append).into_iter();
@@ -63,7 +63,7 @@ impl Entry {
             activations: attributes.activations,
             first: append.first,
             count: append.count,
-            is_flat,
+            is_surfel,
             used: 0,
             clusters: Weak::new(),
             building: Weak::new(),
@@ -75,7 +75,7 @@ impl Entry {
         let mut streams = self.streams.iter().zip(&other.streams);
         let what = |entry: &Self| {
             let Self { first, count, .. } = *entry;
-            let how = (entry.is_flat, entry.activations);
+            let how = (entry.is_surfel, entry.activations);
             (first, count, how, entry.streams.len())
         };
         what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
@@ -86,7 +86,7 @@ impl Entry {
     fn covers(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
         let what = |entry: &Self| {
-            let how = (entry.is_flat, entry.activations);
+            let how = (entry.is_surfel, entry.activations);
             (entry.first, entry.count, how)
         };
         what(self) == what(other) && self.streams.len() >= other.streams.len() && streams.all(|(a, b)| a.is_same(b))
@@ -118,7 +118,7 @@ impl Entry {
 impl Entries {
     /// Frees the least recently used clusters until `bytes` more fit into the budget and at most [`MAX_ENTRIES`] draws
     /// are remembered.
-    fn make_room(&mut self, bytes: u64, budget: u64) {
+    fn evict(&mut self, bytes: u64, budget: u64) {
         self.entries.sort_by_key(|entry| entry.used);
         let held: u64 = self.entries.iter().map(Entry::memory_bytes).sum();
         let mut excess = held.saturating_add(bytes).saturating_sub(budget);
@@ -141,13 +141,13 @@ impl ClusterCache {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The clusters of `append`'s Gaussians, as 2D Gaussians if `is_flat`, or `None` if they have none or these are
+    /// The clusters of `append`'s Gaussians, as 2D Gaussians if `is_surfel`, or `None` if they have none or these are
     /// unfinished; `advance` builds the next piece of them. Draws of the same Gaussians with a lower degree of
     /// spherical harmonics share them. All clusters together take at most `budget` bytes.
     pub(crate) fn get(
         &self,
         append: &GaussianAppend,
-        is_flat: bool,
+        is_surfel: bool,
         budget: u64,
         advance: impl FnOnce(&mut ClusterBuilder, ClusterSource<'_>) -> Option<Clusters>,
     ) -> Option<Arc<Clusters>> {
@@ -157,7 +157,7 @@ impl ClusterCache {
         let with_harmonics = append.attributes.spherical_harmonics.iter().all(is_fixed)
             && clusters::memory_bytes(append, true) <= budget;
         // Generations are read before the memory, so that a write in the meantime makes the clusters out of date.
-        let mut drawn = Entry::new(append, is_flat, with_harmonics);
+        let mut drawn = Entry::new(append, is_surfel, with_harmonics);
         let memory = &append.attributes.position.buffer.memory;
         let building = {
             let mut entries = self.lock();
@@ -180,7 +180,7 @@ impl ClusterCache {
             }
             let Some(entry) = entries.entries.iter().find(|entry| entry.is_same(&drawn)) else {
                 entries.entries.push(drawn);
-                entries.make_room(0, budget);
+                entries.evict(0, budget);
                 return None;
             };
             let building = entry.building.upgrade().unwrap_or_else(|| {
@@ -197,11 +197,11 @@ impl ClusterCache {
                 }
                 !is_covered
             });
-            entries.make_room(drawn.bytes, budget);
+            entries.evict(drawn.bytes, budget);
             entries.entries.push(drawn);
             building
         };
-        let source = ClusterSource { append, is_flat, with_harmonics };
+        let source = ClusterSource { append, is_surfel, with_harmonics };
         let clusters = {
             let mut builder = building.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::new(advance(&mut builder, source)?)
@@ -232,7 +232,7 @@ pub(crate) fn find(
     if !config.optimizations.has(Optimization::ClusterCulling) {
         return found;
     }
-    let is_flat = set.is_flat();
+    let is_surfel = set.has_surfels();
     for (append, found) in set.appends.iter().zip(&mut found) {
         let advance = |builder: &mut ClusterBuilder, source: ClusterSource<'_>| {
             let started = Instant::now();
@@ -241,7 +241,7 @@ pub(crate) fn find(
             counters.add(Counter::ClusterTime, started.elapsed().as_nanos() as u64);
             clusters
         };
-        *found = cache.get(append, is_flat, config.cluster_budget_bytes, advance);
+        *found = cache.get(append, is_surfel, config.cluster_budget_bytes, advance);
     }
     found
 }

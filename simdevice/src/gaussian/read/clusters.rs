@@ -88,7 +88,7 @@ pub(crate) struct ClusterSource<'a> {
     /// An append without indices. Its model's transform is not applied, and has no attribute per vertex.
     pub(crate) append: &'a GaussianAppend,
     /// True for 2D Gaussians: their third scales are taken as zero.
-    pub(crate) is_flat: bool,
+    pub(crate) is_surfel: bool,
     pub(crate) with_harmonics: bool,
 }
 
@@ -182,11 +182,11 @@ fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
 
 impl Cluster {
     fn read(source: ClusterSource<'_>, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
-        let ClusterSource { append, is_flat, with_harmonics } = source;
+        let ClusterSource { append, is_surfel, with_harmonics } = source;
         let group = GroupVertices::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_own(&append.attributes, &group, &mut attributes);
-        if is_flat {
+        if is_surfel {
             attributes.scale[2].fill(0.0);
         }
         let mut bounds = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], scale: 0.0, opacity: 0.0 };
@@ -303,7 +303,7 @@ mod tests {
 
     /// The number of clusters that each piece made, and all clusters.
     fn pieces(append: &GaussianAppend) -> (Vec<usize>, Clusters) {
-        let source = ClusterSource { append, is_flat: false, with_harmonics: true };
+        let source = ClusterSource { append, is_surfel: false, with_harmonics: true };
         let (mut builder, mut made) = (ClusterBuilder::default(), Vec::new());
         loop {
             made.push(builder.advance(source));

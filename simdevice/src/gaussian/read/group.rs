@@ -58,7 +58,7 @@ impl<'a> GroupSource<'a> {
         fetcher: &mut Fetcher,
         attributes: &'b mut Attributes,
         matrices: &'b mut Option<Box<Matrices>>,
-        is_flat: bool,
+        is_surfel: bool,
     ) -> GroupAttributes<'b> {
         let streams = &self.append.attributes;
         let vertices = match self.members {
@@ -89,7 +89,7 @@ impl<'a> GroupSource<'a> {
             Members::From(_) => {
                 fetcher.read_own(streams, &vertices, attributes);
                 fetcher.fade(streams, &vertices, attributes);
-                if is_flat {
+                if is_surfel {
                     attributes.scale[2][..vertices.len].fill(0.0);
                 }
                 (&*attributes, false)

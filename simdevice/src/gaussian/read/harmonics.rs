@@ -1,6 +1,6 @@
 //! Spherical harmonics of single lanes: read from memory, or held by a cluster.
 
-use super::attributes::{GroupVertices, layout};
+use super::attributes::GroupVertices;
 use crate::format::Format;
 use crate::gaussian::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use crate::packet::AttributeStream;
@@ -67,7 +67,7 @@ impl<'a> CoefficientReader<'a> {
         }
         for (stream, out) in self.streams.iter().zip(out.chunks_exact_mut(3)) {
             let mut bytes = [0u8; 16];
-            let bytes = &mut bytes[..layout(stream.format).0.min(16)];
+            let bytes = &mut bytes[..stream.format.texel_size().min(16)];
             stream.read(group.element(stream, lane), bytes);
             out.copy_from_slice(&stream.format.decode(bytes)[..3]);
         }

@@ -5,7 +5,7 @@
 
 use super::attributes::{Fetcher, GroupVertices};
 use crate::gaussian::lanes::{Bits, F32_LANES, GROUP};
-use crate::gaussian::linear_algebra::Linear;
+use crate::gaussian::linear_algebra::Affine;
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// The matrices of a group's Gaussians as they are read, an element per lane.
@@ -32,10 +32,10 @@ impl Matrices {
     }
 
     /// The matrix of all lanes and its translation; `None` if lanes may differ.
-    pub(crate) fn uniform(&self) -> Option<(Linear, [f64; 3])> {
+    pub(crate) fn uniform(&self) -> Option<Affine> {
         let element = |row: usize, column: usize| f64::from(self.rows[row][column][0]);
         let linear = [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column)));
-        self.is_uniform.then(|| (linear, [0, 1, 2].map(|row| element(row, 3))))
+        self.is_uniform.then(|| Affine { linear, translation: [0, 1, 2].map(|row| element(row, 3)) })
     }
 
     /// The lanes among the first `len` whose matrices are finite.
@@ -52,8 +52,8 @@ impl Matrices {
 /// The model of an instance whose model attributes are per instance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct InstanceTransform {
-    /// The rows of the matrix, and its translation.
-    pub(crate) matrix: Option<(Linear, [f64; 3])>,
+    /// The matrix and the translation.
+    pub(crate) matrix: Option<Affine>,
     opacity: Option<f32>,
 }
 

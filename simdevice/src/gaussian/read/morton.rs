@@ -25,8 +25,8 @@ pub(crate) fn morton_order(append: &GaussianAppend) -> Vec<u32> {
             }
         },
     );
-    let (low, per_cell) = grid(&positions);
-    let cells = 1.0 / per_cell;
+    let Grid { low, cell } = Grid::new(&positions);
+    let cells = 1.0 / cell;
     let code = |&[x, y, z]: &[f32; 3]| {
         let cell = |position: f32, axis: usize| {
             // NaN becomes zero.
@@ -40,28 +40,37 @@ pub(crate) fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     host::collect(order.into_iter().map(|(_, number)| number))
 }
 
-/// The lowest corner and the side of a cell of a grid that holds most positions. A few positions far away do not
-/// enlarge it much.
-fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
-    let finite = || {
-        let all = positions.iter();
-        all.filter(|position| position.iter().all(|value| value.is_finite()))
-    };
-    let count = finite().count().max(1) as f64;
-    let [mut mean, mut variance] = [[0.0; 3]; 2];
-    for position in finite() {
-        for axis in 0..3 {
-            mean[axis] += f64::from(position[axis]) / count;
+/// A grid of cubic cells.
+struct Grid {
+    /// The lowest corner.
+    low: [f64; 3],
+    /// The side of a cell.
+    cell: f64,
+}
+
+impl Grid {
+    /// A grid that holds most positions. A few positions far away do not enlarge it much.
+    fn new(positions: &[[f32; 3]]) -> Self {
+        let finite = || {
+            let all = positions.iter();
+            all.filter(|position| position.iter().all(|value| value.is_finite()))
+        };
+        let count = finite().count().max(1) as f64;
+        let [mut mean, mut variance] = [[0.0; 3]; 2];
+        for position in finite() {
+            for axis in 0..3 {
+                mean[axis] += f64::from(position[axis]) / count;
+            }
         }
-    }
-    for position in finite() {
-        for axis in 0..3 {
-            variance[axis] += (f64::from(position[axis]) - mean[axis]).powi(2) / count;
+        for position in finite() {
+            for axis in 0..3 {
+                variance[axis] += (f64::from(position[axis]) - mean[axis]).powi(2) / count;
+            }
         }
+        let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();
+        let half = (3.0 * deviation).clamp(f64::MIN_POSITIVE * 1e9, f64::MAX / 4.0);
+        Self { low: mean.map(|mean| mean - half), cell: 2.0 * half / f64::from(1u32 << AXIS_BITS) }
     }
-    let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();
-    let half = (3.0 * deviation).clamp(f64::MIN_POSITIVE * 1e9, f64::MAX / 4.0);
-    (mean.map(|mean| mean - half), 2.0 * half / f64::from(1u32 << AXIS_BITS))
 }
 
 /// Puts two zeros after each of the [`AXIS_BITS`] bits of a number.
@@ -90,8 +99,8 @@ mod tests {
         positions.extend(vec![[1.0, 0.0, 0.0]; 500]);
         positions.push([f32::NAN, 0.0, 0.0]);
         positions.push([5.0, 0.0, f32::INFINITY]);
-        let (low, per_cell) = grid(&positions);
+        let Grid { low, cell } = Grid::new(&positions);
         assert!((low[0] - (0.5 - 1.5)).abs() < 1e-9, "{low:?}");
-        assert!((per_cell - 3.0 / 1024.0).abs() < 1e-9, "{per_cell}");
+        assert!((cell - 3.0 / 1024.0).abs() < 1e-9, "{cell}");
     }
 }

@@ -4,10 +4,10 @@ use super::radix;
 use super::radix::{SortBuffers, SortedPairs};
 use crate::gaussian::lanes::GROUP;
 use crate::gaussian::splats::group::ProjectedGroup;
-use crate::gaussian::splats::splat::locate;
+use crate::gaussian::splats::splat::SplatIndex;
 use devmem::host;
 
-/// A depth key, and the index of a splat that [`locate`] takes apart.
+/// A depth key, and the number of a splat: see [`SplatIndex`].
 type Pair = (u32, u32);
 
 /// The projected Gaussians in depth order: key, and group number times `GROUP` plus lane. The memory comes from
@@ -26,18 +26,14 @@ fn keys_of(groups: &[ProjectedGroup]) -> Vec<&[[u32; 2]]> {
 /// Orders runs of equal keys by their sequence numbers in the set. With clusters, the groups themselves are not in that
 /// order.
 fn settle_ties(keys: &[&[[u32; 2]]], pairs: &mut [Pair]) {
-    let sequence = |&(_, name): &Pair| {
-        let (group, place) = locate(name);
-        keys[group][place][1]
-    };
+    let sequence = |&(_, number): &Pair| SplatIndex::new(number).of(keys)[1];
     // Sequence numbers are scattered in memory, so they are prefetched first.
     let mut tied = Vec::new();
     for (at, two) in pairs.windows(2).enumerate() {
         if two[0].0 == two[1].0 {
             host::push(&mut tied, at);
-            for &(_, name) in two {
-                let (group, place) = locate(name);
-                devmem::prefetch(std::slice::from_ref(&keys[group][place]));
+            for &(_, number) in two {
+                devmem::prefetch(std::slice::from_ref(SplatIndex::new(number).of(keys)));
             }
         }
     }

@@ -72,7 +72,7 @@ impl RayDepth {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayDepths<'a> {
     /// The Gaussians by group, in the order of the splats.
-    pub(crate) of: &'a [Vec<RayDepth>],
+    pub(crate) by_group: &'a [Vec<RayDepth>],
     pub(crate) rays: PixelRays,
 }
 

@@ -19,7 +19,7 @@ pub(crate) struct Splat {
     /// True if its exponent is a difference of numbers so large that binary32 would lose it.
     pub needs_f64: bool,
     /// True if it is wider than the period of a panorama: it then counts within half a period of its mean only, where
-    /// its copies do not. Such a one is steep.
+    /// its copies do not. Such a one needs binary64.
     pub exceeds_period: bool,
 }
 
@@ -33,8 +33,24 @@ pub(crate) struct SplatLook {
     pub depth: u32,
 }
 
-/// The group and the place in the group of the splat with index `name`.
-#[inline(always)]
-pub(crate) fn locate(name: u32) -> (usize, usize) {
-    (name as usize / GROUP, name as usize % GROUP)
+/// The place of a splat among those of a set: lists of splats hold it as a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SplatIndex {
+    pub(crate) group: usize,
+    /// The place in the group.
+    pub(crate) place: usize,
+}
+
+impl SplatIndex {
+    /// The index that a number stands for: the group's number times [`GROUP`], plus the place.
+    #[inline(always)]
+    pub(crate) fn new(number: u32) -> Self {
+        Self { group: number as usize / GROUP, place: number as usize % GROUP }
+    }
+
+    /// The splat's item of `items`, which are by group, in the order of the splats.
+    #[inline(always)]
+    pub(crate) fn of<T>(self, items: &[impl AsRef<[T]>]) -> &T {
+        &items[self.group].as_ref()[self.place]
+    }
 }

@@ -8,44 +8,54 @@ pub(crate) fn period(camera: &Camera) -> Option<f64> {
     (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
 }
 
-/// A point's position in the picture relative to the principal point, and the two rows of the projection's Jacobian,
-/// both for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
+/// The projection of a point, linearized, for focal lengths of 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Linearization {
+    /// The point's position in the picture, relative to the principal point.
+    pub(crate) place: [f64; 2],
+    /// The rows of the projection's Jacobian.
+    pub(crate) jacobian: [[f64; 3]; 2],
+}
+
+/// Linearizes the projection of a point `t` in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
 /// least and the greatest of `slopes`. Points that have no position give NaN.
-pub(crate) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+pub(crate) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> Linearization {
     match model {
         CameraModel::Pinhole => pinhole(slopes, t),
-        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        CameraModel::Orthographic => {
+            Linearization { place: [t[0], t[1]], jacobian: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] }
+        }
         CameraModel::Fisheye => fisheye(t),
         CameraModel::Equirectangular => equirectangular(t),
     }
 }
 
-fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> Linearization {
     let place = [x / z, y / z];
     let [u, v] = [0, 1].map(|axis| place[axis].max(least[axis]).min(greatest[axis]));
-    (place, [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
+    Linearization { place, jacobian: [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]] }
 }
 
 /// The equidistant projection: the distance from the principal point is the angle from the axis.
-fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+fn fisheye([x, y, z]: [f64; 3]) -> Linearization {
     let r = x.hypot(y);
     if r == 0.0 {
         // A point straight behind the camera projects to a whole circle, so it has no position.
         let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
-        return ([0.0; 2], [[scale, 0.0, 0.0], [0.0, scale, 0.0]]);
+        return Linearization { place: [0.0; 2], jacobian: [[scale, 0.0, 0.0], [0.0, scale, 0.0]] };
     }
     // Along the radius a point moves by z / |t|^2, across it by angle / r, and along the axis by -r / |t|^2.
     let (cos, sin) = (x / r, y / r);
     let length = r.hypot(z);
     let (along, across, axial) = (z / length / length, r.atan2(z) / r, -(r / length / length));
     let mixed = (along - across) * cos * sin;
-    (
-        [across * x, across * y],
-        [
+    Linearization {
+        place: [across * x, across * y],
+        jacobian: [
             [along * cos * cos + across * sin * sin, mixed, axial * cos],
             [mixed, along * sin * sin + across * cos * cos, axial * sin],
         ],
-    )
+    }
 }
 
 /// The least cosine of the latitude for which a panorama's Jacobian is taken. At a pole itself it would be infinite,
@@ -53,17 +63,17 @@ fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
 const POLE: f64 = 1.0 / 1024.0;
 
 /// The equirectangular projection: longitude, from straight ahead to the right, and latitude, downwards.
-fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+fn equirectangular([x, y, z]: [f64; 3]) -> Linearization {
     let r = x.hypot(z);
     let length = r.hypot(y);
     // At a pole the longitude is undefined; that of straight ahead is taken.
     let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
     let across = 1.0 / r.max(POLE * length);
     let (rise, run) = (y / length, r / length);
-    (
-        [x.atan2(z), y.atan2(r)],
-        [[cos * across, 0.0, -sin * across], [-sin * rise / length, run / length, -cos * rise / length]],
-    )
+    Linearization {
+        place: [x.atan2(z), y.atan2(r)],
+        jacobian: [[cos * across, 0.0, -sin * across], [-sin * rise / length, run / length, -cos * rise / length]],
+    }
 }
 
 /// The depth variable, by which near and far plane, fragment depth and the view-depth order go: `t.z` for pinhole and
@@ -94,7 +104,7 @@ mod tests {
             let moved = |by: f64| {
                 let mut t = t;
                 t[axis] += by;
-                linearize(model, SLOPES, t).0
+                linearize(model, SLOPES, t).place
             };
             let (ahead, behind) = (moved(step), moved(-step));
             for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
@@ -114,7 +124,7 @@ mod tests {
                     CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
                     _ => [x, y, z],
                 };
-                let (_, rows) = linearize(model, SLOPES, t);
+                let Linearization { jacobian: rows, .. } = linearize(model, SLOPES, t);
                 for (row, expected) in rows.iter().zip(jacobian(model, t)) {
                     for (a, b) in row.iter().zip(expected) {
                         prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
@@ -126,17 +136,17 @@ mod tests {
 
     #[gaurast_runner::test]
     fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
-        let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
-        assert_eq!((place, rows), linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0]));
-        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
+        let at_axis = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
+        assert_eq!(at_axis, linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0]));
+        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
         assert!((rows[1][1] - 0.25).abs() < 1e-12);
-        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
+        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
         assert!(rows[0][0].is_nan());
     }
 
     #[gaurast_runner::test]
     fn a_panorama_sees_all_directions() {
-        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).0;
+        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).place;
         let right = std::f64::consts::FRAC_PI_2;
         assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
         assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
@@ -145,7 +155,7 @@ mod tests {
         assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
         // At a pole, and a little away from it, a point moves no faster than the stated limit.
         for x in [0.0, 1e-9] {
-            let (_, rows) = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
+            let Linearization { jacobian: rows, .. } = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
             assert_eq!(rows[0], [512.0, 0.0, 0.0]);
             assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
         }

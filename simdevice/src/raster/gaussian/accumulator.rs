@@ -13,8 +13,9 @@ pub(crate) struct Accumulator {
     pub(crate) color: [[[f32; BLOCK_PIXELS]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
     pub(crate) transmittance: [[f32; BLOCK_PIXELS]; BLOCKS],
-    /// In the fast kernel, how far alphas may fall at each pixel; where it is finished, none falls so little.
-    pub(crate) most_fall: [[f32; BLOCK_PIXELS]; BLOCKS],
+    /// In the fast kernel, minus the base-2 logarithm of the alpha floor at each pixel; negative infinity where the pixel is
+    /// finished, so that no alpha reaches the floor.
+    pub(crate) neg_log2_floors: [[f32; BLOCK_PIXELS]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     pub(crate) covered: [u32; BLOCKS],
     /// The median depth as the attachment holds it, where covered, if the draw writes depth.
@@ -51,7 +52,7 @@ impl Accumulator {
     pub(crate) const EMPTY: Self = Self {
         color: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3],
         transmittance: [[1.0; BLOCK_PIXELS]; BLOCKS],
-        most_fall: [[0.0; BLOCK_PIXELS]; BLOCKS],
+        neg_log2_floors: [[0.0; BLOCK_PIXELS]; BLOCKS],
         covered: [0; BLOCKS],
         median: [[0; BLOCK_PIXELS]; BLOCKS],
         means: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2],
@@ -104,14 +105,14 @@ impl Accumulator {
         [load(&r[block]), load(&g[block]), load(&b[block]), f32x16::splat(simd, 1.0) - rest]
     }
 
-    /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
+    /// A bit for each block that has a pixel that is not finished and has more than a transmittance.
     #[inline(always)]
-    pub(crate) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
-        let light = i32x16::splat(simd, light);
+    pub(crate) fn open_blocks<S: Simd>(&self, simd: S, transmittance: TransmittanceBits) -> u64 {
+        let least = i32x16::splat(simd, transmittance.0);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {
             let lanes: i32x16<S> = f32x16::from_slice(simd, lanes).bitcast();
-            open |= u64::from(lanes.simd_gt(light).any_true()) << block;
+            open |= u64::from(lanes.simd_gt(least).any_true()) << block;
         }
         open
     }
@@ -148,15 +149,14 @@ impl Accumulator {
         finished
     }
 
-    /// Finds how far alphas may fall at a block's pixels: no farther than `most_fall`, and where they are finished, not
-    /// at all.
+    /// Finds the floors of a block's pixels: that of the draw, unless they are finished.
     #[inline(always)]
-    pub(crate) fn find_most_fall<S: Simd>(&mut self, simd: S, block: usize, most_fall: f32) {
+    pub(crate) fn find_neg_log2_floors<S: Simd>(&mut self, simd: S, block: usize, neg_log2_floor: f32) {
         let t = f32x16::from_slice(simd, &self.transmittance[block]);
         let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
-        let most_fall = f32x16::splat(simd, most_fall);
+        let neg_log2_floor = f32x16::splat(simd, neg_log2_floor);
         let none = f32x16::splat(simd, f32::NEG_INFINITY);
-        open.select(most_fall, none).store_slice(&mut self.most_fall[block]);
+        open.select(neg_log2_floor, none).store_slice(&mut self.neg_log2_floors[block]);
     }
 
     /// The pixels of a block that are not finished.

@@ -9,38 +9,38 @@
 
 use super::accumulator::{NOT_TERMINATED, TransmittanceBits};
 use super::kernel::Kernel;
-use super::mode::{DepthMode, FAST_POWERS, FASTER_POWERS, NO_DEPTH};
+use super::mode::{DepthMode, Exponential};
 use crate::simd::exp2::{CUBIC, QUADRATIC};
 use crate::state::gaussian::{GaussianApproximation, GaussianState};
 
-/// The approximations of the plain kernel in a draw.
+/// The approximations of the fast kernel in a draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Approximation {
-    /// [`NO_DEPTH`], or what is cheaper.
-    pub(crate) powers: DepthMode,
-    /// Blocks with no more light are finished.
-    pub(crate) light: TransmittanceBits,
+    /// The exactness of powers of two.
+    pub(crate) exponential: Exponential,
+    /// Blocks none of whose pixels has more than this are finished.
+    pub(crate) least_transmittance: TransmittanceBits,
 }
 
 impl Approximation {
-    /// As exactly as it can.
-    pub(crate) const EXACT: Self = Self { powers: NO_DEPTH, light: NOT_TERMINATED };
+    /// No approximation.
+    pub(crate) const EXACT: Self = Self { exponential: Exponential::Exact, least_transmittance: NOT_TERMINATED };
 
-    /// As a state allows it in a mode; all but the plain one are exact.
-    pub(crate) fn of(state: &GaussianState, mode: &Kernel<'_>, depth: DepthMode) -> Self {
-        if depth != NO_DEPTH || !matches!(mode, Kernel::Fast) {
+    /// The approximation that a state allows. All kernels but the fast one are exact, and so are all uses of depths.
+    pub(crate) fn of(state: &GaussianState, kernel: &Kernel<'_>, depth_mode: DepthMode) -> Self {
+        if depth_mode != DepthMode::Composite || !matches!(kernel, Kernel::Fast) {
             return Self::EXACT;
         }
         let GaussianApproximation { exponential_error, contribution_budget } = state.approximation;
         Self {
-            powers: if exponential_error >= QUADRATIC.error {
-                FASTER_POWERS
+            exponential: if exponential_error >= QUADRATIC.error {
+                Exponential::Quadratic
             } else if exponential_error >= CUBIC.error {
-                FAST_POWERS
+                Exponential::Cubic
             } else {
-                NO_DEPTH
+                Exponential::Exact
             },
-            light: TransmittanceBits::of(contribution_budget),
+            least_transmittance: TransmittanceBits::of(contribution_budget),
         }
     }
 }

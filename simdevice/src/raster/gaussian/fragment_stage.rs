@@ -31,9 +31,9 @@ use std::time::Duration;
 /// A resolve shader made ready for tiles, which all workers share.
 pub(crate) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
-    shader: &'a GaussianFragmentStage,
+    gaussian_stage: &'a GaussianFragmentStage,
     stage: &'a FragmentStage,
-    bindings: BoundResources<'a>,
+    bound_resources: BoundResources<'a>,
     targets: Targets<'a>,
     colors: Vec<Option<ColorOutput>>,
     samples: usize,
@@ -46,7 +46,7 @@ pub(crate) struct FragmentStageDraw<'a> {
 /// The tools with which a worker shades a tile.
 pub(crate) struct Tools<'a> {
     pub(crate) buffers: &'a mut Buffers,
-    pub(crate) fragments: &'a GaussianTile,
+    pub(crate) gaussian_tile: &'a GaussianTile,
     pub(crate) counters: &'a mut Counters,
     pub(crate) cancel: &'a AtomicBool,
 }
@@ -58,27 +58,43 @@ struct SampleGroup {
     blocks: Vec<usize>,
 }
 
+/// A block of a tile, and its place in a batch.
+#[derive(Clone, Copy)]
+struct Chunk {
+    /// The number of its chunk of lanes in the batch.
+    number: usize,
+    block: usize,
+}
+
+/// The lanes of a block of which a sample is covered.
+#[derive(Clone, Copy)]
+struct CoveredLanes {
+    sample: usize,
+    /// A bit for each.
+    lanes: u16,
+}
+
 impl<'a> FragmentStageDraw<'a> {
     pub(crate) fn new(
         draw: &'a BinnedDraw,
-        shader: &'a GaussianFragmentStage,
+        gaussian_stage: &'a GaussianFragmentStage,
         targets: Targets<'a>,
         samples: usize,
         runtime: &Runtime,
     ) -> Self {
-        let stage = &shader.program.stage;
+        let stage = &gaussian_stage.program.stage;
         let state = &*draw.state;
         let (logic, constants) = (state.logic_op, state.blend_constants);
         let blend = &state.blend;
         Self {
             draw,
-            shader,
+            gaussian_stage,
             stage,
-            bindings: shader.bindings.bind(runtime.level()),
+            bound_resources: gaussian_stage.bindings.bind(runtime.level()),
             targets,
             colors: color_outputs(Some(stage), targets.color, blend, logic, constants),
             samples,
-            per_sample: shader.sample_shading || stage.interface.per_sample,
+            per_sample: gaussian_stage.sample_shading || stage.interface.per_sample,
             level: runtime.level(),
             limit: runtime.config().shader_timeout,
         }
@@ -86,12 +102,12 @@ impl<'a> FragmentStageDraw<'a> {
 
     /// True if the program reads depths.
     pub(crate) fn reads_depth(&self) -> bool {
-        self.shader.program.reads_depth
+        self.gaussian_stage.program.reads_depth
     }
 
     /// True if the program reads indices of Gaussians, or depth variables.
     pub(crate) fn is_tracking(&self) -> bool {
-        self.shader.program.is_tracking
+        self.gaussian_stage.program.is_tracking
     }
 
     /// True if samples that it discards were tested and counted already.
@@ -101,7 +117,7 @@ impl<'a> FragmentStageDraw<'a> {
 
     /// Marks what the program may have written to as changed.
     pub(crate) fn finish(&self) {
-        self.shader.bindings.bump_generations();
+        self.gaussian_stage.bindings.bump_generations();
     }
 
     /// Shades the covered samples of a tile and writes what comes of them. What is discarded is covered no longer.
@@ -174,10 +190,10 @@ impl<'a> FragmentStageDraw<'a> {
             for lane in (0..BLOCK_PIXELS).filter(|lane| any >> lane & 1 == 0) {
                 helpers.set(BLOCK_PIXELS * number + lane, true);
             }
-            self.set_inputs(tile, group, (number, block), samples, covered, tools, machine);
+            self.set_inputs(tile, group, Chunk { number, block }, samples, covered, tools, machine);
         }
         let watchdog = Watchdog { limit: self.limit, cancel: Some(tools.cancel) };
-        let resources = self.bindings.resources();
+        let resources = self.bound_resources.resources();
         machine.run(&LaneMask::first(lanes), &helpers, &resources, watchdog)?;
         let shaded = (lanes - helpers.count()) as u64;
         tools.counters.add(Counter::FragmentInvocations, shaded);
@@ -187,19 +203,20 @@ impl<'a> FragmentStageDraw<'a> {
         Ok(())
     }
 
-    /// Sets a program's inputs of one block, which is chunk `number` of the batch.
+    /// Sets a program's inputs of one block, which has a chunk of the batch.
     #[expect(clippy::too_many_arguments, reason = "what a block's inputs come from")]
     fn set_inputs(
         &self,
         tile: &Tile,
         group: &SampleGroup,
-        (number, block): (usize, usize),
+        chunk: Chunk,
         samples: &Samples,
         covered: &[PixelMask; SAMPLES],
         tools: &Tools<'_>,
         machine: &mut Machine,
     ) {
-        let accumulator = &tools.fragments.accumulators[samples.accumulators[group.leader][block]];
+        let Chunk { number, block } = chunk;
+        let accumulator = &tools.gaussian_tile.accumulators[samples.accumulators[group.leader][block]];
         let depths =
             if self.reads_depth() { accumulator.depths(block, self.draw.depth_unit) } else { [[0.0; BLOCK_PIXELS]; 2] };
         let accumulated: [[f32; BLOCK_PIXELS]; 4] = dispatch!(self.level, simd => {
@@ -213,7 +230,7 @@ impl<'a> FragmentStageDraw<'a> {
         let bits = |lanes: [f32; BLOCK_PIXELS]| lanes.map(f32::to_bits);
         let of_gaussians = |index: u32| {
             let number = samples.accumulators[group.leader][block];
-            let tracked = tools.fragments.tracked.get(number).filter(|_| self.is_tracking());
+            let tracked = tools.gaussian_tile.tracked.get(number).filter(|_| self.is_tracking());
             tracked.map_or([0; BLOCK_PIXELS], |tracked| {
                 self.tracked_input(tracked, accumulator.covered[block], block, index)
             })
@@ -329,7 +346,7 @@ impl<'a> FragmentStageDraw<'a> {
             interface.colors.iter().map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)))).collect();
         let masks = lanes_of(machine, interface.sample_mask);
         let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
-        let alpha = lanes_of(machine, alpha.filter(|_| self.shader.alpha_to_coverage));
+        let alpha = lanes_of(machine, alpha.filter(|_| self.gaussian_stage.alpha_to_coverage));
         for (number, &block) in group.blocks.iter().enumerate() {
             let killed = killed.words().get(number / 4).copied().unwrap_or(0) >> (16 * (number % 4));
             let by_alpha = match alpha.get(number) {
@@ -348,7 +365,8 @@ impl<'a> FragmentStageDraw<'a> {
                 }
                 covered[sample][block] = lanes.into();
                 if lanes != 0 {
-                    self.write_colors(simd, tile, &sources, (number, block), (sample, lanes), buffers);
+                    let covered = CoveredLanes { sample, lanes };
+                    self.write_colors(simd, tile, &sources, Chunk { number, block }, covered, buffers);
                 }
             }
         }
@@ -360,10 +378,11 @@ impl<'a> FragmentStageDraw<'a> {
         simd: S,
         tile: &Tile,
         sources: &[Sources<'_>],
-        (number, block): (usize, usize),
-        (sample, lanes): (usize, u16),
+        chunk: Chunk,
+        covered: CoveredLanes,
         buffers: &mut Buffers,
     ) {
+        let (Chunk { number, block }, CoveredLanes { sample, lanes }) = (chunk, covered);
         for (index, output) in self.colors.iter().enumerate() {
             let (Some(output), Some(sources)) = (output, sources.get(index)) else {
                 continue;
@@ -371,7 +390,7 @@ impl<'a> FragmentStageDraw<'a> {
             let mut source = load(simd, &sources[0], number);
             let mut second =
                 if output.is_dual_source() { load(simd, &sources[1], number) } else { [f32x16::splat(simd, 0.0); 4] };
-            if self.shader.alpha_to_one {
+            if self.gaussian_stage.alpha_to_one {
                 source[3] = f32x16::splat(simd, 1.0);
                 second[3] = f32x16::splat(simd, 1.0);
             }

@@ -98,7 +98,7 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
     out
 }
 
-/// PixelMask by block.
+/// A set of a tile's pixels: by block, a bit for each lane.
 pub(crate) type PixelMask = [u32; BLOCKS];
 
 /// Every lane of a block.

@@ -1,17 +1,18 @@
 //! The inputs and the account of compositing a tile.
 
 use super::approximation::Approximation;
+use super::depth_ranges::DepthRanges;
 use super::kernel::Kernel;
-use super::mode::DepthMode;
+use super::mode::{DepthMode, Exponential};
 use crate::format::depth::DepthEncoding;
 use crate::gaussian::BinnedDraw;
-use crate::gaussian::splats::splat::{Splat, locate};
+use crate::gaussian::splats::splat::{Splat, SplatIndex};
 use crate::gaussian::view::center_depth::DepthTrend;
 use crate::stats::optimizations::Optimizations;
 use std::slice;
 
-/// Powers of two are formed down to this one.
-const MOST_FALL: f64 = 126.0;
+/// The greatest negated exponent of a power of two that is formed.
+const GREATEST_NEG_LOG2: f64 = 126.0;
 
 /// A bound of the error of exponents of alphas that are at least a half.
 const CAP_MARGIN: f64 = 1e-4;
@@ -19,8 +20,8 @@ const CAP_MARGIN: f64 = 1e-4;
 /// The constants of a draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Thresholds {
-    /// Minus the base-2 logarithm of the alpha floor: no Gaussian contributes where its alpha has fallen further.
-    pub(crate) most_fall: f32,
+    /// Minus the base-2 logarithm of the alpha floor: no Gaussian contributes where that of its alpha is greater.
+    pub(crate) neg_log2_floor: f32,
     /// For modes that compare alpha itself.
     pub(crate) alpha_floor: f32,
     pub(crate) alpha_ceiling: f32,
@@ -29,8 +30,10 @@ pub(crate) struct Thresholds {
     pub(crate) transmittance_floor: f32,
     /// The encoding of depths as numbers.
     pub(crate) depth_unit: DepthEncoding,
-    /// The mode, for code that is the same for all of them: where time matters it is a constant.
+    /// The use of depths and the exactness of powers, for code that is the same for all modes: where time matters they are
+    /// constants.
     pub(crate) depth_mode: DepthMode,
+    pub(crate) exponential: Exponential,
 }
 
 impl Thresholds {
@@ -38,15 +41,16 @@ impl Thresholds {
         let state = &draw.state;
         // Where there is no floor, less than the least normal number is nothing. No alpha reaches a floor above the
         // ceiling.
-        let most_fall = if state.alpha_floor <= state.alpha_ceiling {
-            (-f64::from(state.alpha_floor).log2()).min(MOST_FALL) as f32
+        let neg_log2_floor = if state.alpha_floor <= state.alpha_ceiling {
+            (-f64::from(state.alpha_floor).log2()).min(GREATEST_NEG_LOG2) as f32
         } else {
             f32::NEG_INFINITY
         };
         Self {
             depth_unit: draw.depth_unit,
             depth_mode,
-            most_fall,
+            exponential: Exponential::Exact,
+            neg_log2_floor,
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
             least_capped: (f64::from(state.alpha_ceiling).log2() - CAP_MARGIN) as f32,
@@ -59,23 +63,27 @@ impl Thresholds {
 #[derive(Clone, Copy)]
 pub(crate) struct TileInputs<'a> {
     pub(crate) splats: &'a [Vec<Splat>],
-    pub(crate) mode: Kernel<'a>,
+    pub(crate) kernel: Kernel<'a>,
+    /// The numbers of the splats, in the order of the draw.
     pub(crate) list: &'a [u32],
     /// The work that is left out.
     pub(crate) optimizations: Optimizations,
     pub(crate) trend: DepthTrend,
     /// Half of a panorama's period: see [`BinnedDraw::half_period`].
     pub(crate) half_period: f64,
+    /// The upper left corner of the tile, in pixels.
     pub(crate) corner: [u32; 2],
     pub(crate) thresholds: Thresholds,
-    pub(crate) way: Approximation,
+    pub(crate) approximation: Approximation,
+    /// The depths that pass the depth test.
+    pub(crate) ranges: &'a DepthRanges,
 }
 
 impl<'a> TileInputs<'a> {
+    /// The splat with a number.
     #[inline(always)]
     pub(crate) fn splat(&self, primitive: u32) -> &'a Splat {
-        let (batch, place) = locate(primitive);
-        &self.splats[batch][place]
+        SplatIndex::new(primitive).of(self.splats)
     }
 
     /// A primitive's splat, which is on its way.
@@ -105,6 +113,7 @@ pub(crate) struct TileCounts {
 }
 
 impl TileCounts {
+    /// Adds the counts of another part of the tile's list.
     pub(crate) fn add(&mut self, more: &Self) {
         self.listed += more.listed;
         self.pairs += more.pairs;

@@ -4,6 +4,7 @@ use super::cut_off::CutOff;
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::ray_depth::RayDepths;
+use crate::gaussian::splats::splat::SplatIndex;
 use crate::gaussian::splats::surfel::Surfel;
 use crate::state::gaussian::{GaussianPrecision, GaussianState};
 
@@ -16,7 +17,7 @@ pub(crate) enum Kernel<'a> {
     Half,
     /// Any shapes, in the order of the list or each pixel's own.
     Exact {
-        /// By batch, as the splats, if those are 2D Gaussians.
+        /// By group, as the splats, if those are 2D Gaussians.
         surfels: Option<&'a [Vec<Surfel>]>,
         /// The inverse variance of 2D Gaussians' filter, if there is one.
         inverse_low_pass: Option<f64>,
@@ -26,12 +27,13 @@ pub(crate) enum Kernel<'a> {
         wide_sums: bool,
         /// The shape outside which nothing contributes, if there is one.
         cut_off: Option<CutOff>,
-        /// By batch, as the splats, if which they are is tracked. They are in the order of the list then.
+        /// By group, as the splats, if which they are is tracked. They are in the order of the list then.
         identities: Option<&'a [Vec<Identity>]>,
     },
 }
 
 impl<'a> Kernel<'a> {
+    /// The kernel of a draw.
     pub(crate) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
         let cut_off = CutOff::of(draw).filter(|_| !draw.are_lists_cut);
@@ -72,9 +74,10 @@ impl<'a> Kernel<'a> {
         }
     }
 
-    pub(crate) fn surfel(self, (batch, place): (usize, usize)) -> Option<&'a Surfel> {
+    /// The surfel of a splat, if the draw has surfels.
+    pub(crate) fn surfel(self, index: SplatIndex) -> Option<&'a Surfel> {
         match self {
-            Self::Exact { surfels, .. } => Some(&surfels?[batch][place]),
+            Self::Exact { surfels, .. } => Some(index.of(surfels?)),
             _ => None,
         }
     }

@@ -40,7 +40,7 @@ use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
 use isa::machine::Stopped;
-use mode::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
+use mode::{Composite, FindMean, FindMedian, Mode, TestDepth};
 use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 
@@ -74,12 +74,12 @@ impl<'a> GaussianTileDraw<'a> {
             });
         let depth = targets.depth.map(Target::format);
         let samples = samples.map_or(1, |samples| samples as usize).min(SAMPLES);
-        let resolve = draw.resolve.as_ref();
+        let fragment_stage = draw.fragment_stage.as_ref();
         Self {
             draw,
             targets,
             color,
-            resolve: resolve.map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, runtime)),
+            resolve: fragment_stage.map(|stage| FragmentStageDraw::new(draw, stage, targets, samples, runtime)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
             level: runtime.level(),
@@ -99,7 +99,7 @@ impl<'a> GaussianTileDraw<'a> {
         &self,
         tile: &Tile,
         buffers: &mut Buffers,
-        fragments: &mut GaussianTile,
+        gaussian_tile: &mut GaussianTile,
         counters: &mut Counters,
         cancel: &AtomicBool,
     ) -> Result<(), Stopped> {
@@ -119,19 +119,19 @@ impl<'a> GaussianTileDraw<'a> {
         });
         match self.tests.depth {
             _ if reads_more => {
-                self.composite::<FIND_MEAN>(tile, &mut samples, buffers, fragments, counters);
+                self.composite::<FindMean>(tile, &mut samples, buffers, gaussian_tile, counters);
             }
-            None => self.composite::<NO_DEPTH>(tile, &mut samples, buffers, fragments, counters),
+            None => self.composite::<Composite>(tile, &mut samples, buffers, gaussian_tile, counters),
             Some((_, false)) => {
-                self.composite::<TEST_DEPTH>(tile, &mut samples, buffers, fragments, counters);
+                self.composite::<TestDepth>(tile, &mut samples, buffers, gaussian_tile, counters);
             }
             Some((_, true)) => {
-                self.composite::<FIND_MEDIAN>(tile, &mut samples, buffers, fragments, counters);
+                self.composite::<FindMedian>(tile, &mut samples, buffers, gaussian_tile, counters);
             }
         }
         let mut covered: [PixelMask; SAMPLES] = std::array::from_fn(|sample| {
             std::array::from_fn(|block| {
-                let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
+                let accumulator = &gaussian_tile.accumulators[samples.accumulators[sample][block]];
                 accumulator.covered[block] & samples.tested[sample][block]
             })
         });
@@ -140,7 +140,7 @@ impl<'a> GaussianTileDraw<'a> {
             && covered != [[0; BLOCKS]; SAMPLES]
         {
             let mut done = Counters::default();
-            let mut tools = Tools { buffers, fragments, counters: &mut done, cancel };
+            let mut tools = Tools { buffers, gaussian_tile, counters: &mut done, cancel };
             let ran = resolve.run(tile, &samples, &mut shaded, &mut tools);
             counters.add_all(&done);
             if let Some(record) = &self.draw.record {
@@ -156,14 +156,14 @@ impl<'a> GaussianTileDraw<'a> {
         counters.add(Counter::SamplesPassed, passed.into());
         if passed > 0 {
             if self.resolve.is_none() {
-                self.write_color(tile, &samples, &covered, buffers, fragments);
+                self.write_color(tile, &samples, &covered, buffers, gaussian_tile);
             }
             if self.tests.depth.is_some_and(|(_, write)| write) {
-                self.write_depth(tile, &samples, &covered, buffers, fragments);
+                self.write_depth(tile, &samples, &covered, buffers, gaussian_tile);
             }
         }
         if let Some([face, _]) = &self.tests.stencil {
-            self.write_stencil(face, tile, &samples, &covered, buffers, fragments);
+            self.write_stencil(face, tile, &samples, &covered, buffers, gaussian_tile);
         }
         Ok(())
     }
@@ -203,12 +203,12 @@ impl<'a> GaussianTileDraw<'a> {
     }
 
     /// Runs the kernel for every sample, in the blocks where no earlier one had the same tests.
-    fn composite<const DEPTH: DepthMode>(
+    fn composite<M: Mode>(
         &self,
         tile: &Tile,
         samples: &mut Samples,
         buffers: &mut Buffers,
-        fragments: &mut GaussianTile,
+        gaussian_tile: &mut GaussianTile,
         counters: &mut Counters,
     ) {
         for sample in 0..self.samples {
@@ -234,11 +234,11 @@ impl<'a> GaussianTileDraw<'a> {
             if let Some((op, _)) = self.tests.depth {
                 let start = buffers.depth.start(tile.index, sample);
                 let stored = &buffers.depth.words_mut()[start..][..AREA];
-                fragments.ranges.set(op, stored, &lanes);
-            } else if DEPTH > NO_DEPTH {
-                fragments.ranges = DepthRanges::default();
+                gaussian_tile.ranges.set(op, stored, &lanes);
+            } else if M::DEPTH.tests() {
+                gaussian_tile.ranges = DepthRanges::default();
             }
-            fragments.run::<DEPTH>(self.draw, self.level, tile.at, sample, &lanes, counters);
+            gaussian_tile.run::<M>(self.draw, self.level, tile.at, sample, &lanes, counters);
         }
     }
 
@@ -257,7 +257,7 @@ impl<'a> GaussianTileDraw<'a> {
         samples: &Samples,
         covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
-        fragments: &GaussianTile,
+        gaussian_tile: &GaussianTile,
     ) {
         let target = self.targets.color.first().and_then(Option::as_ref);
         let (Some(output), Some(target), Some(plane)) = (&self.color, target, buffers.color.first_mut()) else {
@@ -269,7 +269,7 @@ impl<'a> GaussianTileDraw<'a> {
             let accumulators = &samples.accumulators[sample];
             let words = plane.words_mut();
             dispatch!(self.level, simd =>
-                blend(simd, output, fragments, accumulators, lanes, start, words));
+                blend(simd, output, gaussian_tile, accumulators, lanes, start, words));
         }
         plane.changed(tile.index);
     }
@@ -281,13 +281,13 @@ impl<'a> GaussianTileDraw<'a> {
         samples: &Samples,
         covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
-        fragments: &GaussianTile,
+        gaussian_tile: &GaussianTile,
     ) {
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.depth.start(tile.index, sample);
             let stored = &mut buffers.depth.words_mut()[start..][..AREA];
             for (block, stored) in stored.as_chunks_mut::<BLOCK_PIXELS>().0.iter_mut().enumerate() {
-                let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
+                let accumulator = &gaussian_tile.accumulators[samples.accumulators[sample][block]];
                 for (lane, stored) in stored.iter_mut().enumerate() {
                     if covered[block] >> lane & 1 == 1 {
                         *stored = accumulator.median[block][lane];
@@ -306,7 +306,7 @@ impl<'a> GaussianTileDraw<'a> {
         samples: &Samples,
         covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
-        fragments: &mut GaussianTile,
+        gaussian_tile: &mut GaussianTile,
     ) {
         if face.write_mask == 0 {
             return;
@@ -319,7 +319,7 @@ impl<'a> GaussianTileDraw<'a> {
                     *reached |= candidates[block] & !covered[block];
                 }
             }
-            reached = fragments.reached(self.draw, self.level, tile.at, &reached);
+            reached = gaussian_tile.reached(self.draw, self.level, tile.at, &reached);
         }
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.stencil.start(tile.index, sample);
@@ -359,7 +359,7 @@ fn keep<T: Copy>(lanes: &mut PixelMask, stored: &[T], passes: impl Fn(T) -> bool
 fn blend<S: Simd>(
     simd: S,
     output: &ColorOutput,
-    fragments: &GaussianTile,
+    gaussian_tile: &GaussianTile,
     accumulators: &[usize; BLOCKS],
     covered: &PixelMask,
     start: usize,
@@ -370,7 +370,7 @@ fn blend<S: Simd>(
         if lanes == 0 {
             continue;
         }
-        let source = fragments.accumulators[accumulators[block]].fragments(simd, block);
+        let source = gaussian_tile.accumulators[accumulators[block]].fragments(simd, block);
         let first = start + block * BLOCK_PIXELS;
         let quads = QuadAddresses::block(first);
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);

@@ -5,7 +5,7 @@ use super::depth_ranges::DepthRanges;
 use super::exponent::power;
 use super::inputs::Thresholds;
 use super::masks::only;
-use super::mode::{DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH};
+use super::mode::{DepthMode, Exponential};
 use crate::gaussian::splats::splat::SplatLook;
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -67,53 +67,52 @@ impl<S: Simd> Pixels<S> {
     }
 }
 
-/// The pixels of a block where alpha has fallen no further than it may, and the depth passes.
+/// The pixels of a block where alpha is not below the floor, and the depth passes.
 #[inline(always)]
 pub(crate) fn reached<S: Simd>(
     simd: S,
-    mode: DepthMode,
-    (block, depth): (usize, u32),
-    fall: f32x16<S>,
+    depth_mode: DepthMode,
+    block: usize,
+    depth: u32,
+    neg_log2_alpha: f32x16<S>,
     ranges: &DepthRanges,
-    most_fall: f32x16<S>,
+    neg_log2_floor: f32x16<S>,
 ) -> mask32x16<S> {
-    let reached = fall.simd_le(most_fall);
-    if mode > NO_DEPTH { reached & ranges.pixels(simd, block, depth) } else { reached }
+    let reached = neg_log2_alpha.simd_le(neg_log2_floor);
+    if depth_mode.tests() { reached & ranges.pixels(simd, block, depth) } else { reached }
 }
 
-/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean
-/// nothing.
+/// The alphas of pixels, at most `ceiling`; zero where they are not `reached`: powers of such exponents are undefined.
 #[inline(always)]
 pub(crate) fn alpha<S: Simd>(
     simd: S,
-    mode: DepthMode,
+    exponential: Exponential,
     reached: mask32x16<S>,
-    fall: f32x16<S>,
+    neg_log2_alpha: f32x16<S>,
     ceiling: f32x16<S>,
 ) -> f32x16<S> {
-    only(simd, reached, power(simd, mode, fall).min(ceiling))
+    only(simd, reached, power(simd, exponential, neg_log2_alpha).min(ceiling))
 }
 
-/// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
+/// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-neg_log2_alpha`; returns
 /// how many pixels accepted it.
 #[inline(always)]
 pub(crate) fn accumulate<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
     block: usize,
-    fall: f32x16<S>,
+    neg_log2_alpha: f32x16<S>,
     look: SplatLook,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let mut pixels = pixels(accumulator, simd, block);
-    let most_fall = f32x16::splat(simd, thresholds.most_fall);
-    let mode = thresholds.depth_mode;
-    let reached = reached(simd, mode, (block, look.depth), fall, ranges, most_fall);
+    let neg_log2_floor = f32x16::splat(simd, thresholds.neg_log2_floor);
+    let depth_mode = thresholds.depth_mode;
+    let reached = reached(simd, depth_mode, block, look.depth, neg_log2_alpha, ranges, neg_log2_floor);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-    let alpha = alpha(simd, mode, reached, fall, ceiling);
-    let at = (block, &mut pixels);
-    let goes_on = composite_one(accumulator, simd, at, alpha, look, thresholds);
+    let alpha = alpha(simd, thresholds.exponential, reached, neg_log2_alpha, ceiling);
+    let goes_on = composite_one(accumulator, simd, block, &mut pixels, alpha, look, thresholds);
     keep(accumulator, block, pixels);
     let accepted = goes_on.to_bitmask() & reached.to_bitmask();
     accepted.count_ones().into()
@@ -127,14 +126,15 @@ pub(crate) fn accumulate<S: Simd>(
 pub(crate) fn composite_one<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, pixels): (usize, &mut Pixels<S>),
+    block: usize,
+    pixels: &mut Pixels<S>,
     alpha: f32x16<S>,
     SplatLook { color, depth }: SplatLook,
     thresholds: Thresholds,
 ) -> mask32x16<S> {
     let t = pixels.transmittance;
     let finished = -t.abs();
-    if thresholds.depth_mode == FIND_REACHED {
+    if thresholds.depth_mode.finds_reached() {
         let reached = alpha.simd_gt(0.0);
         pixels.transmittance = reached.select(finished, t);
         return !reached;
@@ -144,13 +144,13 @@ pub(crate) fn composite_one<S: Simd>(
     let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
     pixels.transmittance = goes_on.select(rest, finished);
     let weight = only(simd, goes_on, weight);
-    if thresholds.depth_mode >= FIND_MEDIAN {
+    if thresholds.depth_mode.finds_median() {
         let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
         let median = first_half.select(u32x16::splat(simd, depth), median);
         median.store_slice(&mut accumulator.median[block]);
     }
-    if thresholds.depth_mode == FIND_MEAN {
+    if thresholds.depth_mode.finds_mean() {
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
         let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);

@@ -7,39 +7,44 @@ use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f64x4, mask32x16, prelude::*};
 
 /// A bound of rounding's effect on exponents, relative to them.
-pub(crate) const ROOM_FACTOR: f32 = 1.0 + 1e-5;
+pub(crate) const RANGE_FACTOR: f32 = 1.0 + 1e-5;
 
 /// The blocks of a tile that a Gaussian may reach, as [`StagedRound::place`] finds them for several at a time.
 #[inline(always)]
-pub(crate) fn reached_blocks<S: Simd>(simd: S, splat: &Splat, middles: &BlockMiddles, most_fall: f32) -> mask32x16<S> {
+pub(crate) fn reached_blocks<S: Simd>(
+    simd: S,
+    splat: &Splat,
+    middles: &BlockMiddles,
+    neg_log2_floor: f32,
+) -> mask32x16<S> {
     let [a, b, c] = splat.factor;
     // In each column of blocks, and each row.
     let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
     let dy = f64x4::from_slice(simd, &middles.y) - splat.mean[1];
-    let (u, sheared, sunk) = (dx * a, dx * b, dy * c);
-    let row = |row: usize| sheared + f64x4::splat(simd, sunk[row]);
+    let (u, v_of_column, v_of_row) = (dx * a, dx * b, dy * c);
+    let row = |row: usize| v_of_column + f64x4::splat(simd, v_of_row[row]);
     let u: f32x8<S> = u.narrow(u);
     let upper: f32x8<S> = row(0).narrow(row(1));
     let lower: f32x8<S> = row(2).narrow(row(3));
     let v = upper.combine(lower);
     let [a, b, c] = [a as f32, b as f32, c as f32];
     let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
-    let room = log2_opacity.mul_add(ROOM_FACTOR, most_fall * ROOM_FACTOR + 1e-3);
+    let log2_range = log2_opacity.mul_add(RANGE_FACTOR, neg_log2_floor * RANGE_FACTOR + 1e-3);
     let least_u = (u.abs() - HALF * a.abs()).max(0.0);
     let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
     let least_u = least_u * least_u;
     let least = least_v.mul_add(least_v, least_u.combine(least_u));
-    least.simd_le(room.combine(room))
+    least.simd_le(log2_range.combine(log2_range))
 }
 
 /// The number of `open` blocks of a tile in which a Gaussian would be evaluated if depths did not hide it.
 #[inline(always)]
-pub(crate) fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, task: &TileInputs<'_>, open: mask32x16<S>) -> u32 {
-    let bounded = task.optimizations.has(Optimization::Blocks) && !splat.needs_f64;
+pub(crate) fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, inputs: &TileInputs<'_>, open: mask32x16<S>) -> u32 {
+    let bounded = inputs.optimizations.has(Optimization::Blocks) && !splat.needs_f64;
     let reached = if bounded {
-        let most_fall = task.thresholds.most_fall;
-        let middles = BlockMiddles::new(task.corner);
-        open & reached_blocks(simd, splat, &middles, most_fall)
+        let neg_log2_floor = inputs.thresholds.neg_log2_floor;
+        let middles = BlockMiddles::new(inputs.corner);
+        open & reached_blocks(simd, splat, &middles, neg_log2_floor)
     } else {
         open
     };

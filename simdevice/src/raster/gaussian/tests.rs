@@ -9,7 +9,7 @@ use super::kernel::needs_f64_sums;
 use super::*;
 use crate::device::Device;
 use crate::format::Format;
-use crate::gaussian::splats::splat::{Splat, locate};
+use crate::gaussian::splats::splat::{Splat, SplatIndex};
 use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
 use crate::runtime::Config;
@@ -59,7 +59,7 @@ fn device_of(case: &Case) -> Device {
     Device::new(&Config { threads: 2, simd: level_of(case), ..Config::default() }).unwrap()
 }
 
-/// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
+/// A scene of `count` Gaussians before a camera at the origin, from ones smaller than a pixel to ones that fill the screen.
 fn draw(seed: u64, count: u32, state: GaussianState, device: &Device, bounds: Rect) -> BinnedDraw {
     draw_with_depth(seed, count, state, device, bounds, None)
 }
@@ -198,13 +198,13 @@ fn naive_sample(
         return per_pixel::naive_sample(draw, tile, [x, y], power, passes);
     }
     let state = &draw.state;
-    let most_fall = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
+    let neg_log2_floor = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
     let corner = tile.map(|tile| tile * TILE_SIZE);
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
     let (mut wide_c, mut wide_t) = ([0.0f64; 3], 1.0f64);
     for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
-        let (batch, place) = locate(primitive);
-        let g = &draw.sorted.splats[batch][place];
+        let index = SplatIndex::new(primitive);
+        let g = index.of(&draw.sorted.splats);
         let middle = |at: usize, corner: u32, mean: f64| ((4 * (at / 4)) as f64 + 2.0 + f64::from(corner)) - mean;
         let (mx, my) = (middle(x, corner[0], g.mean[0]), middle(y, corner[1], g.mean[1]));
         let f = g.factor;
@@ -212,7 +212,7 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = u + dx * f[0] as f32;
         let v = v + mul_add(dy, f[2] as f32, dx * f[1] as f32);
-        let fall = if g.needs_f64 || needs_f64_sums(state) {
+        let neg_log2_alpha = if g.needs_f64 || needs_f64_sums(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
             if g.exceeds_period && !(-draw.half_period..draw.half_period).contains(&dx) {
@@ -223,10 +223,10 @@ fn naive_sample(
         } else {
             mul_add(v, v, mul_add(u, u, -g.log2_opacity))
         };
-        if fall > most_fall {
+        if neg_log2_alpha > neg_log2_floor {
             continue;
         }
-        let alpha = power(-fall).min(state.alpha_ceiling);
+        let alpha = power(-neg_log2_alpha).min(state.alpha_ceiling);
         out.reached = true;
         if !passes(g.look.depth) {
             continue;
@@ -332,13 +332,13 @@ fn it_does_so_where_gaussians_are_wider_than_a_period(case: &Case) {
 }
 
 #[gaurast_runner::test(each = simd_levels())]
-fn it_does_so_where_gaussians_are_steep(case: &Case) {
-    // Without a filter dust is thinner than a pixel by far.
+fn it_does_so_where_exponents_need_binary64(case: &Case) {
+    // Without a filter the smallest ones are thinner than a pixel by far.
     let state = GaussianState { low_pass_variance: 0.0, ..defaults() };
     let device = Device::new(&Config::default()).unwrap();
     let drawn = draw(5, 3000, state.clone(), &device, WHOLE);
-    let steep = drawn.sorted.splats.iter().flatten().filter(|splat| splat.needs_f64);
-    assert!(steep.count() > 10);
+    let wide = drawn.sorted.splats.iter().flatten().filter(|splat| splat.needs_f64);
+    assert!(wide.count() > 10);
     check(case, 5, 3000, &state, WHOLE);
 }
 

@@ -52,7 +52,7 @@ fn append() -> GaussianAppend {
 }
 
 /// Gaussians of all sizes around the edges of the view of a camera at the origin.
-fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
+fn around_edges(rng: &mut ChaCha8Rng, is_surfel: bool) -> Attributes {
     let mut attributes = Attributes::default();
     for lane in 0..GROUP {
         let z = rng.random_range(-0.5..4.0f32).exp() * if rng.random_bool(0.05) { -1.0 } else { 1.0 };
@@ -63,7 +63,7 @@ fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
             attributes.position[axis][lane] = at;
             attributes.scale[axis][lane] = size * rng.random_range(-3.0..0.0f32).exp();
         }
-        if is_flat {
+        if is_surfel {
             attributes.scale[2][lane] = 0.0;
         }
         for part in 0..4 {
@@ -136,21 +136,21 @@ fn what_is_outside_is_drawn_nowhere() {
                     is_sound: false,
                     harmonics: Harmonics::default(),
                 };
-                let mut out = ProjectedGroup::default();
+                let mut projected = ProjectedGroup::default();
                 let mut scratch = Scratch::new();
                 let outside = dispatch!(level, simd => {
                     let sequence = Sequence::From(0);
-                    let kept = cull(&constants, simd, &group, None, &mut out.counters);
-                    project(&constants, simd, &group, &kept, &mut scratch, sequence, &mut out);
+                    let kept = cull(&constants, simd, &group, None, &mut projected.counters);
+                    project(&constants, simd, &group, &kept, &mut scratch, sequence, &mut projected);
                     frustum.lanes_outside(simd, &attributes, GROUP)
                 });
-                drawn += out.keys.len();
+                drawn += projected.keys.len();
                 beside += outside.beside.count();
                 let mut is_drawn = [false; GROUP];
-                for (at, &[_, lane]) in out.keys.iter().enumerate() {
+                for (at, &[_, lane]) in projected.keys.iter().enumerate() {
                     // Discs that reach the eye's plane are listed in all tiles, wherever they are.
                     let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
-                    is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
+                    is_drawn[lane as usize] = !projected.surfels.get(at).is_some_and(everywhere);
                 }
                 let all = Bits::first(GROUP);
                 for (of, what) in [(outside.near, "near"), (outside.far, "far"), (outside.beside, "beside")] {

@@ -18,7 +18,7 @@ type Spans = Vec<(u32, u16, u16)>;
 
 /// A Gaussian in the picture.
 #[derive(Clone, Copy, Debug)]
-struct Flat {
+struct ScreenGaussian {
     mean: [f64; 2],
     /// The covariance.
     covariance: [f64; 3],
@@ -28,7 +28,7 @@ struct Flat {
     depth: f64,
 }
 
-impl Flat {
+impl ScreenGaussian {
     /// True if the ellipse contains a visible pixel centre of a tile.
     fn reaches_a_centre(&self, visible: &Visible, (row, column): (u32, u16)) -> bool {
         let ([x, y], [a, b, c]) = (self.mean, self.covariance);
@@ -58,15 +58,15 @@ impl Flat {
     }
 
     fn put(&self, scratch: &mut Scratch, at: usize) {
-        let flat = &mut *scratch.flat;
-        for (lanes, value) in flat.mean.iter_mut().zip(self.mean) {
+        let screen = &mut *scratch.screen;
+        for (lanes, value) in screen.mean.iter_mut().zip(self.mean) {
             lanes[at] = value;
         }
-        for (lanes, value) in flat.covariance.iter_mut().zip(self.covariance) {
+        for (lanes, value) in screen.covariance.iter_mut().zip(self.covariance) {
             lanes[at] = value;
         }
-        flat.determinant[at] = self.determinant;
-        flat.extent[at] = self.extent;
+        screen.determinant[at] = self.determinant;
+        screen.extent[at] = self.extent;
         scratch.depth[at] = self.depth;
     }
 
@@ -75,7 +75,7 @@ impl Flat {
         let mut scratch = Scratch::new();
         self.put(&mut scratch, 0);
         let mut others = Vec::new();
-        let reach = scratch.flat.ellipse(0).reach(visible, &mut others, None);
+        let reach = scratch.screen.ellipse(0).reach(visible, &mut others, None);
         let spans = reach.iter().flat_map(|reach| reach.spans(&others));
         spans.map(|(row, span)| (row, span.first, span.end)).collect()
     }
@@ -104,7 +104,7 @@ fn projection(visible: Visible) -> ViewConstants {
 fn tiles(
     level: Option<Level>,
     view: &ViewConstants,
-    gaussians: &[Flat],
+    gaussians: &[ScreenGaussian],
     scratch: &mut Scratch,
 ) -> (Vec<Spans>, Counters) {
     scratch.lanes = (0..gaussians.len()).collect();
@@ -112,22 +112,22 @@ fn tiles(
     for (at, gaussian) in gaussians.iter().enumerate() {
         gaussian.put(scratch, at);
     }
-    let mut out = ProjectedGroup::default();
+    let mut projected = ProjectedGroup::default();
     match level {
         None => {
-            dispatch!(Level::new(), simd => find_tiles_by(view, simd, false, scratch, &mut out));
+            dispatch!(Level::new(), simd => find_tiles_by(view, simd, false, scratch, &mut projected));
         }
-        Some(level) => dispatch!(level, simd => find_tiles_by(view, simd, true, scratch, &mut out)),
+        Some(level) => dispatch!(level, simd => find_tiles_by(view, simd, true, scratch, &mut projected)),
     }
     let mut found = vec![Spans::new(); gaussians.len()];
     for &at in &scratch.reached {
         let reach = scratch.reaches.get(at);
-        let spans = reach.spans(&out.spans);
+        let spans = reach.spans(&projected.spans);
         let spans = spans.map(|(row, span)| (row, span.first, span.end));
         found[at] = spans.filter(|(_, first, end)| first < end).collect();
         assert!(!found[at].is_empty(), "{at} reaches nothing");
     }
-    (found, out.counters)
+    (found, projected.counters)
 }
 
 /// True if all of `inner` is in `outer`.
@@ -139,7 +139,7 @@ fn contains(outer: &Spans, inner: &Spans) -> bool {
 }
 
 /// True if an ellipse is known to reach the tiles that the reference finds: it does not test one whose box is in one tile.
-fn is_reached(gaussian: &Flat, view: &ViewConstants, exact: &Spans) -> bool {
+fn is_reached(gaussian: &ScreenGaussian, view: &ViewConstants, exact: &Spans) -> bool {
     match exact[..] {
         [(row, first, end)] if end - first == 1 => gaussian.reaches_a_centre(&view.visible, (row, first)),
         _ => true,
@@ -149,10 +149,10 @@ fn is_reached(gaussian: &Flat, view: &ViewConstants, exact: &Spans) -> bool {
 /// Asserts that the search in binary32 finds all tiles that Gaussians reach at a level, and none that they do not reach
 /// if they are moved outwards by eight times its bound. Returns the numbers of tiles that are reached and that are found,
 /// and of Gaussians that were searched in binary64.
-fn assert_bounded(level: Level, view: &ViewConstants, gaussians: &[Flat], scratch: &mut Scratch) -> [u64; 3] {
+fn assert_bounded(level: Level, view: &ViewConstants, gaussians: &[ScreenGaussian], scratch: &mut Scratch) -> [u64; 3] {
     let (exact, _) = tiles(None, view, gaussians, scratch);
     let (found, counters) = tiles(Some(level), view, gaussians, scratch);
-    let wider: Vec<Flat> = gaussians.iter().map(|gaussian| gaussian.widened(8.0)).collect();
+    let wider: Vec<ScreenGaussian> = gaussians.iter().map(|gaussian| gaussian.widened(8.0)).collect();
     let (wide, _) = tiles(None, view, &wider, scratch);
     for (at, gaussian) in gaussians.iter().enumerate() {
         let (exact, found) = (&exact[at], &found[at]);
@@ -174,7 +174,7 @@ fn assert_bounded(level: Level, view: &ViewConstants, gaussians: &[Flat], scratc
 }
 
 /// A random Gaussian: of all sizes, from needles to discs, many of them at the limits of what is searched in binary32.
-fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
+fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> ScreenGaussian {
     let [width, height] = [visible.right, visible.bottom].map(|end| end as f64);
     let place = |rng: &mut ChaCha8Rng, size: f64| match rng.random_range(0..4) {
         // At edges of pixels and tiles.
@@ -199,17 +199,17 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
         0 => rng.random_range(-0.1..0.1),
         _ => rng.random_range(0.1..40.0),
     };
-    let mut flat = Flat::new(mean, [long, short, angle], extent);
+    let mut screen = ScreenGaussian::new(mean, [long, short, angle], extent);
     // One of many has about the greatest size.
     if rng.random_range(0..512) == 0 {
         let size = f64::from(MOST_SIZE) * (1.0 + f64::from(rng.random_range(-2..=2)) * 1e-7);
         let rest = size - mean[0].abs() - mean[1].abs();
-        let [a, _, c] = flat.covariance;
+        let [a, _, c] = screen.covariance;
         let by = (rest / ((a * extent.abs()).sqrt() + (c * extent.abs()).sqrt())).powi(2);
-        flat.covariance = flat.covariance.map(|element| element * by);
-        flat.determinant *= by * by;
+        screen.covariance = screen.covariance.map(|element| element * by);
+        screen.determinant *= by * by;
     }
-    flat
+    screen
 }
 
 #[gaurast_runner::test(each = simd_levels())]
@@ -224,7 +224,7 @@ fn binary32_finds_every_tile_that_binary64_finds_and_hardly_more(case: &Case) {
     let mut sums = [0; 3];
     for group in 0..groups {
         let view = &views[group % views.len()];
-        let gaussians: Vec<Flat> = (0..255).map(|_| random(&mut rng, &view.visible)).collect();
+        let gaussians: Vec<ScreenGaussian> = (0..255).map(|_| random(&mut rng, &view.visible)).collect();
         let counts = assert_bounded(token_of(case), view, &gaussians, &mut scratch);
         for (sum, count) in sums.iter_mut().zip(counts) {
             *sum += count;
@@ -262,9 +262,9 @@ fn invalid_numbers_lose_no_tiles(case: &Case) {
         odd in (0..40usize, prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1.0), Just(1e120)]),
     )| {
         let view = projection(Visible { left: 3, top: 0, right: 200, bottom: 150 });
-        let mut gaussians: Vec<Flat> = lanes
+        let mut gaussians: Vec<ScreenGaussian> = lanes
             .iter()
-            .map(|&(mean, shape, extent, depth)| Flat { depth, ..Flat::new(mean, shape, extent) })
+            .map(|&(mean, shape, extent, depth)| ScreenGaussian { depth, ..ScreenGaussian::new(mean, shape, extent) })
             .collect();
         let (at, value) = odd;
         let count = gaussians.len();

@@ -6,12 +6,10 @@
 //! level, and [`scalar`] says the same without vectors.
 
 use super::block_kernel::BlockKernel;
-use crate::gaussian::splats::splat::{Splat, SplatLook};
+use crate::gaussian::splats::splat::{Splat, SplatIndex, SplatLook};
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
-use crate::raster::gaussian::mode::{FIND_MEDIAN, NO_DEPTH};
 use crate::simd::exp2::POWER_OF_TWO;
 use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
@@ -52,12 +50,12 @@ fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
 
 /// Compositing in the order of the list, in binary16.
 pub(crate) struct Half {
-    /// The task's thresholds, rounded.
+    /// The draw's thresholds, rounded.
     thresholds: Thresholds,
 }
 
 impl Half {
-    /// For a task with these thresholds.
+    /// The kernel of a draw with these thresholds.
     pub(crate) fn new(thresholds: &Thresholds) -> Self {
         Self { thresholds: rounded(thresholds) }
     }
@@ -68,20 +66,20 @@ impl BlockKernel for Half {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
-        (batch, place): (usize, usize),
-        (accumulator, block): (&mut Accumulator, usize),
-        ranges: &DepthRanges,
+        inputs: &TileInputs<'_>,
+        index: SplatIndex,
+        accumulator: &mut Accumulator,
+        block: usize,
     ) -> u64 {
         let thresholds = self.thresholds;
-        let splat = &task.splats[batch][place];
+        let splat = index.of(inputs.splats);
         let rounded = Splat16::new(splat);
-        let d = offsets(simd, splat, task.corner, block);
+        let d = offsets(simd, splat, inputs.corner, block);
         let alpha = alpha(simd, &rounded, d, thresholds.alpha_ceiling);
-        let shown = if thresholds.depth_mode <= NO_DEPTH {
-            mask32x16::splat(simd, true)
+        let shown = if thresholds.depth_mode.tests() {
+            inputs.ranges.pixels(simd, block, splat.look.depth)
         } else {
-            ranges.pixels(simd, block, splat.look.depth)
+            mask32x16::splat(simd, true)
         };
         let look = SplatLook { color: rounded.color, depth: splat.look.depth };
         accumulate(accumulator, simd, block, alpha, shown, look, thresholds)
@@ -130,7 +128,7 @@ fn accumulate<S: Simd>(
     let reached = alpha.simd_ge(thresholds.alpha_floor) & t.simd_ge(zero) & shown;
     let accepted = reached & rest.simd_ge(thresholds.transmittance_floor);
     let finished = reached & rest.simd_lt(thresholds.transmittance_floor);
-    if thresholds.depth_mode >= FIND_MEDIAN {
+    if thresholds.depth_mode.finds_median() {
         let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = accepted & t.simd_ge(0.5);
         let median = first_half.select(u32x16::splat(simd, depth), median);

@@ -1,46 +1,42 @@
 //! Exponents in binary64 of whatever shapes there are, cut off where the draw has a cut-off.
 
-use crate::raster::gaussian::exponent::falls_64;
+use crate::gaussian::splats::splat::SplatIndex;
+use crate::raster::gaussian::exponent::neg_log2_alphas_f64;
 use crate::raster::gaussian::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::raster::gaussian::inputs::TileInputs;
 use crate::raster::gaussian::kernel::Kernel;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*};
 
-/// The fall of an alpha where a Gaussian is cut off: greater than that of any that contributes.
+/// Minus the base-2 logarithm of the alpha where a Gaussian is cut off: greater than that of any alpha that contributes.
 const CUT: f32 = 1e3;
 
-/// The fall of a primitive's alpha at a block's pixels: minus its base-2 logarithm.
+/// Minus the base-2 logarithms of a Gaussian's alphas at a block's pixels.
 #[inline(always)]
-pub(crate) fn falls<S: Simd>(
-    simd: S,
-    task: &TileInputs<'_>,
-    (batch, place): (usize, usize),
-    block: usize,
-) -> f32x16<S> {
-    let fall = whole_falls(simd, task, (batch, place), block);
-    let Some(cut_off) = task.mode.cut_off() else {
-        return fall;
+pub(crate) fn neg_log2_alphas<S: Simd>(simd: S, inputs: &TileInputs<'_>, index: SplatIndex, block: usize) -> f32x16<S> {
+    let neg_log2_alpha = uncut_neg_log2_alphas(simd, inputs, index, block);
+    let Some(cut_off) = inputs.kernel.cut_off() else {
+        return neg_log2_alpha;
     };
-    let lanes = cut_off.lanes(&task.splats[batch][place], task.corner, block);
-    mask32x16::from_bitmask(simd, lanes.into()).select(fall, f32x16::splat(simd, CUT))
+    let lanes = cut_off.lanes(index.of(inputs.splats), inputs.corner, block);
+    mask32x16::from_bitmask(simd, lanes.into()).select(neg_log2_alpha, f32x16::splat(simd, CUT))
 }
 
-/// As [`falls`], of a primitive that is not cut off.
+/// The same as [`neg_log2_alphas`], of a Gaussian that is not cut off.
 #[inline(always)]
-fn whole_falls<S: Simd>(simd: S, task: &TileInputs<'_>, (batch, place): (usize, usize), block: usize) -> f32x16<S> {
-    let splat = &task.splats[batch][place];
-    let Kernel::Exact { surfels: Some(surfels), inverse_low_pass, .. } = task.mode else {
-        return falls_64(simd, splat, task, block);
+fn uncut_neg_log2_alphas<S: Simd>(simd: S, inputs: &TileInputs<'_>, index: SplatIndex, block: usize) -> f32x16<S> {
+    let splat = index.of(inputs.splats);
+    let Kernel::Exact { surfels: Some(surfels), inverse_low_pass, .. } = inputs.kernel else {
+        return neg_log2_alphas_f64(simd, splat, inputs, block);
     };
-    let surfel = &surfels[batch][place];
-    let from_mean = |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
+    let surfel = index.of(surfels);
+    let from_mean = |axis: usize, block: f64| (f64::from(inputs.corner[axis]) + block) - splat.mean[axis];
     let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-    let fall = |first: usize| {
+    let half = |first: usize| {
         let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
         let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
         surfel.falloff(simd, dx, dy, inverse_low_pass) - opacity
     };
-    let fall: f32x16<S> = fall(0).narrow(fall(8));
-    fall.max(-1.0)
+    let neg_log2_alpha: f32x16<S> = half(0).narrow(half(8));
+    neg_log2_alpha.max(-1.0)
 }

@@ -1,9 +1,9 @@
 //! The kernel for what the fast one cannot do in the order of a list: exponents in binary64 at every pixel, and sums in binary32.
 
 use super::block_kernel::BlockKernel;
-use super::exponents::falls;
+use super::exponents::neg_log2_alphas;
+use crate::gaussian::splats::splat::SplatIndex;
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::inputs::TileInputs;
 use crate::raster::gaussian::pixels::accumulate;
 use fearless_simd::Simd;
@@ -16,14 +16,14 @@ impl BlockKernel for InOrder {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
-        (batch, place): (usize, usize),
-        (accumulator, block): (&mut Accumulator, usize),
-        ranges: &DepthRanges,
+        inputs: &TileInputs<'_>,
+        index: SplatIndex,
+        accumulator: &mut Accumulator,
+        block: usize,
     ) -> u64 {
-        let splat = &task.splats[batch][place];
-        let fall = falls(simd, task, (batch, place), block);
-        let look = splat.look;
-        accumulate(accumulator, simd, block, fall, look, ranges, task.thresholds)
+        let splat = index.of(inputs.splats);
+        let neg_log2_alpha = neg_log2_alphas(simd, inputs, index, block);
+        let (look, ranges) = (splat.look, inputs.ranges);
+        accumulate(accumulator, simd, block, neg_log2_alpha, look, ranges, inputs.thresholds)
     }
 }

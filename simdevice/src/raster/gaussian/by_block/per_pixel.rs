@@ -5,15 +5,13 @@
 //! pixel holds the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out
 //! is gathered by the next, so that time stays near linear.
 
-use super::block_lists::{BlockLists, part};
-use super::exponents::falls;
+use super::block_lists::{BlockLists, divide};
+use super::exponents::neg_log2_alphas;
 use crate::gaussian::splats::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
-use crate::gaussian::splats::splat::locate;
+use crate::gaussian::splats::splat::SplatIndex;
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::raster::gaussian::inputs::{TileCounts, TileInputs};
-use crate::raster::gaussian::mode::{FIND_MEDIAN, NO_DEPTH};
 use crate::simd::exp2::exp2_of_negated;
 use crate::stats::recorder::Run;
 use devmem::host;
@@ -27,28 +25,36 @@ const HELD: usize = 16_384;
 #[cfg(test)]
 pub(crate) const HELD: usize = 64;
 
+/// The place of a contribution in a pixel's order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct OrderKey {
+    /// The depth: see [`ordered_key`].
+    depth: u64,
+    /// The place in the block's list, which follows the draw.
+    number: u32,
+}
+
 /// A Gaussian's contribution to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Contribution {
-    /// Its place in the pixel's order: depth, then the place in the block's list, which follows the draw.
-    place: (u64, u32),
+    key: OrderKey,
     /// The bits of its alpha.
     alpha: u32,
 }
 
 /// The key before all others.
-const START: (u64, u32) = (0, 0);
+const START: OrderKey = OrderKey { depth: 0, number: 0 };
 
 /// The key after all others.
-const END: (u64, u32) = (u64::MAX, u32::MAX);
+const END: OrderKey = OrderKey { depth: u64::MAX, number: u32::MAX };
 
 /// One pixel's contributions: the nearest of those beyond `after`.
 #[derive(Clone, Debug)]
 struct Gathered {
     list: Vec<Contribution>,
-    after: (u64, u32),
+    after: OrderKey,
     /// The key from which on contributions are left to the next pass.
-    limit: (u64, u32),
+    limit: OrderKey,
 }
 
 impl Default for Gathered {
@@ -64,14 +70,14 @@ impl Gathered {
     }
 
     fn add(&mut self, contribution: Contribution) {
-        let place = contribution.place;
-        if place <= self.after || place >= self.limit {
+        let key = contribution.key;
+        if key <= self.after || key >= self.limit {
             return;
         }
         host::push(&mut self.list, contribution);
         if self.list.len() == 2 * HELD {
             let (_, next, _) = self.list.select_nth_unstable(HELD);
-            self.limit = next.place;
+            self.limit = next.key;
             self.list.truncate(HELD);
         }
     }
@@ -86,7 +92,7 @@ impl Gathered {
     fn advance(&mut self) -> bool {
         let more = self.limit != END;
         if let Some(last) = self.list.last() {
-            self.after = last.place;
+            self.after = last.key;
         }
         self.list.clear();
         self.limit = END;
@@ -119,36 +125,36 @@ pub(crate) struct PerPixel {
 pub(crate) fn composite_per_pixel<S: Simd>(
     scratch: &mut PerPixel,
     simd: S,
-    task: &TileInputs<'_>,
+    inputs: &TileInputs<'_>,
     depths: RayDepths<'_>,
     lists: &mut BlockLists,
-    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    accumulator: &mut Accumulator,
     runs: Option<&mut Vec<Run>>,
 ) -> TileCounts {
-    let mut work = part(simd, task, lists, (accumulator, ranges), runs);
+    let mut counts = divide(simd, inputs, lists, accumulator, runs);
     for (block, names) in lists.iter().enumerate() {
         if names.is_empty() {
             continue;
         }
-        work.contributions += scratch.composite_block(simd, task, depths, names, (&mut *accumulator, block), ranges);
+        counts.contributions += scratch.composite_block(simd, inputs, depths, names, accumulator, block);
     }
-    work
+    counts
 }
 
 impl PerPixel {
-    /// Composites a block of a accumulator; returns how many Gaussians its pixels accepted.
+    /// Composites a block of an accumulator; returns how many Gaussians its pixels accepted.
     #[inline(always)]
     fn composite_block<S: Simd>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
+        inputs: &TileInputs<'_>,
         depths: RayDepths<'_>,
         names: &[u32],
-        (accumulator, block): (&mut Accumulator, usize),
-        ranges: &DepthRanges,
+        accumulator: &mut Accumulator,
+        block: usize,
     ) -> u64 {
         let mut open = accumulator.open_lanes(block);
-        let rays = block_rays(&depths.rays, task.corner, block);
+        let rays = block_rays(&depths.rays, inputs.corner, block);
         let mut sums = [Sum::EMPTY; BLOCK_PIXELS];
         for pixel in &mut self.pixels {
             pixel.clear();
@@ -156,21 +162,21 @@ impl PerPixel {
         let mut contributions = 0;
         while open != 0 {
             for (number, &primitive) in (0..).zip(names) {
-                let (batch, place) = locate(primitive);
-                let splat = &task.splats[batch][place];
-                let fall = falls(simd, task, (batch, place), block);
-                let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = exp2_of_negated(simd, fall).min(ceiling);
-                let mut reached = fall.simd_le(task.thresholds.most_fall);
-                if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= ranges.pixels(simd, block, splat.look.depth);
+                let index = SplatIndex::new(primitive);
+                let splat = index.of(inputs.splats);
+                let neg_log2_alpha = neg_log2_alphas(simd, inputs, index, block);
+                let ceiling = f32x16::splat(simd, inputs.thresholds.alpha_ceiling);
+                let alpha = exp2_of_negated(simd, neg_log2_alpha).min(ceiling);
+                let mut reached = neg_log2_alpha.simd_le(inputs.thresholds.neg_log2_floor);
+                if inputs.thresholds.depth_mode.tests() {
+                    reached &= inputs.ranges.pixels(simd, block, splat.look.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {
                     continue;
                 }
                 let (alpha, along) = (alpha.to_array(), {
-                    let depth = &depths.of[batch][place];
+                    let depth = index.of(depths.by_group);
                     let mut along = [0.0; BLOCK_PIXELS];
                     depth.along(simd, &rays, 0).store_slice(&mut along[..8]);
                     depth.along(simd, &rays, 8).store_slice(&mut along[8..]);
@@ -178,8 +184,8 @@ impl PerPixel {
                 });
                 while reached != 0 {
                     let lane = reached.trailing_zeros() as usize % BLOCK_PIXELS;
-                    self.pixels[lane]
-                        .add(Contribution { place: (ordered_key(along[lane]), number), alpha: alpha[lane].to_bits() });
+                    let key = OrderKey { depth: ordered_key(along[lane]), number };
+                    self.pixels[lane].add(Contribution { key, alpha: alpha[lane].to_bits() });
                     reached &= reached - 1;
                 }
             }
@@ -188,7 +194,7 @@ impl PerPixel {
                 if open >> lane & 1 == 0 {
                     continue;
                 }
-                contributions += composite_pixel(sum, pixel, names, task);
+                contributions += composite_pixel(sum, pixel, names, inputs);
                 if sum.finished || !pixel.advance() {
                     open &= !(1 << lane);
                 }
@@ -200,8 +206,8 @@ impl PerPixel {
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &TileInputs<'_>) -> u64 {
-    let floor = f64::from(task.thresholds.transmittance_floor);
+fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], inputs: &TileInputs<'_>) -> u64 {
+    let floor = f64::from(inputs.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {
         let alpha = f64::from(f32::from_bits(contribution.alpha));
@@ -211,12 +217,11 @@ fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &Ti
             sum.finished = true;
             break;
         }
-        let (batch, place) = locate(names[contribution.place.1 as usize]);
-        let splat = &task.splats[batch][place];
+        let splat = inputs.splat(names[contribution.key.number as usize]);
         for (sum, color) in sum.color.iter_mut().zip(splat.look.color) {
             *sum += weight * f64::from(color);
         }
-        if task.thresholds.depth_mode >= FIND_MEDIAN && sum.transmittance >= 0.5 {
+        if inputs.thresholds.depth_mode.finds_median() && sum.transmittance >= 0.5 {
             sum.median = splat.look.depth;
         }
         sum.transmittance = rest;
@@ -262,7 +267,7 @@ mod tests {
             // Many are equal.
             let all: Vec<Contribution> = (0..count as u32)
                 .map(|number| Contribution {
-                    place: (1 << 63 | rng.random_range(0..HELD as u64), number),
+                    key: OrderKey { depth: 1 << 63 | rng.random_range(0..HELD as u64), number },
                     alpha: number,
                 })
                 .collect();

@@ -2,13 +2,12 @@
 //! list, pixel by pixel, with sums in binary64.
 
 use super::block_kernel::BlockKernel;
-use super::exponents::falls;
+use super::exponents::neg_log2_alphas;
 use crate::gaussian::splats::identity::Identity;
+use crate::gaussian::splats::splat::SplatIndex;
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS};
 use crate::raster::gaussian::inputs::TileInputs;
-use crate::raster::gaussian::mode::NO_DEPTH;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -43,8 +42,8 @@ struct Sum {
     /// The depth of the median, as the attachment holds it.
     depth: u32,
     /// The first that contributed, and the median.
-    nearest: Identity,
-    median: Identity,
+    nearest_identity: Identity,
+    median_identity: Identity,
     covered: bool,
     finished: bool,
 }
@@ -56,8 +55,8 @@ impl Sum {
             transmittance: 1.0,
             means: [0.0; 3],
             depth: 0,
-            nearest: Identity::default(),
-            median: Identity::default(),
+            nearest_identity: Identity::default(),
+            median_identity: Identity::default(),
             covered: false,
             finished: !is_open,
         }
@@ -66,9 +65,9 @@ impl Sum {
 
 /// Compositing in the order of the list, with the identities of Gaussians.
 pub(crate) struct Tracking<'a> {
-    /// By batch, as the splats.
+    /// By group, as the splats.
     identities: &'a [Vec<Identity>],
-    to: &'a mut Tracked,
+    tracked: &'a mut Tracked,
     /// The pixels of a block that were to be touched.
     open: u32,
     sums: [Sum; BLOCK_PIXELS],
@@ -76,8 +75,8 @@ pub(crate) struct Tracking<'a> {
 
 impl<'a> Tracking<'a> {
     /// Compositing of Gaussians that have these identities, into what was empty.
-    pub(crate) fn new(identities: &'a [Vec<Identity>], to: &'a mut Tracked) -> Self {
-        Self { identities, to, open: 0, sums: [Sum::new(false); BLOCK_PIXELS] }
+    pub(crate) fn new(identities: &'a [Vec<Identity>], tracked: &'a mut Tracked) -> Self {
+        Self { identities, tracked, open: 0, sums: [Sum::new(false); BLOCK_PIXELS] }
     }
 }
 
@@ -96,27 +95,27 @@ impl BlockKernel for Tracking<'_> {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
-        (batch, place): (usize, usize),
-        (_, block): (&mut Accumulator, usize),
-        ranges: &DepthRanges,
+        inputs: &TileInputs<'_>,
+        index: SplatIndex,
+        _: &mut Accumulator,
+        block: usize,
     ) -> u64 {
-        let thresholds = &task.thresholds;
-        let splat = &task.splats[batch][place];
-        let fall = falls(simd, task, (batch, place), block);
-        let mut reached = fall.simd_le(thresholds.most_fall);
-        if thresholds.depth_mode > NO_DEPTH {
-            reached &= ranges.pixels(simd, block, splat.look.depth);
+        let thresholds = &inputs.thresholds;
+        let splat = index.of(inputs.splats);
+        let neg_log2_alpha = neg_log2_alphas(simd, inputs, index, block);
+        let mut reached = neg_log2_alpha.simd_le(thresholds.neg_log2_floor);
+        if thresholds.depth_mode.tests() {
+            reached &= inputs.ranges.pixels(simd, block, splat.look.depth);
         }
         let mut reached = reached.to_bitmask() as u32 & self.open;
         if reached == 0 {
             return 0;
         }
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-        let alphas = exp2_of_negated(simd, fall).min(ceiling).to_array();
+        let alphas = exp2_of_negated(simd, neg_log2_alpha).min(ceiling).to_array();
         let floor = f64::from(thresholds.transmittance_floor);
         let depth = f64::from(thresholds.depth_unit.decode(splat.look.depth));
-        let identity = self.identities[batch][place];
+        let identity = *index.of(self.identities);
         let mut accepted = 0;
         while reached != 0 {
             let lane = reached.trailing_zeros() as usize % BLOCK_PIXELS;
@@ -139,10 +138,10 @@ impl BlockKernel for Tracking<'_> {
             *distances += weight * f64::from(identity.z);
             *weights += weight;
             if !sum.covered {
-                sum.nearest = identity;
+                sum.nearest_identity = identity;
             }
             if sum.transmittance >= 0.5 {
-                sum.median = identity;
+                sum.median_identity = identity;
                 sum.depth = splat.look.depth;
             }
             sum.transmittance = rest;
@@ -167,12 +166,12 @@ impl BlockKernel for Tracking<'_> {
             let [depths, distances, weights] = sum.means;
             accumulator.means[0][block][lane] = depths as f32;
             accumulator.means[1][block][lane] = weights as f32;
-            self.to.nearest[block][lane] = sum.nearest.sequence;
-            self.to.median[block][lane] = sum.median.sequence;
-            let [mean, median] = &mut self.to.linear;
-            median[block][lane] = sum.median.z;
+            self.tracked.nearest[block][lane] = sum.nearest_identity.sequence;
+            self.tracked.median[block][lane] = sum.median_identity.sequence;
+            let [mean, median] = &mut self.tracked.linear;
+            median[block][lane] = sum.median_identity.z;
             // An alpha that underflows weighs nothing.
-            mean[block][lane] = if weights > 0.0 { (distances / weights) as f32 } else { sum.median.z };
+            mean[block][lane] = if weights > 0.0 { (distances / weights) as f32 } else { sum.median_identity.z };
         }
     }
 }

@@ -5,13 +5,11 @@
 //! worked off at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
 
 use super::block_kernel::BlockKernel;
-use super::exponents::falls;
-use crate::gaussian::splats::splat::SplatLook;
+use super::exponents::neg_log2_alphas;
+use crate::gaussian::splats::splat::{SplatIndex, SplatLook};
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::grid::BLOCK_PIXELS;
-use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
-use crate::raster::gaussian::mode::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH};
+use crate::raster::gaussian::inputs::TileInputs;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -40,16 +38,14 @@ impl BlockKernel for WideSums {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
-        (batch, place): (usize, usize),
-        (accumulator, block): (&mut Accumulator, usize),
-        ranges: &DepthRanges,
+        inputs: &TileInputs<'_>,
+        index: SplatIndex,
+        accumulator: &mut Accumulator,
+        block: usize,
     ) -> u64 {
-        let splat = &task.splats[batch][place];
-        let fall = falls(simd, task, (batch, place), block);
-        let look = splat.look;
-        let to = (block, &mut self.0);
-        accumulate_wide(accumulator, simd, to, fall, look, ranges, task.thresholds)
+        let splat = index.of(inputs.splats);
+        let neg_log2_alpha = neg_log2_alphas(simd, inputs, index, block);
+        accumulate(accumulator, &mut self.0, simd, block, neg_log2_alpha, splat.look, inputs)
     }
 
     #[inline(always)]
@@ -64,6 +60,13 @@ impl BlockKernel for WideSums {
 struct Sums {
     color: [[f64; BLOCK_PIXELS]; 3],
     transmittance: [f64; BLOCK_PIXELS],
+}
+
+/// The lanes of a block that accept a Gaussian, and its weights there; elsewhere they are zero.
+struct Accepted<Weights> {
+    weights: Weights,
+    /// A bit for each.
+    lanes: u64,
 }
 
 impl Sums {
@@ -87,7 +90,7 @@ impl Sums {
     }
 
     /// Composites what has an alpha and a colour in the lanes of `reached`, and marks those that it finishes. Returns
-    /// the weights, and in which lanes it is accepted.
+    /// what the pixels accept.
     #[inline(always)]
     fn add<S: Simd>(
         &mut self,
@@ -96,11 +99,11 @@ impl Sums {
         color: [f32; 3],
         reached: u64,
         floor: f32,
-    ) -> (f32x16<S>, u64) {
+    ) -> Accepted<f32x16<S>> {
         let alphas = alpha.widen();
         let low = self.add_half(simd, 0, alphas.0, color, reached, floor);
         let high = self.add_half(simd, BLOCK_PIXELS / 2, alphas.1, color, reached, floor);
-        (low.0.narrow(high.0), low.1 | high.1)
+        Accepted { weights: low.weights.narrow(high.weights), lanes: low.lanes | high.lanes }
     }
 
     /// Does what [`Sums::add`] does, in half of the lanes.
@@ -113,7 +116,7 @@ impl Sums {
         color: [f32; 3],
         reached: u64,
         floor: f32,
-    ) -> (f64x8<S>, u64) {
+    ) -> Accepted<f64x8<S>> {
         let lanes = first..first + BLOCK_PIXELS / 2;
         let reached = mask64x8::from_bitmask(simd, reached >> first & 0xff);
         let t = f64x8::from_slice(simd, &self.transmittance[lanes.clone()]);
@@ -130,40 +133,42 @@ impl Sums {
             let all = f64x8::from_slice(simd, &sum[lanes.clone()]) + part;
             all.store_slice(&mut sum[lanes.clone()]);
         }
-        (weight, accepted.to_bitmask() << first)
+        Accepted { weights: weight, lanes: accepted.to_bitmask() << first }
     }
 }
 
-/// Does what [`accumulate`] does, to sums that are kept elsewhere.
+/// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-neg_log2_alpha`; returns how many
+/// pixels accepted it. Colours and transmittances are in `sums`, depths in `accumulator`.
 #[inline(always)]
-fn accumulate_wide<S: Simd>(
+fn accumulate<S: Simd>(
     accumulator: &mut Accumulator,
+    sums: &mut Sums,
     simd: S,
-    (block, sums): (usize, &mut Sums),
-    fall: f32x16<S>,
+    block: usize,
+    neg_log2_alpha: f32x16<S>,
     SplatLook { color, depth }: SplatLook,
-    ranges: &DepthRanges,
-    thresholds: Thresholds,
+    inputs: &TileInputs<'_>,
 ) -> u64 {
+    let thresholds = &inputs.thresholds;
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-    let alpha = exp2_of_negated(simd, fall).min(ceiling);
-    let mut reached = fall.simd_le(f32x16::splat(simd, thresholds.most_fall));
-    if thresholds.depth_mode > NO_DEPTH {
-        reached &= ranges.pixels(simd, block, depth);
+    let alpha = exp2_of_negated(simd, neg_log2_alpha).min(ceiling);
+    let mut reached = neg_log2_alpha.simd_le(f32x16::splat(simd, thresholds.neg_log2_floor));
+    if thresholds.depth_mode.tests() {
+        reached &= inputs.ranges.pixels(simd, block, depth);
     }
-    // What has fallen too far has no meaning, and may be anything.
+    // Where it is not reached, alpha is undefined.
     let alpha = reached.select(alpha, f32x16::splat(simd, 0.0));
     let before = sums.transmittance;
     let floor = thresholds.transmittance_floor;
-    let (weight, accepted) = sums.add(simd, alpha, color, reached.to_bitmask(), floor);
-    if thresholds.depth_mode >= FIND_MEDIAN {
+    let Accepted { weights: weight, lanes: accepted } = sums.add(simd, alpha, color, reached.to_bitmask(), floor);
+    if thresholds.depth_mode.finds_median() {
         for (lane, (median, t)) in accumulator.median[block].iter_mut().zip(before).enumerate() {
             if accepted >> lane & 1 == 1 && t >= 0.5 {
                 *median = depth;
             }
         }
     }
-    if thresholds.depth_mode == FIND_MEAN {
+    if thresholds.depth_mode.finds_mean() {
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
         let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);

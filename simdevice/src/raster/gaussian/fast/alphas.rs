@@ -6,7 +6,7 @@ use crate::raster::gaussian::exponent::power;
 use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS, ROUND};
 use crate::raster::gaussian::inputs::Thresholds;
 use crate::raster::gaussian::masks::{Tally, only};
-use crate::raster::gaussian::mode::DepthMode;
+use crate::raster::gaussian::mode::Mode;
 use crate::raster::gaussian::pixels::reached;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -23,22 +23,31 @@ impl Default for Alphas {
     }
 }
 
+/// The numbers of alphas of a round.
+pub(super) struct AlphaCounts {
+    /// Pairs of a Gaussian and a pixel that it reaches, of pixels that are not finished.
+    pub(super) pixels: u64,
+    /// Pairs of a Gaussian and a block.
+    pub(super) blocks: u64,
+}
+
 impl Alphas {
-    /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they
-    /// reach, of those that are not finished, and the number of pairs of a Gaussian and a block. Without `IS_CAPPED`,
-    /// alphas are not compared with the ceiling, which none may reach then.
+    /// Computes the alphas of all Gaussians in the blocks that they may reach: zero below the floor, of which
+    /// `neg_log2_floors` are the negated logarithms. Without `IS_CAPPED`, alphas are not compared with the ceiling, which
+    /// none may reach then.
     ///
-    /// They come before any is composited, since they do not depend on each other: several are on their way at a time.
-    /// A function of its own, so that its constants have the registers for themselves.
+    /// All are computed before any is composited, since they do not depend on each other: the processor works on several at a
+    /// time. The function is not inlined, so that its constants have the registers for themselves.
     #[inline(never)]
-    pub(super) fn find<S: Simd, const DEPTH: DepthMode, const IS_CAPPED: bool>(
+    pub(super) fn find<S: Simd, M: Mode, const IS_CAPPED: bool>(
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
+        round: &StagedRound,
+        neg_log2_floors: &[[f32; BLOCK_PIXELS]; BLOCKS],
         ranges: &DepthRanges,
         thresholds: Thresholds,
-    ) -> (u64, u64) {
+    ) -> AlphaCounts {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -56,21 +65,21 @@ impl Alphas {
                     let Some(column) = round.column(block) else {
                         break;
                     };
-                    let most_fall = f32x16::from_slice(simd, &most_fall[block]);
+                    let neg_log2_floor = f32x16::from_slice(simd, &neg_log2_floors[block]);
                     let mut rest = reaching;
                     for to in alphas {
                         let number = rest.trailing_zeros() as usize;
                         rest &= rest.wrapping_sub(1);
-                        let fall = round.falls(simd, number, (block, column));
-                        let at = (block, round.looks[number].depth);
-                        let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
+                        let neg_log2_alpha = round.neg_log2_alphas(simd, number, block, column);
+                        let depth = round.looks[number].depth;
+                        let reached = reached(simd, M::DEPTH, block, depth, neg_log2_alpha, ranges, neg_log2_floor);
                         pixels.add(reached);
-                        let power = power(simd, DEPTH, fall);
+                        let power = power(simd, M::EXPONENTIAL, neg_log2_alpha);
                         let alpha = if IS_CAPPED { power.min(ceiling) } else { power };
                         only(simd, reached, alpha).store_slice(to);
                     }
                 }
-                (pixels.total(), count_of_all)
+                AlphaCounts { pixels: pixels.total(), blocks: count_of_all }
             },
         )
     }

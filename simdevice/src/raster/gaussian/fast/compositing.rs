@@ -1,15 +1,14 @@
 //! Phase 3 of the fast kernel: the alphas of a round through the pixels of each block, which stay in registers.
 
 use super::alphas::Alphas;
-use super::staging::{Reaching, StagedRound};
+use super::staging::{Placed, Reaching, StagedRound};
 use crate::gaussian::splats::splat::Splat;
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::depth_ranges::DepthRanges;
-use crate::raster::gaussian::exponent::falls_64;
+use crate::raster::gaussian::exponent::neg_log2_alphas_f64;
 use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS};
 use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
 use crate::raster::gaussian::masks::Tally;
-use crate::raster::gaussian::mode::{DepthMode, FIND_MEDIAN, FIND_REACHED, NO_DEPTH};
+use crate::raster::gaussian::mode::Mode;
 use crate::raster::gaussian::pixels::{accumulate, composite_one, keep, pixels};
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
@@ -29,40 +28,52 @@ pub(crate) struct Evaluated {
     pub(crate) may_have_finished: bool,
 }
 
-/// Composites those of `round` that reach a block in it, for each block. Unless `is_capped`, no opacity is above the
-/// ceiling.
+/// Composites the Gaussians of a round that were `placed`, in the blocks that they may reach.
 #[inline(always)]
-pub(crate) fn evaluate<S: Simd, const DEPTH: DepthMode>(
+pub(crate) fn evaluate<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (reaching, is_capped): (&Reaching, bool),
-    (round, alphas): (&StagedRound, &mut Alphas),
-    ranges: &DepthRanges,
-    thresholds: Thresholds,
+    inputs: &TileInputs<'_>,
+    placed: &Placed,
+    round: &StagedRound,
+    alphas: &mut Alphas,
 ) -> Evaluated {
-    let to = (round, &accumulator.most_fall);
+    let Placed { reaching, is_capped, .. } = placed;
+    let (ranges, thresholds) = (inputs.ranges, inputs.thresholds);
+    let floors = &accumulator.neg_log2_floors;
     // Opacities are seldom above the ceiling. Less exact powers may be, whatever the opacity.
-    let (reached, items) = if DEPTH < NO_DEPTH || is_capped {
-        alphas.find::<_, DEPTH, true>(simd, reaching, to, ranges, thresholds)
+    let may_exceed = M::DEPTH.finds_reached() || M::EXPONENTIAL.is_approximate();
+    let found = if may_exceed || *is_capped {
+        alphas.find::<_, M, true>(simd, reaching, round, floors, ranges, thresholds)
     } else {
-        alphas.find::<_, DEPTH, false>(simd, reaching, to, ranges, thresholds)
+        alphas.find::<_, M, false>(simd, reaching, round, floors, ranges, thresholds)
     };
-    let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
+    let refused = composite_all::<_, M>(accumulator, simd, reaching, round, alphas, thresholds);
     Evaluated {
-        items,
-        contributions: reached.saturating_sub(refused.unwrap_or(0)),
+        items: found.blocks,
+        contributions: found.pixels.saturating_sub(refused.unwrap_or(0)),
         may_have_finished: refused.is_some(),
     }
+}
+
+/// The alphas of a block, in the order of the list.
+#[derive(Clone, Copy)]
+struct BlockAlphas<'a> {
+    block: usize,
+    /// A bit for the number in the round of each alpha's Gaussian.
+    reaching: u32,
+    alphas: &'a [[f32; BLOCK_PIXELS]],
 }
 
 /// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no
 /// pixel was finished in the round. A function of its own, as [`Alphas::find`].
 #[inline(never)]
-fn composite_all<S: Simd, const DEPTH: DepthMode>(
+fn composite_all<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
     reaching: &Reaching,
-    (round, alphas): (&StagedRound, &Alphas),
+    round: &StagedRound,
+    alphas: &Alphas,
     thresholds: Thresholds,
 ) -> Option<u64> {
     simd.vectorize(
@@ -79,12 +90,12 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                 if reaching == 0 {
                     continue;
                 }
-                let of_block = (block, reaching, alphas);
-                if DEPTH == FIND_REACHED
-                    || DEPTH >= FIND_MEDIAN
+                let of_block = BlockAlphas { block, reaching, alphas };
+                if M::DEPTH.finds_reached()
+                    || M::DEPTH.finds_median()
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    let more = composite_near_floor::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+                    let more = composite_near_floor::<_, M>(accumulator, simd, of_block, round, thresholds);
                     if let Some(more) = more {
                         refused = Some(refused.unwrap_or(0) + more);
                     }
@@ -101,10 +112,11 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
 fn composite_far_from_floor<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    of_block: BlockAlphas<'_>,
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> bool {
+    let BlockAlphas { block, mut reaching, alphas } = of_block;
     let floor = thresholds.transmittance_floor;
     let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
@@ -137,50 +149,46 @@ fn composite_far_from_floor<S: Simd>(
 /// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of
 /// its own, so that what goes the quick way has the registers for itself.
 #[inline(never)]
-fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
+fn composite_near_floor<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    of_block: BlockAlphas<'_>,
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
-            let (mut reaching, mut alphas) = (reaching, alphas);
-            if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
-                let of_block = (block, reaching, alphas);
-                (reaching, alphas) = composite_until_finished(accumulator, simd, of_block, round, thresholds);
-                if alphas.is_empty() {
+            let mut rest = of_block;
+            if !M::DEPTH.finds_reached() && !M::DEPTH.finds_median() {
+                rest = composite_until_finished(accumulator, simd, rest, round, thresholds);
+                if rest.alphas.is_empty() {
                     return None;
                 }
             }
-            let of_block = (block, reaching, alphas);
-            let refused = composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+            let refused = composite_carefully::<_, M>(accumulator, simd, rest, round, thresholds);
             Some(refused)
         },
     )
 }
-
-/// Alphas of a block, in order, and bits for the numbers of their Gaussians.
-type BlockAlphas<'a> = (u32, &'a [[f32; BLOCK_PIXELS]]);
 
 /// Composites the first of a block's alphas, up to one that finishes a pixel, and returns the others.
 #[inline(always)]
 fn composite_until_finished<'a, S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, mut alphas): (usize, u32, &'a [[f32; BLOCK_PIXELS]]),
+    of_block: BlockAlphas<'a>,
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> BlockAlphas<'a> {
+    let BlockAlphas { block, mut reaching, mut alphas } = of_block;
     let floor = f32x16::splat(simd, thresholds.transmittance_floor);
     let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
     let signs: i32x16<S> = before.bitcast();
-    // What is finished has alphas of zero: here it has light that stays.
-    let light = f32x16::splat(simd, f32::MAX);
-    pixels.transmittance = signs.simd_lt(0).select(light, before);
+    // What is finished has alphas of zero: here its transmittance stays the greatest.
+    let greatest = f32x16::splat(simd, f32::MAX);
+    pixels.transmittance = signs.simd_lt(0).select(greatest, before);
     while let [alpha, rest @ ..] = alphas {
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         if passed.rest.simd_lt(floor).any_true() {
@@ -194,52 +202,50 @@ fn composite_until_finished<'a, S: Simd>(
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
-    (reaching, alphas)
+    BlockAlphas { block, reaching, alphas }
 }
 
 /// Composites a block's alphas; returns the number of pixels that refused one.
 #[inline(always)]
-fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+fn composite_carefully<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    of_block: BlockAlphas<'_>,
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {
-    let thresholds = Thresholds { depth_mode: DEPTH, ..thresholds };
+    let BlockAlphas { block, mut reaching, alphas } = of_block;
+    let thresholds = Thresholds { depth_mode: M::DEPTH, ..thresholds };
     let mut pixels = pixels(accumulator, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
         let look = &round.looks[reaching.trailing_zeros() as usize];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
-        let to = (block, &mut pixels);
-        let goes_on = composite_one(accumulator, simd, to, alpha, *look, thresholds);
+        let goes_on = composite_one(accumulator, simd, block, &mut pixels, alpha, *look, thresholds);
         refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
     keep(accumulator, block, pixels);
-    accumulator.find_most_fall(simd, block, thresholds.most_fall);
+    accumulator.find_neg_log2_floors(simd, block, thresholds.neg_log2_floor);
     refused.total()
 }
 
-/// Composites one steep Gaussian in `blocks`, its exponents formed in binary64; returns the number of pixels that
-/// accepted it.
+/// Composites one Gaussian in `blocks`, its exponents formed in binary64; returns the number of pixels that accepted it.
 #[inline(always)]
-pub(crate) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
+pub(crate) fn composite_in_f64<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
     splat: &Splat,
     blocks: u64,
-    ranges: &DepthRanges,
-    task: &TileInputs<'_>,
+    inputs: &TileInputs<'_>,
 ) -> u64 {
-    let thresholds = Thresholds { depth_mode: DEPTH, ..task.thresholds };
+    let thresholds = Thresholds { depth_mode: M::DEPTH, exponential: M::EXPONENTIAL, ..inputs.thresholds };
     let mut contributions = 0;
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
-        let fall = falls_64(simd, splat, task, block);
+        let neg_log2_alpha = neg_log2_alphas_f64(simd, splat, inputs, block);
         let look = splat.look;
-        contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
-        accumulator.find_most_fall(simd, block, thresholds.most_fall);
+        contributions += accumulate(accumulator, simd, block, neg_log2_alpha, look, inputs.ranges, thresholds);
+        accumulator.find_neg_log2_floors(simd, block, thresholds.neg_log2_floor);
     }
     contributions
 }

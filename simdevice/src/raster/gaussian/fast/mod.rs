@@ -1,150 +1,123 @@
-//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged
-//! ([`staging`]): what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that
-//! are reached are found, and then blended, block by block ([`pixels`]).
+//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round has three phases:
 //!
-//! [`staging`]: super::staging
-//! [`pixels`]: super::pixels
+//! 1. [`staging`] prepares its Gaussians, and finds the blocks that each may reach.
+//! 2. [`alphas`] computes the alphas of all Gaussians in the blocks that they may reach.
+//! 3. [`compositing`] composites the alphas, block by block.
 
 mod alphas;
 mod compositing;
+mod round;
 mod staging;
 
 use super::accumulator::{Accumulator, NOT_TERMINATED};
-use super::depth_ranges::DepthRanges;
-use super::fast::alphas::Alphas;
-use super::fast::compositing::{evaluate, evaluate_steep};
-use super::fast::staging::StagedRound;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{TileCounts, TileInputs};
-use super::mode::{DepthMode, NO_DEPTH};
+use super::mode::Mode;
 use super::reached_blocks::hidden_blocks;
 use crate::gaussian::splats::splat::Splat;
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder;
 use crate::stats::recorder::Run;
+use alphas::Alphas;
+use compositing::{composite_in_f64, evaluate};
 use fearless_simd::{Simd, mask32x16, prelude::*};
+use round::{OpenBlocks, Round};
+use staging::StagedRound;
 
 /// The kernel's scratch besides the pixels.
 #[derive(Debug, Default)]
 pub(crate) struct FastScratch {
     staged: StagedRound,
-    /// Apart, so that both are small enough never to be wanting.
+    /// A box of its own, so that both allocations are small.
     alphas: Box<Alphas>,
 }
 
-/// The blocks of a tile that are not finished before a round.
-#[derive(Clone, Copy)]
-struct Open {
-    /// A bit for each.
-    bits: u64,
-    /// The number of them.
-    blocks: u8,
-    /// Rows of pixels with an unfinished one, if work is recorded.
-    rows: u8,
-}
-
-/// Gaussians that are composited together.
-struct Round<'a> {
-    splats: &'a [&'a Splat],
-    /// The primitives of the round after.
-    next: &'a [u32],
-    open: Open,
-    is_recorded: bool,
-}
-
-/// Composites a task's list.
+/// Composites a tile's list.
 #[inline(always)]
-pub(crate) fn composite<S: Simd, const DEPTH: DepthMode>(
+pub(crate) fn composite<S: Simd, M: Mode>(
     scratch: &mut FastScratch,
     simd: S,
-    task: &TileInputs<'_>,
-    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    inputs: &TileInputs<'_>,
+    accumulator: &mut Accumulator,
     mut runs: Option<&mut Vec<Run>>,
 ) -> TileCounts {
-    let mut work = TileCounts::default();
+    let mut counts = TileCounts::default();
     for block in 0..BLOCKS {
-        accumulator.find_most_fall(simd, block, task.thresholds.most_fall);
+        accumulator.find_neg_log2_floors(simd, block, inputs.thresholds.neg_log2_floor);
     }
-    let Some(&first) = task.list.first() else {
-        return work;
+    let Some(&first) = inputs.list.first() else {
+        return counts;
     };
-    let mut ahead = [task.splat(first); ROUND];
-    for (splat, &primitive) in ahead.iter_mut().zip(task.list) {
-        *splat = task.prefetched(primitive);
+    let mut ahead = [inputs.splat(first); ROUND];
+    for (splat, &primitive) in ahead.iter_mut().zip(inputs.list) {
+        *splat = inputs.prefetched(primitive);
     }
-    // The open blocks stay the same until a pixel is finished, unless blocks are left out for the light that they have.
+    // The open blocks stay the same until a pixel is finished, unless blocks are left out for the transmittance that they have.
     let mut known = None;
-    for (number, primitives) in task.list.chunks(ROUND).enumerate() {
+    for (number, primitives) in inputs.list.chunks(ROUND).enumerate() {
         let round = ahead;
         let splats = &round[..primitives.len().min(ROUND)];
-        let rest = &task.list[number * ROUND..];
+        let rest = &inputs.list[number * ROUND..];
         let bits = match known {
-            Some(bits) if task.way.light == NOT_TERMINATED => bits,
-            _ => open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work),
+            Some(bits) if inputs.approximation.least_transmittance == NOT_TERMINATED => bits,
+            _ => open_blocks::<_, M>(simd, inputs, accumulator, rest, &mut counts),
         };
         if bits == 0 {
             break;
         }
-        let open = Open {
+        let open = OpenBlocks {
             bits,
-            blocks: bits.count_ones() as u8,
+            count: bits.count_ones() as u8,
             rows: if runs.is_some() { accumulator.open_rows() } else { 0 },
         };
-        if DEPTH > NO_DEPTH && ranges.rejects_rest(splats[0].look.depth, task.trend) {
-            work.tiles_hidden += rest.len() as u64;
+        if M::DEPTH.tests() && inputs.ranges.rejects_rest(splats[0].look.depth, inputs.trend) {
+            counts.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
-                work.hidden_rest = rest.len() as u32;
-                recorder::push_run(runs, hidden_run(simd, task, rest, open));
+                counts.hidden_rest = rest.len() as u32;
+                recorder::push_run(runs, hidden_run(simd, inputs, rest, open));
             }
             break;
         }
         let next = rest.get(ROUND..).unwrap_or_default();
-        let before = work;
+        let before = counts;
         let round = Round { splats, next, open, is_recorded: runs.is_some() };
-        let outcome = composite_round::<_, DEPTH>(
-            scratch,
-            simd,
-            task,
-            (&mut *accumulator, ranges),
-            (&round, &mut ahead),
-            &mut work,
-        );
+        let outcome = composite_round::<_, M>(scratch, simd, inputs, accumulator, &round, &mut ahead, &mut counts);
         known = (!outcome.may_have_finished).then_some(bits);
         if let Some(runs) = &mut runs {
             let run = Run {
                 primitives: splats.len() as u32,
                 rows: open.rows,
-                blocks: open.blocks,
-                reached: (work.items - before.items) as u32,
-                hidden: (work.tiles_hidden - before.tiles_hidden) as u32,
-                hidden_blocks: outcome.blocks_of_hidden + (work.blocks_hidden - before.blocks_hidden) as u32,
+                blocks: open.count,
+                reached: (counts.items - before.items) as u32,
+                hidden: (counts.tiles_hidden - before.tiles_hidden) as u32,
+                hidden_blocks: outcome.blocks_of_hidden + (counts.blocks_hidden - before.blocks_hidden) as u32,
             };
             recorder::push_run(runs, run);
         }
     }
     accumulator.find_covered(simd);
-    work
+    counts
 }
 
 /// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since
-/// they have too little light.
+/// they have too little transmittance.
 #[inline(always)]
-fn open_blocks<S: Simd, const DEPTH: DepthMode>(
+fn open_blocks<S: Simd, M: Mode>(
     simd: S,
-    task: &TileInputs<'_>,
+    inputs: &TileInputs<'_>,
     accumulator: &Accumulator,
     rest: &[u32],
-    work: &mut TileCounts,
+    counts: &mut TileCounts,
 ) -> u64 {
-    if !task.optimizations.has(Optimization::EarlyTermination) {
+    if !inputs.optimizations.has(Optimization::EarlyTermination) {
         return ALL_BLOCKS;
     }
-    let open = accumulator.open_blocks(simd, task.way.light);
-    if DEPTH <= NO_DEPTH && task.way.light != NOT_TERMINATED {
+    let open = accumulator.open_blocks(simd, inputs.approximation.least_transmittance);
+    if !M::DEPTH.tests() && inputs.approximation.least_transmittance != NOT_TERMINATED {
         let left_out = accumulator.open_blocks(simd, NOT_TERMINATED) & !open;
         // If no block is open, none will be.
         let of = if open == 0 { rest.len() } else { rest.len().min(ROUND) };
-        work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
+        counts.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
     }
     open
 }
@@ -159,72 +132,59 @@ struct RoundOutcome {
 
 /// Composites a round, and brings the next one's splats `ahead`.
 #[inline(always)]
-fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
+fn composite_round<'a, S: Simd, M: Mode>(
     scratch: &mut FastScratch,
     simd: S,
-    task: &TileInputs<'a>,
-    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
-    (round, ahead): (&Round<'_>, &mut [&'a Splat; ROUND]),
-    work: &mut TileCounts,
+    inputs: &TileInputs<'a>,
+    accumulator: &mut Accumulator,
+    round: &Round<'_>,
+    ahead: &mut [&'a Splat; ROUND],
+    counts: &mut TileCounts,
 ) -> RoundOutcome {
-    let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
+    let (open, blocks) = (round.open.bits, u64::from(round.open.count));
     let mut outcome = RoundOutcome { blocks_of_hidden: 0, may_have_finished: false };
     let mut from = 0;
     loop {
-        let placed = scratch.staged.place::<_, DEPTH>(
-            simd,
-            task,
-            (round.splats, from),
-            (round.next, &mut *ahead),
-            (open, ranges),
-            round.is_recorded,
-        );
-        work.open += placed.count * blocks;
-        work.tiles_hidden += placed.tiles_hidden;
-        work.blocks_hidden += placed.blocks_hidden;
+        let placed = scratch.staged.place::<_, M>(simd, inputs, round, from, ahead);
+        counts.open += placed.count * blocks;
+        counts.tiles_hidden += placed.tiles_hidden;
+        counts.blocks_hidden += placed.blocks_hidden;
         outcome.blocks_of_hidden += placed.blocks_of_hidden;
-        let staged = (&scratch.staged, &mut *scratch.alphas);
-        let evaluated = evaluate::<_, DEPTH>(
-            accumulator,
-            simd,
-            (&placed.reaching, placed.is_capped),
-            staged,
-            ranges,
-            task.thresholds,
-        );
-        work.items += evaluated.items;
-        work.contributions += evaluated.contributions;
+        let evaluated = evaluate::<_, M>(accumulator, simd, inputs, &placed, &scratch.staged, &mut scratch.alphas);
+        counts.items += evaluated.items;
+        counts.contributions += evaluated.contributions;
         outcome.may_have_finished |= evaluated.may_have_finished;
         let Some(&splat) = round.splats.get(placed.end) else {
             break;
         };
-        // It is steep; those before it were composited.
-        let shown = if DEPTH <= NO_DEPTH { open } else { open & ranges.blocks(simd, splat.look.depth).to_bitmask() };
+        // Its exponents need binary64; those before it were composited.
+        let shown =
+            if !M::DEPTH.tests() { open } else { open & inputs.ranges.blocks(simd, splat.look.depth).to_bitmask() };
         let exact = u64::from(shown.count_ones());
-        work.open += blocks;
-        work.blocks_hidden += blocks - exact;
-        work.items += exact;
-        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
+        counts.open += blocks;
+        counts.blocks_hidden += blocks - exact;
+        counts.items += exact;
+        counts.contributions += composite_in_f64::<_, M>(accumulator, simd, splat, shown, inputs);
         outcome.may_have_finished = true;
         from = placed.end + 1;
     }
-    work.pairs += round.splats.len() as u64;
+    counts.pairs += round.splats.len() as u64;
     outcome
 }
 
 /// The record in a trace of the Gaussians at a list's end that depths hide in all of the tile.
 #[inline(always)]
-fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open) -> Run {
+fn hidden_run<S: Simd>(simd: S, inputs: &TileInputs<'_>, rest: &[u32], open: OpenBlocks) -> Run {
     let mut run = Run {
         primitives: rest.len() as u32,
         rows: open.rows,
-        blocks: open.blocks,
+        blocks: open.count,
         hidden: rest.len() as u32,
         ..Run::default()
     };
     let open = mask32x16::from_bitmask(simd, open.bits);
     for &primitive in rest {
-        run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
+        run.hidden_blocks += hidden_blocks(simd, inputs.splat(primitive), inputs, open);
     }
     run
 }

@@ -1,13 +1,13 @@
-//! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
+//! Phase 1 of the fast kernel: the numbers of a round's Gaussians that the other phases need, and the blocks that each may reach.
 
+use super::round::Round;
 use crate::gaussian::splats::splat::{Splat, SplatLook};
-use crate::raster::gaussian::depth_ranges::DepthRanges;
 use crate::raster::gaussian::grid::{
     BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
 };
 use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
-use crate::raster::gaussian::mode::{DepthMode, NO_DEPTH};
-use crate::raster::gaussian::reached_blocks::{ROOM_FACTOR, hidden_blocks};
+use crate::raster::gaussian::mode::Mode;
+use crate::raster::gaussian::reached_blocks::{RANGE_FACTOR, hidden_blocks};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
@@ -26,8 +26,8 @@ pub(crate) struct StagedRound {
     /// `v` at the middle of each block, by block and then by Gaussian.
     v: [[f32; PLACES]; BLOCKS],
     /// By pair of columns of blocks, then by Gaussian, then by column of the pair: `u^2` less the logarithm of the
-    /// opacity at the pixels of two rows of a block. Its other two rows have the same. As are `along` and `looks`, it
-    /// is there for Gaussians that may reach a block.
+    /// opacity at the pixels of two rows of a block. Its other two rows have the same. Like `along` and `looks`, it
+    /// is set for Gaussians that may reach a block.
     from_u: [[[f32; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
     /// By Gaussian, the addition of a pixel's offset from the middle of its block to `v` there.
     along: [[f32; BLOCK_PIXELS]; PLACES],
@@ -75,7 +75,7 @@ impl Default for Gathered {
     }
 }
 
-/// The outcome of placing a round's Gaussians, up to a steep one.
+/// The outcome of placing a round's Gaussians, up to one whose exponents need binary64.
 #[derive(Debug, Default)]
 pub(crate) struct Placed {
     pub(crate) reaching: Reaching,
@@ -83,7 +83,7 @@ pub(crate) struct Placed {
     pub(crate) is_capped: bool,
     /// The number of Gaussians placed.
     pub(crate) count: u64,
-    /// The number in the round of the first steep Gaussian from where they begin, or the round's length.
+    /// The number in the round of the first Gaussian after those placed.
     pub(crate) end: usize,
     /// Gaussians that depths hide in all of the tile.
     pub(crate) tiles_hidden: u64,
@@ -94,64 +94,62 @@ pub(crate) struct Placed {
 }
 
 impl StagedRound {
-    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the
-    /// next round on their way, which are then `ahead`. `open` are the blocks that are not finished.
+    /// Places the Gaussians of a tile's round from number `from` on, before one whose exponents need binary64. Prefetches as many
+    /// splats of the next round, and puts them into `ahead`.
     #[inline(never)]
-    pub(crate) fn place<'a, S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn place<'a, S: Simd, M: Mode>(
         &mut self,
         simd: S,
-        task: &TileInputs<'a>,
-        (round, from): (&[&Splat], usize),
-        (next, ahead): (&[u32], &mut [&'a Splat; ROUND]),
-        (open, ranges): (u64, &DepthRanges),
-        is_recorded: bool,
+        inputs: &TileInputs<'a>,
+        round: &Round<'_>,
+        from: usize,
+        ahead: &mut [&'a Splat; ROUND],
     ) -> Placed {
         simd.vectorize(
             #[inline(always)]
             || {
                 let mut placed = Placed::default();
-                let open_mask = mask32x16::from_bitmask(simd, open);
+                let open_mask = mask32x16::from_bitmask(simd, round.open.bits);
                 let (mut present, mut number) = (0u32, from);
-                while let Some(&splat) = round.get(number) {
-                    if let Some(&primitive) = next.get(number) {
-                        ahead[number % ROUND] = task.prefetched(primitive);
+                while let Some(&splat) = round.splats.get(number) {
+                    if let Some(&primitive) = round.next.get(number) {
+                        ahead[number % ROUND] = inputs.prefetched(primitive);
                     }
-                    if DEPTH > NO_DEPTH && ranges.hides(splat.look.depth) {
+                    if M::DEPTH.tests() && inputs.ranges.hides(splat.look.depth) {
                         number += 1;
                         placed.tiles_hidden += 1;
-                        if is_recorded {
-                            placed.blocks_of_hidden += hidden_blocks(simd, splat, task, open_mask);
+                        if round.is_recorded {
+                            placed.blocks_of_hidden += hidden_blocks(simd, splat, inputs, open_mask);
                         }
                         continue;
                     }
                     if splat.needs_f64 {
                         break;
                     }
-                    self.gather::<DEPTH>(number % ROUND, splat);
+                    self.gather::<M>(number % ROUND, splat);
                     present |= 1 << (number % ROUND);
                     number += 1;
                 }
                 placed.end = number;
                 placed.count = present.count_ones().into();
-                let middles = BlockMiddles::new(task.corner);
+                let middles = BlockMiddles::new(inputs.corner);
                 let mut reaching = [[0; ROUND / 8]; BLOCKS];
                 // A bit for each Gaussian whose alphas may reach the ceiling.
                 let mut capped = 0;
                 for first in (from / S::f32s::LEN * S::f32s::LEN..number).step_by(S::f32s::LEN) {
-                    let of_tile = (&middles, task.thresholds);
-                    let some = self.find_blocks(simd, first, of_tile, &mut reaching);
+                    let some = self.find_blocks(simd, first, &middles, inputs.thresholds, &mut reaching);
                     capped |= (some as u32) << (first % ROUND);
                 }
                 let mut reaching = u32x16::simd_from(simd, words_of(reaching));
-                if !task.optimizations.has(Optimization::Blocks) {
+                if !inputs.optimizations.has(Optimization::Blocks) {
                     reaching = u32x16::splat(simd, u32::MAX);
                 }
                 let open: i32x16<S> = open_mask.to_vector();
                 let mut reaching = reaching & open.bitcast::<u32x16<S>>() & present;
-                if DEPTH > NO_DEPTH {
+                if M::DEPTH.tests() {
                     let mut words = reaching.to_array();
                     for (block, word) in words.iter_mut().enumerate().filter(|(_, word)| **word > 0) {
-                        let shown = ranges.shown(simd, block, &self.gathered.depth);
+                        let shown = inputs.ranges.shown(simd, block, &self.gathered.depth);
                         placed.blocks_hidden += u64::from((*word & !shown).count_ones());
                         *word &= shown;
                     }
@@ -164,7 +162,7 @@ impl StagedRound {
                 while any != 0 {
                     let number = any.trailing_zeros() as usize;
                     any &= any - 1;
-                    if let Some(splat) = round.get(number) {
+                    if let Some(splat) = round.splats.get(number) {
                         self.record(simd, number, splat);
                     }
                 }
@@ -176,7 +174,7 @@ impl StagedRound {
 
     /// Makes `splat` the round's Gaussian `number`.
     #[inline(always)]
-    fn gather<const DEPTH: DepthMode>(&mut self, number: usize, splat: &Splat) {
+    fn gather<M: Mode>(&mut self, number: usize, splat: &Splat) {
         let Gathered { mean, factor, log2_opacity, depth, .. } = &mut self.gathered;
         for (lanes, &part) in mean.iter_mut().zip(&splat.mean) {
             lanes[number] = part;
@@ -185,7 +183,7 @@ impl StagedRound {
             lanes[number] = part;
         }
         log2_opacity[number] = splat.log2_opacity;
-        if DEPTH > NO_DEPTH {
+        if M::DEPTH.tests() {
             depth[number] = splat.look.depth;
         }
     }
@@ -206,9 +204,9 @@ impl StagedRound {
                 u.mul_sub(u, log2_opacity).store_slice(to);
             }
         }
-        let sheared = columns * b;
+        let v_of_column = columns * b;
         let rows = f32x16::simd_from(simd, LANE_Y);
-        let along = rows.mul_add(f32x16::splat(simd, c), sheared.combine(sheared));
+        let along = rows.mul_add(f32x16::splat(simd, c), v_of_column.combine(v_of_column));
         along.store_slice(&mut self.along[number]);
     }
 
@@ -219,7 +217,8 @@ impl StagedRound {
         &mut self,
         simd: S,
         first: usize,
-        (middles, thresholds): (&BlockMiddles, Thresholds),
+        middles: &BlockMiddles,
+        thresholds: Thresholds,
         reaching: &mut ReachingBytes,
     ) -> u64 {
         let lanes = first..first + S::f32s::LEN;
@@ -234,10 +233,10 @@ impl StagedRound {
         let (x, y) = (wide(&mean[0]), wide(&mean[1]));
         let (a, b, c) = (wide(&factor[0]), wide(&factor[1]), wide(&factor[2]));
         let log2_opacity = S::f32s::from_slice(simd, &log2_opacity[lanes.clone()]);
-        // How far the exponent may fall, with a margin for rounding.
-        let room = log2_opacity.mul_add(
-            S::f32s::splat(simd, ROOM_FACTOR),
-            S::f32s::splat(simd, thresholds.most_fall * ROOM_FACTOR + 1e-3),
+        // The base-2 logarithm of the ratio of opacity and floor, with a margin for rounding.
+        let log2_range = log2_opacity.mul_add(
+            S::f32s::splat(simd, RANGE_FACTOR),
+            S::f32s::splat(simd, thresholds.neg_log2_floor * RANGE_FACTOR + 1e-3),
         );
         let capped = log2_opacity.simd_gt(thresholds.least_capped).to_bitmask();
         let (narrow_a, narrow_b, narrow_c) = (a.narrow(), b.narrow(), c.narrow());
@@ -247,26 +246,26 @@ impl StagedRound {
         let around_u = narrow_a.abs() * HALF;
         let around_v = (narrow_b.abs() + narrow_c.abs()) * HALF;
         let zero = S::f32s::splat(simd, 0.0);
-        let mut sheared = [b; BLOCKS_ACROSS];
+        let mut v_of_column = [b; BLOCKS_ACROSS];
         let mut least_u = [zero; BLOCKS_ACROSS];
         for column in 0..BLOCKS_ACROSS {
             let dx = x.distance_to(simd, middles.x[column]);
             let u = dx.times(a).narrow();
             u.store_slice(&mut self.u[column][lanes.clone()]);
-            sheared[column] = dx.times(b);
+            v_of_column[column] = dx.times(b);
             let least = (u.abs() - around_u).max(zero);
             least_u[column] = least * least;
         }
         for row in 0..BLOCKS_ACROSS {
-            let sunk = y.distance_to(simd, middles.y[row]).times(c);
+            let v_of_row = y.distance_to(simd, middles.y[row]).times(c);
             for column in 0..BLOCKS_ACROSS {
                 let block = row * BLOCKS_ACROSS + column;
-                let v = sheared[column].plus(sunk).narrow();
+                let v = v_of_column[column].plus(v_of_row).narrow();
                 v.store_slice(&mut self.v[block][lanes.clone()]);
                 // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
                 let least_v = (v.abs() - around_v).max(zero);
                 let least = least_v.mul_add(least_v, least_u[column]);
-                let may_reach = least.simd_le(room).to_bitmask();
+                let may_reach = least.simd_le(log2_range).to_bitmask();
                 set_bits(&mut reaching[block], first, S::f32s::LEN, may_reach);
             }
         }
@@ -279,9 +278,15 @@ impl StagedRound {
         self.from_u[block % BLOCKS_ACROSS / 2][block % 2..].first_chunk()
     }
 
-    /// The fall of a Gaussian's alpha at a block's pixels: minus its base-2 logarithm. `column` is that of the block.
+    /// Minus the base-2 logarithms of a Gaussian's alphas at a block's pixels. `column` is that of the block.
     #[inline(always)]
-    pub(crate) fn falls<S: Simd>(&self, simd: S, number: usize, (block, column): (usize, &ColumnSquares)) -> f32x16<S> {
+    pub(super) fn neg_log2_alphas<S: Simd>(
+        &self,
+        simd: S,
+        number: usize,
+        block: usize,
+        column: &ColumnSquares,
+    ) -> f32x16<S> {
         let from_u = f32x8::from_slice(simd, &column[2 * number]);
         let v = f32x16::from_slice(simd, &self.along[number]) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))

@@ -4,16 +4,16 @@ use super::*;
 use crate::simd::exp2::{CUBIC, Powers, QUADRATIC};
 use crate::state::gaussian::GaussianApproximation;
 
-/// The worst relative error of a polynomial's powers of two at a level, over all falls that it is for.
+/// The worst relative error of a polynomial's powers of two at a level, over all neg_log2_alphas that it is for.
 fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 {
     let mut worst = 0.0f64;
     let mut first = -4.0f32;
     while first < 125.9 {
-        let falls: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| first + lane as f32 / 4096.0);
+        let neg_log2_alphas: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| first + lane as f32 / 4096.0);
         let found = dispatch!(level, simd =>
-            powers.of_negated(simd, f32x16::simd_from(simd, falls)).to_array());
-        for (fall, power) in falls.into_iter().zip(found) {
-            let exact = f64::from(-fall).exp2();
+            powers.of_negated(simd, f32x16::simd_from(simd, neg_log2_alphas)).to_array());
+        for (neg_log2_alpha, power) in neg_log2_alphas.into_iter().zip(found) {
+            let exact = f64::from(-neg_log2_alpha).exp2();
             worst = worst.max((f64::from(power) / exact - 1.0).abs());
         }
         first += 16.0 / 4096.0;

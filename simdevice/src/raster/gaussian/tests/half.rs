@@ -15,8 +15,8 @@ pub(super) fn naive_sample(
     let state = scalar::State::new(&draw.state);
     let mut pixel = scalar::Pixel::default();
     for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
-        let (batch, place) = locate(primitive);
-        let g = &draw.sorted.splats[batch][place];
+        let index = SplatIndex::new(primitive);
+        let g = index.of(&draw.sorted.splats);
         let alpha = alpha_at(draw, g, [0, 1].map(|axis| tile[axis] as usize * TILE + [x, y][axis]));
         if alpha >= state.alpha_floor {
             out.reached = true;
@@ -109,14 +109,14 @@ fn tiles_and_blocks_list_whatever_it_reaches() {
         let state = GaussianState { low_pass_variance, ..state() };
         let draw = draw(seed, 600, state.clone(), &device, WHOLE);
         let mut reached = 0;
-        for (batch, splats) in draw.sorted.splats.iter().enumerate() {
+        for (group, splats) in draw.sorted.splats.iter().enumerate() {
             for (place, g) in splats.iter().enumerate() {
                 for (x, y) in (0..64).flat_map(|y| (0..96).map(move |x| (x, y))) {
                     if alpha_at(&draw, g, [x, y]) < state.alpha_floor {
                         continue;
                     }
                     let list = draw.sorted.tiles.list((x / TILE) as u32, (y / TILE) as u32);
-                    let named = list.iter().any(|&name| locate(name) == (batch, place));
+                    let named = list.iter().any(|&name| SplatIndex::new(name) == SplatIndex { group, place });
                     assert!(named, "seed {seed}: {g:?} at {x}, {y}");
                     reached += 1;
                 }

@@ -14,15 +14,15 @@ pub(super) fn naive_sample(
 ) -> Naive {
     let mut out = Naive::default();
     let state = &draw.state;
-    let most_fall = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
+    let neg_log2_floor = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
     let depths = draw.ray_depths().unwrap();
     let at = [x, y].map(|at| at as f64 + 0.5);
     let at = [0, 1].map(|axis| at[axis] + f64::from(tile[axis] * TILE_SIZE));
     let rays = depths.rays.of([at[0]; 16], [at[1]; 16]);
     let mut reached = Vec::new();
     for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
-        let (batch, place) = locate(primitive);
-        let g = &draw.sorted.splats[batch][place];
+        let index = SplatIndex::new(primitive);
+        let g = index.of(&draw.sorted.splats);
         let f = g.factor;
         // The kernel's roundings: from the corner to the mean, to the middle of the block, to the pixel.
         let from = |axis: usize, at: usize| {
@@ -32,14 +32,14 @@ pub(super) fn naive_sample(
         };
         let (dx, dy) = (from(0, x), from(1, y));
         let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-        let fall = ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0);
-        if fall > most_fall {
+        let neg_log2_alpha = ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0);
+        if neg_log2_alpha > neg_log2_floor {
             continue;
         }
-        let alpha = power(-fall).min(state.alpha_ceiling);
+        let alpha = power(-neg_log2_alpha).min(state.alpha_ceiling);
         out.reached = true;
         if passes(g.look.depth) {
-            let depth = &depths.of[batch][place];
+            let depth = index.of(depths.by_group);
             let along = dispatch!(Level::baseline(), simd => depth.along(simd, &rays, 0).as_slice()[0]);
             reached.push((ordered_key(along), g, alpha));
         }

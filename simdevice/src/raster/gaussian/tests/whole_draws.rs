@@ -374,7 +374,7 @@ fn hidden_work(
     let lanes = [u32::from(u16::MAX); BLOCKS];
     let codes = stored.map(|depth| DepthEncoding::Float.encode_one(depth));
     tile.ranges.set(compare, &codes, &lanes);
-    tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
+    tile.run::<TestDepth>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
     assert!(pairs <= draw.sorted.tiles.list(2, 2).len() as u64);
     counters
@@ -399,20 +399,20 @@ fn what_is_behind_a_whole_tile_is_not_even_fetched() {
 }
 
 #[gaurast_runner::test]
-fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
+fn gaussians_in_binary64_behind_a_whole_tile_are_not_fetched_either() {
     // The nearer ones fail, so that no list's end is hidden at once.
     let hidden = |change: fn(&mut BinnedDraw)| {
         let counters = hidden_work(FORWARD, CompareOp::Greater, [0.3; 256], None, change);
         counters.get(Counter::GaussianTilesHidden)
     };
-    let steep = hidden(|draw| {
+    let in_f64 = hidden(|draw| {
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten() {
             splat.needs_f64 = true;
         }
     });
-    assert!(steep > 0);
-    assert_eq!(steep, hidden(|_| {}));
+    assert!(in_f64 > 0);
+    assert_eq!(in_f64, hidden(|_| {}));
 }
 
 #[gaurast_runner::test]
