@@ -77,12 +77,6 @@ pub struct Canvas {
     depth: Option<Image>,
 }
 
-impl Default for Canvas {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Canvas {
     /// A canvas of floats without depth.
     #[expect(clippy::new_without_default, reason = "it opens a device")]

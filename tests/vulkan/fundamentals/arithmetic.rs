@@ -96,7 +96,7 @@ fn words(gpu: &Gpu) -> Vec<u32> {
     let bindings = Bindings::new(gpu, &[Resource::Storage(found.raw)]);
     let kernel = Kernel::new(gpu, &functions(), &bindings);
     kernel.run(&[bindings.set], &[], [INVOCATIONS / 64, 1, 1]);
-    found.read()
+    found.values()
 }
 
 /// Blended triangles in perspective, whose colours are functions of interpolated values, and whose target holds
@@ -226,7 +226,7 @@ fn folded(gpu: &Gpu) -> [Vec<u32>; 2] {
         let words = compile(Stage::Compute, &source);
         let kernel = Kernel::specialized(gpu, &words, &[bindings.layout], &constants).expect("a pipeline");
         kernel.run(&[bindings.set], &[], [1, 1, 1]);
-        found.read()
+        found.values()
     })
 }
 
