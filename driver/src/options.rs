@@ -110,7 +110,11 @@ impl Options {
         let limit = format!("there are {processors} processors, and at most {most} threads are started");
         let Some(text) = &environment.threads else {
             let count = self.thread_count as usize;
-            return if count <= most { Ok(count) } else { Err(wrong("threadCount-91001", count, &limit)) };
+            return if count <= most {
+                Ok(count)
+            } else {
+                Err(wrong("VUID-VkDriverOptionsGAURAST-threadCount-91001", count, &limit))
+            };
         };
         match text.parse() {
             Ok(count) if count <= most => Ok(count),
@@ -131,7 +135,11 @@ impl Options {
             SimdLevelGAURAST::SSE2 => Ok(SimdLevel::Baseline),
             SimdLevelGAURAST::AVX2 => Ok(SimdLevel::Avx2),
             SimdLevelGAURAST::AVX512 => Ok(SimdLevel::Avx512),
-            other => Err(wrong("simdLevel-parameter", other.as_raw(), "it is no VkSimdLevelGAURAST")),
+            other => Err(wrong(
+                "VUID-VkDriverOptionsGAURAST-simdLevel-parameter",
+                other.as_raw(),
+                "it is no VkSimdLevelGAURAST",
+            )),
         }
     }
 
@@ -154,8 +162,12 @@ impl Options {
         let Some(names) = &self.optimizations else {
             return Ok(Optimizations::default());
         };
-        let text = names.to_str().map_err(|_| wrong("pOptimizations-parameter", names, "it is not UTF-8"))?;
-        text.parse().map_err(|error: UnknownOptimization| wrong("pOptimizations-91002", names, &error.to_string()))
+        let text = names
+            .to_str()
+            .map_err(|_| wrong("VUID-VkDriverOptionsGAURAST-pOptimizations-parameter", names, "it is not UTF-8"))?;
+        text.parse().map_err(|error: UnknownOptimization| {
+            wrong("VUID-VkDriverOptionsGAURAST-pOptimizations-91002", names, &error.to_string())
+        })
     }
 
     fn simulated_timestamps(&self, environment: &Environment) -> Result<bool, Error> {
@@ -168,13 +180,10 @@ impl Options {
     }
 }
 
-/// The error of an option of the program. `rule` is the end of the valid usage's id: the member and the rule's name.
-fn wrong(rule: &str, value: impl std::fmt::Debug, reason: &str) -> Error {
-    let member = rule.split('-').next().unwrap_or(rule);
-    Error::usage(
-        format!("VUID-VkDriverOptionsGAURAST-{rule}"),
-        format!("VkDriverOptionsGAURAST::{member} is {value:?}: {reason}"),
-    )
+/// The error of an option of the program. `rule` is the valid usage's id, whose last part but one is the member.
+fn wrong(rule: &'static str, value: impl std::fmt::Debug, reason: &str) -> Error {
+    let member = rule.rsplit('-').nth(1).unwrap_or(rule);
+    Error::usage(rule, format!("VkDriverOptionsGAURAST::{member} is {value:?}: {reason}"))
 }
 
 /// The error of a variable of the environment.
@@ -375,7 +384,7 @@ mod tests {
         ] {
             let error = config(wrong).unwrap_err();
             assert_eq!(error.result(), vk::Result::ERROR_VALIDATION_FAILED_EXT);
-            assert_eq!(error.message_id(), format!("VUID-VkDriverOptionsGAURAST-{rule}"));
+            assert!(error.message_id().ends_with(rule), "{}", error.message_id());
         }
     }
 

@@ -1,22 +1,9 @@
-//! Helpers for [`DriverOptionsGAURAST`]: SIMD levels by name, and a receiver of traces of work.
+//! A receiver of the traces of work that [`DriverOptionsGAURAST`] asks for.
 
 use core::ffi::c_void;
 use std::sync::{Mutex, PoisonError};
 
-use crate::vk::{DriverOptionsGAURAST, SimdLevelGAURAST};
-
-impl SimdLevelGAURAST {
-    /// The level of a name of the environment variable `GAURAST_SIMD`.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "best" => Some(Self::BEST),
-            "sse2" => Some(Self::SSE2),
-            "avx2" => Some(Self::AVX2),
-            "avx512" => Some(Self::AVX512),
-            _ => None,
-        }
-    }
-}
+use crate::vk::DriverOptionsGAURAST;
 
 /// Receives the trace of work of each device of an instance as the device is destroyed, and keeps the last one.
 ///

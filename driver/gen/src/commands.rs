@@ -92,7 +92,8 @@ pub(crate) fn write(
         writer.add(&mut output, row)?;
     }
     let modules: BTreeSet<&str> = entry_points.values().filter_map(|it| it.path.split("::").next()).collect();
-    let modules: Vec<&str> = modules.into_iter().collect();
+    let modules = modules.into_iter().filter(|module| *module != "super");
+    let modules: Vec<&str> = modules.collect();
     rust::file(
         "//! The commands: the functions that Vulkan calls, and the table of them. Each function is safe to call within
 //! Vulkan's valid usage: handles are live, or null where that is allowed, and pointers are null or valid.",

@@ -88,7 +88,10 @@ fn entry_point(module: &str, function: &syn::ItemFn) -> EntryPoint {
         })
         .collect();
     EntryPoint {
-        path: format!("{module}::{}", function.sig.ident),
+        path: match module.strip_prefix("dispatch::") {
+            Some(sibling) => format!("super::{sibling}::{}", function.sig.ident),
+            None => format!("{module}::{}", function.sig.ident),
+        },
         is_unsafe: function.sig.unsafety.is_some(),
         parameters,
         output: match &function.sig.output {

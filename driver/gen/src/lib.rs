@@ -20,6 +20,7 @@ mod file;
 mod grammar;
 mod properties;
 mod registry;
+mod repository;
 mod rust;
 mod spirv;
 mod support;
@@ -28,6 +29,7 @@ mod tables;
 pub use error::Error;
 pub use file::File;
 pub use grammar::generate as generate_grammar;
+pub use repository::repository;
 
 use crate::ash::Declarations;
 use crate::registry::Registry;
@@ -65,9 +67,4 @@ pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
         File { path: "driver/src/registry/spirv.rs", text: spirv::write(&registry, &declarations, &support)? },
     ]);
     Ok(files)
-}
-
-/// The root of the repository that this crate was built in.
-pub fn repository() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }

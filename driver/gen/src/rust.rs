@@ -58,7 +58,7 @@ pub(crate) fn format(source: &str) -> Result<String, Error> {
     let failed = |reason: String| Error::Program { program: "rustfmt", reason };
     let mut rustfmt = Command::new("rustfmt")
         .args(["--edition", "2024", "--config-path"])
-        .arg(crate::repository())
+        .arg(crate::repository::repository())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

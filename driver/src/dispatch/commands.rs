@@ -19,8 +19,8 @@ use crate::command::buffer::record;
 use crate::command::dynamic_state::{set, set_faces};
 use crate::pipeline::dynamic_state::DynamicState;
 use crate::{
-    calibrated_timestamps, command, descriptor, device, dispatch, instance, physical_device, pipeline, query_pool,
-    queue, render_pass, resource, shader_module, surface, swapchain, sync,
+    calibrated_timestamps, command, descriptor, device, instance, physical_device, pipeline, query_pool, queue,
+    render_pass, resource, shader_module, surface, swapchain, sync,
 };
 use ash::vk;
 
@@ -664,7 +664,7 @@ pub(crate) unsafe extern "system" fn vkGetInstanceProcAddr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(instance, "vkGetInstanceProcAddr", || unsafe {
-        dispatch::lookup::get_instance_proc_addr(
+        super::lookup::get_instance_proc_addr(
             &COMMANDS,
             handle::get_optional(instance)?.map(AsRef::as_ref),
             valid::string(p_name).ok_or(Error::NullPointer { what: "p_name" })?,
@@ -678,7 +678,7 @@ unsafe extern "system" fn vkGetDeviceProcAddr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(device, "vkGetDeviceProcAddr", || unsafe {
-        dispatch::lookup::get_device_proc_addr(
+        super::lookup::get_device_proc_addr(
             &COMMANDS,
             handle::get(device)?,
             valid::string(p_name).ok_or(Error::NullPointer { what: "p_name" })?,

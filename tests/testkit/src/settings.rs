@@ -32,7 +32,7 @@ impl Settings<'_> {
     /// # Panics
     /// If there is no SIMD level of that name.
     pub(crate) fn options(&self) -> DriverOptionsGAURAST<'_> {
-        let simd = self.simd.map(|name| SimdLevelGAURAST::from_name(name).expect("the name of a SIMD level"));
+        let simd = self.simd.map(simd_level);
         let mut options = DriverOptionsGAURAST::default()
             .thread_count(self.threads.unwrap_or_default() as u32)
             .simd_level(simd.unwrap_or_default())
@@ -44,5 +44,16 @@ impl Settings<'_> {
             options = options.work_trace(trace);
         }
         options
+    }
+}
+
+/// The SIMD level of a name of the variable `GAURAST_SIMD`.
+fn simd_level(name: &str) -> SimdLevelGAURAST {
+    match name {
+        "best" => SimdLevelGAURAST::BEST,
+        "sse2" => SimdLevelGAURAST::SSE2,
+        "avx2" => SimdLevelGAURAST::AVX2,
+        "avx512" => SimdLevelGAURAST::AVX512,
+        _ => panic!("{name} is no SIMD level"),
     }
 }

@@ -8,6 +8,7 @@ use gaurast_testkit::{
     Bindings, Buffer, Gpu, Kernel, Pass, Pipeline, PipelineOptions, Resource, Settings, Target, TargetOptions, Vertex,
     blend,
 };
+use std::sync::LazyLock;
 
 /// Invocations of the kernel of functions.
 const INVOCATIONS: u32 = 1 << 14;
@@ -99,6 +100,22 @@ fn words(gpu: &Gpu) -> Vec<u32> {
     found.values()
 }
 
+/// The corners of the triangles. They are computed once, so that a thread with other modes draws the same ones.
+static VERTICES: LazyLock<Vec<Vertex>> = LazyLock::new(|| {
+    let corner = |x: f32, y: f32, w: f32, color: [f32; 4]| Vertex { position: [x * w, y * w, 0.3 * w, w], color };
+    (0..24)
+        .flat_map(|number| {
+            let (t, w) = (number as f32 / 24.0, 1.0 + 0.37 * (number % 5) as f32);
+            let at = [1.7 * t - 0.9, 0.9 - 1.6 * t];
+            [
+                corner(at[0], at[1], w, [t, 0.1, 0.9 - t, 1.0]),
+                corner(0.93 - at[0], at[1] + 0.31, 1.0, [0.7, t, 0.2, 0.4]),
+                corner(at[1], -0.87, 2.0 * w, [0.1, 0.8, t, 0.0]),
+            ]
+        })
+        .collect()
+});
+
 /// Blended triangles in perspective, whose colours are functions of interpolated values, and whose target holds
 /// floats; and in a target of bytes.
 fn pictures(gpu: &Gpu) -> Vec<u32> {
@@ -109,19 +126,7 @@ fn pictures(gpu: &Gpu) -> Vec<u32> {
             float wave = 0.5 + 0.5 * sin(40.0 * v_color.x);
             color = vec4(exp2(-v_color.y), wave, pow(v_color.z, 2.2), 0.3 + 0.4 * v_color.w);
         }";
-    let corner = |x: f32, y: f32, w: f32, color: [f32; 4]| Vertex { position: [x * w, y * w, 0.3 * w, w], color };
-    let vertices: Vec<Vertex> = (0..24)
-        .flat_map(|number| {
-            let (t, w) = (number as f32 / 24.0, 1.0 + 0.37 * (number % 5) as f32);
-            let at = [1.7 * t - 0.9, 0.9 - 1.6 * t];
-            [
-                corner(at[0], at[1], w, [t, 0.1, 0.9 - t, 1.0]),
-                corner(0.93 - at[0], at[1] + 0.31, 1.0, [0.7, t, 0.2, 0.4]),
-                corner(at[1], -0.87, 2.0 * w, [0.1, 0.8, t, 0.0]),
-            ]
-        })
-        .collect();
-    let vertices = Buffer::of(gpu, &vertices);
+    let vertices = Buffer::of(gpu, &VERTICES);
     let over = blend(vk::BlendFactor::SRC_ALPHA, vk::BlendFactor::ONE_MINUS_SRC_ALPHA, vk::BlendOp::ADD);
     let mut found = Vec::new();
     for format in [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R8G8B8A8_UNORM, vk::Format::R8G8B8A8_SRGB] {

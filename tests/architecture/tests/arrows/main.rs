@@ -72,7 +72,7 @@ fn all_crates_are_found() {
         "gaurast-cli/main",
         "gaurast-examples/hello_triangle",
         "gaurast-bench/gaurast-bench",
-        "gaurast-tests/conformance",
+        "gaurast-tests/vulkan",
     ] {
         let is_there = targets.iter().any(|target| target.name == name);
         assert!(is_there, "{name}");
