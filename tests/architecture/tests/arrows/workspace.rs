@@ -145,7 +145,11 @@ impl Package {
 
     fn target_name(&self, path: &Path) -> String {
         let stem = path.file_stem().expect("a name").to_string_lossy();
-        format!("{}/{stem}", self.name)
+        let folder = path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
+        match folder {
+            Some(folder) if stem == "main" && folder != "src" => format!("{}/{folder}", self.name),
+            _ => format!("{}/{stem}", self.name),
+        }
     }
 
     /// Returns true if the file is next to a manifest. The package of all tests has its root in the folder where cargo
