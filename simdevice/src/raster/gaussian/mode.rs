@@ -7,7 +7,7 @@ pub(crate) enum DepthMode {
     FindReached,
     /// Colours are composited.
     Composite,
-    /// What fails the depth test is left out.
+    /// Samples that fail the depth test are left out.
     Test,
     /// The median depth is found.
     FindMedian,

@@ -18,7 +18,7 @@
 //! | then | the inputs of a resolve shader | [`resolve`] |
 //! | then | depth and stencil tests, sample by sample | [`sample_tests`] |
 //!
-//! What the text rules in a word or a number is data ([`Rules`]), so that the conformance cases can be held against an oracle
+//! Rules that the text gives in a word or a number are data ([`Rules`]), so that the conformance cases can be held against an oracle
 //! that follows other rules.
 //!
 //! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), as the device gets them.
