@@ -93,8 +93,8 @@ pub(super) fn sky(brush: &mut Brush, count: usize) {
     let spacing = (4.0 * std::f64::consts::PI / all.max(1) as f64).sqrt();
     for i in 0..count {
         let direction = spread(i, all);
-        let cloud = libm::sin(7.0 * direction.x + 3.0 * direction.z)
-            * libm::sin(16.0 * direction.y + 2.5 * direction.x);
+        let cloud =
+            libm::sin(7.0 * direction.x + 3.0 * direction.z) * libm::sin(16.0 * direction.y + 2.5 * direction.x);
         let low = smooth(direction.y / 0.08) * (1.0 - smooth((direction.y - 0.15) / 0.3));
         let colour = sky_colour(direction) + DVec3::new(0.16, 0.09, 0.09) * (cloud * low);
         let mut splat = Splat::new(direction * radius, radius * spacing * 0.62, colour);
