@@ -5,7 +5,7 @@ use glam::Vec3;
 use rand::Rng;
 
 use super::models::{Model, Ready};
-use super::shapes;
+use gaurast_testkit::shapes;
 use gaurast_testkit::drawn::Missing;
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{

@@ -8,7 +8,7 @@ use gaurast_testkit::{
     Bindings, Buffer, Image, ImageOptions, Kernel, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions,
 };
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 /// The words that a kernel writes to its binding 0, a buffer of this size.
 fn words(buffer: &Buffer) -> Vec<u32> {

@@ -7,7 +7,7 @@ use gaurast_testkit::shader::GLSLANG;
 use gaurast_tests::triangles::checksum::{Checksums, first_difference, numbers};
 use gaurast_tests::triangles::clipped::{KINDS, SIZE as SMALL, clipped, places};
 use gaurast_tests::triangles::edges::{Position, is_near, lines, to_clip};
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;

@@ -8,7 +8,7 @@ use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions, Vertex, blend, depth_test,
 };
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 /// The side of the square target in pixels.
 const SIZE: usize = 128;

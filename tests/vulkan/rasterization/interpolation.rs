@@ -7,7 +7,7 @@ use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{
     Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test, fetch_sample,
 };
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 use rand::Rng;
 

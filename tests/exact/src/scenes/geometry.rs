@@ -7,7 +7,7 @@ use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple, with};
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, blend};
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 /// Draws with a geometry shader.
 fn drawn(gpu: &Gpu, topology: Topology, geometry: &str, vertices: &[Vertex]) -> Output {

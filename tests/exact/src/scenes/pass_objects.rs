@@ -7,7 +7,7 @@ use gaurast_testkit::drawn::need_format;
 use gaurast_testkit::{
     Bindings, Buffer, Commands, Gpu, Pipeline, PipelineOptions, Resource, Target, TargetOptions, depth_test,
 };
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 /// A render pass with a framebuffer.
 struct Object {

@@ -5,7 +5,7 @@ use ash::vk;
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple, with};
 use gaurast_testkit::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test};
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 /// Culls each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {

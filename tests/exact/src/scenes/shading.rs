@@ -5,7 +5,7 @@ use ash::vk;
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::simple;
 use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions};
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 fn fragment(gpu: &Gpu, seed: u64, source: &str) -> Output {
     let options = PipelineOptions { fragment: Some(source), ..PipelineOptions::default() };

@@ -8,7 +8,7 @@ use gaurast_testkit::drawn::{cases, need, need_format, simple};
 use gaurast_testkit::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
-use gaurast_tests::triangles::shapes;
+use gaurast_testkit::shapes;
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;
 
