@@ -20,7 +20,11 @@ use crate::rasterization::models;
 /// Scenes of files of the test data.
 const MODELS: &[Scene] = &[
     Scene { chapter: "rasterization", name: "african_head", draw: models::african_head },
-    Scene { chapter: "rasterization", name: "african_head_of_four_samples", draw: models::african_head_of_four_samples },
+    Scene {
+        chapter: "rasterization",
+        name: "african_head_of_four_samples",
+        draw: models::african_head_of_four_samples,
+    },
     Scene { chapter: "rasterization", name: "duck", draw: models::duck },
     Scene { chapter: "rasterization", name: "bunny", draw: models::bunny },
 ];

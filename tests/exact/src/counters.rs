@@ -6,7 +6,8 @@ use ash::vk::QueryPipelineStatisticFlags as Statistics;
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::shapes;
 use gaurast_testkit::{
-    Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, TransformFeedback, Vertex, depth_test,
+    Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, TransformFeedback, Vertex,
+    depth_test,
 };
 
 /// Triangles of a draw.

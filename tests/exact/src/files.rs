@@ -116,8 +116,11 @@ fn framed() -> Vec<u8> {
     let extent = Extent::of(&scene);
     let angles = (0..12).map(f64::from).map(|at| [30.0 * at - 170.0, 15.0 * at - 80.0]);
     let camera = |[azimuth, elevation]: [f64; 2]| {
-        let framing =
-            Framing { azimuth: Some(azimuth), elevation: Some(elevation), ..Framing::new(35.0 + elevation / 4.0, size) };
+        let framing = Framing {
+            azimuth: Some(azimuth),
+            elevation: Some(elevation),
+            ..Framing::new(35.0 + elevation / 4.0, size)
+        };
         framing.camera(&extent).expect("a camera")
     };
     let mut cameras: Vec<Camera> = angles.map(camera).collect();

@@ -46,13 +46,14 @@ impl Device {
     /// # Errors
     /// [`OpenError`] if the processor lacks the level.
     pub fn open(level: &str, threads: u32) -> Result<Self, OpenError> {
-        let settings =
-            Settings { simd: Some(level), threads: Some(threads as usize), timeout: Some(TIMEOUT), ..Settings::default() };
-        let opening = Opening {
-            settings,
-            extensions: &[ash::ext::transform_feedback::NAME],
-            ..Opening::of(Driver::Embedded)
+        let settings = Settings {
+            simd: Some(level),
+            threads: Some(threads as usize),
+            timeout: Some(TIMEOUT),
+            ..Settings::default()
         };
+        let opening =
+            Opening { settings, extensions: &[ash::ext::transform_feedback::NAME], ..Opening::of(Driver::Embedded) };
         let mut feedback = vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default().transform_feedback(true);
         let gpu = Gpu::open_with(&opening, &mut feedback)?;
         let options = DeviceOptions { threads, simd: settings.level().unwrap_or_default(), ..DeviceOptions::default() };
@@ -77,7 +78,11 @@ pub struct Case {
 
 impl Case {
     /// A case whose bytes cannot fail to be made.
-    fn sure(chapter: &'static str, name: impl Into<String>, make: impl Fn(&Device) -> Vec<u8> + Send + Sync + 'static) -> Self {
+    fn sure(
+        chapter: &'static str,
+        name: impl Into<String>,
+        make: impl Fn(&Device) -> Vec<u8> + Send + Sync + 'static,
+    ) -> Self {
         Self { chapter, name: name.into(), make: Box::new(move |device| Ok(make(device))) }
     }
 
@@ -177,9 +182,7 @@ pub fn all() -> Vec<Case> {
         cases.push(Case::sure("files", name, move |_| files::bytes(name)));
     }
     for view in renders::ALL {
-        let make = |device: &Device| {
-            renders::bytes(&device.options, view).map_err(|error| Failure(error.to_string()))
-        };
+        let make = |device: &Device| renders::bytes(&device.options, view).map_err(|error| Failure(error.to_string()));
         cases.push(Case { chapter: "renders", name: view.name.to_owned(), make: Box::new(make) });
     }
     for case in gaurast_conformance::all() {

@@ -1,6 +1,8 @@
 //! Frames of the renderer: a generated garden through each camera, in each mode, with depths and the device's counters.
 
-use gaurast_render::{Antialiasing, CutOff, DeviceOptions, Frame, Geometry, Order, Precision, RenderError, Renderer, Settings};
+use gaurast_render::{
+    Antialiasing, CutOff, DeviceOptions, Frame, Geometry, Order, Precision, RenderError, Renderer, Settings,
+};
 use gaurast_scene::{Camera, garden};
 
 /// Width and height of frames.

@@ -4,11 +4,11 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Resource, Target, TargetOptions, Vertex, attribute,
     binding,
 };
-use gaurast_testkit::shapes;
 
 /// Draws with colours in a vertex format of their own, from a second binding.
 fn colored(gpu: &Gpu, format: vk::Format, stride: u32, bytes: &[u8], fragment_scale: f32) -> Output {

@@ -7,8 +7,8 @@ use ash::vk::PrimitiveTopology as Topology;
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple};
 use gaurast_testkit::shader::Stage;
-use gaurast_testkit::{Gpu, PipelineOptions, TargetOptions, Vertex, blend};
 use gaurast_testkit::shapes;
+use gaurast_testkit::{Gpu, PipelineOptions, TargetOptions, Vertex, blend};
 
 /// A control shader that passes on `count` vertices and sets the levels.
 fn control(count: u32, levels: &str) -> String {

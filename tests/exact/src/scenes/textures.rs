@@ -5,11 +5,11 @@ use rand::Rng;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, need_format};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Output, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions,
 };
-use gaurast_testkit::shapes;
 
 const RGBA8: vk::Format = vk::Format::R8G8B8A8_UNORM;
 

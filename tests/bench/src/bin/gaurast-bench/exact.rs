@@ -56,7 +56,8 @@ pub fn run(arguments: &ExactArguments) -> Result<(), ExactError> {
     }
     let expected = arguments.check.as_deref().map(read).transpose()?;
     let device = Device::open(&arguments.level, arguments.threads)?;
-    let wanted = cases.iter().filter(|case| arguments.only.is_empty() || arguments.only.iter().any(|it| it == case.chapter));
+    let wanted =
+        cases.iter().filter(|case| arguments.only.is_empty() || arguments.only.iter().any(|it| it == case.chapter));
     let (mut made, mut failures) = (0, 0);
     for case in wanted.step_by(arguments.every as usize) {
         made += 1;
