@@ -76,7 +76,7 @@ impl Queue {
     /// [`Error::DeviceLost`]; the work is dropped.
     pub(crate) fn submit(&self, work: Work) -> Result<(), Error> {
         self.sync.check()?;
-        release(&*self.sync);
+        release(&*work);
         let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
         worker
             .as_ref()
@@ -90,15 +90,16 @@ impl Queue {
     /// [`Error::DeviceLost`].
     pub(crate) fn wait_idle(&self) -> Result<(), Error> {
         let (done, wait) = channel();
-        let sync = Arc::clone(&self.sync);
+        let idle = Arc::new(());
+        let reached = Arc::clone(&idle);
         self.submit(Box::new(move |_| {
-            release(&*sync);
+            release(&*reached);
             // The receiver exists as long as this closure.
             let _ = done.send(());
         }))?;
         // The sender is dropped without a message only if the queue dropped the work.
         let waited = wait.recv();
-        acquire(&*self.sync);
+        acquire(&*idle);
         self.sync.check()?;
         waited.map_err(|_| Error::DeviceLost("its queue has stopped".to_owned()))
     }
@@ -120,7 +121,7 @@ impl Queue {
 fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync) {
     ignore_thread();
     while let Ok(work) = work.recv() {
-        acquire(sync);
+        acquire(&*work);
         let executed = catch_unwind(AssertUnwindSafe(|| {
             if sync.check().is_ok() {
                 work(&mut processor);

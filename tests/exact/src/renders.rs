@@ -1,5 +1,6 @@
 //! Frames of the renderer: a generated garden through each camera, in each mode, with depths and the device's counters.
 
+use ash::vk::PerformanceCounterUnitKHR;
 use gaurast_render::{
     Antialiasing, CutOff, DeviceOptions, Frame, Geometry, Order, Precision, RenderError, Renderer, Settings,
 };
@@ -44,7 +45,7 @@ pub(crate) const ALL: &[View] = &[
     View { name: "depths_of_panorama", camera: Camera::panorama, change: |s| s.depth = true },
 ];
 
-/// The bytes of a frame: colours, depths, and the counters.
+/// The bytes of a frame: colours, depths, and the counters but for times.
 pub(crate) fn bytes(options: &DeviceOptions, view: &View) -> Result<Vec<u8>, RenderError> {
     let mut renderer = Renderer::with_options(vulkan_gaurast::entry(), options)?;
     let mut scene = renderer.upload(&garden::scene(1, GAUSSIANS), None)?;
@@ -55,6 +56,7 @@ pub(crate) fn bytes(options: &DeviceOptions, view: &View) -> Result<Vec<u8>, Ren
     let Frame { picture, counters, depth, .. } = renderer.render(&scene, &(view.camera)(&camera))?;
     let mut bytes = bytemuck::cast_slice(&picture.pixels).to_vec();
     bytes.extend_from_slice(bytemuck::cast_slice(&depth.unwrap_or_default()));
-    bytes.extend(counters.iter().flat_map(|counter| counter.value.to_le_bytes()));
+    let counted = counters.iter().filter(|counter| counter.unit != PerformanceCounterUnitKHR::NANOSECONDS);
+    bytes.extend(counted.flat_map(|counter| counter.value.to_le_bytes()));
     Ok(bytes)
 }
