@@ -182,6 +182,34 @@ fn instances_move_gaussians_by_attributes_of_their_own() {
     assert_eq!(at(&pixels, CENTER), [0.0; 4]);
 }
 
+/// Instances beyond the first two share a position by a divisor of 2; with a divisor of 0 all have the first.
+#[gaurast_runner::test]
+fn divisors_act_on_attributes_of_gaussians() {
+    let (x, y) = CENTER;
+    for (divisor, instances, seen) in [(2, 4, [true, true]), (2, 2, [true, false]), (0, 4, [true, false])] {
+        let mut request = splats();
+        request.bindings.push(vk::VertexInputBindingDescription {
+            binding: 5,
+            stride: 12,
+            input_rate: vk::VertexInputRate::INSTANCE,
+        });
+        request.divisors.push(vk::VertexInputBindingDivisorDescriptionKHR { binding: 5, divisor });
+        request.attributes[0].binding = 5;
+        let scene = Scene::new(&[splat([f32::NAN; 3], 0.02, 0.8, RED)], &request);
+        let positions = [[-1.0f32, 0.0, 5.0], [1.0, 0.0, 5.0]];
+        let positions = Buffer::of(&scene.gpu, positions.as_flattened());
+        let pixels = scene.draw([0.0; 4], |device, commands| {
+            // SAFETY: see the crate.
+            unsafe {
+                device.cmd_bind_vertex_buffers(commands, 5, &[positions.raw], &[0]);
+                device.cmd_draw(commands, 1, instances, 0, 0);
+            }
+        });
+        let shows = [x - 20, x + 20].map(|x| at(&pixels, (x, y)) != [0.0; 4]);
+        assert_eq!(shows, seen, "{divisor}, {instances}");
+    }
+}
+
 #[gaurast_runner::test]
 fn indirect_draws_read_their_numbers_when_they_execute() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.5, RED), splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE)]);

@@ -404,6 +404,39 @@ fn each_draw_of_a_command_of_several_is_a_set() {
     assert!(several != one_by_one([draws[1], draws[0]]), "the order of draws shows");
 }
 
+/// Draws in the parts of a rendering that is suspended and resumed are draws in one.
+#[gaurast_runner::test]
+fn suspended_rendering_goes_on() {
+    let request = Graphics { blend: vec![over()], ..splats() };
+    let scene = Scene::new(&gaussians(), &request);
+    let whole = scene.draw(BEHIND, |device, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_draw(commands, 1, 1, 2, 0);
+            device.cmd_draw(commands, 2, 1, 0, 0);
+        }
+    });
+    scene.gpu.run(|recording| {
+        let (device, commands) = recording.raw();
+        let part = |flags, first: u32, count| {
+            pass_with(flags, device, commands, &scene.image, BEHIND, || {
+                set_viewport(device, commands, &scene.image);
+                scene.bind(device, commands);
+                // SAFETY: see the crate.
+                unsafe {
+                    gaussian(&scene.gpu).cmd_begin_gaussian_set(commands);
+                    device.cmd_draw(commands, count, 1, first, 0);
+                    gaussian(&scene.gpu).cmd_end_gaussian_set(commands);
+                }
+            });
+        };
+        part(vk::RenderingFlags::SUSPENDING, 2, 1);
+        part(vk::RenderingFlags::RESUMING, 0, 2);
+    });
+    assert!(scene.pixels() == whole);
+    assert_eq!(scene.gpu.message_texts(), Vec::<String>::new());
+}
+
 /// Records a secondary command buffer for [`Scene`]'s pass.
 fn secondary(scene: &Scene, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> gaurast_testkit::Recorded {
     let formats = [FORMAT];
@@ -590,9 +623,11 @@ fn every_interaction_has_a_test() {
     /// The files whose tests the page names.
     const SOURCES: &[&str] = &[
         include_str!("interactions.rs"),
+        include_str!("determinism.rs"),
         include_str!("draws.rs"),
         include_str!("shaders.rs"),
         include_str!("../vulkan/command_buffers/life_cycle.rs"),
+        include_str!("../vulkan/pipelines/libraries.rs"),
         include_str!("../vulkan/queries/pools.rs"),
         include_str!("depth_stencil.rs"),
         include_str!("viewer/stereo.rs"),
