@@ -1,10 +1,8 @@
 //! Frames of the renderer: a generated garden through each camera, in each mode, with depths and the device's counters.
 
 use ash::vk::PerformanceCounterUnitKHR;
-use gaurast_render::{
-    Antialiasing, CutOff, DeviceOptions, Frame, Geometry, Order, Precision, RenderError, Renderer, Settings,
-};
-use gaurast_scene::{Camera, garden};
+use gaurast_render::{CutOff, DeviceOptions, Frame, Precision, RenderError, Renderer, Settings};
+use gaurast_scene::{Antialiasing, Camera, Geometry, SortOrder, garden};
 
 /// Width and height of frames.
 const SIZE: [u32; 2] = [160, 90];
@@ -26,9 +24,9 @@ pub(crate) const ALL: &[View] = &[
     View { name: "orthographic", camera: |camera| camera.orthographic(6.0), change: |_| () },
     View { name: "fisheye", camera: |camera| camera.fisheye(3.0), change: |_| () },
     View { name: "panorama", camera: Camera::panorama, change: |_| () },
-    View { name: "order_distance", camera: Camera::clone, change: |s| s.order = Order::Distance },
-    View { name: "order_per_pixel", camera: Camera::clone, change: |s| s.order = Order::PerPixel },
-    View { name: "fisheye_per_pixel", camera: |camera| camera.fisheye(2.0), change: |s| s.order = Order::PerPixel },
+    View { name: "order_distance", camera: Camera::clone, change: |s| s.order = SortOrder::Distance },
+    View { name: "order_per_pixel", camera: Camera::clone, change: |s| s.order = SortOrder::PerPixel },
+    View { name: "fisheye_per_pixel", camera: |camera| camera.fisheye(2.0), change: |s| s.order = SortOrder::PerPixel },
     View { name: "surfels", camera: Camera::clone, change: |s| s.geometry = Geometry::Surfel },
     View { name: "binary16", camera: Camera::clone, change: |s| s.precision = Precision::Fp16 },
     View { name: "compensated", camera: Camera::clone, change: |s| s.antialiasing = Antialiasing::Compensated },
