@@ -130,7 +130,7 @@ fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync
             }
         }));
         if let Err(panic) = executed {
-            sync.lose(panic_message(panic.as_ref()));
+            sync.lose(Error::DeviceLostByDefect(panic_message(panic.as_ref()).to_owned()));
         }
     }
 }
