@@ -17,7 +17,6 @@ pub mod command_processor;
 pub mod compute;
 pub mod device;
 pub mod format;
-#[allow(clippy::disallowed_methods, reason = "the Gaussian path has an arithmetic of its own")]
 pub mod gaussian;
 pub mod geometry;
 mod hardware_model;

@@ -1,8 +1,11 @@
-//! Changes that must not affect a picture, or must affect it in a known way: the number of threads, ways of drawing the
-//! same Gaussians, parts of the target, formats of targets and backgrounds.
+//! Changes that must not affect a picture, or must affect it in a known way: the SIMD level, the number of threads, the modes of
+//! the application's threads, ways of drawing the same Gaussians, parts of the target, formats of targets and backgrounds.
 
 use ash::vk;
-use gaurast::vk::GaussianCameraGAURAST;
+use gaurast::vk::{
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::{
     Buffer, Commands, Formats, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, PassObject, Settings,
@@ -15,6 +18,8 @@ use half::f16;
 
 /// The picture's size; not a multiple of a tile.
 const SIZE: [u32; 2] = [203, 139];
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 fn camera() -> OracleCamera {
     scenes::camera(SIZE[0], SIZE[1])
@@ -129,18 +134,70 @@ fn distance(a: [f32; 4], b: [f64; 4]) -> f64 {
     channels.fold(0.0, f64::max)
 }
 
-#[gaurast_runner::test(each = simd_levels())]
-fn threads_change_nothing(case: &Case) {
-    let scene = scene();
-    let draw = |threads| {
-        let settings = Settings { simd: Some(case.variant()), threads: Some(threads), ..Settings::default() };
-        Bench::with(&scene, &settings, &GaussianOptions::new(scene.degree)).whole()
+/// A camera of each model, among the Gaussians, and a state that it is tested with.
+fn views() -> [(GaussianCameraGAURAST<'static>, State); 4] {
+    use {GaussianCameraModelGAURAST as Model, GaussianOrderGAURAST as Order};
+    let pinhole = camera().to_vulkan();
+    let inside = pinhole.eye([0.2, -0.1, 5.0]);
+    let panorama = inside.model(Model::EQUIRECTANGULAR).focal_length([SIZE[0] as f32 / std::f32::consts::TAU, 40.0]);
+    let discs = State::default().geometry(GaussianGeometryGAURAST::GAUSSIAN_2D).low_pass_variance(0.5);
+    [
+        (pinhole, State::default()),
+        (pinhole.model(Model::ORTHOGRAPHIC).focal_length([31.0, 29.0]), discs),
+        (
+            inside.model(Model::FISHEYE).focal_length([32.0; 2]),
+            State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
+        ),
+        (panorama, State::default().order(Order::PER_PIXEL)),
+    ]
+}
+
+/// The pictures of all views.
+fn pictures(
+    scene: &SceneBuffers,
+    views: &[(GaussianCameraGAURAST<'static>, State)],
+    settings: &Settings,
+) -> Vec<Vec<[f32; 4]>> {
+    let picture = |&(camera, state): &(GaussianCameraGAURAST<'static>, State)| {
+        let options = GaussianOptions { state, ..GaussianOptions::new(scene.degree) };
+        Bench { camera, ..Bench::with(scene, settings, &options) }.whole()
     };
-    let one = draw(1);
-    for threads in [2, 3, 8] {
-        assert_same(&one, &draw(threads));
+    views.iter().map(picture).collect()
+}
+
+fn settings(simd: &str, threads: usize) -> Settings<'_> {
+    Settings { simd: Some(simd), threads: Some(threads), ..Settings::default() }
+}
+
+#[gaurast_runner::test(each = simd_levels())]
+fn levels_and_threads_change_nothing(case: &Case) {
+    let (scene, views) = (scene(), views());
+    let expected = pictures(&scene, &views, &settings("sse2", 1));
+    for threads in [1, 2, 7] {
+        let drawn = pictures(&scene, &views, &settings(case.variant(), threads));
+        for (drawn, expected) in drawn.iter().zip(&expected) {
+            assert_same(expected, drawn);
+        }
     }
-    assert!(one.iter().filter(|rgba| rgba[3] > 0.5).count() > one.len() / 10);
+    for picture in &expected {
+        assert!(picture.iter().filter(|rgba| rgba[3] > 0.5).count() > picture.len() / 10);
+    }
+}
+
+/// The modes of the threads that create devices and pipelines and that record and submit.
+#[cfg(target_arch = "x86_64")]
+#[gaurast_runner::test(each = simd_levels())]
+fn the_modes_of_the_applications_threads_change_nothing(case: &Case) {
+    use gaurast_testkit::control::{Control, FLUSH, ROUNDING};
+    // Nothing but the device computes with floats while the thread has other modes.
+    let (scene, views) = (scene(), views());
+    let settings = settings(case.variant(), 2);
+    let expected = pictures(&scene, &views, &settings);
+    for mode in ROUNDING {
+        let _control = Control::with(mode | FLUSH);
+        let drawn = pictures(&scene, &views, &settings);
+        assert!(drawn == expected, "{mode:#x}");
+    }
 }
 
 #[gaurast_runner::test]

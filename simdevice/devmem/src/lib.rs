@@ -16,5 +16,5 @@ mod memory;
 #[doc(hidden)]
 pub use fearless_simd;
 pub use hints::prefetch;
-pub use lookup::{gather, look_up, places};
+pub use lookup::{gather, look_up};
 pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds, PAGE_SIZE};

@@ -1,6 +1,6 @@
 //! Lookups that SIMD vectors lack: words from scattered indices of memory, and from a small table in registers.
 
-use fearless_simd::{Level, Simd, prelude::*, u32x8, u32x16};
+use fearless_simd::{Simd, prelude::*, u32x8, u32x16};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// The words at eight indices. An index beyond the end gives the last word; an empty slice gives zeros.
@@ -19,55 +19,33 @@ pub fn gather<S: Simd>(simd: S, words: &[AtomicU32], places: u32x8<S>) -> u32x8<
     u32x8::simd_from(simd, found)
 }
 
-/// The greatest length of a table in which a processor of a level can look words up by one instruction, in words. None
-/// if it can't.
+/// The words of a table of eight at sixteen places, modulo eight.
 #[inline(always)]
-pub fn places(level: Level) -> Option<usize> {
+pub fn look_up<S: Simd>(simd: S, table: &[u32; 8], places: u32x16<S>) -> u32x16<S> {
     #[cfg(target_arch = "x86_64")]
-    return match level.as_avx512() {
-        Some(_) => Some(32),
-        None => level.as_avx2().map(|_| 8),
-    };
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        let _ = level;
-        None
-    }
-}
-
-/// The words of a table at sixteen indices, modulo its length. It is fast if the length is that of [`places`].
-#[inline(always)]
-pub fn look_up<S: Simd, const PLACES: usize>(simd: S, table: &[u32; PLACES], places: u32x16<S>) -> u32x16<S> {
-    #[cfg(target_arch = "x86_64")]
-    match (table.as_chunks::<16>().0, table.as_chunks::<8>().0) {
-        ([low, high], _) => {
-            if let Some(avx512) = simd.level().as_avx512() {
-                let vector = |words: [u32; 16]| u32x16::simd_from(avx512, words);
-                let of = vector(places.into());
-                let found = permute_32(avx512, vector(*low).into(), of.into(), vector(*high).into());
-                return u32x16::simd_from(simd, <[u32; 16]>::from(u32x16::simd_from(avx512, found)));
-            }
-        }
-        (_, [words]) => {
-            if let Some(avx2) = simd.level().as_avx2() {
-                let half = |places: u32x8<S>| {
-                    let places = u32x8::simd_from(avx2, <[u32; 8]>::from(places));
-                    let table = u32x8::simd_from(avx2, *words);
-                    let found = permute_8(avx2, table.into(), places.into());
-                    u32x8::simd_from(simd, <[u32; 8]>::from(u32x8::simd_from(avx2, found)))
-                };
-                let (low, high) = places.split();
-                return half(low).combine(half(high));
-            }
-        }
-        _ => {}
+    if let Some(avx512) = simd.level().as_avx512() {
+        // An instruction has a table of sixteen.
+        let [a, b, c, d, e, f, g, h] = *table;
+        let twice = u32x16::simd_from(avx512, [a, b, c, d, e, f, g, h, a, b, c, d, e, f, g, h]);
+        let places = u32x16::simd_from(avx512, <[u32; 16]>::from(places));
+        let found = permute_16(avx512, places.into(), twice.into());
+        return u32x16::simd_from(simd, <[u32; 16]>::from(u32x16::simd_from(avx512, found)));
+    } else if let Some(avx2) = simd.level().as_avx2() {
+        let half = |places: u32x8<S>| {
+            let places = u32x8::simd_from(avx2, <[u32; 8]>::from(places));
+            let table = u32x8::simd_from(avx2, *table);
+            let found = permute_8(avx2, table.into(), places.into());
+            u32x8::simd_from(simd, <[u32; 8]>::from(u32x8::simd_from(avx2, found)))
+        };
+        let (low, high) = places.split();
+        return half(low).combine(half(high));
     }
     let places: [u32; 16] = places.into();
-    u32x16::simd_from(simd, places.map(|place| table[place as usize % PLACES]))
+    u32x16::simd_from(simd, places.map(|place| table[place as usize % table.len()]))
 }
 
 #[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{__m256i, __m512i, _mm256_permutevar8x32_epi32, _mm512_permutex2var_epi32};
+use std::arch::x86_64::{__m256i, __m512i, _mm256_permutevar8x32_epi32, _mm512_permutexvar_epi32};
 
 #[cfg(target_arch = "x86_64")]
 fearless_simd::kernel!(
@@ -80,8 +58,8 @@ fearless_simd::kernel!(
 #[cfg(target_arch = "x86_64")]
 fearless_simd::kernel!(
     #[inline]
-    fn permute_32(avx512: Avx512, low: __m512i, places: __m512i, high: __m512i) -> __m512i {
-        _mm512_permutex2var_epi32(low, places, high)
+    fn permute_16(avx512: Avx512, places: __m512i, table: __m512i) -> __m512i {
+        _mm512_permutexvar_epi32(places, table)
     }
 );
 
@@ -89,6 +67,7 @@ fearless_simd::kernel!(
 mod tests {
     use super::*;
     use crate::dispatch;
+    use fearless_simd::Level;
 
     fn gather_words(words: &[AtomicU32], places: [u32; 8]) -> [u32; 8] {
         dispatch!(Level::new(), simd => {
@@ -107,19 +86,14 @@ mod tests {
 
     #[test]
     fn places_count_modulo_the_length() {
-        agrees(std::array::from_fn::<u32, 8, _>(|place| 10 + place as u32));
-        agrees(std::array::from_fn::<u32, 32, _>(|place| 7 * place as u32));
-        agrees([1, 2, 3]);
-    }
-
-    fn agrees<const PLACES: usize>(table: [u32; PLACES]) {
+        let table = std::array::from_fn(|place| 10 + place as u32);
         let places = std::array::from_fn(|lane| 0xABCD_EF00 + 3 * lane as u32);
-        let expected = places.map(|place| table[place as usize % PLACES]);
+        let expected = places.map(|place: u32| table[place as usize % table.len()]);
         for level in [Level::new(), Level::baseline()] {
             let found: [u32; 16] = dispatch!(level, simd => {
                 look_up(simd, &table, u32x16::simd_from(simd, places)).into()
             });
-            assert_eq!(found, expected, "{PLACES} words, {level:?}");
+            assert_eq!(found, expected, "{level:?}");
         }
     }
 }

@@ -111,7 +111,7 @@ pub(crate) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
     // log2(m) = 2 / ln 2 (s + s^3 / 3 + s^5 / 5 + ...), |s| < 0.1716: the omitted terms are below 1e-15.
     let mut series = number(1.0 / 17.0);
     for denominator in [15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
-        series = series.mul_add(s2, number(1.0 / denominator));
+        series = series * s2 + 1.0 / denominator;
     }
     let value = exponent + s * series * (2.0 / std::f64::consts::LN_2);
     let normal = x.simd_ge(f64::MIN_POSITIVE);

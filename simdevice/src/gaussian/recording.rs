@@ -100,13 +100,13 @@ fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
     let [xx, xy, yy] = covariance(splat);
     let middle = 0.5 * (xx + yy);
     let spread = (middle * middle - (xx * yy - xy * xy)).max(0.1).sqrt();
-    let radius = (3.0 * (middle + spread).sqrt()).ceil();
+    let radius = libm::ceil(3.0 * (middle + spread).sqrt());
     let tiles = |mean: f64, start: i32, length: u32| {
         let size = f64::from(TILE_SIZE);
         let (start, end) = (f64::from(start), f64::from(start) + f64::from(length));
-        let (first, last) = ((start / size).floor(), (end / size).ceil());
-        let low = ((mean - radius) / size).floor().clamp(first, last);
-        let high = ((mean + radius + size - 1.0) / size).floor().clamp(first, last);
+        let (first, last) = (libm::floor(start / size), libm::ceil(end / size));
+        let low = libm::floor((mean - radius) / size).clamp(first, last);
+        let high = libm::floor((mean + radius + size - 1.0) / size).clamp(first, last);
         (high - low) as u64
     };
     let [x, y] = splat.mean;

@@ -53,8 +53,8 @@ pub enum SortError {
 fn viewport_pixels(viewport: &Viewport) -> Rect {
     let span = |start: f32, size: f32| {
         let (start, end) = (f64::from(start), f64::from(start) + f64::from(size));
-        let first = (start - 0.5).ceil();
-        let last = (end - 0.5).ceil();
+        let first = libm::ceil(start - 0.5);
+        let last = libm::ceil(end - 0.5);
         (first as i32, (last - first).max(0.0) as u32)
     };
     let (x, width) = span(viewport.x, viewport.width);

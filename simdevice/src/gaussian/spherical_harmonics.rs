@@ -1,6 +1,7 @@
 //! Spherical harmonics: the view-dependent colour of a Gaussian, with the signs and order of 3DGS.
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
+use isa::float;
 
 /// The number of coefficients of degrees 0 to 4.
 pub(crate) const MAX_COEFFICIENTS: usize = 25;
@@ -143,7 +144,7 @@ impl Bases {
                 *sum += f64::from(lanes[direction]) * f64::from(*k);
             }
         }
-        let [red, green, blue] = sum.map(|value| value.max(0.0).min(f64::from(f32::MAX)) as f32);
+        let [red, green, blue] = sum.map(|value| float::least(float::greatest(value, 0.0), f32::MAX.into()) as f32);
         Some([red, green, blue, 0.0])
     }
 
@@ -170,7 +171,7 @@ impl Bases {
     #[inline(always)]
     fn term<S: Simd>(&self, simd: S, at: usize, coefficients: &[f32], k: usize, sum: f32x4<S>) -> f32x4<S> {
         let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-        coefficient.mul_add(f32x4::splat(simd, self.0[k][at]), sum)
+        coefficient.mul_add_precise(f32x4::splat(simd, self.0[k][at]), sum)
     }
 }
 

@@ -2,7 +2,6 @@
 
 mod color;
 mod depth_stencil;
-#[allow(clippy::disallowed_methods, reason = "the Gaussian path has an arithmetic of its own")]
 pub mod gaussian;
 pub(crate) mod output;
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! third of the time of setting up small triangles. Neither are fearless_simd's `to_bits` and `from_bits`: as calls
 //! they are compiled without the SIMD level's instructions, and pass vectors through memory.
 
-#[allow(clippy::disallowed_methods, reason = "the Gaussian path has an arithmetic of its own")]
 pub(crate) mod exp2;
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};

@@ -6,6 +6,7 @@ mod common;
 mod compute;
 mod levels;
 mod optimizations;
+mod random_gaussians;
 mod render_pass;
 #[path = "../common/scenes.rs"]
 mod scenes;

@@ -1,4 +1,5 @@
-//! C programs under ThreadSanitizer and under Valgrind's Helgrind hear nothing of the driver, and still hear of themselves.
+//! C programs under ThreadSanitizer, AddressSanitizer and Valgrind's Helgrind hear nothing of the driver, and still hear of
+//! themselves.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -97,6 +98,16 @@ fn thread_sanitizer_finds_the_programs_own_race() {
     let reports: Vec<&str> = errors.lines().filter(|line| line.starts_with("SUMMARY")).collect();
     assert!(!reports.is_empty(), "{errors}");
     assert!(reports.iter().all(|report| report.contains("recording_threads.c")), "{errors}");
+}
+
+/// The program destroys its objects, so that nothing leaks. (The C sample leaves that to the end of its process.)
+#[gaurast_runner::test(needs = C)]
+fn address_sanitizer_reports_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = PROGRAMS[1].compile(folder.path(), &["-fsanitize=address,undefined"]);
+    let output = run(&mut Command::new(program), &folder);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && errors.is_empty(), "{errors}");
 }
 
 /// Runs a program under Helgrind with the driver's suppressions. It exits with 9 if Helgrind reports an error.

@@ -34,6 +34,7 @@ typedef struct {
     int number;
     VkCommandPool pool;
     VkBuffer source, target;
+    VkDeviceMemory source_memory, target_memory;
     uint32_t *written, *read;
     VkSemaphore done, seen;
     VkFence fence;
@@ -44,19 +45,18 @@ typedef struct {
 } Worker;
 static Worker workers[THREADS];
 
-static VkBuffer buffer(uint32_t** mapped) {
+static VkBuffer buffer(VkDeviceMemory* memory, uint32_t** mapped) {
     VkBufferCreateInfo info = {.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = 4 * WORDS,
         .usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT};
     VkMemoryAllocateInfo allocation = {.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, .memoryTypeIndex = memory_type};
     VkMemoryRequirements needs;
-    VkDeviceMemory memory;
     VkBuffer made;
     CHECK(vkCreateBuffer(device, &info, NULL, &made));
     vkGetBufferMemoryRequirements(device, made, &needs);
     allocation.allocationSize = needs.size;
-    CHECK(vkAllocateMemory(device, &allocation, NULL, &memory));
-    CHECK(vkBindBufferMemory(device, made, memory, 0));
-    CHECK(vkMapMemory(device, memory, 0, VK_WHOLE_SIZE, 0, (void**)mapped));
+    CHECK(vkAllocateMemory(device, &allocation, NULL, memory));
+    CHECK(vkBindBufferMemory(device, made, *memory, 0));
+    CHECK(vkMapMemory(device, *memory, 0, VK_WHOLE_SIZE, 0, (void**)mapped));
     return made;
 }
 
@@ -178,12 +178,23 @@ int main(int count, char** arguments) {
         CHECK(vkCreateFence(device, &fence, NULL, &worker->fence));
         worker->done = timeline();
         worker->seen = timeline();
-        worker->source = buffer(&worker->written);
-        worker->target = buffer(&worker->read);
+        worker->source = buffer(&worker->source_memory, &worker->written);
+        worker->target = buffer(&worker->target_memory, &worker->read);
     }
     for (int i = 0; i < THREADS; i++) pthread_create(&threads[i], NULL, run, &workers[i]);
     for (int i = 0; i < THREADS; i++) pthread_join(threads[i], NULL);
     for (int i = 0; i < QUEUES; i++) CHECK(vkQueueWaitIdle(queues[i]));
+    for (int i = 0; i < THREADS; i++) {
+        Worker* worker = &workers[i];
+        vkDestroyFence(device, worker->fence, NULL);
+        vkDestroySemaphore(device, worker->done, NULL);
+        vkDestroySemaphore(device, worker->seen, NULL);
+        vkDestroyCommandPool(device, worker->pool, NULL);
+        vkDestroyBuffer(device, worker->source, NULL);
+        vkDestroyBuffer(device, worker->target, NULL);
+        vkFreeMemory(device, worker->source_memory, NULL);
+        vkFreeMemory(device, worker->target_memory, NULL);
+    }
     vkDestroyDevice(device, NULL);
     vkDestroyInstance(instance, NULL);
     return 0;

@@ -67,9 +67,6 @@ const MATHEMATICS: &[&str] = &[
     "trunc",
 ];
 
-/// The functions that the path of Gaussians still calls (docs/arithmetic.md).
-const OF_GAUSSIANS: &[&str] = &["atan2", "cos", "exp", "exp2", "fma", "hypot", "log2", "sin", "sincos"];
-
 /// True if a symbol is a function of C's mathematics.
 fn is_mathematics(symbol: &str) -> bool {
     let stem = symbol.strip_suffix(['f', 'l']).unwrap_or(symbol);
@@ -115,14 +112,13 @@ fn library() -> Vec<u8> {
 }
 
 #[gaurast_runner::test]
-fn the_library_imports_mathematics_of_the_c_library_for_gaussians_alone() {
+fn the_library_imports_no_mathematics_of_the_c_library() {
     let bytes = library();
     let file = object::File::parse(&*bytes).expect("an ELF file");
     let symbols = file.dynamic_symbols().filter(|symbol| symbol.is_undefined());
     let names: Vec<_> = symbols.filter_map(|symbol| symbol.name().ok()).collect();
     assert!(names.contains(&"memcpy"), "a library imports something: {names:?}");
-    let imported: Vec<_> =
-        names.into_iter().filter(|name| is_mathematics(name) && !OF_GAUSSIANS.contains(name)).collect();
+    let imported: Vec<_> = names.into_iter().filter(|name| is_mathematics(name)).collect();
     assert!(imported.is_empty(), "{imported:?}");
 }
 

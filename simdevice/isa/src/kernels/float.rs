@@ -7,7 +7,10 @@
 
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
-type F<S> = f32x16<S>;
+/// A vector of binary32 numbers.
+pub trait Floats<S: Simd>: SimdFloat<S, Element = f32> {}
+
+impl<S: Simd, F: SimdFloat<S, Element = f32>> Floats<S> for F {}
 
 /// The smaller number: `a` if it is less, `b` if the two are equal, and the other one if one is NaN.
 #[inline(always)]
@@ -42,55 +45,56 @@ const NO_FRACTION: f32 = 8_388_608.0;
 
 /// `rounded` with the sign of `a`; `a` itself where it is an integer by its magnitude, or NaN.
 #[inline(always)]
-fn or_integer<S: Simd>(a: F<S>, rounded: F<S>) -> F<S> {
-    let has_fraction = a.abs().simd_lt(F::splat(a.simd, NO_FRACTION));
+fn or_integer<S: Simd, F: Floats<S>>(a: F, rounded: F) -> F {
+    let has_fraction = a.abs().simd_lt(F::splat(a.token(), NO_FRACTION));
     has_fraction.select(rounded.copysign(a), a)
 }
 
-/// The integer part of numbers below 2^31, without the sign of zero.
+/// The nearest integer, halves to even, of numbers without a sign below [`NO_FRACTION`].
 #[inline(always)]
-fn integer_part<S: Simd>(a: F<S>) -> F<S> {
-    F::float_from(i32x16::truncate_from(a))
+fn nearest<S: Simd, F: Floats<S>>(positive: F) -> F {
+    // At this magnitude binary32 has no bits for a fraction.
+    (positive + NO_FRACTION) - NO_FRACTION
 }
 
 /// The integer part.
 #[inline(always)]
-pub fn trunc<S: Simd>(a: F<S>) -> F<S> {
+pub fn trunc<S: Simd>(a: f32x16<S>) -> f32x16<S> {
     if has_instructions(a.simd) {
         return a.trunc();
     }
-    or_integer(a, integer_part(a))
+    or_integer(a, f32x16::float_from(i32x16::truncate_from(a)))
 }
 
 /// The next integer at or below.
 #[inline(always)]
-pub fn floor<S: Simd>(a: F<S>) -> F<S> {
-    if has_instructions(a.simd) {
+pub fn floor<S: Simd, F: Floats<S>>(a: F) -> F {
+    let simd = a.token();
+    if has_instructions(simd) {
         return a.floor();
     }
-    let (whole, zero) = (integer_part(a), F::splat(a.simd, 0.0));
-    or_integer(a, whole - whole.simd_gt(a).select(F::splat(a.simd, 1.0), zero))
+    let whole = nearest(a.abs()).copysign(a);
+    or_integer(a, whole - whole.simd_gt(a).select(F::splat(simd, 1.0), F::splat(simd, 0.0)))
 }
 
 /// The next integer at or above.
 #[inline(always)]
-pub fn ceil<S: Simd>(a: F<S>) -> F<S> {
-    if has_instructions(a.simd) {
+pub fn ceil<S: Simd, F: Floats<S>>(a: F) -> F {
+    let simd = a.token();
+    if has_instructions(simd) {
         return a.ceil();
     }
-    let (whole, zero) = (integer_part(a), F::splat(a.simd, 0.0));
-    or_integer(a, whole + whole.simd_lt(a).select(F::splat(a.simd, 1.0), zero))
+    let whole = nearest(a.abs()).copysign(a);
+    or_integer(a, whole + whole.simd_lt(a).select(F::splat(simd, 1.0), F::splat(simd, 0.0)))
 }
 
 /// The nearest integer, halves to even.
 #[inline(always)]
-pub fn round_ties_even<S: Simd>(a: F<S>) -> F<S> {
-    if has_instructions(a.simd) {
+pub fn round_ties_even<S: Simd, F: Floats<S>>(a: F) -> F {
+    if has_instructions(a.token()) {
         return a.round_ties_even();
     }
-    // At this magnitude binary32 has no bits for a fraction.
-    let a_positive = a.abs();
-    or_integer(a, (a_positive + NO_FRACTION) - NO_FRACTION)
+    or_integer(a, nearest(a.abs()))
 }
 
 /// Defines a function of one binary64, for kernels that run lane by lane.

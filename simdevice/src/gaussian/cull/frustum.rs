@@ -185,7 +185,7 @@ impl Frustum {
             let size = x.abs() + y.abs() + z.abs() + far_off;
             let (x, y, z) = (x - rest[0], y - rest[1], z - rest[2]);
             let ([nx, ny, nz], error) = depth;
-            let t = x.mul_add(nx, y.mul_add(ny, z * nz));
+            let t = x.mul_add_precise(nx, y.mul_add_precise(ny, z * nz));
             let slack = size * error;
             outside.near.set(at, (t + slack).simd_le(near));
             outside.far.set(at, (t - slack).simd_ge(far));
@@ -193,8 +193,8 @@ impl Frustum {
             let scale = load(sx).max(load(sy)).max(load(sz));
             let mut beside = S::mask32s::splat(simd, false);
             for &([nx, ny, nz], per_scale, offset, error) in planes {
-                let slack = size.mul_add(error, scale.mul_add(per_scale, offset));
-                let value = x.mul_add(nx, y.mul_add(ny, z.mul_add(nz, slack)));
+                let slack = size.mul_add_precise(error, scale.mul_add_precise(per_scale, offset));
+                let value = x.mul_add_precise(nx, y.mul_add_precise(ny, z.mul_add_precise(nz, slack)));
                 beside |= value.simd_lt(0.0);
             }
             outside.beside.set(at, beside);

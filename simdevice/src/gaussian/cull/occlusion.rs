@@ -150,14 +150,14 @@ impl TileTransmittance {
     /// The columns and rows of the tiles of which an occluder may cover enough.
     fn covered(&self, splat: &Splat) -> [std::ops::Range<u32>; 2] {
         let [a, b, c] = splat.factor;
-        let extent = f64::from(splat.log2_opacity) - self.alphas[1].log2();
+        let extent = f64::from(splat.log2_opacity) - libm::log2(self.alphas[1]);
         let half = extent.max(0.0).sqrt() / a.abs();
-        let half = [half, half * a.hypot(b) / c.abs()];
+        let half = [half, half * libm::hypot(a, b) / c.abs()];
         let along = |axis: usize| {
             let tile = |pixel: f64| pixel / f64::from(TILE_SIZE) - f64::from(self.first[axis]);
             // Pixel centres are half a pixel inside the tile.
-            let first = tile(splat.mean[axis] - half[axis] - 0.5).ceil();
-            let end = tile(splat.mean[axis] + half[axis] + 0.5).floor();
+            let first = libm::ceil(tile(splat.mean[axis] - half[axis] - 0.5));
+            let end = libm::floor(tile(splat.mean[axis] + half[axis] + 0.5));
             let within = |tile: f64| tile.clamp(0.0, self.count[axis].into()) as u32;
             within(first)..within(end)
         };
@@ -237,5 +237,5 @@ fn least_alpha(splat: &Splat, [column, row]: [u32; 2]) -> f64 {
         let (u, v) = (a * dx, b * dx + c * dy);
         greatest = greatest.max(u * u + v * v);
     }
-    (f64::from(splat.log2_opacity) - greatest).exp2()
+    libm::exp2(f64::from(splat.log2_opacity) - greatest)
 }

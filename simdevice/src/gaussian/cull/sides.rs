@@ -49,7 +49,7 @@ pub(crate) struct Sides {
 
 /// The sides of a camera's frustum for Gaussians whose opacities are at most `opacity`.
 pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> Sides {
-    let log2_range = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
+    let log2_range = libm::log2(opacity.max(1.0).into()) - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
     let extent = if is_half {
         ScreenExtent::in_half(log2_range, projection.low_pass)

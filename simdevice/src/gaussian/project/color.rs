@@ -24,7 +24,7 @@ const SQUARES: [f32; 2] = [1e-20, 1e20];
 #[inline(always)]
 pub(crate) fn normalize<S: Simd>(simd: S, vectors: &mut [[f32; DIRECTIONS]; 3]) -> bool {
     let [x, y, z] = vectors.each_ref().map(|lanes| f32x16::from_slice(simd, lanes));
-    let square = z.mul_add(z, y.mul_add(y, x * x));
+    let square = z.mul_add_precise(z, y.mul_add_precise(y, x * x));
     let [least, greatest] = SQUARES;
     if !square.max(least).min(greatest).simd_eq(square).all_true() {
         return false;

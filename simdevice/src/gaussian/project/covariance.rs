@@ -1,8 +1,8 @@
 //! Means and covariances: from a group's attributes to Gaussians in the picture.
 //!
 //! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in binary32
-//! the determinant of a very thin Gaussian and the depth of neighbours are wrong in the fourth digit. No fused operations are
-//! used for means, so that these have the same bits at every SIMD level.
+//! the determinant of a very thin Gaussian and the depth of neighbours are wrong in the fourth digit. No operation is fused,
+//! since SSE2 would take long for a fused one in binary64.
 
 use super::scratch::Scratch;
 use super::screen::shape;
@@ -49,7 +49,7 @@ pub(crate) fn to_screen<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAtt
         let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
         let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
         // Squares of binary32 numbers are in binary64's range.
-        let double = two / z.mul_add(z, y.mul_add(y, x.mul_add(x, w * w)));
+        let double = two / (w * w + x * x + y * y + z * z);
         let [dx, dy, dz] = [double * x, double * y, double * z];
         let (xx, yy, zz) = (dx * x, dy * y, dz * z);
         let (xy, xz, yz) = (dx * y, dx * z, dy * z);
@@ -80,17 +80,13 @@ pub(crate) fn to_screen<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAtt
             };
             for part in 0..3 {
                 let [cx, cy, cz] = columns[part];
-                m[axis][part] = scale[part] * kz.mul_add(cz, ky.mul_add(cy, kx * cx));
+                m[axis][part] = scale[part] * (kx * cx + ky * cy + kz * cz);
             }
         }
         let [[ax, ay, az], [bx, by, bz]] = m;
         let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-        let mut area2 = cz.mul_add(cz, cy.mul_add(cy, cx * cx));
-        let mut covariance = [
-            az.mul_add(az, ay.mul_add(ay, ax * ax)),
-            az.mul_add(bz, ay.mul_add(by, ax * bx)),
-            bz.mul_add(bz, by.mul_add(by, bx * bx)),
-        ];
+        let mut area2 = cx * cx + cy * cy + cz * cz;
+        let mut covariance = [ax * ax + ay * ay + az * az, ax * bx + ay * by + az * bz, bx * bx + by * by + bz * bz];
         if unscented {
             covariance = [load(&moments[0], at), load(&moments[1], at), load(&moments[2], at)];
             area2 = load(&moments[3], at);

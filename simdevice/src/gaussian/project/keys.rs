@@ -1,5 +1,4 @@
-//! Sort keys and sequence numbers of kept Gaussians. No fused operations are used for keys, so that these have the same bits at
-//! every SIMD level.
+//! Sort keys and sequence numbers of kept Gaussians.
 
 use super::scratch::Scratch;
 use crate::gaussian::read::group::Sequence;

@@ -22,7 +22,7 @@ fn near(visible: &Visible, x: f64, period: f64) -> Visible {
     let half = 0.5 * period + 1.0;
     // Outside of the visible range there are no pixels, however far `x` is.
     let pixel = |x: f64| (x as i64).clamp(visible.left, visible.right);
-    Visible { left: pixel((x - half).floor()), right: pixel((x + half).ceil()), ..*visible }
+    Visible { left: pixel(libm::floor(x - half)), right: pixel(libm::ceil(x + half)), ..*visible }
 }
 
 /// The tiles that a Gaussian and its copies reach, or `None` if there are none. Copies that reach tiles are added to

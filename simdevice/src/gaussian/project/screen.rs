@@ -97,7 +97,7 @@ pub(crate) fn shape<S: Simd>(
         value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
     };
     let low_pass = number(view.low_pass);
-    let determinant = low_pass.mul_add(xx + yy, area2) + low_pass * low_pass;
+    let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
     store(determinant, &mut screen.determinant);
     if view.compensated {
         let mut ratio = area2 / determinant;

@@ -20,6 +20,7 @@ use crate::state::gaussian::GaussianGeometry;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
+use isa::float;
 
 #[cfg(test)]
 mod tests;
@@ -62,10 +63,11 @@ impl<S: Simd> Range<S> {
     /// [`footprint`](super::footprint).
     #[inline(always)]
     fn new(low: S::f32s, high: S::f32s, [first, last]: [S::f32s; 2]) -> Self {
-        let low = (low - 0.5).ceil().max(first);
-        let high = (high - 0.5).floor().min(last);
+        let low = float::ceil(low - 0.5).max(first);
+        let high = float::floor(high - 0.5).min(last);
         let per_pixel = 1.0 / TILE_SIZE as f32;
-        Self { low, high, first: (low * per_pixel).floor(), last: (high * per_pixel).floor(), any: low.simd_le(high) }
+        let [first, last] = [float::floor(low * per_pixel), float::floor(high * per_pixel)];
+        Self { low, high, first, last, any: low.simd_le(high) }
     }
 
     /// The number of tiles.
@@ -163,7 +165,7 @@ impl<S: Simd> Ellipses<S> {
             narrowing: shapes.determinant * per_c * per_c,
             peak: b * per_a * half_x,
             square: rise * rise,
-            margin: slope.abs().mul_add(margin, margin),
+            margin: slope.abs().mul_add_precise(margin, margin),
             across: Range::new(x - wide, x + wide, columns),
             along: Range::new(y - tall, y + tall, rows),
             columns,
@@ -186,7 +188,7 @@ impl<S: Simd> Ellipses<S> {
         let to_left = (zero - self.peak).max(above).min(below);
         let to_right = self.peak.max(above).min(below);
         let width = |height: S::f32s| {
-            let square = height.mul_add(zero - height, self.square);
+            let square = height.mul_add_precise(zero - height, self.square);
             (self.narrowing * square.max(zero)).sqrt() + self.margin
         };
         let low = x + (self.slope * to_left - width(to_left));
@@ -204,7 +206,7 @@ fn last_rounded_to(value: f32) -> f64 {
     }
     // Numbers round to infinity from half a unit above the greatest binary32 number on.
     let wide = |value: f32| {
-        if value.is_infinite() { 2f64.powi(128).copysign(value.into()) } else { f64::from(value) }
+        if value.is_infinite() { libm::ldexp(1.0, 128).copysign(value.into()) } else { f64::from(value) }
     };
     let middle = 0.5 * (wide(value) + wide(value.next_up()));
     if middle as f32 <= value { middle } else { middle.next_down() }

@@ -140,17 +140,17 @@ fn place(model: CameraModel, t: [f64; 3]) -> [f64; 2] {
 /// points beyond the near plane. Cameras that see all around accept points at less than a right angle from `t`, with no
 /// singularity of the projection as near as that.
 fn projects_continuously(model: CameraModel, near: f64, t: [f64; 3], point: [f64; 3]) -> bool {
-    let angle = || length(cross(t, point)).atan2(dot(t, point));
+    let angle = || libm::atan2(length(cross(t, point)), dot(t, point));
     let [x, y, z] = t;
     match model {
         CameraModel::Pinhole => point[2] > near,
         CameraModel::Orthographic => true,
         CameraModel::Fisheye => {
             let angle = angle();
-            angle < FRAC_PI_2 && x.hypot(y).atan2(z) + angle < PI
+            angle < FRAC_PI_2 && libm::atan2(libm::hypot(x, y), z) + angle < PI
         }
         CameraModel::Equirectangular => {
-            let latitude = y.atan2(x.hypot(z)).abs();
+            let latitude = libm::atan2(y, libm::hypot(x, z)).abs();
             latitude + angle() < FRAC_PI_2
         }
     }

@@ -303,9 +303,9 @@ fn activate(activations: Activations, len: usize, out: &mut Attributes) {
     };
     if activations.log_scale {
         let scales = out.scale.iter_mut();
-        scales.for_each(|lanes| apply(lanes, f64::exp));
+        scales.for_each(|lanes| apply(lanes, libm::exp));
     }
     if activations.logit_opacity {
-        apply(&mut out.opacity, |logit| 1.0 / (1.0 + (-logit).exp()));
+        apply(&mut out.opacity, |logit| 1.0 / (1.0 + libm::exp(-logit)));
     }
 }

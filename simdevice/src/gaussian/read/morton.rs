@@ -64,7 +64,8 @@ impl Grid {
         }
         for position in finite() {
             for axis in 0..3 {
-                variance[axis] += (f64::from(position[axis]) - mean[axis]).powi(2) / count;
+                let distance = f64::from(position[axis]) - mean[axis];
+                variance[axis] += distance * distance / count;
             }
         }
         let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();

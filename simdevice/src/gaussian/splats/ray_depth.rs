@@ -136,11 +136,11 @@ impl PixelRays {
                 CameraModel::Fisheye => {
                     let angle = (u * u + v * v).sqrt();
                     // The limit on the axis.
-                    let across = if angle == 0.0 { 1.0 } else { angle.sin() / angle };
-                    [u * across, v * across, angle.cos()]
+                    let across = if angle == 0.0 { 1.0 } else { libm::sin(angle) / angle };
+                    [u * across, v * across, libm::cos(angle)]
                 }
                 CameraModel::Equirectangular => {
-                    let ((sin_u, cos_u), (sin_v, cos_v)) = (u.sin_cos(), v.sin_cos());
+                    let ((sin_u, cos_u), (sin_v, cos_v)) = (libm::sincos(u), libm::sincos(v));
                     [sin_u * cos_v, sin_v, cos_u * cos_v]
                 }
             };

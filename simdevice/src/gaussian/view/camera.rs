@@ -1,6 +1,7 @@
 //! Camera models: the projection of a point to the picture, the projection's Jacobian, and the depth variable.
 
 use crate::state::gaussian::{Camera, CameraModel};
+use isa::float;
 
 /// After how many pixels a camera's picture repeats to the right and to the left, if it does.
 pub(crate) fn period(camera: &Camera) -> Option<f64> {
@@ -32,13 +33,13 @@ pub(crate) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) 
 
 fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> Linearization {
     let place = [x / z, y / z];
-    let [u, v] = [0, 1].map(|axis| place[axis].max(least[axis]).min(greatest[axis]));
+    let [u, v] = [0, 1].map(|axis| float::least(float::greatest(place[axis], least[axis]), greatest[axis]));
     Linearization { place, jacobian: [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]] }
 }
 
 /// The equidistant projection: the distance from the principal point is the angle from the axis.
 fn fisheye([x, y, z]: [f64; 3]) -> Linearization {
-    let r = x.hypot(y);
+    let r = libm::hypot(x, y);
     if r == 0.0 {
         // A point straight behind the camera projects to a whole circle, so it has no position.
         let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
@@ -46,8 +47,8 @@ fn fisheye([x, y, z]: [f64; 3]) -> Linearization {
     }
     // Along the radius a point moves by z / |t|^2, across it by angle / r, and along the axis by -r / |t|^2.
     let (cos, sin) = (x / r, y / r);
-    let length = r.hypot(z);
-    let (along, across, axial) = (z / length / length, r.atan2(z) / r, -(r / length / length));
+    let length = libm::hypot(r, z);
+    let (along, across, axial) = (z / length / length, libm::atan2(r, z) / r, -(r / length / length));
     let mixed = (along - across) * cos * sin;
     Linearization {
         place: [across * x, across * y],
@@ -64,14 +65,14 @@ const POLE: f64 = 1.0 / 1024.0;
 
 /// The equirectangular projection: longitude, from straight ahead to the right, and latitude, downwards.
 fn equirectangular([x, y, z]: [f64; 3]) -> Linearization {
-    let r = x.hypot(z);
-    let length = r.hypot(y);
+    let r = libm::hypot(x, z);
+    let length = libm::hypot(r, y);
     // At a pole the longitude is undefined; that of straight ahead is taken.
     let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
     let across = 1.0 / r.max(POLE * length);
     let (rise, run) = (y / length, r / length);
     Linearization {
-        place: [x.atan2(z), y.atan2(r)],
+        place: [libm::atan2(x, z), libm::atan2(y, r)],
         jacobian: [[cos * across, 0.0, -sin * across], [-sin * rise / length, run / length, -cos * rise / length]],
     }
 }

@@ -62,7 +62,7 @@ impl CenterDepth {
             DepthEncoding::Unorm(bits) => {
                 let depth = clamp(depth);
                 let greatest = f64::from((1u32 << bits) - 1);
-                (depth * greatest).round_ties_even() as u32
+                libm::rint(depth * greatest) as u32
             }
         }
     }

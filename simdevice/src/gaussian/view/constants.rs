@@ -85,7 +85,7 @@ impl ViewConstants {
             compensated: state.opacity_compensated,
             compensation_floor: state.footprint.compensation_floor.into(),
             alpha_floor: state.alpha_floor.into(),
-            log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
+            log2_floor: libm::log2(state.alpha_floor.into()).max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
             depth,

@@ -43,7 +43,7 @@ impl TileCutOff {
 
     /// The tile of a pixel's centre along an axis.
     pub(crate) fn tile_of(&self, axis: usize, centre: f64) -> f64 {
-        ((centre - self.corner[axis]) / CUT_TILE).floor()
+        libm::floor((centre - self.corner[axis]) / CUT_TILE)
     }
 
     /// The first tile, and the one after the last, along x and y, of a Gaussian with a mean, in framebuffer pixels, and the
@@ -56,16 +56,16 @@ impl TileCutOff {
             let half_difference = 0.5 * (xx - yy);
             let spread = half_difference * half_difference + xy * xy;
             let greatest = 0.5 * (xx + yy) + spread.max(LEAST_SPREAD).sqrt();
-            let radius = (self.deviations * greatest.sqrt()).ceil();
+            let radius = libm::ceil(self.deviations * greatest.sqrt());
             return from_corner.map(|mean| {
                 let mean = mean - 0.5;
-                [((mean - radius) / CUT_TILE).floor(), ((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE).floor()]
+                [libm::floor((mean - radius) / CUT_TILE), libm::floor((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE)]
             });
         }
-        let radii = [xx, yy].map(|variance| (self.deviations * variance.sqrt()).ceil());
+        let radii = [xx, yy].map(|variance| libm::ceil(self.deviations * variance.sqrt()));
         [0, 1].map(|axis| {
             let (mean, radius) = (from_corner[axis], radii[axis]);
-            [((mean - radius) / CUT_TILE).floor(), ((mean + radius) / CUT_TILE).ceil()]
+            [libm::floor((mean - radius) / CUT_TILE), libm::ceil((mean + radius) / CUT_TILE)]
         })
     }
 

@@ -42,7 +42,7 @@ impl Thresholds {
         // Where there is no floor, less than the least normal number is nothing. No alpha reaches a floor above the
         // ceiling.
         let neg_log2_floor = if state.alpha_floor <= state.alpha_ceiling {
-            (-f64::from(state.alpha_floor).log2()).min(GREATEST_NEG_LOG2) as f32
+            (-libm::log2(state.alpha_floor.into())).min(GREATEST_NEG_LOG2) as f32
         } else {
             f32::NEG_INFINITY
         };
@@ -53,7 +53,7 @@ impl Thresholds {
             neg_log2_floor,
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
-            least_capped: (f64::from(state.alpha_ceiling).log2() - CAP_MARGIN) as f32,
+            least_capped: (libm::log2(state.alpha_ceiling.into()) - CAP_MARGIN) as f32,
             transmittance_floor: state.transmittance_floor,
         }
     }

@@ -218,7 +218,7 @@ impl<'a> GaussianTileDraw<'a> {
                     let tested = &samples.tested;
                     tested[*earlier][block] == tested[sample][block]
                         && (self.tests.depth.is_none()
-                            || self.depths(tile, buffers, *earlier, block) == self.depths(tile, buffers, sample, block))
+                            || self.have_equal_depths(tile, buffers, [*earlier, sample], block, *lanes))
                 };
                 let accumulator = (0..sample).find(same).unwrap_or(sample);
                 samples.accumulators[sample][block] = samples.accumulators[accumulator][block];
@@ -240,6 +240,13 @@ impl<'a> GaussianTileDraw<'a> {
             }
             gaussian_tile.run::<M>(self.draw, self.level, tile.at, sample, &lanes, counters);
         }
+    }
+
+    /// True if two samples have the same stored depths at `lanes` of a block. Elsewhere the buffer holds what was there before.
+    fn have_equal_depths(&self, tile: &Tile, buffers: &Buffers, samples: [usize; 2], block: usize, lanes: u32) -> bool {
+        let [a, b] = samples.map(|sample| self.depths(tile, buffers, sample, block));
+        let mut pairs = a.into_iter().zip(b).enumerate();
+        pairs.all(|(lane, (a, b))| a == b || lanes >> lane & 1 == 0)
     }
 
     /// A sample's stored depths in a block.

@@ -51,19 +51,19 @@ pub(crate) fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels:
 }
 
 impl<S: Simd> Pixels<S> {
-    /// The effect of a Gaussian of so much alpha. The transmittance behind it is rounded once, where processors can.
+    /// The effect of a Gaussian of so much alpha. The transmittance behind it is rounded once.
     #[inline(always)]
     pub(super) fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
         let t = self.transmittance;
-        Passed { weight: t * alpha, rest: t.mul_add(-alpha, t) }
+        Passed { weight: t * alpha, rest: t.mul_add_precise(-alpha, t) }
     }
 
     /// Adds so much of a colour.
     #[inline(always)]
     pub(super) fn add(&mut self, simd: S, weight: f32x16<S>, [red, green, blue]: [f32; 3]) {
-        self.red = weight.mul_add(f32x16::splat(simd, red), self.red);
-        self.green = weight.mul_add(f32x16::splat(simd, green), self.green);
-        self.blue = weight.mul_add(f32x16::splat(simd, blue), self.blue);
+        self.red = weight.mul_add_precise(f32x16::splat(simd, red), self.red);
+        self.green = weight.mul_add_precise(f32x16::splat(simd, green), self.green);
+        self.blue = weight.mul_add_precise(f32x16::splat(simd, blue), self.blue);
     }
 }
 
@@ -154,7 +154,7 @@ pub(crate) fn composite_one<S: Simd>(
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
         let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);
-        weight.mul_add(depth, sum).store_slice(&mut depths[block]);
+        weight.mul_add_precise(depth, sum).store_slice(&mut depths[block]);
         let sum = f32x16::from_slice(simd, &weights[block]) + weight;
         sum.store_slice(&mut weights[block]);
     }

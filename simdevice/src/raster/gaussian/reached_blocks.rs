@@ -29,11 +29,11 @@ pub(crate) fn reached_blocks<S: Simd>(
     let v = upper.combine(lower);
     let [a, b, c] = [a as f32, b as f32, c as f32];
     let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
-    let log2_range = log2_opacity.mul_add(RANGE_FACTOR, neg_log2_floor * RANGE_FACTOR + 1e-3);
+    let log2_range = log2_opacity.mul_add_precise(RANGE_FACTOR, neg_log2_floor * RANGE_FACTOR + 1e-3);
     let least_u = (u.abs() - HALF * a.abs()).max(0.0);
     let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
     let least_u = least_u * least_u;
-    let least = least_v.mul_add(least_v, least_u.combine(least_u));
+    let least = least_v.mul_add_precise(least_v, least_u.combine(least_u));
     least.simd_le(log2_range.combine(log2_range))
 }
 

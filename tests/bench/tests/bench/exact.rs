@@ -21,8 +21,34 @@ fn pictures_and_buffers_are_the_stored_ones(level: &Case) {
         let device = Device::open(level.variant(), threads).expect("a device");
         for case in cases.iter().skip(first % every).step_by(every) {
             let line = case.line(&device).expect("the device has all features");
-            assert!(expected.contains(&line), "{} threads: {line} is not in the list", threads);
+            assert!(expected.contains(&line), "{threads} threads: {line} is not in the list");
         }
+    }
+}
+
+/// The application's threads may round in other ways and flush denormals: nothing changes. Operands of `operations` are
+/// made by the device. What other cases draw is computed by the thread that has the modes, so that it may not round in another
+/// way itself; without denormals, a thread that flushes them computes the same.
+#[cfg(target_arch = "x86_64")]
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn the_modes_of_the_applications_threads_change_nothing() {
+    use gaurast_testkit::control::{Control, FLUSH, ROUNDING};
+    let expected = stored(STORED).expect("the list is well-formed");
+    let (cases, every) = (all(), if is_long() { 1 } else { EVERY });
+    for (first, mode) in ROUNDING.into_iter().enumerate() {
+        let _control = Control::with(mode | FLUSH);
+        let device = Device::open("best", 2).expect("a device");
+        let operations = cases.iter().filter(|case| case.chapter == "operations");
+        for case in operations.skip(first % every).step_by(every) {
+            let line = case.line(&device).expect("the device has all features");
+            assert!(expected.contains(&line), "{mode:#x}: {line} is not in the list");
+        }
+    }
+    let _control = Control::with(FLUSH);
+    let device = Device::open("best", 2).expect("a device");
+    for case in cases.iter().filter(|case| case.chapter != "files").step_by(every) {
+        let line = case.line(&device).expect("the device has all features");
+        assert!(expected.contains(&line), "flushed denormals: {line} is not in the list");
     }
 }
 

@@ -172,7 +172,7 @@ fn accumulate<S: Simd>(
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
         let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);
-        weight.mul_add(depth, sum).store_slice(&mut depths[block]);
+        weight.mul_add_precise(depth, sum).store_slice(&mut depths[block]);
         let sum = f32x16::from_slice(simd, &weights[block]) + weight;
         sum.store_slice(&mut weights[block]);
     }

@@ -14,7 +14,7 @@ pub(super) fn naive_sample(
 ) -> Naive {
     let mut out = Naive::default();
     let state = &draw.state;
-    let neg_log2_floor = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
+    let neg_log2_floor = (-libm::log2(state.alpha_floor.into())).min(126.0) as f32;
     let depths = draw.ray_depths().unwrap();
     let at = [x, y].map(|at| at as f64 + 0.5);
     let at = [0, 1].map(|axis| at[axis] + f64::from(tile[axis] * TILE_SIZE));
