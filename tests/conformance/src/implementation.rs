@@ -2,7 +2,10 @@
 
 use gaurast_oracle::oracle::Stored;
 
+use gaurast_testkit::Gpu;
+
 use crate::draw::Draw;
+use crate::program::Program;
 
 /// The reason for which drawing failed, or there is nothing to test.
 #[derive(Debug)]
@@ -24,6 +27,16 @@ pub trait Implementation {
 
     /// The first feature, limit or format that a draw needs and the implementation lacks.
     fn missing(&self, draw: &Draw) -> Option<&'static str>;
+
+    /// The first feature, limit or format that a program needs and the implementation lacks.
+    fn missing_for(&self, _program: &Program) -> Option<&'static str> {
+        Some("Vulkan commands")
+    }
+
+    /// The device that executes programs, if it is one.
+    fn gpu(&self) -> Option<&Gpu> {
+        None
+    }
 
     /// Draws. `stored` is the initial contents of the depth and stencil attachment.
     ///

@@ -36,7 +36,7 @@ impl Implementation for Second {
             (draw.footprint.is_some(), "gaussianCutOff"),
             (draw.shown.is_some(), "resolveFragmentShader"),
             (draw.samples > 1, "gaussianMultisample"),
-            (draw.blend != Blend::Over, "other blending"),
+            (draw.blend != Blend::Over || draw.equation.is_some(), "other blending"),
             (draw.write_mask != vk::ColorComponentFlags::RGBA, "write masks"),
             (draw.format != ColorFormat::Float32, "other formats"),
             (draw.scissor.is_some() || draw.area.is_some(), "scissor and render area"),
