@@ -140,7 +140,7 @@ fn each_feature_has_a_case() {
 #[gaurast_runner::test]
 fn each_limit_has_cases() {
     const XML: &str = include_str!("../../api/spec/vk_gaurast.xml");
-    let name = "name=\"VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST\"";
+    let name = "category=\"struct\" name=\"VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST\"";
     let start = XML.find(name).expect("the structure of properties");
     let structure = &XML[start..][..XML[start..].find("</type>").expect("its end")];
     let members = structure.split("<name>").skip(1).filter_map(|rest| rest.split("</name>").next());
