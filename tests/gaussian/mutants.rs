@@ -1,7 +1,7 @@
 //! The conformance cases are held to account: a layer makes this driver wrong in one way after another, and a case of the
 //! chapter that the table names must fail. The page `docs/mutants.md` is the table of all cases that fail.
 //!
-//! `GAURAST_WRITE_MUTANTS=1`, with `GAURAST_TEST_LONG=1`, has the page written.
+//! `GAURAST_BLESS=1`, with `GAURAST_TEST_LONG=1`, has the page written.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -68,7 +68,7 @@ whose code no case reaches is an error. [conformance.md](conformance.md#mutants)
 
 The table is of this driver. Under _caught by_ are the number of failing cases of the mutant's chapter and the first of them; under
 _others_ the failing ones of every tenth case of other chapters. `GAURAST_TEST_LONG=1` runs the tests that make the table and compare
-it, and `GAURAST_WRITE_MUTANTS=1` has it written.
+it, and `GAURAST_BLESS=1` has it written.
 
 | mutant | what is wrong | caught by | others |
 |---|---|---|---|
@@ -87,10 +87,10 @@ fn the_page_is_what_fails(case: &Case) {
             caught.unwrap_or_else(|error| panic!("{}", error.0)).row() + "\n"
         });
         let page: String = std::iter::once(HEAD.to_owned()).chain(rows).collect();
-        if std::env::var_os("GAURAST_WRITE_MUTANTS").is_some() {
+        if std::env::var_os("GAURAST_BLESS").is_some() {
             std::fs::write(PAGE, &page).expect("the page is written");
         }
-        assert_eq!(std::fs::read_to_string(PAGE).expect("the page"), page, "GAURAST_WRITE_MUTANTS=1 writes the page");
+        assert_eq!(std::fs::read_to_string(PAGE).expect("the page"), page, "GAURAST_BLESS=1 writes the page");
     });
 }
 

@@ -148,18 +148,18 @@ impl Framing {
         let up = (DVec3::from_array(self.up).try_normalize()).ok_or(CameraError::NoUp)?;
         let front = front(up);
         let side = up.cross(front);
-        let level = azimuth.cos() * front + azimuth.sin() * side;
-        let from = elevation.cos() * level + elevation.sin() * up;
+        let level = libm::cos(azimuth) * front + libm::sin(azimuth) * side;
+        let from = libm::cos(elevation) * level + libm::sin(elevation) * up;
         // Seen straight from above or below, the picture's upper edge is the far or the near one.
-        let upwards = if elevation.cos().abs() < 1e-6 { -level * elevation.sin().signum() } else { up };
+        let upwards = if libm::cos(elevation).abs() < 1e-6 { -level * libm::sin(elevation).signum() } else { up };
         Ok((from, upwards))
     }
 }
 
 /// The default azimuth and elevation of a framing, in degrees.
 pub fn default_angles() -> (f64, f64) {
-    let level = FROM.x.hypot(FROM.z);
-    (FROM.x.atan2(-FROM.z).to_degrees(), (-FROM.y).atan2(level).to_degrees())
+    let level = libm::hypot(FROM.x, FROM.z);
+    (libm::atan2(FROM.x, -FROM.z).to_degrees(), libm::atan2(-FROM.y, level).to_degrees())
 }
 
 /// The direction of azimuth 0: the horizontal direction nearest to -z; or to +y, if -z is almost vertical.

@@ -73,10 +73,15 @@ impl Device {
         features.p_next = (&raw mut libraries).cast::<c_void>();
         let opening = Opening { extensions: &optional, ..*opening };
         let gpu = if optional.is_empty() { Gpu::open(&opening)? } else { Gpu::open_with(&opening, &mut features)? };
-        Ok(Self::of(gpu, optional))
+        Ok(Self::having(gpu, optional))
     }
 
-    fn of(gpu: Gpu, optional: Vec<&'static CStr>) -> Self {
+    /// The device of the tests' application, without optional extensions.
+    pub fn of(gpu: Gpu) -> Self {
+        Self::having(gpu, Vec::new())
+    }
+
+    fn having(gpu: Gpu, optional: Vec<&'static CStr>) -> Self {
         let mut features = Features::default();
         let mut vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
         let mut features_2 = vk::PhysicalDeviceFeatures2::default().push_next(&mut features).push_next(&mut vulkan_1_2);
@@ -117,6 +122,11 @@ impl Device {
             "drawIndirectCount" => self.has_draw_indirect_count,
             _ => self.optional.iter().any(|extension| extension.to_bytes() == name.as_bytes()),
         }
+    }
+
+    /// The device of the tests' application.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// The first feature, limit or format that a draw needs and the device lacks.
@@ -165,7 +175,7 @@ impl Implementation for Device {
         lacks.or_else(|| program.draws().find_map(|draw| self.lacks(draw)))
     }
 
-    fn gpu(&self) -> Option<&Gpu> {
+    fn vulkan(&self) -> Option<&Gpu> {
         Some(&self.gpu)
     }
 

@@ -34,7 +34,7 @@ pub trait Implementation {
     }
 
     /// The device that executes programs, if it is one.
-    fn gpu(&self) -> Option<&Gpu> {
+    fn vulkan(&self) -> Option<&Gpu> {
         None
     }
 

@@ -134,7 +134,7 @@ impl Drawing {
 
 /// Lets an implementation execute a program, and judges its pictures.
 fn execute(program: &Program, expected: &[Expected], implementation: &dyn Implementation) -> Outcome {
-    let Some(gpu) = implementation.gpu() else {
+    let Some(gpu) = implementation.vulkan() else {
         return Outcome::NotSupported("Vulkan commands");
     };
     let pictures = match program.execute(gpu) {

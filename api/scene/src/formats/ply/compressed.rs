@@ -128,7 +128,7 @@ fn unpack(bounds: &Bounds, words: [u32; 4]) -> ([f32; 3], GaussianShape, [f32; 3
     let scale = unpack_11_10_11(scale);
     let channel = |index: usize| bits(colour, 24 - 8 * index as u32, 8);
     let shape = GaussianShape {
-        scale: std::array::from_fn(|axis| between(6, axis, scale[axis]).exp() as f32),
+        scale: std::array::from_fn(|axis| libm::exp(between(6, axis, scale[axis])) as f32),
         rotation: unpack_rotation(rotation),
         opacity: channel(3) as f32,
     };

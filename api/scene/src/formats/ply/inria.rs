@@ -57,7 +57,11 @@ fn gaussian(values: &[f64], flat: bool, sh: &mut [[f32; 3]]) -> ([f32; 3], Gauss
     let (required, rest) = values.split_at(REQUIRED.len());
     let (third, rest) = rest.split_at(usize::from(!flat));
     let shape = GaussianShape {
-        scale: [required[3].exp() as f32, required[4].exp() as f32, third.first().map_or(0.0, |log| log.exp() as f32)],
+        scale: [
+            libm::exp(required[3]) as f32,
+            libm::exp(required[4]) as f32,
+            third.first().map_or(0.0, |&log| libm::exp(log) as f32),
+        ],
         rotation: std::array::from_fn(|i| required[5 + i] as f32),
         opacity: sigmoid(required[9]),
     };
