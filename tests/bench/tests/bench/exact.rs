@@ -21,7 +21,7 @@ fn pictures_and_buffers_are_the_stored_ones(level: &Case) {
         let device = Device::open(level.variant(), threads).expect("a device");
         for case in cases.iter().skip(first % every).step_by(every) {
             let line = case.line(&device).expect("the device has all features");
-            assert!(expected.contains(&line), "{} threads: {line} is not in the list", threads);
+            assert!(expected.contains(&line), "{threads} threads: {line} is not in the list");
         }
     }
 }
