@@ -12,7 +12,8 @@ use gaurast_testkit::{Gpu, OpenError, Opening};
 
 use crate::draw::Draw;
 use crate::features::{self, FEATURES};
-use crate::implementation::{Error, Implementation, Picture};
+use crate::implementation::{Error, Implementation};
+use crate::picture::Picture;
 use crate::program::Program;
 use crate::record::record;
 

@@ -14,7 +14,7 @@ use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
 use crate::draw::{Blend, Call, ColorFormat, Draw, Equation};
-use crate::implementation::Picture;
+use crate::picture::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 pub(crate) const CONTRACT: f64 = 5e-6;

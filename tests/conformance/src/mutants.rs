@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use gaurast_mutants::mutant::{MUTANT, REPORT};
+use gaurast_mutants::environment::{MUTANT, REPORT};
 use gaurast_mutants::{MUTANTS, Mutant};
 
 use crate::cases::Case;

@@ -5,8 +5,8 @@ use gaurast_testkit::{Commands, Gpu, Graphics};
 
 use crate::draw::Draw;
 use crate::features;
-use crate::implementation::Picture;
 use crate::judge::{Expected, expected, stored_before};
+use crate::picture::Picture;
 use crate::stage::Stage;
 
 /// A picture that a program must leave.

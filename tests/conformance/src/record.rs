@@ -4,7 +4,7 @@ use gaurast_oracle::oracle::Stored;
 use gaurast_testkit::{Buffer, Commands, Gpu};
 
 use crate::draw::{Call, Draw};
-use crate::implementation::Picture;
+use crate::picture::Picture;
 use crate::stage::Stage;
 
 /// Draws on a device.

@@ -8,8 +8,9 @@ use gaurast_oracle::oracle::Stored;
 
 use crate::cases::{Case, Subject};
 use crate::draw::Draw;
-use crate::implementation::{Implementation, Picture};
+use crate::implementation::Implementation;
 use crate::judge::{Expected, expected, stored_before};
+use crate::picture::Picture;
 use crate::program::Program;
 use crate::resolved::Inputs;
 

@@ -10,8 +10,9 @@ use gaurast_oracle::oracle::Stored;
 use gaurast_second as second;
 
 use crate::draw::{Blend, ColorFormat, Draw};
-use crate::implementation::{Error, Implementation, Picture};
+use crate::implementation::{Error, Implementation};
 use crate::judge::{combined_scene, sets};
+use crate::picture::Picture;
 
 /// The second implementation.
 pub struct Second;

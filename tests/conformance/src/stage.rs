@@ -14,8 +14,8 @@ use gaurast_testkit::{
 use half::f16;
 
 use crate::draw::{Blend, ColorFormat, Draw, Equation};
-use crate::implementation::Picture;
 use crate::judge::stored_before;
+use crate::picture::Picture;
 
 /// A uniform buffer of the draw's camera, and the descriptor set that has it.
 struct CameraBuffer {

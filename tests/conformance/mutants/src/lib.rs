@@ -8,7 +8,9 @@
 //! | module | has |
 //! |---|---|
 //! | [`table`] | all mutants: name, chapter, what is wrong |
-//! | [`mutant`] | the active one, and its count |
+//! | [`mutant`] | a mutant, the active one, and its count |
+//! | [`environment`] | the variables that choose it, and say where its count is written |
+//! | `below` | the functions of the next layer by which commands are looked up |
 //! | `hooks` | the commands that are intercepted, by chapter of Vulkan |
 //! | `request` | a pipeline that is created, as a copy that may be changed |
 //! | `recording` | what is known of each command buffer |
@@ -18,6 +20,8 @@
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid
 //! usage, so that what pointers name is there, and what a mutant changes keeps it where it is passed on.
 
+mod below;
+pub mod environment;
 mod hooks;
 mod interface;
 pub mod mutant;
@@ -28,31 +32,14 @@ pub mod table;
 
 use std::ffi::c_char;
 use std::mem::transmute;
-use std::sync::{PoisonError, RwLock};
 
 use ash::vk;
 
 pub use crate::mutant::Mutant;
 pub use crate::table::MUTANTS;
 
-use crate::interface::{Function, GetInstanceProcAddr, NegotiateLayerInterface};
-
-/// The functions of the next layer by which commands are looked up.
-#[derive(Clone, Copy)]
-pub(crate) struct Below {
-    pub(crate) instance: vk::Instance,
-    pub(crate) get_instance_proc_addr: GetInstanceProcAddr,
-    pub(crate) get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
-    pub(crate) get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
-}
-
-/// Those of the instance that was created last.
-pub(crate) static BELOW: RwLock<Option<Below>> = RwLock::new(None);
-
-/// The functions of the next layer, if there is an instance.
-pub(crate) fn below() -> Option<Below> {
-    *BELOW.read().unwrap_or_else(PoisonError::into_inner)
-}
+use crate::below::below;
+use crate::interface::{Function, NegotiateLayerInterface};
 
 /// Agrees with the loader on the version of their interface, and gives it the layer's functions.
 ///

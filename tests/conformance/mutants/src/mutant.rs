@@ -1,16 +1,6 @@
 //! A mutant, the one that is active, and how often its code was reached.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
-
-use crate::table::MUTANTS;
-
-/// The variable that names the active mutant. The layer reads it as an instance is created.
-pub const MUTANT: &str = "GAURAST_MUTANT";
-
-/// The variable with the path of a file. As an instance is destroyed, the layer writes to it how often the active
-/// mutant's code was reached.
-pub const REPORT: &str = "GAURAST_MUTANT_REPORT";
 
 /// A wrong behaviour.
 #[derive(Debug)]
@@ -60,25 +50,14 @@ impl Mutant {
     }
 }
 
-/// Makes the mutant active that the environment names.
-pub(crate) fn choose() {
-    let name = std::env::var(MUTANT).unwrap_or_default();
-    let found = MUTANTS.iter().find(|mutant| mutant.name.eq_ignore_ascii_case(&name));
-    if found.is_none() && !name.is_empty() {
-        eprintln!("VK_LAYER_GAURAST_mutants: {MUTANT} is {name}, which is no mutant");
-    }
-    let chosen = found.map_or(std::ptr::null(), |mutant| std::ptr::from_ref::<Mutant>(mutant));
+/// Makes a mutant active, or none, whose code was not reached yet.
+pub(crate) fn activate(mutant: Option<&'static Mutant>) {
+    let chosen = mutant.map_or(std::ptr::null(), std::ptr::from_ref);
     ACTIVE.store(chosen.cast_mut(), Ordering::Relaxed);
     REACHED.store(0, Ordering::Relaxed);
 }
 
-/// Writes how often the active mutant's code was reached.
-pub(crate) fn report() {
-    let Some(path) = std::env::var_os(REPORT).map(PathBuf::from) else {
-        return;
-    };
-    let reached = REACHED.load(Ordering::Relaxed);
-    if let Err(error) = std::fs::write(&path, reached.to_string()) {
-        eprintln!("VK_LAYER_GAURAST_mutants: {}: {error}", path.display());
-    }
+/// How often the active mutant's code was reached.
+pub(crate) fn reached() -> u64 {
+    REACHED.load(Ordering::Relaxed)
 }

@@ -9,9 +9,10 @@ use gaurast::vk::{
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
 };
 
+use crate::below::{Below, below, remember};
 use crate::interface::{DeviceLink, InstanceLink, find, take_link};
 use crate::table::*;
-use crate::{BELOW, Below, below, mutant, next};
+use crate::{environment, next};
 
 /// What the layer below says of a physical device. The commands are looked up as the instance is created, since the
 /// loader gives the first layer's functions later.
@@ -33,7 +34,7 @@ pub(super) unsafe extern "system" fn create_instance(
     allocator: *const vk::AllocationCallbacks<'_>,
     instance: *mut vk::Instance,
 ) -> vk::Result {
-    mutant::choose();
+    environment::choose();
     // SAFETY: see the crate; the loader's link is in the chain, and gives commands by name.
     unsafe {
         let Some(link) = take_link::<InstanceLink>((*info).p_next) else {
@@ -65,7 +66,7 @@ pub(super) unsafe extern "system" fn create_instance(
             })
         })();
         *ANSWERS.write().unwrap_or_else(PoisonError::into_inner) = found;
-        *BELOW.write().unwrap_or_else(PoisonError::into_inner) = Some(Below {
+        remember(Below {
             instance: *instance,
             get_instance_proc_addr: get,
             get_physical_device_proc_addr: link.get_physical_device_proc_addr,
@@ -79,7 +80,7 @@ pub(super) unsafe extern "system" fn destroy_instance(
     instance: vk::Instance,
     allocator: *const vk::AllocationCallbacks<'_>,
 ) {
-    mutant::report();
+    environment::report();
     if let Some(answers) = answers() {
         // SAFETY: see the crate.
         unsafe { (answers.destroy)(instance, allocator) };
@@ -106,7 +107,7 @@ pub(super) unsafe extern "system" fn create_device(
         if result == vk::Result::SUCCESS {
             let get = link.get_device_proc_addr;
             let below = Below { get_device_proc_addr: Some(get), ..below };
-            *BELOW.write().unwrap_or_else(PoisonError::into_inner) = Some(below);
+            remember(below);
             next::load(|name| get(*device, name.as_ptr()));
         }
         result
