@@ -38,8 +38,11 @@ fn each_mistake() -> Vec<Variant> {
 fn a_case_catches_each_mistake(case: &Case) {
     let mistake = MISTAKES.iter().find(|mistake| mistake.name == case.variant()).expect("a variant is a mistake");
     let all = all();
-    let mut expectations =
-        all.iter().filter(|case| case.chapter == mistake.chapter).map(|case| Expectation::new(case.draw()));
+    let mut expectations = all
+        .iter()
+        .filter(|case| case.chapter == mistake.chapter)
+        .filter_map(|case| case.draw())
+        .map(Expectation::of_draw);
     let caught = expectations.find(|expectation| mistake.is_caught(expectation));
     let caught = caught.unwrap_or_else(|| panic!("no case of {} catches it", mistake.chapter));
     assert!(matches!(caught.judge(&Oracle::default()), Outcome::Pass(_)), "the case fails without the mistake");

@@ -18,6 +18,7 @@ mod instances;
 mod interactions;
 mod interleavings;
 mod modes;
+mod mutants;
 mod pipelines;
 mod popping;
 mod rasterization_modes;

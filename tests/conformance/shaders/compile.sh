@@ -2,6 +2,6 @@
 # Compiles every shader here to SPIR-V, which is checked in beside it, so that the cases need no compiler.
 set -e
 cd "$(dirname "$0")"
-for shader in *.frag; do
+for shader in *.vert *.frag *.comp; do
     glslangValidator --quiet -V --target-env vulkan1.3 -o "$shader.spv" "$shader"
 done

@@ -1,21 +1,20 @@
 //! A Vulkan device under test, with every feature of the extension that it supports.
 
+use std::ffi::{CStr, c_void};
 use std::path::Path;
 
 use ash::vk;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
-use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model, GaussianCutOffGAURAST as CutOff,
-    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
-    GaussianPrecisionGAURAST as Precision,
-};
 use gaurast_oracle::oracle::Stored;
 use gaurast_testkit::gpu::Driver;
 use gaurast_testkit::{Gpu, OpenError, Opening};
 
 use crate::draw::Draw;
-use crate::implementation::{Error, Implementation, Picture};
+use crate::features::{self, FEATURES};
+use crate::implementation::{Error, Implementation};
+use crate::picture::Picture;
+use crate::program::Program;
 use crate::record::record;
 
 /// A device of a Vulkan driver.
@@ -25,7 +24,14 @@ pub struct Device {
     pub features: Features<'static>,
     /// The extension's properties.
     pub properties: Properties<'static>,
+    /// The optional extensions that are enabled.
+    optional: Vec<&'static CStr>,
+    has_draw_indirect_count: bool,
 }
+
+/// Extensions of which some cases are, if the device has them.
+const OPTIONAL: [&CStr; 3] =
+    [ash::ext::multi_draw::NAME, ash::khr::pipeline_library::NAME, ash::ext::graphics_pipeline_library::NAME];
 
 impl Device {
     /// Opens a driver's device. `driver` is one of these: `embedded` for the driver that is linked into this program;
@@ -35,6 +41,14 @@ impl Device {
     /// # Errors
     /// If there is no such device, or Vulkan fails.
     pub fn open(driver: &str) -> Result<Self, Error> {
+        Self::open_under(driver, &[])
+    }
+
+    /// Opens a driver's device under layers, which the loader must find; the embedded driver has none.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_under(driver: &str, layers: &[&CStr]) -> Result<Self, Error> {
         let is_manifest = Path::new(driver).extension().is_some_and(|extension| extension == "json");
         if is_manifest {
             for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
@@ -48,14 +62,30 @@ impl Device {
             _ if is_manifest => Opening::of(Driver::Extended),
             name => Opening { device: name, ..Opening::of(Driver::Extended) },
         };
-        let refused = |error: OpenError| Error(error.to_string());
-        Ok(Self::of(Gpu::open(&opening).map_err(refused)?))
+        Self::with(&Opening { layers, ..opening }).map_err(|error| Error(error.to_string()))
     }
 
-    /// The device of the tests' application.
+    fn with(opening: &Opening<'_>) -> Result<Self, OpenError> {
+        let optional = supported(&Gpu::open(opening)?);
+        let mut libraries = vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::default()
+            .graphics_pipeline_library(optional.contains(&ash::ext::graphics_pipeline_library::NAME));
+        let mut features = vk::PhysicalDeviceMultiDrawFeaturesEXT::default()
+            .multi_draw(optional.contains(&ash::ext::multi_draw::NAME));
+        features.p_next = (&raw mut libraries).cast::<c_void>();
+        let opening = Opening { extensions: &optional, ..*opening };
+        let gpu = if optional.is_empty() { Gpu::open(&opening)? } else { Gpu::open_with(&opening, &mut features)? };
+        Ok(Self::having(gpu, optional))
+    }
+
+    /// The device of the tests' application, without optional extensions.
     pub fn of(gpu: Gpu) -> Self {
+        Self::having(gpu, Vec::new())
+    }
+
+    fn having(gpu: Gpu, optional: Vec<&'static CStr>) -> Self {
         let mut features = Features::default();
-        let mut features_2 = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
+        let mut vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut features_2 = vk::PhysicalDeviceFeatures2::default().push_next(&mut features).push_next(&mut vulkan_1_2);
         let mut properties = Properties::default();
         let mut properties_2 = vk::PhysicalDeviceProperties2::default().push_next(&mut properties);
         // SAFETY: the physical device is the instance's, and has the extension of these structures.
@@ -66,7 +96,33 @@ impl Device {
         }
         features.p_next = std::ptr::null_mut();
         properties.p_next = std::ptr::null_mut();
-        Self { gpu, features, properties }
+        let has_draw_indirect_count = vulkan_1_2.draw_indirect_count != vk::FALSE;
+        Self { gpu, features, properties, optional, has_draw_indirect_count }
+    }
+
+    /// The first of some features, of the extension or of Vulkan, that the device lacks.
+    fn lacks_feature(&self, needs: &[&'static str]) -> Option<&'static str> {
+        needs.iter().copied().find(|name| !self.offers(name))
+    }
+
+    /// Reports whether the device has a feature of the extension, a feature of Vulkan, or an optional extension.
+    fn offers(&self, name: &str) -> bool {
+        let of_extension = FEATURES.iter().find(|(feature, _)| *feature == name);
+        if let Some((_, offered)) = of_extension {
+            return offered(&self.features) != vk::FALSE;
+        }
+        let has = self.gpu.features();
+        match name {
+            "multiDrawIndirect" => has.multi_draw_indirect != vk::FALSE,
+            "drawIndirectFirstInstance" => has.draw_indirect_first_instance != vk::FALSE,
+            "independentBlend" => has.independent_blend != vk::FALSE,
+            "logicOp" => has.logic_op != vk::FALSE,
+            "occlusionQueryPrecise" => has.occlusion_query_precise != vk::FALSE,
+            "pipelineStatisticsQuery" => has.pipeline_statistics_query != vk::FALSE,
+            "depthBounds" => has.depth_bounds != vk::FALSE,
+            "drawIndirectCount" => self.has_draw_indirect_count,
+            _ => self.optional.iter().any(|extension| extension.to_bytes() == name.as_bytes()),
+        }
     }
 
     /// The device of the tests' application.
@@ -76,41 +132,11 @@ impl Device {
 
     /// The first feature, limit or format that a draw needs and the device lacks.
     fn lacks(&self, draw: &Draw) -> Option<&'static str> {
-        let has = &self.features;
-        let state = &draw.state;
-        let depth = draw.depth.as_ref();
-        let any = draw.approximation.is_some_and(|numbers| numbers != [0.0; 2]);
-        let footprint = draw.footprint.unwrap_or_default();
-        let needs = [
-            (state.order == Order::RADIAL_DISTANCE, has.radial_distance_order, "radialDistanceOrder"),
-            (state.order == Order::PRIMITIVE, has.primitive_order, "primitiveOrder"),
-            (state.order == Order::PER_PIXEL, has.per_pixel_order, "perPixelOrder"),
-            (state.precision == Precision::FLOAT16, has.rasterization_float16, "rasterizationFloat16"),
-            (state.antialiasing == Antialiasing::OPACITY_COMPENSATED, has.opacity_compensation, "opacityCompensation"),
-            (draw.camera.model == Model::ORTHOGRAPHIC, has.orthographic_camera, "orthographicCamera"),
-            (draw.camera.model == Model::FISHEYE, has.fisheye_camera, "fisheyeCamera"),
-            (draw.camera.model == Model::EQUIRECTANGULAR, has.equirectangular_camera, "equirectangularCamera"),
-            (state.linearization == Linearization::UNSCENTED, has.unscented_projection, "unscentedProjection"),
-            (state.geometry == Geometry::GAUSSIAN_2D, has.gaussian_2d, "gaussian2D"),
-            (draw.camera_in_buffer, has.uniform_buffer_camera, "uniformBufferCamera"),
-            (draw.merged, has.merged_draws, "mergedDraws"),
-            (draw.instances.is_some(), has.gaussian_instancing, "gaussianInstancing"),
-            (
-                depth.is_some_and(|d| d.test.is_some() || d.bounds.is_some() || d.stencil.is_some()),
-                has.gaussian_depth_stencil,
-                "gaussianDepthStencil",
-            ),
-            (draw.samples > 1, has.gaussian_multisample, "gaussianMultisample"),
-            (any, has.gaussian_approximation, "gaussianApproximation"),
-            (footprint.cut_off != CutOff::NONE, has.gaussian_cut_off, "gaussianCutOff"),
-            (footprint.compensation_floor != 0.0, has.opacity_compensation_floor, "opacityCompensationFloor"),
-            (draw.shown.is_some(), has.resolve_fragment_shader, "resolveFragmentShader"),
-            (draw.shown.is_some(), has.resolve_gaussian_indices, "resolveGaussianIndices"),
-        ];
-        let lacks = needs.iter().find(|(needed, offered, _)| *needed && *offered == vk::FALSE);
-        if let Some((_, _, name)) = lacks {
-            return Some(name);
+        let lacks = self.lacks_feature(&features::needs(draw));
+        if lacks.is_some() {
+            return lacks;
         }
+        let depth = draw.depth.as_ref();
         if draw.degree > self.properties.max_spherical_harmonics_degree {
             return Some("maxSphericalHarmonicsDegree");
         }
@@ -145,7 +171,25 @@ impl Implementation for Device {
         self.lacks(draw)
     }
 
+    fn missing_for(&self, program: &Program) -> Option<&'static str> {
+        let lacks = self.lacks_feature(&program.needs());
+        lacks.or_else(|| program.draws().find_map(|draw| self.lacks(draw)))
+    }
+
+    fn vulkan(&self) -> Option<&Gpu> {
+        Some(&self.gpu)
+    }
+
     fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
         Ok(record(&self.gpu, draw, stored))
     }
+}
+
+/// The optional extensions that a device has.
+fn supported(gpu: &Gpu) -> Vec<&'static CStr> {
+    // SAFETY: the physical device is the instance's.
+    let all = unsafe { gpu.instance().enumerate_device_extension_properties(gpu.physical_device()) };
+    let all = all.unwrap_or_default();
+    let has = |name: &&CStr| all.iter().any(|extension| extension.extension_name_as_c_str() == Ok(*name));
+    OPTIONAL.into_iter().filter(has).collect()
 }

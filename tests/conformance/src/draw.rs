@@ -63,6 +63,8 @@ pub struct Draw {
     pub behind: [f32; 4],
     /// Blending of fragments.
     pub blend: Blend,
+    /// Another blend equation in place of that.
+    pub equation: Option<Equation>,
     /// Components that are written.
     pub write_mask: vk::ColorComponentFlags,
     /// Depth and stencil.
@@ -140,6 +142,17 @@ pub enum Blend {
     Add,
     /// `ONE_MINUS_DST_ALPHA`, `ONE`: the fragments are behind the contents.
     Under,
+}
+
+/// A blend equation: factors of the fragment and of the contents, and their operation, for colours and for alpha.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Equation {
+    /// The factors and the operation of red, green and blue.
+    pub color: ([vk::BlendFactor; 2], vk::BlendOp),
+    /// Those of alpha.
+    pub alpha: ([vk::BlendFactor; 2], vk::BlendOp),
+    /// The constants of constant factors.
+    pub constants: [f32; 4],
 }
 
 /// A colour attachment's format.
@@ -232,6 +245,7 @@ impl Draw {
             format: ColorFormat::Float32,
             behind: [0.0; 4],
             blend: Blend::Over,
+            equation: None,
             write_mask: vk::ColorComponentFlags::RGBA,
             depth: None,
             samples: 1,

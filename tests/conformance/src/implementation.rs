@@ -2,20 +2,15 @@
 
 use gaurast_oracle::oracle::Stored;
 
+use gaurast_testkit::Gpu;
+
 use crate::draw::Draw;
+use crate::picture::Picture;
+use crate::program::Program;
 
 /// The reason for which drawing failed, or there is nothing to test.
 #[derive(Debug)]
 pub struct Error(pub String);
-
-/// Contents of the attachments after a draw.
-#[derive(Clone, Debug, Default)]
-pub struct Picture {
-    /// Colours, row by row; resolved if there are several samples.
-    pub color: Vec<[f32; 4]>,
-    /// Depths, as numbers of their format, and stencils, if they are tested and there is one sample.
-    pub stored: Stored,
-}
 
 /// An implementation under test: a driver's device, or any other renderer.
 pub trait Implementation {
@@ -24,6 +19,16 @@ pub trait Implementation {
 
     /// The first feature, limit or format that a draw needs and the implementation lacks.
     fn missing(&self, draw: &Draw) -> Option<&'static str>;
+
+    /// The first feature, limit or format that a program needs and the implementation lacks.
+    fn missing_for(&self, _program: &Program) -> Option<&'static str> {
+        Some("Vulkan commands")
+    }
+
+    /// The device that executes programs, if it is one.
+    fn vulkan(&self) -> Option<&Gpu> {
+        None
+    }
 
     /// Draws. `stored` is the initial contents of the depth and stencil attachment.
     ///

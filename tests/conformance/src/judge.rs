@@ -13,8 +13,8 @@ use gaurast_oracle::oracle::{
 use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
-use crate::draw::{Blend, Call, ColorFormat, Draw};
-use crate::implementation::Picture;
+use crate::draw::{Blend, Call, ColorFormat, Draw, Equation};
+use crate::picture::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 pub(crate) const CONTRACT: f64 = 5e-6;
@@ -290,6 +290,9 @@ fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
         return behind;
     }
     let fragment = stored_color(draw, fragment);
+    if let Some(equation) = &draw.equation {
+        return stored_color(draw, by_equation(draw, equation, fragment, behind));
+    }
     let [source, destination] = match draw.blend {
         Blend::Over => [1.0, 1.0 - fragment[3]],
         Blend::Add => [1.0, 1.0],
@@ -301,6 +304,43 @@ fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
         if mask >> c & 1 == 1 { source * fragment[c] + destination * behind[c] } else { behind[c] }
     };
     stored_color(draw, [0, 1, 2, 3].map(component))
+}
+
+/// The result of a blend equation.
+fn by_equation(draw: &Draw, equation: &Equation, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
+    use vk::BlendFactor as Factor;
+    let constants = equation.constants.map(f64::from);
+    let factor = |factor: Factor, c: usize| match factor {
+        Factor::ZERO => 0.0,
+        Factor::SRC_COLOR => fragment[c],
+        Factor::ONE_MINUS_SRC_COLOR => 1.0 - fragment[c],
+        Factor::DST_COLOR => behind[c],
+        Factor::ONE_MINUS_DST_COLOR => 1.0 - behind[c],
+        Factor::SRC_ALPHA => fragment[3],
+        Factor::ONE_MINUS_SRC_ALPHA => 1.0 - fragment[3],
+        Factor::DST_ALPHA => behind[3],
+        Factor::ONE_MINUS_DST_ALPHA => 1.0 - behind[3],
+        Factor::CONSTANT_COLOR => constants[c],
+        Factor::ONE_MINUS_CONSTANT_COLOR => 1.0 - constants[c],
+        Factor::CONSTANT_ALPHA => constants[3],
+        Factor::ONE_MINUS_CONSTANT_ALPHA => 1.0 - constants[3],
+        _ => 1.0,
+    };
+    let mask = draw.write_mask.as_raw();
+    [0, 1, 2, 3].map(|c| {
+        if mask >> c & 1 == 0 {
+            return behind[c];
+        }
+        let ([from, to], op) = if c == 3 { equation.alpha } else { equation.color };
+        let [source, destination] = [factor(from, c) * fragment[c], factor(to, c) * behind[c]];
+        match op {
+            vk::BlendOp::SUBTRACT => source - destination,
+            vk::BlendOp::REVERSE_SUBTRACT => destination - source,
+            vk::BlendOp::MIN => fragment[c].min(behind[c]),
+            vk::BlendOp::MAX => fragment[c].max(behind[c]),
+            _ => source + destination,
+        }
+    })
 }
 
 impl Expected {

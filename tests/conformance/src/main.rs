@@ -5,8 +5,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
+use gaurast_conformance::mutants::{self, Answers, Extent};
 use gaurast_conformance::report::{Counts, Result, junit};
 use gaurast_conformance::{Case, Implementation, Outcome, all, cases, mistakes, open, run};
+use gaurast_mutants::MUTANTS;
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
@@ -37,6 +39,19 @@ struct Arguments {
     /// code is 1 if none fails
     #[arg(long, conflicts_with = "driver")]
     mistakes: bool,
+    /// Tests the cases: makes the driver wrong in one way after another, by the layer VK_LAYER_GAURAST_mutants, whose
+    /// manifest is in FOLDER. The exit code is 1 if a mutant fails no case of its chapter, or its code is not reached
+    #[arg(long, value_name = "FOLDER", conflicts_with = "mistakes")]
+    mutants: Option<PathBuf>,
+    /// With --mutants: this one; may be given more than once
+    #[arg(long, value_name = "NAME", requires = "mutants")]
+    mutant: Vec<String>,
+    /// With --mutants: runs each on all cases and prints a table, not on its chapter's up to the first that fails
+    #[arg(long, requires = "mutants")]
+    every_case: bool,
+    /// Runs the largest draws too, which take long and much memory
+    #[arg(long)]
+    large: bool,
 }
 
 fn main() -> ExitCode {
@@ -44,6 +59,7 @@ fn main() -> ExitCode {
     // A panic is an outcome of a case, with its message.
     std::panic::set_hook(Box::new(|_| {}));
     let mut cases = all();
+    cases.retain(|case| arguments.large || !case.is_large);
     if !arguments.case.is_empty() {
         cases.retain(|case| arguments.case.iter().any(|pattern| cases::fits(&case.path(), pattern)));
     }
@@ -55,6 +71,9 @@ fn main() -> ExitCode {
     }
     if arguments.mistakes {
         return catch_mistakes(&cases);
+    }
+    if let Some(folder) = &arguments.mutants {
+        return catch_mutants(cases, folder, &arguments);
     }
     let device = match open(&arguments.driver) {
         Ok(device) => device,
@@ -97,6 +116,34 @@ fn catch_mistakes(cases: &[Case]) -> ExitCode {
     let escaped = catches.iter().filter(|catches| catches.all() == 0).count();
     println!("{} mistakes, {escaped} of them escape", catches.len());
     if escaped == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Prints what became of each mutant.
+fn catch_mutants(cases: Vec<Case>, folder: &Path, arguments: &Arguments) -> ExitCode {
+    // SAFETY: the program has not started a second thread.
+    unsafe { std::env::set_var("VK_ADD_LAYER_PATH", folder) };
+    let chosen =
+        |name: &str| arguments.mutant.is_empty() || arguments.mutant.iter().any(|one| one.eq_ignore_ascii_case(name));
+    let answers = Answers::new(cases);
+    let extent = if arguments.every_case { Extent::EveryCase } else { Extent::UntilCaught };
+    let (mut all, mut faults) = (0, 0);
+    for mutant in MUTANTS.iter().filter(|mutant| chosen(mutant.name)) {
+        let catch = match mutants::catch(&arguments.driver, mutant, &answers, extent) {
+            Ok(catch) => catch,
+            Err(error) => {
+                eprintln!("{}: {}", arguments.driver, error.0);
+                return ExitCode::from(2);
+            }
+        };
+        all += 1;
+        println!("{}", catch.row());
+        if let Some(fault) = catch.fault() {
+            println!("    {fault}");
+            faults += 1;
+        }
+    }
+    println!("{all} mutants, {faults} of them escape");
+    if faults == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 fn line(counts: Counts) -> String {

@@ -3,8 +3,9 @@
 use gaurast_oracle::oracle::Stored;
 
 use crate::draw::Draw;
-use crate::implementation::{Error, Implementation, Picture};
+use crate::implementation::{Error, Implementation};
 use crate::judge::expected;
+use crate::picture::Picture;
 use crate::resolved::Inputs;
 
 /// The oracle.

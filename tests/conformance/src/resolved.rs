@@ -4,8 +4,8 @@ use gaurast_oracle::oracle::resolve::{Resolved, resolve_scene};
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleScene, OracleTests};
 
 use crate::draw::{Camera, Draw, Shown};
-use crate::implementation::Picture;
 use crate::judge::{CONTRACT, combined_scene, oracle_camera, oracle_state, sets};
+use crate::picture::Picture;
 
 /// The inputs of a draw's resolve shader, and those that it shows.
 #[derive(Clone, Debug)]

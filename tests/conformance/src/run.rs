@@ -6,10 +6,12 @@ use std::path::Path;
 use gaurast_oracle::compare::write_difference;
 use gaurast_oracle::oracle::Stored;
 
-use crate::cases::Case;
+use crate::cases::{Case, Subject};
 use crate::draw::Draw;
 use crate::implementation::Implementation;
 use crate::judge::{Expected, expected, stored_before};
+use crate::picture::Picture;
+use crate::program::Program;
 use crate::resolved::Inputs;
 
 /// The outcome of a case.
@@ -48,9 +50,17 @@ fn message(panic: &(dyn std::any::Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it panics")
 }
 
-/// A draw and the contents that its attachments may have afterwards, with which the pictures of any number of implementations
+/// A case and the contents that its attachments may have afterwards, with which the pictures of any number of implementations
 /// are compared.
-pub struct Expectation {
+pub enum Expectation {
+    /// That of a draw.
+    Draw(Box<Drawing>),
+    /// That of a program: the contents by picture.
+    Program(Box<Program>, Vec<Expected>),
+}
+
+/// A draw, and the contents of its attachments before and after.
+pub struct Drawing {
     draw: Draw,
     before: Stored,
     after: After,
@@ -62,44 +72,105 @@ enum After {
     Shown(Box<Inputs>),
 }
 
+/// The outcome of a failure without a picture.
+fn failed(message: String) -> Outcome {
+    Outcome::Fail(Failure { message, picture: None })
+}
+
+/// Compares a picture with what is expected.
+fn compared(expected: &Expected, picture: Picture) -> Outcome {
+    match expected.fault(&picture) {
+        None => Outcome::Pass(expected.accuracy(&picture).max_distance),
+        Some(message) => Outcome::Fail(Failure { message, picture: Some((Box::new(expected.clone()), picture.color)) }),
+    }
+}
+
 impl Expectation {
+    /// The oracle's answer to a case.
+    pub fn new(case: &Case) -> Self {
+        match case.subject() {
+            Subject::Draw(draw) => Self::of_draw(*draw),
+            Subject::Program(program) => {
+                let expected = program.expected();
+                Self::Program(Box::new(program), expected)
+            }
+        }
+    }
+
     /// The oracle's answer to a draw.
-    pub fn new(draw: Draw) -> Self {
+    pub fn of_draw(draw: Draw) -> Self {
         let before = stored_before(&draw);
         let after = match draw.shown {
             Some(shown) => After::Shown(Box::new(Inputs::of(&draw, shown))),
             None => After::Attachments(Box::new(expected(&draw, &before))),
         };
-        Self { draw, before, after }
+        Self::Draw(Box::new(Drawing { draw, before, after }))
     }
 
     /// Lets an implementation draw, and judges the picture.
     pub fn judge(&self, implementation: &dyn Implementation) -> Outcome {
-        let nothing = |message: String| Outcome::Fail(Failure { message, picture: None });
-        let drawn = catch_unwind(AssertUnwindSafe(|| implementation.draw(&self.draw, &self.before)));
-        let picture = match drawn {
-            Ok(Ok(picture)) => picture,
-            Ok(Err(error)) => return nothing(error.0),
-            Err(panic) => return nothing(format!("the driver refuses: {}", message(&*panic))),
+        let judged = catch_unwind(AssertUnwindSafe(|| match self {
+            Self::Draw(drawing) => drawing.judge(implementation),
+            Self::Program(program, expected) => execute(program, expected, implementation),
+        }));
+        judged.unwrap_or_else(|panic| failed(format!("the driver refuses: {}", message(&*panic))))
+    }
+}
+
+impl Drawing {
+    fn judge(&self, implementation: &dyn Implementation) -> Outcome {
+        let picture = match implementation.draw(&self.draw, &self.before) {
+            Ok(picture) => picture,
+            Err(error) => return failed(error.0),
         };
         match &self.after {
             After::Shown(inputs) => match inputs.distance(&picture) {
                 Ok(distance) => Outcome::Pass(distance),
-                Err(message) => nothing(message),
+                Err(message) => failed(message),
             },
-            After::Attachments(expected) => match expected.fault(&picture) {
-                None => Outcome::Pass(expected.accuracy(&picture).max_distance),
-                Some(message) => Outcome::Fail(Failure { message, picture: Some((expected.clone(), picture.color)) }),
-            },
+            After::Attachments(expected) => compared(expected, picture),
         }
+    }
+}
+
+/// Lets an implementation execute a program, and judges its pictures.
+fn execute(program: &Program, expected: &[Expected], implementation: &dyn Implementation) -> Outcome {
+    let Some(gpu) = implementation.vulkan() else {
+        return Outcome::NotSupported("Vulkan commands");
+    };
+    let pictures = match program.execute(gpu) {
+        Ok(pictures) => pictures,
+        Err(message) => return failed(message),
+    };
+    if pictures.len() != expected.len() {
+        return failed(format!("{} pictures, not {}", pictures.len(), expected.len()));
+    }
+    let mut farthest = 0.0_f64;
+    for (number, (picture, expected)) in pictures.into_iter().zip(expected).enumerate() {
+        match compared(expected, picture) {
+            Outcome::Pass(distance) => farthest = farthest.max(distance),
+            Outcome::Fail(failure) => {
+                let message = format!("picture {number}: {}", failure.message);
+                return Outcome::Fail(Failure { message, ..failure });
+            }
+            other => return other,
+        }
+    }
+    Outcome::Pass(farthest)
+}
+
+/// The first feature, limit or format that a case needs and an implementation lacks.
+pub fn missing(case: &Case, implementation: &dyn Implementation) -> Option<&'static str> {
+    match case.subject() {
+        Subject::Draw(draw) => implementation.missing(&draw),
+        Subject::Program(program) => implementation.missing_for(&program),
     }
 }
 
 /// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
 pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
-    let draw = case.draw();
-    match implementation.missing(&draw) {
+    match missing(case, implementation) {
         Some(feature) => Outcome::NotSupported(feature),
-        None => Expectation::new(draw).judge(implementation),
+        None => Expectation::new(case).judge(implementation),
     }
 }

@@ -10,8 +10,9 @@ use gaurast_oracle::oracle::Stored;
 use gaurast_second as second;
 
 use crate::draw::{Blend, ColorFormat, Draw};
-use crate::implementation::{Error, Implementation, Picture};
+use crate::implementation::{Error, Implementation};
 use crate::judge::{combined_scene, sets};
+use crate::picture::Picture;
 
 /// The second implementation.
 pub struct Second;
@@ -36,7 +37,7 @@ impl Implementation for Second {
             (draw.footprint.is_some(), "gaussianCutOff"),
             (draw.shown.is_some(), "resolveFragmentShader"),
             (draw.samples > 1, "gaussianMultisample"),
-            (draw.blend != Blend::Over, "other blending"),
+            (draw.blend != Blend::Over || draw.equation.is_some(), "other blending"),
             (draw.write_mask != vk::ColorComponentFlags::RGBA, "write masks"),
             (draw.format != ColorFormat::Float32, "other formats"),
             (draw.scissor.is_some() || draw.area.is_some(), "scissor and render area"),

@@ -67,7 +67,7 @@ pub use pipeline::{
     Compute, FRAGMENT, Graphics, Kernel, Pipeline, PipelineOptions, Shader, VERTEX, Vertex, attribute, binding, blend,
     depth_test, opaque, whole,
 };
-pub use resource::{Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size};
+pub use resource::{Addressed, Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size};
 pub use settings::Settings;
 pub use target::{PassObject, Target, TargetOptions, fetch_sample};
 pub use transform_feedback::TransformFeedback;

@@ -43,6 +43,29 @@ pub fn layer_manifest(folder: &Path) -> PathBuf {
     path
 }
 
+/// Builds the layer that makes drivers wrong, and writes its manifest to `folder`, as [`manifest`] does for the driver.
+fn mutants_manifest(folder: &Path) {
+    let name = "libgaurast_mutants.so";
+    let library = gaurast_runner::built_library("gaurast-mutants", name);
+    let library = library.to_str().expect("a path of Unicode");
+    let template = include_str!("../../conformance/mutants/gaurast_mutants.json");
+    let text = template.replace(&format!("../../../target/release/{name}"), library);
+    assert!(text.contains(library), "the template names the library");
+    std::fs::write(folder.join("gaurast_mutants.json"), text).expect("the manifest is written");
+}
+
+/// As [`through_the_loader`], where the loader also finds the layer that makes drivers wrong.
+///
+/// # Panics
+/// As [`through_the_loader`].
+pub fn with_mutants(case: &Case, inside: impl FnOnce()) {
+    let add = |command: &mut Command, folder: &Path| {
+        mutants_manifest(folder);
+        command.env("VK_ADD_LAYER_PATH", folder);
+    };
+    loaded(case, add, inside);
+}
+
 /// Runs `inside` in a process of its own, where the loader finds this driver alone. The test needs the loader.
 ///
 /// # Panics

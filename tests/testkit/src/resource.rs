@@ -66,7 +66,7 @@ impl Buffer {
         unsafe {
             let raw = device.create_buffer(&info, None).expect("a buffer");
             let needed = device.get_buffer_memory_requirements(raw);
-            let memory = allocate(gpu, needed, flags);
+            let memory = allocate(gpu, needed, flags, further.contains(Usage::SHADER_DEVICE_ADDRESS));
             device.bind_buffer_memory(raw, memory, 0).expect("a buffer is bound");
             Self { raw, size, memory, gpu: gpu.clone() }
         }
@@ -126,10 +126,41 @@ impl Drop for Buffer {
     }
 }
 
-fn allocate(gpu: &Gpu, needed: vk::MemoryRequirements, flags: vk::MemoryPropertyFlags) -> vk::DeviceMemory {
-    let info = vk::MemoryAllocateInfo::default()
+/// A mappable buffer that shaders and the device find by its address.
+pub struct Addressed {
+    /// The buffer.
+    pub buffer: Buffer,
+    /// The address of its first byte.
+    pub address: vk::DeviceAddress,
+    /// Its size in bytes.
+    pub size: u64,
+}
+
+impl Addressed {
+    /// A buffer that holds `contents`.
+    pub fn of<T: NoUninit>(gpu: &Gpu, contents: &[T]) -> Self {
+        let buffer = Buffer::with_usage(gpu, size_of_val(contents) as u64, vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+        buffer.write(contents);
+        let info = vk::BufferDeviceAddressInfo::default().buffer(buffer.raw);
+        // SAFETY: see the crate.
+        let address = unsafe { gpu.device().get_buffer_device_address(&info) };
+        Self { address, size: buffer.size, buffer }
+    }
+}
+
+fn allocate(
+    gpu: &Gpu,
+    needed: vk::MemoryRequirements,
+    flags: vk::MemoryPropertyFlags,
+    has_address: bool,
+) -> vk::DeviceMemory {
+    let mut addresses = vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+    let mut info = vk::MemoryAllocateInfo::default()
         .allocation_size(needed.size)
         .memory_type_index(gpu.memory_type(needed.memory_type_bits, flags));
+    if has_address {
+        info = info.push_next(&mut addresses);
+    }
     // SAFETY: see the crate.
     unsafe { gpu.device().allocate_memory(&info, None) }.expect("memory")
 }
@@ -254,7 +285,7 @@ impl Image {
         unsafe {
             let raw = device.create_image(&info, None).expect("an image");
             let needed = device.get_image_memory_requirements(raw);
-            let memory = allocate(gpu, needed, vk::MemoryPropertyFlags::empty());
+            let memory = allocate(gpu, needed, vk::MemoryPropertyFlags::empty(), false);
             device.bind_image_memory(raw, memory, 0).expect("an image is bound");
             let aspects = aspects(options.format);
             let one = if aspects.contains(vk::ImageAspectFlags::DEPTH) { vk::ImageAspectFlags::DEPTH } else { aspects };

@@ -244,6 +244,27 @@ impl<'a> PassObject<'a> {
     }
 }
 
+impl PassObject<'_> {
+    /// Records a pass of secondary command buffers, which clears the target to a colour.
+    pub fn execute(&self, commands: &Commands, color: [f32; 4], secondaries: &[vk::CommandBuffer]) {
+        let clears = [vk::ClearValue { color: vk::ClearColorValue { float32: color } }];
+        let info = vk::RenderPassBeginInfo::default()
+            .render_pass(self.render_pass)
+            .framebuffer(self.framebuffer)
+            .render_area(self.target.area(&Pass::default()))
+            .clear_values(&clears);
+        let (device, raw) = commands.raw();
+        commands.barrier();
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_begin_render_pass(raw, &info, vk::SubpassContents::SECONDARY_COMMAND_BUFFERS);
+            device.cmd_execute_commands(raw, secondaries);
+            device.cmd_end_render_pass(raw);
+        }
+        commands.barrier();
+    }
+}
+
 impl Attachments for PassObject<'_> {
     fn size(&self) -> [u32; 2] {
         self.target.size()

@@ -30,11 +30,11 @@ fn camera(reverse: bool) -> Camera {
     front().depth_coefficients(coefficients(reverse))
 }
 
-fn tested(format: vk::Format, op: vk::CompareOp, write: bool) -> Depth {
+pub(super) fn tested(format: vk::Format, op: vk::CompareOp, write: bool) -> Depth {
     Depth { format, test: Some((op, write)), bounds: None, stencil: None, stripes: [2.5, 4.0, 6.0, 7.0, 9.0, 16.0] }
 }
 
-fn with_depth(depth: Depth) -> Draw {
+pub(super) fn with_depth(depth: Depth) -> Draw {
     Draw { depth: Some(depth), behind: [0.1, 0.2, 0.3, 0.4], ..Draw::new(layered(31, 0)) }.seen_by(camera(false))
 }
 

@@ -9,7 +9,7 @@ use super::modes::ORDERS;
 use super::scenes::{Gaussian, SceneBuffers, ball, cameras, cloud, dense, layered, many};
 use crate::draw::{Call, Draw, State};
 
-fn vertices(first: u32, count: u32) -> Call {
+pub(super) fn vertices(first: u32, count: u32) -> Call {
     Call::Draw { vertices: [first, count], instances: [0, 1] }
 }
 
@@ -161,7 +161,7 @@ pub(super) fn instances(chapter: &mut Chapter<'_>) {
 }
 
 /// A few Gaussians, each at all placements, or each at its own placement.
-fn placed(rate: vk::VertexInputRate, placements: Vec<OracleInstance>, degree: u32) -> Draw {
+pub(super) fn placed(rate: vk::VertexInputRate, placements: Vec<OracleInstance>, degree: u32) -> Draw {
     let mut scene = cloud(25, 90, degree);
     scene.scales.as_flattened_mut().iter_mut().for_each(|scale| *scale *= 8.0);
     let count = placements.len() as u32;
@@ -173,7 +173,7 @@ fn placed(rate: vk::VertexInputRate, placements: Vec<OracleInstance>, degree: u3
 }
 
 /// Matrices that rotate, stretch, shear, mirror and translate.
-fn placements() -> Vec<OracleInstance> {
+pub(super) fn placements() -> Vec<OracleInstance> {
     (0..6)
         .map(|at| {
             let angle = at as f32;

@@ -1,21 +1,36 @@
 //! The cases of all chapters, made from tables.
 
+mod activation;
 mod attachments;
 mod chapter;
+mod descriptors;
+mod draws;
+mod dynamic_state;
 mod footprint;
+mod harmonics_buffer;
 mod input;
+mod libraries;
+mod limits;
 mod modes;
 mod numerics;
+mod passes;
+mod projection;
+mod queries;
 mod resolve;
 mod scenes;
+mod sets;
+mod targets;
+mod updates;
+mod vertex_input;
+mod views;
 
-pub use chapter::Case;
 use chapter::Chapter;
+pub use chapter::{Case, Subject};
 
 type Write = fn(&mut Chapter<'_>);
 
 /// The chapters in their order.
-const CHAPTERS: [(&str, Write); 17] = [
+const CHAPTERS: [(&str, Write); 32] = [
     ("topology", input::topology),
     ("attributes", input::attributes),
     ("instances", input::instances),
@@ -33,6 +48,21 @@ const CHAPTERS: [(&str, Write); 17] = [
     ("stencil", attachments::stencil),
     ("interactions", attachments::interactions),
     ("numerics", numerics::numerics),
+    ("draws", draws::draws),
+    ("sets", sets::sets),
+    ("vertex_input", vertex_input::vertex_input),
+    ("activation", activation::activation),
+    ("harmonics_buffer", harmonics_buffer::harmonics_buffer),
+    ("dynamic_state", dynamic_state::dynamic_state),
+    ("views", views::views),
+    ("projection", projection::projection),
+    ("targets", targets::targets),
+    ("passes", passes::passes),
+    ("updates", updates::updates),
+    ("descriptors", descriptors::descriptors),
+    ("queries", queries::queries),
+    ("libraries", libraries::libraries),
+    ("limits", limits::limits),
 ];
 
 /// The names of the chapters.

@@ -7,11 +7,14 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST as Precision,
 };
 
+use gaurast_testkit::Pass;
+
 use super::chapter::Chapter;
 use super::scenes::{
     Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels, pinholes, strange,
 };
 use crate::draw::{Draw, State};
+use crate::program::Program;
 
 pub(super) const ORDERS: [(&str, Order); 4] = [
     ("view_depth", Order::VIEW_DEPTH),
@@ -22,6 +25,46 @@ pub(super) const ORDERS: [(&str, Order); 4] = [
 
 type Scene = fn() -> SceneBuffers;
 type Change = fn(State) -> State;
+
+/// Cameras that are set more than once, and before a pipeline is bound.
+fn again(chapter: &mut Chapter<'_>) {
+    chapter.program("set_again", || {
+        Program::pass(Draw::new(dense(4, 1)).seen_by(front().eye([0.3, 0.1, -0.5])), |stage, commands| {
+            commands.camera(&front().eye([50.0; 3]));
+            commands.camera(&stage.draw.camera);
+            commands.draw(0..500);
+        })
+    });
+    chapter.program("each_draw_its_own", || {
+        // Nothing is seen through the second.
+        Program::pass(Draw::new(dense(5, 1)), |stage, commands| {
+            commands.draw(0..500);
+            commands.camera(&stage.draw.camera.eye([1e5; 3]));
+            commands.draw(0..500);
+        })
+    });
+    chapter.program("set_before_the_pipeline", || {
+        Program::pass(Draw::new(dense(6, 1)), |stage, commands| {
+            commands.camera(&front().eye([50.0; 3]));
+            commands.camera(&stage.draw.camera);
+            commands.bind(&stage.pipeline);
+            commands.draw(0..500);
+        })
+    });
+    chapter.program("in_the_next_pass", || {
+        Program::on_stage(Draw::new(dense(7, 1)), |stage| {
+            stage.gpu.run(|commands| {
+                stage.pass(commands, || {});
+                // The camera stays when a pass ends.
+                commands.pass(&stage.target, &Pass::load(), || {
+                    commands.bind(&stage.pipeline);
+                    stage.scene.bind_buffers(commands);
+                    commands.draw(0..500);
+                });
+            });
+        })
+    });
+}
 
 pub(super) fn camera(chapter: &mut Chapter<'_>) {
     let scenes: [(&str, Scene); 4] = [
@@ -42,6 +85,7 @@ pub(super) fn camera(chapter: &mut Chapter<'_>) {
             ..Draw::new(dense(3, 2)).seen_by(camera)
         });
     }
+    again(chapter);
     // Centres in the planes are not between them; their neighbours are.
     let in_planes = || {
         many(6, |index| {

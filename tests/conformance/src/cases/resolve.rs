@@ -61,6 +61,7 @@ pub(super) fn resolve(chapter: &mut Chapter<'_>) {
         }
     }
     names(chapter);
+    super::targets::inputs(chapter);
 }
 
 /// Vertices and instances by which Gaussians are named.

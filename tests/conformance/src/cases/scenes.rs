@@ -1,5 +1,7 @@
 //! Scenes and cameras that the tables of cases use.
 
+use std::ops::Range;
+
 use gaurast::vk::GaussianCameraModelGAURAST as Model;
 pub(super) use gaurast_oracle::scenes::{Gaussian, SceneBuffers, awkward, cloud};
 
@@ -37,6 +39,19 @@ pub(super) fn layered(seed: u64, degree: u32) -> SceneBuffers {
 /// Gaussians of every shape, many of which are skipped or cover everything.
 pub(super) fn strange(seed: u64) -> SceneBuffers {
     awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32)
+}
+
+/// The Gaussians of a scene in a range of its vertices.
+pub(super) fn part(scene: &SceneBuffers, vertices: Range<usize>) -> SceneBuffers {
+    let triples = (scene.degree + 1).pow(2) as usize;
+    SceneBuffers {
+        positions: scene.positions[vertices.clone()].to_vec(),
+        scales: scene.scales[vertices.clone()].to_vec(),
+        rotations: scene.rotations[vertices.clone()].to_vec(),
+        opacities: scene.opacities[vertices.clone()].to_vec(),
+        sh: scene.sh[vertices.start * triples..vertices.end * triples].to_vec(),
+        degree: scene.degree,
+    }
 }
 
 /// One round Gaussian of degree 0 straight ahead.

@@ -1,0 +1,149 @@
+//! The extension's commands.
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST as Camera, GaussianCameraModelGAURAST as Model,
+    GaussianOrderGAURAST, GaussianSphericalHarmonicsBufferGAURAST as Harmonics,
+};
+
+use crate::interface::slice;
+use crate::next::next;
+use crate::recording::{Deferred, of};
+use crate::table::*;
+
+/// Makes the active mutant's change to a camera.
+fn changed(mut camera: Camera<'_>) -> Camera<'_> {
+    let [x, y, z] = camera.eye;
+    CAMERA_EYE.replaces(&mut camera.eye, [-x, y, z]);
+    CAMERA_EYE_BINARY32.replaces(&mut camera.eye, [x, y, z].map(|c| f64::from(c as f32)));
+    for (mutant, model, mistaken) in [
+        (&CAMERA_ORTHOGRAPHIC, Model::ORTHOGRAPHIC, Model::PINHOLE),
+        (&CAMERA_FISHEYE, Model::FISHEYE, Model::PINHOLE),
+        (&CAMERA_EQUIRECTANGULAR, Model::EQUIRECTANGULAR, Model::FISHEYE),
+    ] {
+        if camera.model == model {
+            mutant.replaces(&mut camera.model, mistaken);
+            break;
+        }
+    }
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = camera.rotation;
+    CAMERA_ROTATION.replaces(&mut camera.rotation, [xx, yx, zx, xy, yy, zy, xz, yz, zz]);
+    CAMERA_FOCAL_LENGTH.changes(&mut camera.focal_length, |[x, _]| [x; 2]);
+    CAMERA_PRINCIPAL_POINT.changes(&mut camera.principal_point, |[x, _]| [x; 2]);
+    DEPTH_COEFFICIENTS.replaces(&mut camera.depth_coefficients, [1.0, -0.2]);
+    let far = camera.far_plane;
+    CAMERA_NEAR_PLANE.replaces(&mut camera.near_plane, 0.2_f32.min(far / 2.0));
+    CAMERA_FAR_PLANE.replaces(&mut camera.far_plane, f32::INFINITY);
+    camera
+}
+
+pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
+    commands: vk::CommandBuffer,
+    count: u32,
+    cameras: *const Camera<'_>,
+) {
+    let is_later = of(commands, |recording| recording.count("cameras")) > 0;
+    if CAMERA_SET_ONCE.strikes(is_later) {
+        return;
+    }
+    // SAFETY: see the crate.
+    unsafe {
+        let mut cameras: Vec<_> = slice(cameras, count).iter().copied().map(changed).collect();
+        if VIEWS_ONE_CAMERA.strikes(count > 1) {
+            cameras.truncate(1);
+        }
+        if VIEWS_LAST_CAMERA.strikes(count > 1) {
+            cameras = cameras.pop().into_iter().collect();
+        }
+        if count > 2 && VIEWS_CAMERAS_PACKED.strikes(true) {
+            cameras[2] = cameras[1];
+        }
+        (next().cmd_set_gaussian_cameras)(commands, cameras.len() as u32, cameras.as_ptr());
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_begin_gaussian_set(commands: vk::CommandBuffer) {
+    let is_passed_on = of(commands, |recording| {
+        recording.in_set = true;
+        recording.draws_of_set = 0;
+        let is_open = std::mem::replace(&mut recording.set_is_open, SETS_JOINED.is_active());
+        !SET_APART.strikes(true) && !SETS_JOINED.strikes(is_open)
+    });
+    if is_passed_on {
+        // SAFETY: see the crate.
+        unsafe { (next().cmd_begin_gaussian_set)(commands) };
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_end_gaussian_set(commands: vk::CommandBuffer) {
+    let waiting = of(commands, |recording| {
+        recording.in_set = false;
+        std::mem::take(&mut recording.after_set)
+    });
+    // What is cleared late is cleared after the set.
+    let (before, after) = if SET_CLEARED.is_active() { (Vec::new(), waiting) } else { (waiting, Vec::new()) };
+    before.into_iter().for_each(|command: Deferred| command());
+    if !SET_APART.is_active() && !SETS_JOINED.is_active() {
+        // SAFETY: see the crate.
+        unsafe { (next().cmd_end_gaussian_set)(commands) };
+    }
+    after.into_iter().for_each(|command| command());
+}
+
+/// Ends a set that a mutant has kept open up to the end of the pass.
+pub(super) fn end_open_set(commands: vk::CommandBuffer) {
+    if of(commands, |recording| std::mem::take(&mut recording.set_is_open)) {
+        // SAFETY: see the crate.
+        unsafe { (next().cmd_end_gaussian_set)(commands) };
+    }
+}
+
+/// A command that sets a dynamic state: it is dropped after the first of its kind, if the mutant is active.
+macro_rules! dynamic {
+    ($($name:ident($type:ty);)*) => {
+        $(pub(super) unsafe extern "system" fn $name(commands: vk::CommandBuffer, value: $type) {
+            let is_later = of(commands, |recording| recording.count(stringify!($name))) > 0;
+            if !DYNAMIC_SET_ONCE.strikes(is_later) {
+                // SAFETY: see the crate.
+                unsafe { (next().$name)(commands, value) };
+            }
+        })*
+    };
+}
+
+dynamic! {
+    cmd_set_gaussian_order(GaussianOrderGAURAST);
+    cmd_set_gaussian_antialiasing(GaussianAntialiasingGAURAST);
+    cmd_set_gaussian_low_pass_variance(f32);
+    cmd_set_gaussian_alpha_floor(f32);
+    cmd_set_gaussian_alpha_ceiling(f32);
+    cmd_set_gaussian_transmittance_floor(f32);
+    cmd_set_gaussian_spherical_harmonics_degree(u32);
+    cmd_set_gaussian_exponential_error(f32);
+    cmd_set_gaussian_contribution_budget(f32);
+}
+
+pub(super) unsafe extern "system" fn cmd_bind_gaussian_spherical_harmonics(
+    commands: vk::CommandBuffer,
+    buffer: *const Harmonics<'_>,
+) {
+    let is_lost = of(commands, |recording| {
+        let is_later = recording.count("harmonics") > 0;
+        let is_late = recording.in_set && recording.draws_of_set > 0;
+        HARMONICS_REBOUND.strikes(is_later) || SET_HARMONICS.strikes(is_late)
+    });
+    if is_lost {
+        return;
+    }
+    // SAFETY: see the crate.
+    unsafe {
+        let mut buffer = *buffer;
+        HARMONICS_ADDRESS.changes(&mut buffer.device_address, |address| address - 64);
+        HARMONICS_SIZE.changes(&mut buffer.size, |size| size + 64);
+        HARMONICS_SIZE_HALF.changes(&mut buffer.size, |size| size / 2);
+        HARMONICS_FORMAT.replaces(&mut buffer.format, vk::Format::R32G32B32_SFLOAT);
+        HARMONICS_STRIDE.replaces(&mut buffer.stride, 48);
+        HARMONICS_COEFFICIENT_STRIDE.replaces(&mut buffer.coefficient_stride, 12);
+        (next().cmd_bind_gaussian_spherical_harmonics)(commands, &raw const buffer);
+    }
+}

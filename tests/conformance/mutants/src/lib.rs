@@ -1,0 +1,119 @@
+//! `VK_LAYER_GAURAST_mutants`: a Vulkan layer that makes any driver of `VK_GAURAST_gaussian_primitive_topology` wrong in
+//! one way, the _mutant_ that the environment's `GAURAST_MUTANT` names. It tests the conformance cases: each mutant must
+//! fail one of its chapter.
+//!
+//! Commands are passed on as they are, but for those that the mutant concerns. A mutant counts how often it changed
+//! something; the count is written to the file that `GAURAST_MUTANT_REPORT` names.
+//!
+//! | module | has |
+//! |---|---|
+//! | [`table`] | all mutants: name, chapter, what is wrong |
+//! | [`mutant`] | a mutant, the active one, and its count |
+//! | [`environment`] | the variables that choose it, and say where its count is written |
+//! | `below` | the functions of the next layer by which commands are looked up |
+//! | `hooks` | the commands that are intercepted, by chapter of Vulkan |
+//! | `request` | a pipeline that is created, as a copy that may be changed |
+//! | `recording` | what is known of each command buffer |
+//! | `next` | the next layer's commands |
+//! | `interface` | the loader's structures |
+//!
+//! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid
+//! usage, so that what pointers name is there, and what a mutant changes keeps it where it is passed on.
+
+mod below;
+pub mod environment;
+mod hooks;
+mod interface;
+pub mod mutant;
+mod next;
+mod recording;
+mod request;
+pub mod table;
+
+use std::ffi::c_char;
+use std::mem::transmute;
+
+use ash::vk;
+
+pub use crate::mutant::Mutant;
+pub use crate::table::MUTANTS;
+
+use crate::below::below;
+use crate::interface::{Function, NegotiateLayerInterface};
+
+/// Agrees with the loader on the version of their interface, and gives it the layer's functions.
+///
+/// # Safety
+/// `version` points at the loader's structure, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
+    version: *mut NegotiateLayerInterface,
+) -> vk::Result {
+    // SAFETY: the caller's promise.
+    let Some(version) = (unsafe { version.as_mut() }) else {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    };
+    if version.version < interface::VERSION {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    }
+    version.version = interface::VERSION;
+    version.get_instance_proc_addr = Some(get_instance_proc_addr);
+    version.get_device_proc_addr = Some(get_device_proc_addr);
+    version.get_physical_device_proc_addr = Some(get_physical_device_proc_addr);
+    vk::Result::SUCCESS
+}
+
+/// `vkGetInstanceProcAddr`.
+unsafe extern "system" fn get_instance_proc_addr(
+    instance: vk::Instance,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the name is a string, or null.
+    let command = unsafe { interface::string(name) };
+    let (get, get_device): (vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkGetDeviceProcAddr) =
+        (get_instance_proc_addr, get_device_proc_addr);
+    // SAFETY: function pointers have one size, and whoever calls it casts it back.
+    unsafe {
+        if command == c"vkGetInstanceProcAddr" {
+            return transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get);
+        }
+        if command == c"vkGetDeviceProcAddr" {
+            return transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device);
+        }
+    }
+    if instance == vk::Instance::null() {
+        return hooks::instance_hook(command).map(plain).filter(|_| command == c"vkCreateInstance");
+    }
+    // SAFETY: the instance is valid, and the name is a string.
+    let next = unsafe { (below()?.get_instance_proc_addr)(instance, name) }?;
+    let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
+    Some(hook.map_or(next, plain))
+}
+
+/// `vkGetDeviceProcAddr`.
+unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the name is a string, or null.
+    let command = unsafe { interface::string(name) };
+    let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
+    if command == c"vkGetDeviceProcAddr" {
+        // SAFETY: function pointers have one size, and whoever calls it casts it back.
+        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get) };
+    }
+    // SAFETY: the device is valid, and the name is a string.
+    let next = unsafe { (below()?.get_device_proc_addr?)(device, name) }?;
+    Some(hooks::device_hook(command).map_or(next, plain))
+}
+
+/// `vk_layerGetPhysicalDeviceProcAddr`.
+unsafe extern "system" fn get_physical_device_proc_addr(
+    instance: vk::Instance,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the instance is valid, and the name is a string.
+    unsafe { (below()?.get_physical_device_proc_addr?)(instance, name) }
+}
+
+/// A function without a type, as ash has it.
+fn plain(function: Function) -> unsafe extern "system" fn() {
+    function
+}
