@@ -3,6 +3,7 @@
 //! Every [`Scene`] is in the frame of the original 3D Gaussian splatting code and its PLY files: +x right, +y **down**,
 //! +z forward. Files in other frames are rotated when they are read; `docs/files.md` has the formats and their frames.
 
+mod axes;
 pub mod camera;
 pub mod camera_files;
 pub mod camera_path;
@@ -19,10 +20,11 @@ mod scene;
 mod shape;
 mod transform;
 
+pub use axes::{Axes, AxesReason, FileAxes};
 pub use camera::Camera;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{Options, known_extensions, open, open_with, read, read_with};
-pub use framing::{DEFAULT_UP, Extent, Framing, default_angles, frame, inside};
+pub use framing::{DEFAULT_UP, Extent, Framed, Framing, Subject, default_angles, frame, inside};
 pub use harmonics::{MAX_SH_DEGREE, SH_C0};
 pub use mesh::{Mesh, MeshVertex};
 pub use metadata::{Antialiasing, ColorSpace, Geometry, Metadata, SortOrder};
