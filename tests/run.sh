@@ -28,6 +28,7 @@ need verilator verilator
 need make make
 need yosys yosys
 need xvfb Xvfb
+need qemu-user qemu-x86_64
 if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then

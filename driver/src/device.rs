@@ -2,6 +2,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, Reporter, objects};
+use crate::abi::sanitizer;
 use crate::abi::valid;
 use crate::device_addresses::Addresses;
 use crate::device_sync::DeviceSync;
@@ -58,6 +59,9 @@ impl Device {
         simulated: simdevice::Device,
         families: &[u32],
     ) -> Result<Arc<Self>, Error> {
+        if sanitizer::is_present() {
+            simulated.runtime().install(|| rayon::broadcast(|_| sanitizer::ignore_thread()));
+        }
         let device = Arc::new(Self {
             instance,
             extensions,

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 pub(crate) struct DeviceSync {
     gate: Mutex<()>,
     changed: Condvar,
-    lost: OnceLock<String>,
+    lost: OnceLock<Error>,
 }
 
 /// The end of a wait.
@@ -42,22 +42,19 @@ impl DeviceSync {
     }
 
     /// Marks the device as lost and wakes every waiter. Only the first reason is kept, because others follow from it.
-    pub(crate) fn lose(&self, reason: &str) {
-        log::error!("the device is lost: {reason}");
+    pub(crate) fn lose(&self, reason: Error) {
+        log::error!("{reason}");
         self.update(|| {
-            self.lost.get_or_init(|| reason.to_owned());
+            self.lost.get_or_init(|| reason);
         });
     }
 
     /// Fails if the device is lost. Commands that may return `VK_ERROR_DEVICE_LOST` call this first.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`].
+    /// [`Error::DeviceLost`], or [`Error::DeviceLostByDefect`].
     pub(crate) fn check(&self) -> Result<(), Error> {
-        match self.lost.get() {
-            None => Ok(()),
-            Some(reason) => Err(Error::DeviceLost(reason.clone())),
-        }
+        self.lost.get().map_or(Ok(()), |reason| Err(reason.clone()))
     }
 
     /// Waits until `ready`, at most until `deadline` (forever without one).
@@ -116,7 +113,7 @@ mod tests {
             let sync = sync.clone();
             move || sync.wait(None, || false)
         });
-        sync.lose("a test");
+        sync.lose(Error::DeviceLost("a test".to_owned()));
         assert_eq!(waiter.join().unwrap(), WaitResult::Lost);
         assert_eq!(sync.wait(None, || true), WaitResult::Ready);
         assert!(sync.check().unwrap_err().to_string().contains("a test"));

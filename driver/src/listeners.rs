@@ -2,6 +2,7 @@
 //! `VK_EXT_debug_report`.
 
 use crate::abi::error::Error;
+use crate::abi::sanitizer::observed;
 use ash::vk;
 use std::ffi::{CStr, CString, c_void};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -127,7 +128,7 @@ impl DebugMessenger {
         let wanted = self.severities.contains(severity) && self.types.intersects(types);
         if let Some(callback) = self.callback.filter(|_| wanted) {
             // SAFETY: the caller's promise. The callback's result, which asks to abort the call, is meant for layers.
-            unsafe { callback(severity, types, data, self.user_data) };
+            observed(|| unsafe { callback(severity, types, data, self.user_data) });
         }
     }
 
@@ -177,7 +178,7 @@ impl DebugReportCallback {
         if let Some(callback) = self.callback.filter(|_| wanted) {
             // SAFETY: the caller's promise; the strings outlive the call. The callback's result, which asks to abort the
             // call, is meant for layers.
-            unsafe {
+            observed(|| unsafe {
                 callback(
                     flags,
                     origin.object_type,
@@ -188,7 +189,7 @@ impl DebugReportCallback {
                     text.as_ptr(),
                     self.user_data,
                 )
-            };
+            });
         }
     }
 

@@ -7,6 +7,7 @@
 use crate::abi::error::Error;
 use crate::abi::guard::panic_message;
 use crate::abi::handle::{Reporter, objects};
+use crate::abi::sanitizer::{acquire, ignore_thread, release};
 use crate::device_sync::DeviceSync;
 use crate::instance::Instance;
 use ash::vk;
@@ -75,6 +76,7 @@ impl Queue {
     /// [`Error::DeviceLost`]; the work is dropped.
     pub(crate) fn submit(&self, work: Work) -> Result<(), Error> {
         self.sync.check()?;
+        release(&*work);
         let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
         worker
             .as_ref()
@@ -88,12 +90,16 @@ impl Queue {
     /// [`Error::DeviceLost`].
     pub(crate) fn wait_idle(&self) -> Result<(), Error> {
         let (done, wait) = channel();
+        let idle = Arc::new(());
+        let reached = Arc::clone(&idle);
         self.submit(Box::new(move |_| {
+            release(&*reached);
             // The receiver exists as long as this closure.
             let _ = done.send(());
         }))?;
         // The sender is dropped without a message only if the queue dropped the work.
         let waited = wait.recv();
+        acquire(&*idle);
         self.sync.check()?;
         waited.map_err(|_| Error::DeviceLost("its queue has stopped".to_owned()))
     }
@@ -113,7 +119,9 @@ impl Queue {
 
 /// The queue's thread: runs work until the queue is stopped. After a panic it drops further work instead of running it.
 fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync) {
+    ignore_thread();
     while let Ok(work) = work.recv() {
+        acquire(&*work);
         let executed = catch_unwind(AssertUnwindSafe(|| {
             if sync.check().is_ok() {
                 work(&mut processor);
@@ -122,7 +130,7 @@ fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync
             }
         }));
         if let Err(panic) = executed {
-            sync.lose(panic_message(panic.as_ref()));
+            sync.lose(Error::DeviceLostByDefect(panic_message(panic.as_ref()).to_owned()));
         }
     }
 }

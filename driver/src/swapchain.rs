@@ -6,6 +6,7 @@
 use crate::abi::error::Error;
 use crate::abi::guard::panic_message;
 use crate::abi::handle::{self, objects};
+use crate::abi::sanitizer::ignore_thread;
 use crate::abi::valid;
 use crate::command::submit::{Batch, enqueue};
 use crate::device::Device;
@@ -300,6 +301,7 @@ pub(crate) fn create_swapchain(
     let thread = std::thread::Builder::new()
         .name("gaurast-present".to_owned())
         .spawn(move || {
+            ignore_thread();
             let shown = catch_unwind(AssertUnwindSafe(|| run.run(canvas.as_mut())));
             match shown {
                 Ok(Ok(())) => {}

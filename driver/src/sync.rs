@@ -2,6 +2,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::objects;
+use crate::abi::sanitizer::{acquire, release};
 use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
 use ash::vk;
@@ -29,11 +30,16 @@ impl Fence {
 
     /// Reports whether it is signaled.
     pub(crate) fn is_signaled(&self) -> bool {
-        self.signaled.load(Ordering::Acquire)
+        let is_signaled = self.signaled.load(Ordering::Acquire);
+        if is_signaled {
+            acquire(self);
+        }
+        is_signaled
     }
 
     /// Signals the fence.
     pub(crate) fn signal(&self) {
+        release(self);
         self.sync.update(|| self.signaled.store(true, Ordering::Release));
     }
 
@@ -71,12 +77,17 @@ impl Semaphore {
     pub(crate) fn value(&self) -> Option<u64> {
         match &self.payload {
             Payload::Binary(_) => None,
-            Payload::Timeline(value) => Some(value.load(Ordering::Acquire)),
+            Payload::Timeline(value) => {
+                let value = value.load(Ordering::Acquire);
+                acquire(self);
+                Some(value)
+            }
         }
     }
 
     /// Signals the semaphore; a timeline semaphore gets `value`.
     pub(crate) fn signal(&self, value: u64) {
+        release(self);
         self.sync.update(|| match &self.payload {
             Payload::Binary(signaled) => signaled.store(true, Ordering::Release),
             // A smaller value is the application's error; a timeline never decreases.
@@ -88,10 +99,14 @@ impl Semaphore {
 
     /// Reports whether a wait for `value` (which a binary semaphore ignores) has ended.
     pub(crate) fn is_reached(&self, value: u64) -> bool {
-        match &self.payload {
+        let is_reached = match &self.payload {
             Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
             Payload::Timeline(current) => current.load(Ordering::Acquire) >= value,
+        };
+        if is_reached {
+            acquire(self);
         }
+        is_reached
     }
 
     /// Ends a queue's wait: a binary semaphore becomes unsignaled.
@@ -117,11 +132,16 @@ impl Event {
 
     /// Reports whether it is set.
     pub(crate) fn is_set(&self) -> bool {
-        self.value.load(Ordering::Acquire)
+        let is_set = self.value.load(Ordering::Acquire);
+        if is_set {
+            acquire(self);
+        }
+        is_set
     }
 
     /// Sets or resets the event.
     pub(crate) fn set(&self, value: bool) {
+        release(self);
         self.sync.update(|| self.value.store(value, Ordering::Release));
     }
 }

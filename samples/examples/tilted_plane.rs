@@ -7,9 +7,9 @@
 use std::error::Error;
 use std::path::Path;
 
-use gaurast_render::{Geometry, Renderer, Settings};
+use gaurast_render::{Renderer, Settings};
 use gaurast_scene::camera::Camera;
-use gaurast_scene::{GaussianShape, Scene};
+use gaurast_scene::{GaussianShape, Geometry, Scene};
 
 /// The number of discs along a side of the floor, and their distance.
 const SIDE: i32 = 24;

@@ -267,6 +267,66 @@ fn attributes_advance_by_instance() {
     assert_same(&Bench::new(&expected).whole(), &drawn);
 }
 
+/// Small instances share groups of the device; the picture is that of the same Gaussians by vertex.
+#[gaurast_runner::test(each = simd_levels())]
+fn small_instances_are_the_gaussians_that_they_have(case: &Case) {
+    let settings = Settings { simd: Some(case.variant()), ..Settings::default() };
+    for (count, instances) in [(1_u64, 700_u32), (2, 300), (7, 90), (100, 6), (128, 5), (129, 4), (300, 2)] {
+        let shapes = scenes::cloud(count, count as usize, 1);
+        let looks = scenes::cloud(count + 1, 1 + instances as usize, 1);
+        let mut mixed = shapes.clone();
+        mixed.opacities.clone_from(&looks.opacities);
+        mixed.sh.clone_from(&looks.sh);
+        let mut expected = SceneBuffers { degree: 1, ..SceneBuffers::default() };
+        for instance in 1..=instances as usize {
+            let look = part(&looks, instance..instance + 1);
+            let copies = || std::iter::repeat_n(look.sh.as_slice(), count as usize);
+            let copy = SceneBuffers {
+                opacities: vec![look.opacities[0]; count as usize],
+                sh: copies().flatten().copied().collect(),
+                ..shapes.clone()
+            };
+            expected = joined(expected, &copy);
+        }
+        let expected = Bench::with(&expected, &settings, &GaussianOptions::new(1)).whole();
+        let options = GaussianOptions { looks_by_instance: true, ..GaussianOptions::new(1) };
+        let bench = Bench::with(&mixed, &settings, &options);
+        let vertices = count as u32;
+        let drawn = bench.draw(|commands| commands.draw_instances(0..vertices, 1..1 + instances));
+        assert_same(&expected, &drawn);
+        // The same through indices that count from 9.
+        let indices: Vec<u32> = (0..vertices).map(|vertex| vertex + 9).collect();
+        let indices = Buffer::of(&bench.gpu, &indices);
+        let indexed = bench.draw(|commands| {
+            commands.indices(&indices, 0, vk::IndexType::UINT32);
+            let (device, raw) = commands.raw();
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw_indexed(raw, vertices, instances, 0, -9, 1) };
+        });
+        assert_same(&expected, &indexed);
+    }
+}
+
+/// Vertices beyond the buffers cost nothing, and are warned of once.
+#[gaurast_runner::test]
+fn vertices_beyond_the_buffers_draw_nothing() {
+    let scene = scenes::cloud(26, 1200, 0);
+    let bench = Bench::new(&scene);
+    let expected = bench.whole();
+    let indirect = Buffer::of(&bench.gpu, &[[u32::MAX, 1, 0, 0]]);
+    let target = bench.target();
+    bench.gpu.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            bench.scene.bind(commands, &bench.pipeline, &bench.camera);
+            commands.draw_indirect(&indirect, 1);
+        });
+    });
+    assert_same(&expected, &target.read());
+    let texts = bench.gpu.message_texts();
+    let [text] = &*texts else { panic!("{texts:?}") };
+    assert!(text.contains("leaves out 4294966095 of them"), "{text}");
+}
+
 #[gaurast_runner::test]
 fn empty_draws_draw_nothing() {
     let bench = Bench::new(&scene());

@@ -316,7 +316,7 @@ fn too_many() -> String {
     let scene = Scene::new(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], &splats());
     let pixels = scene.draw([0.25; 4], |device, commands| {
         // SAFETY: see the crate.
-        unsafe { device.cmd_draw(commands, u32::MAX, 2, 0, 0) };
+        unsafe { device.cmd_draw(commands, 1, (1 << 26) + 1, 0, 0) };
     });
     assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
     scene.gpu.message_texts().concat()

@@ -3,6 +3,7 @@
 mod abort;
 mod fuzzing;
 mod long_run;
+mod sanitizers;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()

@@ -144,7 +144,7 @@ impl Colors {
     fn shown(self, colour: f32) -> f32 {
         match self {
             Self::Srgb => colour,
-            Self::Linear if colour > 0.003_130_8 => 1.055 * colour.powf(1.0 / 2.4) - 0.055,
+            Self::Linear if colour > 0.003_130_8 => 1.055 * libm::powf(colour, 1.0 / 2.4) - 0.055,
             Self::Linear => 12.92 * colour,
         }
     }
@@ -357,13 +357,13 @@ fn to_linear(colour: f32, alpha: f32) -> f32 {
         return 0.0;
     }
     let straight = colour / alpha;
-    let linear = if straight > 0.04045 { ((straight + 0.055) / 1.055).powf(2.4) } else { straight / 12.92 };
+    let linear = if straight > 0.04045 { libm::powf((straight + 0.055) / 1.055, 2.4) } else { straight / 12.92 };
     linear * alpha
 }
 
 /// Rounds a colour to eight bits, without a transfer function.
 fn to_byte(value: f32) -> u8 {
-    (255.0 * value.clamp(0.0, 1.0)).round() as u8
+    libm::roundf(255.0 * value.clamp(0.0, 1.0)) as u8
 }
 
 #[cfg(test)]

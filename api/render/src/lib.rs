@@ -26,6 +26,8 @@
 //! # }
 //! ```
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 pub mod device;
 mod device_scene;
 mod draw;
@@ -44,7 +46,7 @@ mod target;
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
 pub use gaurast::WorkTrace;
-pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
+pub use modes::{CutOff, Precision};
 pub use options::{DeviceOptions, Message, MessageFunction};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};

@@ -41,7 +41,7 @@ pub(crate) fn lit(scene: &Scene) -> Vec<LitVertex> {
 
 /// The linear light of an sRGB value, both from 0 to 1.
 fn linear(srgb: f32) -> f32 {
-    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+    if srgb <= 0.040_45 { srgb / 12.92 } else { libm::powf((srgb + 0.055) / 1.055, 2.4) }
 }
 
 /// The matrix, column by column, from the scene to clip coordinates of a pinhole or orthographic camera. Depths are 1

@@ -4,30 +4,8 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
     GaussianPrecisionGAURAST,
 };
+use gaurast_scene::{Antialiasing, Geometry, SortOrder};
 use serde::{Deserialize, Serialize};
-
-/// The key by which Gaussians are sorted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Order {
-    /// Depth along the camera's axis, as in 3DGS.
-    #[default]
-    Depth,
-    /// Distance from the camera.
-    Distance,
-    /// Depth along each pixel's own ray: no Gaussian pops as the camera turns.
-    PerPixel,
-}
-
-impl Order {
-    /// The value for the pipeline.
-    pub(crate) fn raw(self) -> GaussianOrderGAURAST {
-        match self {
-            Self::Depth => GaussianOrderGAURAST::VIEW_DEPTH,
-            Self::Distance => GaussianOrderGAURAST::RADIAL_DISTANCE,
-            Self::PerPixel => GaussianOrderGAURAST::PER_PIXEL,
-        }
-    }
-}
 
 /// The shape outside which a Gaussian does not contribute, of a number of standard deviations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,34 +33,6 @@ impl CutOff {
     }
 }
 
-/// The shape of Gaussians in space.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Geometry {
-    /// Volumes with three axes, as in 3DGS.
-    #[default]
-    Volume,
-    /// Flat discs with two axes, as in 2DGS; a third scale is ignored.
-    Surfel,
-}
-
-impl Geometry {
-    /// The value for the pipeline.
-    pub(crate) fn raw(self) -> GaussianGeometryGAURAST {
-        match self {
-            Self::Volume => GaussianGeometryGAURAST::GAUSSIAN_3D,
-            Self::Surfel => GaussianGeometryGAURAST::GAUSSIAN_2D,
-        }
-    }
-
-    /// The variance of the screen filter for this shape, in px^2.
-    pub(crate) fn low_pass_variance(self) -> f32 {
-        match self {
-            Self::Volume => 0.3,
-            Self::Surfel => 0.5,
-        }
-    }
-}
-
 /// The rasterizer's arithmetic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Precision {
@@ -103,22 +53,35 @@ impl Precision {
     }
 }
 
-/// The treatment of Gaussians that are smaller than a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Antialiasing {
-    /// They are dilated and keep their opacity, as in 3DGS: distant ones look too thick.
-    #[default]
-    Dilate,
-    /// They are dilated and lose opacity in proportion, for scenes that are trained so.
-    Compensated,
+/// The pipeline's value for a sort order.
+pub(crate) fn raw_order(order: SortOrder) -> GaussianOrderGAURAST {
+    match order {
+        SortOrder::Depth => GaussianOrderGAURAST::VIEW_DEPTH,
+        SortOrder::Distance => GaussianOrderGAURAST::RADIAL_DISTANCE,
+        SortOrder::PerPixel => GaussianOrderGAURAST::PER_PIXEL,
+    }
 }
 
-impl Antialiasing {
-    /// The value for the pipeline.
-    pub(crate) fn raw(self) -> GaussianAntialiasingGAURAST {
-        match self {
-            Self::Dilate => GaussianAntialiasingGAURAST::DILATE,
-            Self::Compensated => GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
-        }
+/// The pipeline's value for a shape in space.
+pub(crate) fn raw_geometry(geometry: Geometry) -> GaussianGeometryGAURAST {
+    match geometry {
+        Geometry::Volume => GaussianGeometryGAURAST::GAUSSIAN_3D,
+        Geometry::Surfel => GaussianGeometryGAURAST::GAUSSIAN_2D,
+    }
+}
+
+/// The variance of the screen filter for a shape, in px^2.
+pub(crate) fn low_pass_variance(geometry: Geometry) -> f32 {
+    match geometry {
+        Geometry::Volume => 0.3,
+        Geometry::Surfel => 0.5,
+    }
+}
+
+/// The pipeline's value for the compensation of the screen filter.
+pub(crate) fn raw_antialiasing(antialiasing: Antialiasing) -> GaussianAntialiasingGAURAST {
+    match antialiasing {
+        Antialiasing::Off => GaussianAntialiasingGAURAST::DILATE,
+        Antialiasing::Compensated => GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
     }
 }

@@ -11,6 +11,7 @@ use gaurast::vk::{
 
 use crate::device::Device;
 use crate::error::{During, RenderError};
+use crate::modes;
 use crate::settings::Settings;
 use crate::target::{DEPTH_FORMAT, DEPTHS_FORMAT};
 use gaurast_scene::GaussianShape;
@@ -93,11 +94,11 @@ impl GaussianPipeline {
             .alpha_floor(settings.alpha_floor)
             .alpha_ceiling(settings.alpha_ceiling)
             .transmittance_floor(settings.transmittance_floor)
-            .order(settings.order.raw())
-            .geometry(settings.geometry.raw())
+            .order(modes::raw_order(settings.order))
+            .geometry(modes::raw_geometry(settings.geometry))
             .precision(settings.precision.raw())
-            .antialiasing(settings.antialiasing.raw())
-            .low_pass_variance(settings.geometry.low_pass_variance())
+            .antialiasing(modes::raw_antialiasing(settings.antialiasing))
+            .low_pass_variance(modes::low_pass_variance(settings.geometry))
             .attribute_locations(
                 GaussianAttributeLocationsGAURAST::default()
                     .position(0)

@@ -1,11 +1,11 @@
 //! The settings with which a scene is drawn.
 
 use gaurast_scene::camera::Model;
-use gaurast_scene::{Camera, MAX_SH_DEGREE};
+use gaurast_scene::{Antialiasing, Camera, Geometry, MAX_SH_DEGREE, SortOrder};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{Antialiasing, CutOff, Geometry, Order, Precision};
+use crate::modes::{CutOff, Precision};
 
 /// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,7 +20,7 @@ pub struct Settings {
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
     /// The key by which Gaussians are sorted.
-    pub order: Order,
+    pub order: SortOrder,
     /// The shape of Gaussians.
     pub geometry: Geometry,
     /// The rasterizer's arithmetic. binary16 supports only volumes, in another order than per pixel.
@@ -49,12 +49,12 @@ impl Default for Settings {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
-            order: Order::Depth,
+            order: SortOrder::Depth,
             geometry: Geometry::Volume,
             precision: Precision::Fp32,
             exponential_error: 0.0,
             contribution_budget: 0.0,
-            antialiasing: Antialiasing::Dilate,
+            antialiasing: Antialiasing::Off,
             compensation_floor: 0.0,
             cut_off: CutOff::None,
             cut_off_deviations: 3.0,
@@ -94,7 +94,7 @@ impl Settings {
         camera.check()?;
         let half = self.precision == Precision::Fp16;
         let surfels = self.geometry == Geometry::Surfel;
-        let per_pixel = self.order == Order::PerPixel;
+        let per_pixel = self.order == SortOrder::PerPixel;
         let panorama = camera.model == Model::Equirectangular;
         let refused = [
             (surfels && half, "flat Gaussians (2d) are not drawn in binary16 (fp16)"),

@@ -80,7 +80,8 @@ impl FromStr for Axes {
     type Err = &'static str;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let wrong = "axes are three letters, one of right and left, one of up and down, one of front and back, such as rub";
+        let wrong =
+            "axes are three letters, one of right and left, one of up and down, one of front and back, such as rub";
         let letters: Vec<char> = text.chars().map(|letter| letter.to_ascii_lowercase()).collect();
         let axes = Self(letters.try_into().map_err(|_| wrong)?);
         if axes.matrix().determinant().abs() == 1.0 { Ok(axes) } else { Err(wrong) }

@@ -129,7 +129,7 @@ impl Camera {
     /// A camera of vertical field of view `fov` in degrees, looking through its picture's centre.
     pub(crate) fn new(rotation: [[f64; 3]; 3], eye: [f64; 3], fov: f64, size: [u32; 2]) -> Self {
         let [width, height] = size.map(f64::from);
-        let focal = height / 2.0 / (fov.to_radians() / 2.0).tan();
+        let focal = height / 2.0 / libm::tan(fov.to_radians() / 2.0);
         Self {
             model: Model::Pinhole,
             rotation,

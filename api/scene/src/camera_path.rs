@@ -48,8 +48,8 @@ impl Keyframe {
         let eye = DVec3::from_array(camera.eye);
         let height = f64::from(camera.height) / camera.focal[1];
         let fov = match camera.model {
-            Model::Pinhole => 2.0 * (height / 2.0).atan().to_degrees(),
-            Model::Orthographic => 2.0 * (height / 2.0 / distance).atan().to_degrees(),
+            Model::Pinhole => 2.0 * libm::atan(height / 2.0).to_degrees(),
+            Model::Orthographic => 2.0 * libm::atan(height / 2.0 / distance).to_degrees(),
             Model::Fisheye => height.to_degrees(),
             Model::Equirectangular => DEFAULT_FOV,
         };

@@ -124,7 +124,7 @@ fn quadrature() -> impl Iterator<Item = (DVec3, f64)> {
     ];
     heights.into_iter().flat_map(|(z, weight): (f64, f64)| {
         (0..10).map(move |step| {
-            let (sine, cosine) = (TAU * f64::from(step) / 10.0).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(step) / 10.0);
             let radius = (1.0 - z * z).sqrt();
             let direction = DVec3::new(radius * cosine, radius * sine, z);
             (direction, weight * TAU / 10.0)

@@ -74,7 +74,7 @@ impl Info {
             origin: scene.origin(),
             bounds: None,
             opacities: (0..OPACITY_BARS).map(|step| bar(step as f32 / OPACITY_BARS as f32)).collect(),
-            scales: (first..last).map(|power| bar(10_f32.powi(power))).collect(),
+            scales: (first..last).map(|power| bar(libm::exp10(power.into()) as f32)).collect(),
             metadata: scene.metadata().clone(),
         };
         let coefficients = scene.sh().chunks_exact(scene.sh_stride());

@@ -3,6 +3,8 @@
 //! Every [`Scene`] is in the frame of the original 3D Gaussian splatting code and its PLY files: +x right, +y **down**,
 //! +z forward. Files in other frames are rotated when they are read; `docs/files.md` has the formats and their frames.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod axes;
 pub mod camera;
 pub mod camera_files;

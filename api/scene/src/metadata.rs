@@ -1,11 +1,11 @@
 //! The metadata of a scene file: what it states apart from its Gaussians.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::axes::FileAxes;
 
 /// The compensation for the filter of 0.3 px^2 that every Gaussian gets on the screen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Antialiasing {
     /// None: the filter makes Gaussians larger, as in 3DGS.
@@ -16,7 +16,7 @@ pub enum Antialiasing {
 }
 
 /// The shape of Gaussians in space.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Geometry {
     /// Volumes with three axes, as in 3DGS.
@@ -27,14 +27,16 @@ pub enum Geometry {
 }
 
 /// The key by which Gaussians are sorted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum SortOrder {
     /// The depth of their centres along the view direction, as in 3DGS.
     #[default]
     Depth,
     /// The distance of their centres from the camera: `cameraDistance` of glTF.
     Distance,
+    /// Their depth along each pixel's own ray: no Gaussian pops as the camera turns. No file states it.
+    PerPixel,
 }
 
 /// The colour space of a scene's colours, in which they are blended.

@@ -17,5 +17,5 @@ pub struct GaussianShape {
 
 /// The logistic function, evaluated in binary64 and rounded once.
 pub fn sigmoid(logit: f64) -> f32 {
-    (1.0 / (1.0 + (-logit).exp())) as f32
+    (1.0 / (1.0 + libm::exp(-logit))) as f32
 }

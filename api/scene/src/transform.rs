@@ -84,13 +84,7 @@ impl Motion {
 
     /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first. The centre
     /// is moved by `shift` instead of the translation.
-    pub(crate) fn apply(
-        &self,
-        shift: DVec3,
-        position: &mut [f32; 3],
-        shape: &mut GaussianShape,
-        sh: &mut [[f32; 3]],
-    ) {
+    pub(crate) fn apply(&self, shift: DVec3, position: &mut [f32; 3], shape: &mut GaussianShape, sh: &mut [[f32; 3]]) {
         let moved = self.linear * DVec3::from_array(position.map(f64::from)) + shift;
         *position = moved.as_vec3().to_array();
         match &self.shape {
@@ -130,7 +124,7 @@ impl Motion {
 
 /// The factor and the orthogonal matrix whose product is `linear`. None if it is no such product.
 fn similarity(linear: DMat3) -> Option<(f64, DMat3)> {
-    let scale = linear.determinant().abs().cbrt();
+    let scale = libm::cbrt(linear.determinant().abs());
     let orthogonal = linear * scale.recip();
     let error = orthogonal.transpose() * orthogonal - DMat3::IDENTITY;
     let small = error.to_cols_array().into_iter().all(|entry| entry.abs() < 1e-6);
@@ -176,8 +170,8 @@ fn orthogonal_columns(matrix: DMat3) -> (DMat3, DMat3) {
                 continue;
             }
             let zeta = (b - a) / (2.0 * product);
-            let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-            let cosine = tangent.hypot(1.0).recip();
+            let tangent = zeta.signum() / (zeta.abs() + libm::hypot(zeta, 1.0));
+            let cosine = libm::hypot(tangent, 1.0).recip();
             let sine = cosine * tangent;
             for pair in [&mut columns, &mut turned] {
                 let (first, second) = (pair[p], pair[q]);

@@ -43,9 +43,12 @@ pub(crate) enum Error {
     /// An object could not be created.
     #[error("{0}")]
     InitializationFailed(String),
-    /// The device is lost: a submission panicked.
+    /// The device is lost: a shader ran for too long, memory is lacking, or a command cannot be executed.
     #[error("the device is lost: {0}")]
     DeviceLost(String),
+    /// The device is lost by a defect of the driver: a submission panicked.
+    #[error("the device is lost by a defect in the driver: {0}")]
+    DeviceLostByDefect(String),
     /// A window to which pictures can no longer be presented.
     #[error(transparent)]
     SurfaceLost(WindowLost),
@@ -109,7 +112,7 @@ impl Error {
             Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
             Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,
             Self::InitializationFailed(_) => vk::Result::ERROR_INITIALIZATION_FAILED,
-            Self::DeviceLost(_) => vk::Result::ERROR_DEVICE_LOST,
+            Self::DeviceLost(_) | Self::DeviceLostByDefect(_) => vk::Result::ERROR_DEVICE_LOST,
             Self::SurfaceLost(_) => vk::Result::ERROR_SURFACE_LOST_KHR,
             Self::NativeWindowInUse => vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR,
             Self::MemoryMapFailed(_) => vk::Result::ERROR_MEMORY_MAP_FAILED,
@@ -129,7 +132,8 @@ impl Error {
             Self::NullPointer { .. } => "GAURAST-null-pointer",
             Self::Unsupported { .. } => "GAURAST-unsupported-command",
             Self::InvalidShader(_) => "GAURAST-invalid-shader",
-            Self::Panic(_) | Self::DeviceLost(_) => "GAURAST-driver-defect",
+            Self::DeviceLost(_) => "GAURAST-device-lost",
+            Self::Panic(_) | Self::DeviceLostByDefect(_) => "GAURAST-driver-defect",
             _ => "GAURAST-error",
         }
     }

@@ -13,6 +13,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, Handle, Object, Reporter};
+use crate::abi::sanitizer::Ignored;
 use ash::vk;
 use simdevice::host::OutOfMemory;
 use std::any::Any;
@@ -104,14 +105,15 @@ impl<T> Caller for *mut T {
     }
 }
 
-/// Runs a command. No panic leaves it, every error is reported, and the rounding mode of the application's thread does
-/// not matter.
+/// Runs a command. No panic leaves it, every error is reported, the rounding mode of the application's thread does not
+/// matter, and ThreadSanitizer ignores what the command accesses.
 pub(crate) fn guard<C: Caller, R: ReturnCode, S: Success<R>>(
     caller: C,
     command: &str,
     body: impl FnOnce() -> Result<S, Error>,
 ) -> R {
     let _environment = FloatEnvironment::set_default();
+    let _ignored = Ignored::begin();
     match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(value)) => value.result(),
         Ok(Err(error)) => {

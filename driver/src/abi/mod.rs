@@ -3,4 +3,5 @@
 pub(crate) mod error;
 pub(crate) mod guard;
 pub(crate) mod handle;
+pub(crate) mod sanitizer;
 pub(crate) mod valid;

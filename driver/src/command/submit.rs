@@ -47,10 +47,10 @@ impl Submission {
         for batch in self.batches {
             if let Err(error) = execute_batch(batch, &mut execution) {
                 let reason = match &error {
-                    Error::DeviceLost(reason) => reason.clone(),
-                    other => other.to_string(),
+                    Error::DeviceLost(_) | Error::DeviceLostByDefect(_) => error.clone(),
+                    other => Error::DeviceLost(other.to_string()),
                 };
-                self.sync.lose(&reason);
+                self.sync.lose(reason);
                 self.instance.report(
                     vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
                     vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,

@@ -295,7 +295,7 @@ pub(crate) struct UpdateTemplate {
 /// would give wrong results.
 fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
     host::catch(body).unwrap_or_else(|memory| {
-        device.sync().lose(&memory.to_string());
+        device.sync().lose(Error::DeviceLost(memory.to_string()));
         Err(Error::OutOfHostMemory(memory.to_string()))
     })
 }

@@ -27,8 +27,8 @@ const VENDOR_ID: u32 = 0;
 /// The device id, of the vendor's only device.
 const DEVICE_ID: u32 = 1;
 
-/// The most Gaussians of one draw or one sorted set: their numbers have 32 bits.
-pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64;
+/// The most Gaussians of one draw or one sorted set that were tried (docs/testing.md).
+pub(crate) const MAX_GAUSSIANS: u64 = 1 << 26;
 
 /// The greatest degree of spherical harmonics of a pipeline.
 pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 4;

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
-use gaurast_scene::{Axes, MAX_SH_DEGREE, Transform};
+use gaurast_scene::{Antialiasing, Axes, Geometry, MAX_SH_DEGREE, SortOrder, Transform};
 use glam::{DQuat, DVec3};
 
 use crate::heatmap::Quantity;
@@ -234,15 +235,15 @@ pub struct ModeArguments {
 
     /// The key that the Gaussians are sorted by
     #[arg(long, value_enum, default_value_t)]
-    pub order: Order,
+    pub order: Choice<SortOrder>,
 
     /// The shape of Gaussians
     #[arg(long, value_enum, default_value_t)]
-    pub geometry: Geometry,
+    pub geometry: Choice<Geometry>,
 
     /// The treatment of Gaussians that are smaller than a pixel
     #[arg(long, value_enum, default_value_t)]
-    pub antialiasing: Antialiasing,
+    pub antialiasing: Choice<Antialiasing>,
 
     /// The rasterizer's arithmetic
     #[arg(long, value_enum, default_value_t)]
@@ -376,44 +377,76 @@ pub enum CameraModel {
     Orthographic,
 }
 
-/// Values of `--order`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Order {
-    /// As in the file; depth if the file has no order
+/// A value from the scene's file, or one that replaces it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Choice<T> {
     #[default]
     Auto,
-    /// Depth along the camera's axis, as 3DGS does
-    Depth,
-    /// Distance from the camera
-    Distance,
-    /// Depth along each pixel's own ray: nothing pops as the camera rotates
-    PerPixel,
+    Given(T),
+}
+
+impl<T> Choice<T> {
+    /// The given value, or the file's.
+    pub fn or(self, of_file: T) -> T {
+        match self {
+            Self::Auto => of_file,
+            Self::Given(value) => value,
+        }
+    }
+}
+
+/// Values of `--order`.
+impl ValueEnum for Choice<SortOrder> {
+    fn value_variants<'a>() -> &'a [Self] {
+        use SortOrder::{Depth, Distance, PerPixel};
+        &[Self::Auto, Self::Given(Depth), Self::Given(Distance), Self::Given(PerPixel)]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Auto => ("auto", "As in the file; depth if the file has no order"),
+            Self::Given(SortOrder::Depth) => ("depth", "Depth along the camera's axis, as 3DGS does"),
+            Self::Given(SortOrder::Distance) => ("distance", "Distance from the camera"),
+            Self::Given(SortOrder::PerPixel) => {
+                ("per-pixel", "Depth along each pixel's own ray: nothing pops as the camera rotates")
+            }
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 /// Values of `--geometry`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Geometry {
-    /// As in the file; volumes if the file has no shape
-    #[default]
-    Auto,
-    /// Volumes with three axes, as in 3DGS
-    #[value(name = "3d")]
-    Volume,
-    /// Flat discs with two axes, as in 2DGS; a third scale is ignored
-    #[value(name = "2d")]
-    Surfel,
+impl ValueEnum for Choice<Geometry> {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Auto, Self::Given(Geometry::Volume), Self::Given(Geometry::Surfel)]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Auto => ("auto", "As in the file; volumes if the file has no shape"),
+            Self::Given(Geometry::Volume) => ("3d", "Volumes with three axes, as in 3DGS"),
+            Self::Given(Geometry::Surfel) => ("2d", "Flat discs with two axes, as in 2DGS; a third scale is ignored"),
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 /// Values of `--antialiasing`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Antialiasing {
-    /// As in the file; off if the file has no setting
-    #[default]
-    Auto,
-    /// Gaussians are dilated and keep their opacity, as in 3DGS
-    Off,
-    /// Their opacity compensates for the dilation: for scenes that are trained so
-    Compensated,
+impl ValueEnum for Choice<Antialiasing> {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Auto, Self::Given(Antialiasing::Off), Self::Given(Antialiasing::Compensated)]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Auto => ("auto", "As in the file; off if the file has no setting"),
+            Self::Given(Antialiasing::Off) => ("off", "Gaussians are dilated and keep their opacity, as in 3DGS"),
+            Self::Given(Antialiasing::Compensated) => {
+                ("compensated", "Their opacity compensates for the dilation: for scenes that are trained so")
+            }
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 /// Values of `--precision`.

@@ -232,12 +232,7 @@ fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
 }
 
 /// The camera given by options, or one that fits the scene; or an orbit that starts there.
-fn by_hand(
-    arguments: &CameraArguments,
-    extent: &Extent,
-    scene: &Scene,
-    garden: bool,
-) -> Result<Views, ViewError> {
+fn by_hand(arguments: &CameraArguments, extent: &Extent, scene: &Scene, garden: bool) -> Result<Views, ViewError> {
     let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
     let up = arguments.up.map_or(DEFAULT_UP, |up| up.0);
     let inside = is_inside(arguments.model);
@@ -274,8 +269,7 @@ fn by_hand(
                 ..Framing::new(fov.unwrap_or(DEFAULT_FOV), size)
             };
             let subject = Subject::of(scene);
-            let framed =
-                if arguments.orbit.is_some() { framing.orbit(&subject)? } else { framing.framed(&subject)? };
+            let framed = if arguments.orbit.is_some() { framing.orbit(&subject)? } else { framing.framed(&subject)? };
             let (azimuth, elevation) = default_angles();
             let placed = format!(
                 "framed by --azimuth {:.1} --elevation {:.1} --distance {}",

@@ -219,7 +219,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
 /// The picture after rounding to eight bits, as in a file.
 fn in_eight_bits(mut picture: Picture) -> Picture {
     for value in picture.pixels.as_flattened_mut() {
-        *value = (255.0 * value.clamp(0.0, 1.0)).round() / 255.0;
+        *value = libm::roundf(255.0 * value.clamp(0.0, 1.0)) / 255.0;
     }
     picture
 }

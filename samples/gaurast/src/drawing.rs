@@ -5,16 +5,15 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, WorkTrace};
-use gaurast_scene::{MAX_SH_DEGREE, Scene, SortOrder};
+use gaurast_scene::{Antialiasing, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
 use thiserror::Error;
 
-use crate::args::{Antialiasing, Geometry, ModeArguments, Order};
+use crate::args::{Choice, ModeArguments};
 use crate::cameras::{View, short};
 use crate::info;
 use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
-use crate::renderers::OtherRenderer;
 
 /// A failure of drawing. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -31,32 +30,15 @@ pub enum DrawError {
 
 /// The settings from the command line and the scene's file.
 pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
-    let surfels = match modes.geometry {
-        Geometry::Auto => scene.geometry() == gaurast_scene::Geometry::Surfel,
-        Geometry::Volume => false,
-        Geometry::Surfel => true,
-    };
-    let compensated = match modes.antialiasing {
-        Antialiasing::Auto => scene.antialiasing() == gaurast_scene::Antialiasing::Compensated,
-        Antialiasing::Off => false,
-        Antialiasing::Compensated => true,
-    };
-    let order = match modes.order {
-        Order::Auto if modes.renderer.is_some() => modes.renderer.map_or_else(Default::default, OtherRenderer::order),
-        Order::Auto if metadata_order(scene) == SortOrder::Distance => gaurast_render::Order::Distance,
-        Order::Auto | Order::Depth => gaurast_render::Order::Depth,
-        Order::Distance => gaurast_render::Order::Distance,
-        Order::PerPixel => gaurast_render::Order::PerPixel,
+    let order_of_file = match modes.renderer {
+        Some(renderer) => renderer.order(),
+        None => scene.metadata().order.unwrap_or_default(),
     };
     let settings = Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
-        order,
-        geometry: if surfels { gaurast_render::Geometry::Surfel } else { gaurast_render::Geometry::Volume },
-        antialiasing: if compensated {
-            gaurast_render::Antialiasing::Compensated
-        } else {
-            gaurast_render::Antialiasing::Dilate
-        },
+        order: modes.order.or(order_of_file),
+        geometry: modes.geometry.or(scene.geometry()),
+        antialiasing: modes.antialiasing.or(scene.antialiasing()),
         precision: modes.precision.into(),
         exponential_error: modes.exponential_error,
         contribution_budget: modes.contribution_budget,
@@ -68,14 +50,9 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     }
 }
 
-/// The sort order in the scene's file.
-fn metadata_order(scene: &Scene) -> SortOrder {
-    scene.metadata().order.unwrap_or_default()
-}
-
 /// Returns true if the colours in the scene's file are linear light.
 pub fn has_linear_colors(scene: &Scene) -> bool {
-    scene.metadata().color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display)
+    scene.metadata().color_space == Some(ColorSpace::LinearRec709Display)
 }
 
 /// Notes for the user about settings in the scene's file, a sentence each.
@@ -93,14 +70,14 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
             "positions are kept relative to {x},{y},{z}, so that they keep their digits; cameras are in the file's coordinates"
         ));
     }
-    if modes.geometry == Geometry::Auto && scene.geometry() == gaurast_scene::Geometry::Surfel {
+    if modes.geometry == Choice::Auto && scene.geometry() == Geometry::Surfel {
         notes.push("flat Gaussians are drawn (--geometry 2d), as the file says".to_owned());
     }
-    if modes.antialiasing == Antialiasing::Auto && scene.antialiasing() == gaurast_scene::Antialiasing::Compensated {
+    if modes.antialiasing == Choice::Auto && scene.antialiasing() == Antialiasing::Compensated {
         let note = "opacity makes up for dilation (--antialiasing compensated), as the file says";
         notes.push(note.to_owned());
     }
-    if metadata.color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display) {
+    if metadata.color_space == Some(ColorSpace::LinearRec709Display) {
         let note = "the file's colours are linear light, and are written without a transfer function";
         notes.push(note.to_owned());
     }

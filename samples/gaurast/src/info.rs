@@ -3,8 +3,8 @@
 use std::io::Write;
 
 use clap::Args;
-use gaurast_scene::{AxesReason, FileAxes, Subject};
 use gaurast_scene::info::{Bar, Info};
+use gaurast_scene::{AxesReason, FileAxes, Subject};
 use serde_json::json;
 use thiserror::Error;
 

@@ -1,5 +1,7 @@
 //! `gaurast`: a command that draws pictures of 3D Gaussian scenes on a simulated Gaussian rasterizer, without a window.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod args;
 mod cameras;
 mod command_line;

@@ -1,7 +1,8 @@
 //! Other renderers, whose pictures of a scene are asked for.
 
 use clap::ValueEnum;
-use gaurast_render::{Antialiasing, CutOff, Order, Settings};
+use gaurast_render::{CutOff, Settings};
+use gaurast_scene::{Antialiasing, SortOrder};
 
 /// Values of `--as`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -16,10 +17,10 @@ pub enum OtherRenderer {
 
 impl OtherRenderer {
     /// The order in which it composites.
-    pub fn order(self) -> Order {
+    pub fn order(self) -> SortOrder {
         match self {
-            Self::Inria | Self::Gsplat => Order::Depth,
-            Self::Gltf => Order::Distance,
+            Self::Inria | Self::Gsplat => SortOrder::Depth,
+            Self::Gltf => SortOrder::Distance,
         }
     }
 

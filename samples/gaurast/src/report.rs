@@ -203,7 +203,7 @@ fn value(counter: &Counter) -> String {
         Unit::KELVIN => format!("{:.1} K", counter.value),
         Unit::VOLTS => format!("{:.3} V", counter.value),
         Unit::AMPS => format!("{:.3} A", counter.value),
-        _ if counter.value.fract() == 0.0 => grouped(counter.value),
+        _ if counter.value % 1.0 == 0.0 => grouped(counter.value),
         _ => format!("{:.3}", counter.value),
     }
 }

@@ -144,7 +144,8 @@ const CAPTION: f64 = 24.0;
 
 /// The colour of a share of the most cycles: from white over orange to dark red.
 fn heat(share: f64) -> String {
-    let [r, g, b] = [255.0 - 120.0 * share.powi(3), 255.0 * (1.0 - share), 220.0 * (1.0 - share).powi(2)];
+    let rest = 1.0 - share;
+    let [r, g, b] = [255.0 - 120.0 * share * share * share, 255.0 * rest, 220.0 * rest * rest];
     format!("rgb({r:.0},{g:.0},{b:.0})")
 }
 

@@ -62,9 +62,11 @@ pub(crate) fn preprocess(
     let mut by_device = Counters::default();
     let map = preprocessor.occlusion(set, clusters);
     let tasks = group_tasks(set, clusters, &constants, map.as_ref(), &mut by_device)?;
+    by_device.add(Counter::GaussiansRead, set.beyond_buffers);
+    by_device.add(Counter::SkippedZeroRotation, set.beyond_buffers);
     if optimizations.has(Optimization::Harmonics) {
-        let unread = by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
-        by_device.add(Counter::HarmonicsUnread, unread);
+        let culled = by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
+        by_device.add(Counter::HarmonicsUnread, culled + set.beyond_buffers);
     }
     let mut groups = preprocessor.run(&tasks);
     panorama::append_copies(&mut groups);

@@ -12,6 +12,11 @@ use isa::machine::Stopped;
 /// The most groups of a set: a splat's index, which is its group and its place there, has 32 bits.
 pub(crate) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 
+/// True if instances of `count` Gaussians share groups: otherwise more than half of each group would be empty.
+pub(crate) const fn is_packed(count: u32) -> bool {
+    count as usize <= GROUP / 2
+}
+
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
 pub struct GaussianSet {
@@ -24,6 +29,8 @@ pub struct GaussianSet {
     pub(crate) depth_format: Format,
     pub(crate) fragment_stage: Option<GaussianFragmentStage>,
     pub(crate) appends: Vec<GaussianAppend>,
+    /// The number of Gaussians of the packets that lie beyond their buffers. They are not in `appends`.
+    pub(crate) beyond_buffers: u64,
     /// The draws that a vertex program projects. They come after the appends.
     pub(crate) draws: Vec<Draw>,
 }
@@ -76,6 +83,7 @@ impl GaussianSet {
             depth_format: depth.unwrap_or(Format::D32Sfloat),
             fragment_stage: None,
             appends: Vec::new(),
+            beyond_buffers: 0,
             draws: Vec::new(),
         }
     }
@@ -92,10 +100,12 @@ impl GaussianSet {
         Self { layer, ..Self::begin(&begin, area, depth) }
     }
 
-    /// Adds the Gaussians of a packet to the set.
+    /// Adds the Gaussians of a packet to the set, except those [beyond its buffers](GaussianAppend::within_buffers).
     pub fn append(&mut self, append: &GaussianAppend) {
-        if append.count > 0 && append.instance_count > 0 {
-            host::push(&mut self.appends, append.clone());
+        let within = append.clone().within_buffers();
+        self.beyond_buffers = self.beyond_buffers.saturating_add(append.gaussians() - within.gaussians());
+        if within.gaussians() > 0 {
+            host::push(&mut self.appends, within);
         }
     }
 
@@ -114,13 +124,16 @@ impl GaussianSet {
         }
     }
 
-    /// The number of groups of the set's Gaussians, where each instance of a draw has groups of its own.
+    /// The number of groups of the set's Gaussians, where an instance has groups of its own unless it [is small](is_packed).
     pub(crate) fn groups(&self) -> u64 {
         let of_draw = |count: u32, instance_count: u32| {
             let per_instance = count.div_ceil(GROUP as u32);
             u64::from(per_instance) * u64::from(instance_count)
         };
-        let appends = self.appends.iter().map(|append| of_draw(append.count, append.instance_count));
+        let appends = self.appends.iter().map(|append| match is_packed(append.count) {
+            true => (u64::from(append.count) * u64::from(append.instance_count)).div_ceil(GROUP as u64),
+            false => of_draw(append.count, append.instance_count),
+        });
         let draws = self.draws.iter().map(|draw| of_draw(draw.count, draw.instance_count));
         appends.chain(draws).fold(0, u64::saturating_add)
     }

@@ -48,6 +48,15 @@ impl AttributeStream {
         self.buffer.offset.checked_add(start)
     }
 
+    /// The number of elements inside the buffer; `None` if all elements are the same.
+    fn len(&self) -> Option<u64> {
+        let stride = Some(u64::from(self.stride)).filter(|stride| *stride > 0)?;
+        let memory = self.buffer.memory.len().saturating_sub(self.buffer.offset);
+        let bytes = memory.min(self.buffer.size).saturating_sub(self.offset.into());
+        let past_first = bytes.checked_sub(self.format.texel_size() as u64);
+        Some(past_first.map_or(0, |bytes| bytes / stride + 1))
+    }
+
     /// Reads bytes from an element on. Fills `out` with zeros unless all of the bytes are inside the buffer.
     #[inline]
     pub(crate) fn read(&self, element: u64, out: &mut [u8]) {
@@ -241,6 +250,33 @@ pub struct GaussianAppend {
     pub first_instance: u32,
     /// The number of instances.
     pub instance_count: u32,
+}
+
+impl GaussianAppend {
+    /// The number of Gaussians: vertices times instances.
+    pub fn gaussians(&self) -> u64 {
+        u64::from(self.count) * u64::from(self.instance_count)
+    }
+
+    /// Leaves out the vertices and the instances that have no rotation in its buffer. They would read zeros, and a Gaussian with
+    /// a quaternion of zeros is skipped.
+    #[must_use]
+    pub fn within_buffers(mut self) -> Self {
+        let rotation = &self.attributes.rotation;
+        let Some(rotations) = rotation.len() else {
+            return self;
+        };
+        let most = |first: u32, times: u32| {
+            let rest = rotations.saturating_sub(first.into()).saturating_mul(times.into());
+            u32::try_from(rest).unwrap_or(u32::MAX)
+        };
+        match rotation.instance_divisor {
+            None if self.indices.is_none() => self.count = self.count.min(most(self.first, 1)),
+            None | Some(0) => {}
+            Some(divisor) => self.instance_count = self.instance_count.min(most(self.first_instance, divisor)),
+        }
+        self
+    }
 }
 
 /// The fragment program of a set: see [`Packet::GaussianFragmentStage`](crate::Packet::GaussianFragmentStage). Blending

@@ -52,7 +52,8 @@ impl Device {
         Ok(Self::of(Gpu::open(&opening).map_err(refused)?))
     }
 
-    fn of(gpu: Gpu) -> Self {
+    /// The device of the tests' application.
+    pub fn of(gpu: Gpu) -> Self {
         let mut features = Features::default();
         let mut features_2 = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
         let mut properties = Properties::default();
@@ -66,6 +67,11 @@ impl Device {
         features.p_next = std::ptr::null_mut();
         properties.p_next = std::ptr::null_mut();
         Self { gpu, features, properties }
+    }
+
+    /// The device of the tests' application.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// The first feature, limit or format that a draw needs and the device lacks.

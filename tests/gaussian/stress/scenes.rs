@@ -146,7 +146,7 @@ fn shapes() -> Vec<Stress> {
             [radius, radius, 1e-6]
         }),
         scaled("giants, thousands of screens wide", 3, |rng| [0; 3].map(|_| rng.random_range(1e3..1e5))),
-        scaled("dust of 1e-6 pixels", 4, |_| [1e-7; 3]),
+        scaled("specks of 1e-6 px", 4, |_| [1e-7; 3]),
         scaled("deviations beyond 1e9 pixels", 5, |rng| [0; 3].map(|_| rng.random_range(1e8..1e12))),
         scaled("scales near binary32's greatest", 6, |rng| [rng.random_range(1e30..3e38), 1e-3, HUGE]),
         Stress::new(

@@ -13,7 +13,7 @@ pub type Plane = fn(&mut ChaCha8Rng) -> Position;
 
 /// Triangles that some planes cut, in units of 1/64.
 pub fn clipped(seed: u64, count: usize, plane: Plane) -> Vec<[Position; 3]> {
-    let mut rng = super::shapes::rng(seed);
+    let mut rng = gaurast_testkit::shapes::rng(seed);
     (0..count).map(|_| [0; 3].map(|_| plane(&mut rng))).collect()
 }
 

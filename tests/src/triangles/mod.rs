@@ -8,7 +8,6 @@ pub mod clipped;
 pub mod edges;
 mod expected;
 pub mod models;
-pub mod shapes;
 pub mod workloads;
 
 pub use expected::{Exception, Expected};

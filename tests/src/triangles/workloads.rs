@@ -5,9 +5,9 @@ use glam::Vec3;
 use rand::Rng;
 
 use super::models::{Model, Ready};
-use super::shapes;
 use gaurast_testkit::drawn::Missing;
 use gaurast_testkit::shader::Stage;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded, Resource, Sampler, Target,
     TargetOptions, Vertex, blend, depth_test,

@@ -14,6 +14,7 @@
 //! | [`difference`] | comparison of the pictures of two devices |
 //! | [`devices`], [`context`] | devices that tests share, or open with some features; instances without a device |
 //! | [`scene`], [`canvas`] | small pictures of Gaussians, and of points, lines and triangles |
+//! | [`shapes`] | vertices of shapes that scenes draw |
 //! | [`drawn`] | scenes that this driver and lavapipe draw |
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
 //! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
@@ -48,6 +49,7 @@ pub mod resource;
 pub mod scene;
 pub mod settings;
 pub mod shader;
+pub mod shapes;
 pub mod stage_program;
 pub mod target;
 pub mod texels;

@@ -27,15 +27,22 @@ impl Settings<'_> {
     pub const DEFAULT: Settings<'static> =
         Settings { simd: None, threads: None, timeout: None, optimizations: None, trace: None };
 
+    /// The SIMD level.
+    ///
+    /// # Panics
+    /// If there is no SIMD level of that name.
+    pub fn level(&self) -> Option<SimdLevelGAURAST> {
+        self.simd.map(simd_level)
+    }
+
     /// The settings as the driver receives them.
     ///
     /// # Panics
     /// If there is no SIMD level of that name.
     pub(crate) fn options(&self) -> DriverOptionsGAURAST<'_> {
-        let simd = self.simd.map(simd_level);
         let mut options = DriverOptionsGAURAST::default()
             .thread_count(self.threads.unwrap_or_default() as u32)
-            .simd_level(simd.unwrap_or_default())
+            .simd_level(self.level().unwrap_or_default())
             .shader_timeout(self.timeout.unwrap_or_default().as_nanos() as u64);
         if let Some(names) = self.optimizations {
             options = options.p_optimizations(names.as_ptr());

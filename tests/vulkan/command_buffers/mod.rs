@@ -2,5 +2,4 @@
 //!
 //! Unit tests: `driver/src/command`.
 
-pub mod commands;
 mod life_cycle;

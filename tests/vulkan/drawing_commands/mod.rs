@@ -4,4 +4,3 @@
 
 mod conditional_rendering;
 mod draws;
-pub mod topology;

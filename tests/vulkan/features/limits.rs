@@ -4,11 +4,11 @@ use ash::vk;
 use gaurast_testkit::devices::own;
 use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Image, ImageOptions, Kernel, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions,
 };
-use gaurast_tests::triangles::shapes;
 
 /// The words that a kernel writes to its binding 0, a buffer of this size.
 fn words(buffer: &Buffer) -> Vec<u32> {

@@ -66,12 +66,12 @@ fn a_layer_passes_the_options_on(case: &Case) {
 }
 
 /// A variant for each way to the driver.
-fn doors() -> Vec<Variant> {
+fn ways() -> Vec<Variant> {
     vec![Variant::new("embedded"), Variant { needs: vec![Need::VulkanLoader], ..Variant::new("loader") }]
 }
 
 /// Each refused option is named by the message, which reaches a messenger that is created with the instance.
-#[gaurast_runner::test(each = doors())]
+#[gaurast_runner::test(each = ways())]
 fn a_wrong_option_is_refused_by_its_rule(case: &Case) {
     let check = |entry: fn() -> ash::Entry| {
         let options = DriverOptionsGAURAST::default();

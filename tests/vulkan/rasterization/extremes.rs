@@ -4,11 +4,11 @@
 use ash::vk;
 use gaurast_testkit::devices::own;
 use gaurast_testkit::shader::GLSLANG;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions, Vertex, blend, depth_test,
 };
-use gaurast_tests::triangles::shapes;
 
 /// The side of the square target in pixels.
 const SIZE: usize = 128;

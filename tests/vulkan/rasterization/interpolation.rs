@@ -4,10 +4,10 @@ use ash::vk;
 use gaurast_runner::Need;
 use gaurast_testkit::devices::{lavapipe, own};
 use gaurast_testkit::shader::GLSLANG;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test, fetch_sample,
 };
-use gaurast_tests::triangles::shapes;
 
 use rand::Rng;
 

@@ -4,5 +4,3 @@ mod coverage;
 mod extremes;
 mod interpolation;
 pub mod models;
-pub mod multisample;
-pub mod polygons;

@@ -4,6 +4,5 @@
 
 mod feedback_loop;
 mod multiview;
-pub mod pass_objects;
 mod passes;
 mod subpasses;

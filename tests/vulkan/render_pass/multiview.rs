@@ -3,9 +3,9 @@
 use ash::vk;
 use gaurast_testkit::devices::own;
 use gaurast_testkit::shader::GLSLANG;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Bindings, Vertex};
 use gaurast_testkit::{Buffer, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Target, TargetOptions};
-use gaurast_tests::triangles::shapes;
 
 const SIDE: u32 = 8;
 const LAYERS: u32 = 7;

@@ -3,7 +3,6 @@
 //! Unit tests: `driver/src/descriptor`, `driver/src/device_addresses.rs`.
 
 mod addresses;
-pub mod buffers;
 mod draw_resources;
 mod indexing;
 mod sets;

@@ -2,4 +2,3 @@
 
 mod modes;
 mod sampling;
-pub mod textures;

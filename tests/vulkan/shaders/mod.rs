@@ -6,7 +6,6 @@ mod clock;
 mod features;
 mod instructions;
 mod kernels;
-pub mod shading;
 mod structured;
 
 use gaurast_tests::kernels::Context;

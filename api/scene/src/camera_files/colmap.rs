@@ -119,7 +119,12 @@ impl Intrinsics {
                 let [width, height] = self.size;
                 let focal = [width / std::f64::consts::TAU, height / std::f64::consts::PI];
                 let distortion = Distortion::default();
-                return Ok(Lens { model: Model::Equirectangular, focal, principal: [width / 2.0, height / 2.0], distortion });
+                return Ok(Lens {
+                    model: Model::Equirectangular,
+                    focal,
+                    principal: [width / 2.0, height / 2.0],
+                    distortion,
+                });
             }
             other => return Err(ViewError::Model(other.to_owned())),
         };
@@ -468,7 +473,8 @@ mod tests {
         let fisheyes = [5, 8, 9, 10, 11, 14, 15];
         for (number, entry) in (0..).zip(&MODELS) {
             for count in [Some(entry.parameters), entry.earlier].into_iter().flatten() {
-                let first: &[f64] = if simple.contains(&number) { &[50.0, 90.0, 60.0] } else { &[50.0, 80.0, 90.0, 60.0] };
+                let first: &[f64] =
+                    if simple.contains(&number) { &[50.0, 90.0, 60.0] } else { &[50.0, 80.0, 90.0, 60.0] };
                 let mut parameters = vec![0.0; count.max(first.len())];
                 parameters[..first.len()].copy_from_slice(first);
                 parameters.truncate(count);

@@ -111,7 +111,8 @@ impl Intrinsics {
 /// The size of the photograph `name` in `folder`. Blender's files name photographs without their extensions.
 fn size_of_photograph(folder: &Path, name: &str) -> Option<[f64; 2]> {
     let extensions = ["", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG"];
-    let found = extensions.iter().find_map(|extension| imagesize::size(folder.join(format!("{name}{extension}"))).ok())?;
+    let found =
+        extensions.iter().find_map(|extension| imagesize::size(folder.join(format!("{name}{extension}"))).ok())?;
     Some([found.width, found.height].map(|side| side as f64))
 }
 
@@ -142,7 +143,7 @@ impl Frame {
             Some("EQUIRECTANGULAR") => Model::Equirectangular,
             Some(other) => return Err(ViewError::Model(other.to_owned())),
         };
-        let of_angle = |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / (angle / 2.0).tan());
+        let of_angle = |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / libm::tan(angle / 2.0));
         let fx = own.fl_x.or(shared.fl_x).or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
         let fy = own.fl_y.or(shared.fl_y).or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
         let whole = model == Model::Equirectangular;
@@ -212,7 +213,7 @@ impl CameraPath {
     pub(super) fn views(self, _: &CameraFileOptions) -> Vec<Result<View, ViewError>> {
         let size = [self.render_width, self.render_height];
         let view = |frame: &PathFrame| {
-            let half = (frame.fov.to_radians() / 2.0).tan();
+            let half = libm::tan(frame.fov.to_radians() / 2.0);
             let (model, focal) = match self.camera_type.as_deref() {
                 None | Some("perspective") => (Model::Pinhole, [size[1] / 2.0 / half; 2]),
                 Some("equirectangular") => {

@@ -161,7 +161,7 @@ impl Numbers {
     /// The camera.
     pub(super) fn camera(self) -> Result<Camera, ViewError> {
         let Self { model, rotation, eye, focal, principal, size } = self;
-        if !size.iter().all(|s| (1.0..=MAX_SIZE).contains(s) && s.fract() == 0.0) {
+        if !size.iter().all(|s| (1.0..=MAX_SIZE).contains(s) && libm::trunc(*s) == *s) {
             return Err(ViewError::Size);
         }
         if !focal.iter().all(|f| (*f as f32) > 0.0 && (*f as f32).is_finite()) {

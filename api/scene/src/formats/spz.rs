@@ -367,7 +367,7 @@ impl Header {
 }
 
 fn scale(byte: u8) -> f32 {
-    (f64::from(byte) / 16.0 - 10.0).exp() as f32
+    libm::exp(f64::from(byte) / 16.0 - 10.0) as f32
 }
 
 /// Decodes a quaternion w, x, y, z.

@@ -1,6 +1,6 @@
 //! The part of a picture that a scene covers, at low resolution and without colours.
 
-use glam::{DVec3, Mat3, Quat, Vec3};
+use glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 
 use crate::camera::Camera;
@@ -158,10 +158,7 @@ impl View {
 
     /// The position in the picture of a point in the camera's axes, in pixels.
     fn project(&self, point: Vec3) -> [f32; 2] {
-        [
-            self.focal[0] * point.x / point.z + self.principal[0],
-            self.focal[1] * point.y / point.z + self.principal[1],
-        ]
+        [self.focal[0] * point.x / point.z + self.principal[0], self.focal[1] * point.y / point.z + self.principal[1]]
     }
 
     /// Adds a Gaussian.
@@ -171,10 +168,10 @@ impl View {
         if !is_drawn || f64::from(point.length_squared()) < self.selection.beyond * self.selection.beyond {
             return;
         }
-        let [w, x, y, z] = shape.rotation;
-        let quaternion = Quat::from_xyzw(x, y, z, w);
+        let [w, x, y, z] = shape.rotation.map(f64::from);
+        let quaternion = DQuat::from_xyzw(x, y, z, w);
         let is_rotation = quaternion.length_squared() > 0.0;
-        let axes = if is_rotation { Mat3::from_quat(quaternion.normalize()) } else { Mat3::IDENTITY };
+        let axes = if is_rotation { DMat3::from_quat(quaternion.normalize()).as_mat3() } else { Mat3::IDENTITY };
         let scaled = self.rotation * axes * Mat3::from_diagonal(Vec3::from_array(shape.scale));
         let slope = |axis: usize, value: f32| {
             let greatest = BESIDE * self.size[axis] as f32 / 2.0 / self.focal[axis];
@@ -238,7 +235,8 @@ impl View {
         for (point, corner) in points.iter().zip(&corners) {
             cover(point[0], point[1], corner.z);
         }
-        let edge = |a: [f32; 2], b: [f32; 2], p: [f32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        let edge =
+            |a: [f32; 2], b: [f32; 2], p: [f32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
         let area = edge(points[0], points[1], points[2]);
         if area == 0.0 || !area.is_finite() {
             return;

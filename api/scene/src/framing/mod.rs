@@ -93,16 +93,7 @@ pub struct Framing {
 impl Framing {
     /// A framing with all values chosen for the scene.
     pub fn new(fov: f64, size: [u32; 2]) -> Self {
-        Self {
-            azimuth: None,
-            elevation: None,
-            distance: None,
-            target: None,
-            zoom: 1.0,
-            up: DEFAULT_UP,
-            fov,
-            size,
-        }
+        Self { azimuth: None, elevation: None, distance: None, target: None, zoom: 1.0, up: DEFAULT_UP, fov, size }
     }
 
     /// The camera of [`Framing::framed`].
@@ -120,7 +111,9 @@ impl Framing {
     pub fn framed(&self, subject: &Subject<'_>) -> Result<Framed, CameraError> {
         let boxed = self.boxed(&subject.extent)?;
         let needed = self.distance.is_none() || self.target.is_none();
-        let Some(fit) = subject.object.filter(|_| needed).and_then(|scene| silhouette::fit(scene, &boxed.camera, boxed.distance)) else {
+        let Some(fit) =
+            subject.object.filter(|_| needed).and_then(|scene| silhouette::fit(scene, &boxed.camera, boxed.distance))
+        else {
             return Ok(self.finished(boxed, &subject.extent, f64::INFINITY));
         };
         let forward = DVec3::from_array(boxed.camera.rotation[2]);
@@ -226,18 +219,18 @@ impl Framing {
         let up = (DVec3::from_array(self.up).try_normalize()).ok_or(CameraError::NoUp)?;
         let front = front(up);
         let side = up.cross(front);
-        let level = azimuth.cos() * front + azimuth.sin() * side;
-        let from = elevation.cos() * level + elevation.sin() * up;
+        let level = libm::cos(azimuth) * front + libm::sin(azimuth) * side;
+        let from = libm::cos(elevation) * level + libm::sin(elevation) * up;
         // Seen straight from above or below, the picture's upper edge is the far or the near one.
-        let upwards = if elevation.cos().abs() < 1e-6 { -level * elevation.sin().signum() } else { up };
+        let upwards = if libm::cos(elevation).abs() < 1e-6 { -level * libm::sin(elevation).signum() } else { up };
         Ok((from, upwards))
     }
 }
 
 /// The default azimuth and elevation of a framing, in degrees.
 pub fn default_angles() -> (f64, f64) {
-    let level = FROM.x.hypot(FROM.z);
-    (FROM.x.atan2(-FROM.z).to_degrees(), (-FROM.y).atan2(level).to_degrees())
+    let level = libm::hypot(FROM.x, FROM.z);
+    (libm::atan2(FROM.x, -FROM.z).to_degrees(), libm::atan2(-FROM.y, level).to_degrees())
 }
 
 /// The direction of azimuth 0: the horizontal direction nearest to -z; or to +y, if -z is almost vertical.

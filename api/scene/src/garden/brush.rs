@@ -68,7 +68,7 @@ impl Brush {
 
     /// An evenly distributed point of the disc of `radius` on the ground.
     pub(super) fn on_disc(&mut self, radius: f64) -> DVec3 {
-        let (sin, cos) = self.even(0.0, std::f64::consts::TAU).sin_cos();
+        let (sin, cos) = libm::sincos(self.even(0.0, std::f64::consts::TAU));
         let radius = radius * self.even(0.0, 1.0).sqrt();
         DVec3::new(radius * cos, 0.0, radius * sin)
     }

@@ -9,7 +9,7 @@ pub(super) fn spread(index: usize, count: usize) -> DVec3 {
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     let y = 1.0 - 2.0 * (index as f64 + 0.5) / count as f64;
     let ring = (1.0 - y * y).sqrt();
-    let (sin, cos) = (golden * index as f64 % TAU).sin_cos();
+    let (sin, cos) = libm::sincos(golden * index as f64 % TAU);
     DVec3::new(ring * cos, y, ring * sin)
 }
 

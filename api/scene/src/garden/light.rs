@@ -21,7 +21,8 @@ pub(super) fn sky(direction: DVec3) -> DVec3 {
     let horizon = DVec3::new(0.98, 0.66, 0.44);
     let sky = horizon.lerp(middle, smooth(height / 0.22)).lerp(zenith, smooth((height - 0.12) / 0.75));
     let towards = direction.dot(sun()).max(0.0);
-    sky + DVec3::new(0.55, 0.32, 0.10) * towards.powi(6) * 0.6 + DVec3::new(1.0, 0.85, 0.55) * towards.powi(90) * 0.9
+    let glow = DVec3::new(0.55, 0.32, 0.10) * libm::pow(towards, 6.0) * 0.6;
+    sky + glow + DVec3::new(1.0, 0.85, 0.55) * libm::pow(towards, 90.0) * 0.9
 }
 
 /// The colour of a matte surface, lit by sun, sky and ground. `open` is the share of light that reaches it, 0 to 1.

@@ -49,11 +49,11 @@ const TREES: [Tree; 12] = [
 
 /// The ground's height above the water.
 fn ground(x: f64, z: f64) -> f64 {
-    let from_centre = x.hypot(z);
+    let from_centre = libm::hypot(x, z);
     let bank = smooth((from_centre - POND + 0.25) / 1.4);
-    let hills = 0.16 * (0.7 * x + 0.4).sin() * (0.6 * z - 0.8).cos()
-        + 0.5 * smooth((from_centre - 6.0) / 26.0) * (0.21 * x + 0.17 * z).sin()
-        + 0.05 * (2.3 * x - 1.1 * z).sin();
+    let hills = 0.16 * libm::sin(0.7 * x + 0.4) * libm::cos(0.6 * z - 0.8)
+        + 0.5 * smooth((from_centre - 6.0) / 26.0) * libm::sin(0.21 * x + 0.17 * z)
+        + 0.05 * libm::sin(2.3 * x - 1.1 * z);
     -0.25 + bank * (0.37 + hills)
 }
 
@@ -69,11 +69,12 @@ fn shade(x: f64, z: f64) -> f64 {
         // The crown's shadow lies opposite the sun.
         let reach = 0.62 * tree.height / sun().y;
         let (dx, dz) = (x - (tree.x - sun().x * reach), z - (tree.z - sun().z * reach));
-        let along = (dx * sun().x + dz * sun().z) / sun().x.hypot(sun().z);
-        let across = dx.hypot(dz).powi(2) - along * along;
+        let along = (dx * sun().x + dz * sun().z) / libm::hypot(sun().x, sun().z);
+        let across = dx * dx + dz * dz - along * along;
         let size = 0.30 * tree.height;
-        let distance = (across + (0.45 * along).powi(2)).max(0.0) / (size * size);
-        open * (1.0 - 0.75 * (-distance).exp())
+        let stretched = 0.45 * along;
+        let distance = (across + stretched * stretched).max(0.0) / (size * size);
+        open * (1.0 - 0.75 * libm::exp(-distance))
     })
 }
 
@@ -92,7 +93,8 @@ pub(super) fn sky(brush: &mut Brush, count: usize) {
     let spacing = (4.0 * std::f64::consts::PI / all.max(1) as f64).sqrt();
     for i in 0..count {
         let direction = spread(i, all);
-        let cloud = (7.0 * direction.x + 3.0 * direction.z).sin() * (16.0 * direction.y + 2.5 * direction.x).sin();
+        let cloud =
+            libm::sin(7.0 * direction.x + 3.0 * direction.z) * libm::sin(16.0 * direction.y + 2.5 * direction.x);
         let low = smooth(direction.y / 0.08) * (1.0 - smooth((direction.y - 0.15) / 0.3));
         let colour = sky_colour(direction) + DVec3::new(0.16, 0.09, 0.09) * (cloud * low);
         let mut splat = Splat::new(direction * radius, radius * spacing * 0.62, colour);
@@ -106,14 +108,14 @@ pub(super) fn sky(brush: &mut Brush, count: usize) {
 /// Paints ground and grass: denser near the pond, larger far away.
 pub(super) fn meadow(brush: &mut Brush, count: usize) {
     for i in 0..count {
-        let (sin, cos) = brush.even(0.0, TAU).sin_cos();
+        let (sin, cos) = libm::sincos(brush.even(0.0, TAU));
         // The same number at every scale of distance from the pond's bank.
-        let reach = brush.even(0.0, 1.0).powf(1.3);
-        let from_centre = (POND - 0.05) * (MEADOW / (POND - 0.05)).powf(reach);
+        let reach = libm::pow(brush.even(0.0, 1.0), 1.3);
+        let from_centre = (POND - 0.05) * libm::pow(MEADOW / (POND - 0.05), reach);
         let (x, z) = (from_centre * cos, from_centre * sin);
         let (height, normal) = (ground(x, z), ground_normal(x, z));
-        let size = 0.013 * from_centre.max(2.0).powf(0.8);
-        let patch = 0.5 + 0.5 * (1.7 * x + (1.3 * z).sin()).sin() * (1.1 * z - 0.6 * x).cos();
+        let size = 0.013 * libm::pow(from_centre.max(2.0), 0.8);
+        let patch = 0.5 + 0.5 * libm::sin(1.7 * x + libm::sin(1.3 * z)) * libm::cos(1.1 * z - 0.6 * x);
         let grass = DVec3::new(0.17, 0.27, 0.07).lerp(DVec3::new(0.38, 0.38, 0.12), patch);
         let albedo = grass * brush.even(0.75, 1.2);
         let open = shade(x, z);
@@ -158,7 +160,7 @@ pub(super) fn flowers(brush: &mut Brush, count: usize) {
     let mut head = DVec3::ZERO;
     for i in 0..count {
         if i % (40 * PETALS) == 0 {
-            let (sin, cos) = brush.even(0.0, TAU).sin_cos();
+            let (sin, cos) = libm::sincos(brush.even(0.0, TAU));
             centre = DVec3::new(cos, 0.0, sin) * brush.even(POND + 0.5, 6.5);
             colour = COLOURS[(brush.even(0.0, 5.0) as usize).min(4)];
         }
@@ -167,7 +169,7 @@ pub(super) fn flowers(brush: &mut Brush, count: usize) {
             head = DVec3::new(x, ground(x, z).max(0.03) + brush.even(0.06, 0.15), z);
         }
         let middle = i % PETALS == 0;
-        let (sin, cos) = (TAU * (i % PETALS) as f64 / (PETALS - 1) as f64).sin_cos();
+        let (sin, cos) = libm::sincos(TAU * (i % PETALS) as f64 / (PETALS - 1) as f64);
         let offset = if middle { 0.0 } else { 0.016 };
         let position = head + DVec3::new(cos, brush.even(-0.2, 0.3), sin) * offset;
         let albedo = if middle { COLOURS[1] } else { colour };
@@ -182,7 +184,7 @@ pub(super) fn flowers(brush: &mut Brush, count: usize) {
 
 /// Paints trees: near ones get most of the leaves.
 pub(super) fn trees(brush: &mut Brush, count: usize) {
-    let weight = |tree: &Tree| 1.0 / (1.0 + 0.10 * tree.x.hypot(tree.z + 4.0).powi(2)).sqrt();
+    let weight = |tree: &Tree| 1.0 / (1.0 + 0.10 * (tree.x * tree.x + (tree.z + 4.0) * (tree.z + 4.0))).sqrt();
     let total: f64 = TREES.iter().map(weight).sum();
     let mut left = count;
     for (i, tree) in TREES.iter().enumerate() {
@@ -211,9 +213,9 @@ fn grow(brush: &mut Brush, tree: &Tree, count: usize) {
     let bark = count / 14;
     for _ in 0..bark {
         let t = brush.even(0.0, 1.0);
-        let (sin, cos) = brush.even(0.0, TAU).sin_cos();
+        let (sin, cos) = libm::sincos(brush.even(0.0, TAU));
         let outwards = DVec3::new(cos, 0.0, sin);
-        let radius = height * (0.042 - 0.026 * t) * (1.0 + 0.9 * (-9.0 * t).exp());
+        let radius = height * (0.042 - 0.026 * t) * (1.0 + 0.9 * libm::exp(-9.0 * t));
         let position = trunk(t) + outwards * radius;
         let albedo = DVec3::new(0.30, 0.22, 0.16) * brush.even(0.6, 1.15);
         let lit = matte(albedo, outwards, 0.75 - 0.5 * t);
@@ -222,12 +224,12 @@ fn grow(brush: &mut Brush, tree: &Tree, count: usize) {
         splat.scale *= DVec3::new(0.9, 3.2, 0.4);
         brush.paint(&splat);
     }
-    let leaf_size = height * 0.0075 * (20_000.0 / count.max(1) as f64).powf(0.33).clamp(0.8, 2.2);
+    let leaf_size = height * 0.0075 * libm::pow(20_000.0 / count.max(1) as f64, 0.33).clamp(0.8, 2.2);
     for i in bark..count {
         let (centre, radius) = clumps[i % clumps.len()];
         let direction = brush.direction();
         // Most leaves are near the clump's surface.
-        let out = brush.even(0.0, 1.0).powf(0.3) + brush.normal(0.06);
+        let out = libm::pow(brush.even(0.0, 1.0), 0.3) + brush.normal(0.06);
         let position = centre + direction * DVec3::new(1.0, 0.8, 1.0) * (radius * out);
         let outwards = ((position - crown) / (0.3 * height)).clamp_length_max(1.0);
         let normal = (0.6 * direction + 0.7 * outwards + 0.35 * brush.direction()).normalize_or(DVec3::Y);
@@ -282,9 +284,9 @@ fn lily_pad(brush: &mut Brush, index: usize) -> Splat {
 fn water(brush: &mut Brush) -> Splat {
     let position = brush.on_disc(POND + 0.25);
     let ripple = DVec3::new(
-        0.05 * (9.0 * position.x + 5.0 * position.z).sin(),
+        0.05 * libm::sin(9.0 * position.x + 5.0 * position.z),
         1.0,
-        0.05 * (8.0 * position.z - 4.0 * position.x).sin(),
+        0.05 * libm::sin(8.0 * position.z - 4.0 * position.x),
     )
     .normalize();
     let mut splat = Splat::new(position, 0.08, DVec3::new(0.10, 0.16, 0.24));
@@ -321,9 +323,9 @@ pub(super) fn knot(brush: &mut Brush, count: usize) {
 /// The knot's centre line at `t`, from 0 to 2 pi.
 fn course(t: f64) -> DVec3 {
     let (angle, around) = (2.0 * t, 3.0 * t);
-    let radius = 0.62 + 0.26 * around.cos();
-    let (sin, cos) = angle.sin_cos();
-    DVec3::new(radius * cos, 1.14 + radius * sin, 0.30 * around.sin())
+    let radius = 0.62 + 0.26 * libm::cos(around);
+    let (sin, cos) = libm::sincos(angle);
+    DVec3::new(radius * cos, 1.14 + radius * sin, 0.30 * libm::sin(around))
 }
 
 fn paint_knot(brush: &mut Brush, count: usize, mirrored: bool) {
@@ -338,10 +340,10 @@ fn paint_knot(brush: &mut Brush, count: usize, mirrored: bool) {
         let tangent = (ahead - here).normalize();
         let side = tangent.cross(DVec3::Y + 0.01 * DVec3::X).normalize_or(DVec3::X);
         // Multiples of the golden angle leave no gaps.
-        let (sin, cos) = (2.399_963 * i as f64 % TAU).sin_cos();
+        let (sin, cos) = libm::sincos(2.399_963 * i as f64 % TAU);
         let normal = side * cos + tangent.cross(side) * sin;
         let tone = 3.0 * (t / TAU);
-        let (from, part) = (tone as usize % 3, smooth(tone.fract()));
+        let (from, part) = (tone as usize % 3, smooth(tone - libm::trunc(tone)));
         let metal = TONES[from].lerp(TONES[(from + 1) % 3], part);
         let mut splat = Splat::new(here + normal * TUBE, size, DVec3::ZERO);
         splat.opacity = 0.97;

@@ -31,7 +31,10 @@ fn axes_are_turned_in_every_format() {
     let files = [
         ("a.ply", ply(Encoding::Little, &properties, &rows)),
         ("a.compressed.ply", compressed_ply(true, true)),
-        ("a.spz", gzip(&[spz_header(2, 2, 1, 0), (0..56).map(|i| 37 * i + 5).map(|i: u32| i as u8).collect()].concat())),
+        (
+            "a.spz",
+            gzip(&[spz_header(2, 2, 1, 0), (0..56).map(|i| 37 * i + 5).map(|i: u32| i as u8).collect()].concat()),
+        ),
     ];
     for (name, file) in &files {
         let plain = with_axes(name, file, "rdf");
@@ -203,7 +206,8 @@ fn numbers_that_are_not_finite_are_named() {
     rows[2][3] = f32::NEG_INFINITY;
     rows[3][5] = f32::NEG_INFINITY;
     for encoding in [Encoding::Ascii, Encoding::Little] {
-        let warnings = read("a.ply", &ply(encoding, &properties, &rows)).expect("a good file").metadata().warnings.clone();
+        let warnings =
+            read("a.ply", &ply(encoding, &properties, &rows)).expect("a good file").metadata().warnings.clone();
         assert_eq!(warnings.len(), 2, "{warnings:?}");
         assert!(warnings[0].starts_with("2 Gaussians have a scale of -inf"), "{warnings:?}");
         assert!(warnings[1].starts_with("2 of 5 Gaussians"), "{warnings:?}");

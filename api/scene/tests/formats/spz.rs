@@ -329,7 +329,10 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
         let energy = |scene: &gaurast_scene::Scene| -> f32 { scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum() };
         close(&[energy(&scene)], &[energy(&plain)], 1e-4);
         if frame == "RUB" {
-            assert_eq!((scene.positions(), scene.shapes(), scene.sh()), (plain.positions(), plain.shapes(), plain.sh()));
+            assert_eq!(
+                (scene.positions(), scene.shapes(), scene.sh()),
+                (plain.positions(), plain.shapes(), plain.sh())
+            );
         }
         // The gradient of degree 1 rotates with the file's axes, as the positions do.
         let gradient = |sh: &[[f32; 3]]| [-sh[3][1], -sh[1][1], sh[2][1]];

@@ -82,24 +82,41 @@ pub(crate) fn append(
     draw: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
-    let count = u64::from(draw.count) * u64::from(draw.instance_count);
-    if count > MAX_GAUSSIANS {
-        return Err(DrawError::TooManyGaussians(count));
-    }
+    let check = |gaussians: u64| match gaussians {
+        ..=MAX_GAUSSIANS => Ok(()),
+        _ => Err(DrawError::TooManyGaussians(gaussians)),
+    };
     let sources = match &gaussian.source {
         GaussianSource::Attributes(sources) => sources,
         GaussianSource::VertexShader(projection) => {
+            check(u64::from(draw.count) * u64::from(draw.instance_count))?;
             return shaded(state, pipeline, gaussian, projection, draw, draw_index);
         }
     };
-    Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
+    let append = GaussianAppend {
         attributes: attributes(state, pipeline, sources, set.state.sh_degree)?,
         indices: indices(state, draw)?,
         first: draw.first,
         count: draw.count,
         first_instance: draw.first_instance,
         instance_count: draw.instance_count,
-    })))
+    };
+    check(append.clone().within_buffers().gaussians())?;
+    Ok(Packet::GaussianAppend(Box::new(append)))
+}
+
+/// The sentence on the Gaussians of a draw's packets that lie beyond its buffers; `None` if there are none.
+pub(crate) fn beyond_buffers(packets: &[Packet]) -> Option<String> {
+    let append = packets.iter().find_map(|packet| match packet {
+        Packet::GaussianAppend(append) => Some(&**append),
+        _ => None,
+    })?;
+    let drawn = append.clone().within_buffers().gaussians();
+    let beyond = append.gaussians() - drawn;
+    (beyond > 0).then(|| {
+        let all = append.gaussians();
+        format!("a draw of {all} Gaussians leaves out {beyond} of them, which lie beyond the buffer of their rotations")
+    })
 }
 
 /// The packet that adds a draw whose Gaussians are projected by a vertex shader.

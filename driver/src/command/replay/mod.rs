@@ -225,7 +225,12 @@ fn draw(
         return Ok(());
     }
     match packets(state, parameters, draw_index) {
-        Ok(packets) => packets.iter().try_for_each(|packet| execution.execute(packet)),
+        Ok(packets) => {
+            if let Some(sentence) = gaussian::beyond_buffers(&packets) {
+                execution.report(&sentence);
+            }
+            packets.iter().try_for_each(|packet| execution.execute(packet))
+        }
         Err(reason) => {
             execution.report(&format!("a draw draws nothing: {reason}"));
             Ok(())

@@ -19,9 +19,8 @@ const GREEN: [f64; 3] = [0.0, 1.0, 0.0];
 const GREY: [f64; 3] = [0.5; 3];
 
 /// The properties of a Gaussian but its place.
-const PROPERTIES: [&str; 11] = [
-    "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2",
-];
+const PROPERTIES: [&str; 11] =
+    ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2"];
 
 /// A PLY file with places of type `kind`, and lines `extra` in its header.
 fn ply(balls: &[Ball], kind: &str, extra: &str) -> String {
@@ -80,7 +79,8 @@ fn picture(folder: &TempDir, name: &str) -> image::RgbaImage {
 
 /// The mean row of the pixels in which one channel dominates.
 fn mean_row(picture: &image::RgbaImage, channel: usize) -> f64 {
-    let is_of = |pixel: &image::Rgba<u8>| (0..3).all(|other| other == channel || pixel.0[channel] > pixel.0[other] + 60);
+    let is_of =
+        |pixel: &image::Rgba<u8>| (0..3).all(|other| other == channel || pixel.0[channel] > pixel.0[other] + 60);
     let rows: Vec<f64> = picture.enumerate_pixels().filter(|(.., p)| is_of(p)).map(|(_, y, _)| f64::from(y)).collect();
     assert!(!rows.is_empty(), "no pixel of channel {channel}");
     rows.iter().sum::<f64>() / rows.len() as f64

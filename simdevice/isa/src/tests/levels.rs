@@ -2,6 +2,7 @@
 
 use gaurast_runner::{Case, is_long};
 
+use super::random::{ELEMENTARY, ROUNDING};
 use super::transcendental::{LANES, program};
 use super::{Random, level, machine, run};
 use crate::level::SimdLevel;
@@ -13,35 +14,6 @@ fn same(a: u32, b: u32) -> bool {
     a == b || f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan()
 }
 
-/// The 32-bit operations of one float whose results are floats.
-const UNARY: &[Op] = &[
-    Op::FFloor,
-    Op::FCeil,
-    Op::FTrunc,
-    Op::FRoundEven,
-    Op::FFract,
-    Op::FSqrt,
-    Op::FInverseSqrt,
-    Op::FSign,
-    Op::RoundToF16,
-    Op::FExp,
-    Op::FExp2,
-    Op::FLog,
-    Op::FLog2,
-    Op::FSin,
-    Op::FCos,
-    Op::FTan,
-    Op::FAsin,
-    Op::FAcos,
-    Op::FAtan,
-    Op::FSinh,
-    Op::FCosh,
-    Op::FTanh,
-    Op::FAsinh,
-    Op::FAcosh,
-    Op::FAtanh,
-];
-
 /// Operations of one float, on all floats or on a sample of them.
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
 fn operations_of_one_float_give_the_same_bits(case: &Case) {
@@ -49,7 +21,8 @@ fn operations_of_one_float_give_the_same_bits(case: &Case) {
     let least = SimdLevel::Baseline.resolve().expect("a level of every processor");
     // The step is odd, so that the low bits of the sample vary.
     let step = if is_long() { 1 } else { 40_009 };
-    for &op in UNARY {
+    // The 32-bit operations of one float whose results are floats.
+    for &op in ROUNDING.iter().chain(ELEMENTARY).chain(&[Op::FSign]) {
         let program = program(op);
         let [mut ours, mut theirs] = [level, least].map(|level| machine(&program, level, LANES));
         let mut next = 0u64;

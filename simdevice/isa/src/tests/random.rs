@@ -42,9 +42,11 @@ const INTEGER: &[Op] = &[
 ];
 const FLOAT: &[Op] = &[Op::FAdd, Op::FSub, Op::FMul, Op::FDiv, Op::FMin, Op::FMax, Op::FRem];
 const FUSED: &[Op] = &[Op::FFma, Op::FMulSub, Op::FNegMulAdd];
-const ROUNDING: &[Op] = &[Op::FFloor, Op::FCeil, Op::FTrunc, Op::FRoundEven, Op::FFract, Op::FSqrt, Op::RoundToF16];
+/// Operations of one float that are exact, or rounded once.
+pub(super) const ROUNDING: &[Op] =
+    &[Op::FFloor, Op::FCeil, Op::FTrunc, Op::FRoundEven, Op::FFract, Op::FSqrt, Op::RoundToF16];
 /// Functions that the scalar interpreter computes in another way.
-const ELEMENTARY: &[Op] = &[
+pub(super) const ELEMENTARY: &[Op] = &[
     Op::FExp,
     Op::FExp2,
     Op::FLog,

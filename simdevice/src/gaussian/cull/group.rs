@@ -27,7 +27,7 @@ impl GroupTask<'_> {
             return None;
         }
         let mut frustum = Cow::Borrowed(&*self.frustum);
-        if let Members::From(_) = self.source.members {
+        if let Members::Run(_) = self.source.members {
             let opacities = &group.attributes.opacity[..group.vertices.len];
             let opacity = opacities.iter().copied().fold(1.0, f32::max);
             if opacity > 1.0 {

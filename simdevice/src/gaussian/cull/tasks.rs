@@ -5,9 +5,9 @@ use super::group::GroupTask;
 use super::occlusion::OcclusionMap;
 use crate::gaussian::lanes::GROUP;
 use crate::gaussian::read::clusters::{Cluster, Clusters};
-use crate::gaussian::read::group::{GroupSource, Members};
+use crate::gaussian::read::group::{GroupSource, MemberRun, Members};
 use crate::gaussian::read::models::InstanceTransform;
-use crate::gaussian::set::{GaussianSet, MAX_GROUPS, SortError};
+use crate::gaussian::set::{GaussianSet, MAX_GROUPS, SortError, is_packed};
 use crate::gaussian::view::constants::ViewConstants;
 use crate::packet::GaussianAppend;
 use crate::stats::counters::{Counter, Counters};
@@ -39,6 +39,27 @@ pub(crate) fn group_tasks<'a>(
         let opacity = clusters.as_ref().map_or(1.0, |clusters| clusters.opacity);
         let view = InstanceView::new(constants, opacity);
         let has_harmonics = clusters.as_ref().map(|all| all.have_harmonics_of(append));
+        if is_packed(append.count) {
+            let task = |instance: u32, run| GroupTask {
+                source: GroupSource {
+                    append,
+                    instance: append.first_instance.saturating_add(instance),
+                    sequence: sequence.wrapping_add(instance.wrapping_mul(append.count)),
+                    members: Members::Run(run),
+                    has_harmonics: false,
+                },
+                frustum: Arc::clone(&view.frustum),
+            };
+            let count = u64::from(append.count);
+            let gaussians = count * u64::from(append.instance_count);
+            host::reserve(&mut tasks, gaussians.div_ceil(GROUP as u64) as usize);
+            tasks.extend((0..gaussians).step_by(GROUP).map(|first| {
+                let len = (gaussians - first).min(GROUP as u64) as u32;
+                task((first / count) as u32, MemberRun { start: (first % count) as u32, len })
+            }));
+            sequence = sequence.wrapping_add(append.count.wrapping_mul(append.instance_count));
+            continue;
+        }
         for instance in 0..append.instance_count {
             let instance = append.first_instance.saturating_add(instance);
             let of_instance;
@@ -66,7 +87,9 @@ pub(crate) fn group_tasks<'a>(
             match clusters {
                 None => {
                     let starts = (0..append.count).step_by(GROUP);
-                    tasks.extend(starts.map(|start| task(Members::From(start))));
+                    tasks.extend(starts.map(|start| {
+                        task(Members::Run(MemberRun { start, len: (append.count - start).min(GROUP as u32) }))
+                    }));
                 }
                 Some(clusters) => tasks.extend(
                     clusters

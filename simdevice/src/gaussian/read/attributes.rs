@@ -52,18 +52,49 @@ impl Attributes {
 /// stride each element is read by itself.
 const WHOLE_SPAN_STRIDE: u32 = 64;
 
-/// The vertices of one group of one instance.
+/// The vertices and the instances of a group's Gaussians.
 pub(crate) struct GroupVertices<'a> {
     /// The vertices, as many as the group has lanes in use.
     vertices: VertexNumbers<'a>,
-    pub(crate) instance: u32,
-    pub(crate) first_instance: u32,
+    instances: InstanceNumbers,
+    first_instance: u32,
     pub(crate) len: usize,
+}
+
+/// The instances of a group's lanes.
+enum InstanceNumbers {
+    /// All lanes are of this instance.
+    One(u32),
+    /// Instance after instance.
+    Several(InstanceRun),
+}
+
+/// A run of Gaussians that goes on from an instance to the next.
+#[derive(Clone, Copy)]
+struct InstanceRun {
+    /// The instance of lane 0.
+    instance: u32,
+    /// The place of lane 0 in its instance.
+    place: u32,
+    /// The Gaussians of an instance.
+    count: u32,
+}
+
+impl InstanceRun {
+    fn instance(self, lane: usize) -> u32 {
+        self.instance.saturating_add((self.place + lane as u32) / self.count)
+    }
+
+    fn place(self, lane: usize) -> u32 {
+        (self.place + lane as u32) % self.count
+    }
 }
 
 enum VertexNumbers<'a> {
     /// Consecutive vertices, from this one on.
     From(u64),
+    /// The draw's first vertex, and the places of lanes in their instances.
+    Run(u64, InstanceRun),
     /// Vertex numbers read from an index buffer.
     Listed(Vec<u64>),
     /// The draw's first vertex, and the numbers of a cluster's vertices relative to it.
@@ -71,21 +102,35 @@ enum VertexNumbers<'a> {
 }
 
 impl<'a> GroupVertices<'a> {
-    /// The `len` vertices of `append` from number `start` on, for `instance`.
+    /// The `len` vertices of `append` from number `start` of `instance` on. They go on in the next instances if `instance` has
+    /// fewer.
     pub(crate) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
-        let first = u64::from(append.first) + u64::from(start);
+        let first = u64::from(append.first);
+        let first_instance = append.first_instance;
+        if u64::from(start) + len as u64 <= u64::from(append.count) {
+            let first = first + u64::from(start);
+            let vertices = match &append.indices {
+                None => VertexNumbers::From(first),
+                Some(stream) => VertexNumbers::Listed(read_indices(stream, first, len)),
+            };
+            return Self { vertices, instances: InstanceNumbers::One(instance), first_instance, len };
+        }
+        let run = InstanceRun { instance, place: start, count: append.count };
         let vertices = match &append.indices {
-            None => VertexNumbers::From(first),
-            Some(stream) => VertexNumbers::Listed(read_indices(stream, first, len)),
+            None => VertexNumbers::Run(first, run),
+            Some(stream) => {
+                let of_instance = read_indices(stream, first, append.count as usize);
+                VertexNumbers::Listed((0..len).map(|lane| of_instance[run.place(lane) as usize]).collect())
+            }
         };
-        Self { vertices, instance, first_instance: append.first_instance, len }
+        Self { vertices, instances: InstanceNumbers::Several(run), first_instance, len }
     }
 
     /// The vertices of `append` with these numbers, relative to its first vertex, for `instance`.
     pub(crate) fn of_cluster(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
         Self {
             vertices: VertexNumbers::Cluster(append.first.into(), numbers),
-            instance,
+            instances: InstanceNumbers::One(instance),
             first_instance: append.first_instance,
             len: numbers.len(),
         }
@@ -96,19 +141,36 @@ impl<'a> GroupVertices<'a> {
         match stream.instance_divisor {
             Some(0) => u64::from(self.first_instance),
             Some(divisor) => {
-                u64::from(self.first_instance) + u64::from((self.instance - self.first_instance) / divisor)
+                let instance = match self.instances {
+                    InstanceNumbers::One(instance) => instance,
+                    InstanceNumbers::Several(run) => run.instance(lane),
+                };
+                u64::from(self.first_instance) + u64::from((instance - self.first_instance) / divisor)
             }
             None => match &self.vertices {
                 VertexNumbers::From(first) => first + lane as u64,
+                VertexNumbers::Run(first, run) => first + u64::from(run.place(lane)),
                 VertexNumbers::Listed(list) => list[lane],
                 VertexNumbers::Cluster(first, numbers) => first + u64::from(numbers[lane]),
             },
         }
     }
 
+    /// True if all lanes read one element of `stream`.
+    pub(super) fn is_uniform(&self, stream: &AttributeStream) -> bool {
+        match (stream.instance_divisor, &self.instances) {
+            (None, _) => false,
+            (Some(divisor), instances) => divisor == 0 || matches!(instances, InstanceNumbers::One(_)),
+        }
+    }
+
     /// True if consecutive lanes read consecutive elements of `stream`.
     fn is_consecutive(&self, stream: &AttributeStream) -> bool {
-        stream.instance_divisor.is_none() && matches!(self.vertices, VertexNumbers::From(_))
+        match (stream.instance_divisor, &self.instances) {
+            (None, _) => matches!(self.vertices, VertexNumbers::From(_)),
+            (Some(divisor), InstanceNumbers::Several(run)) => divisor == 1 && run.count == 1,
+            (Some(_), InstanceNumbers::One(_)) => false,
+        }
     }
 }
 
@@ -144,7 +206,7 @@ impl Fetcher {
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
         let (size, floats) = (stream.format.texel_size(), is_of_floats(stream.format));
-        if stream.instance_divisor.is_some() && group.len > 0 {
+        if group.is_uniform(stream) && group.len > 0 {
             let element = self.read_element(stream, group.element(stream, 0), size);
             let value = stream.format.decode(element);
             for (component, out) in out.iter_mut().enumerate() {

@@ -4,7 +4,6 @@ use super::attributes::{Attributes, Fetcher, GroupVertices};
 use super::clusters::Cluster;
 use super::harmonics::{CoefficientReader, Harmonics};
 use super::models::Matrices;
-use crate::gaussian::lanes::GROUP;
 use crate::gaussian::spherical_harmonics::{COEFFICIENT_FLOATS, coefficient_count};
 use crate::packet::GaussianAppend;
 
@@ -12,20 +11,31 @@ use crate::packet::GaussianAppend;
 #[derive(Clone)]
 pub(crate) struct GroupSource<'a> {
     pub(crate) append: &'a GaussianAppend,
+    /// The instance of the first Gaussian.
     pub(crate) instance: u32,
-    /// The number in the set of the instance's first Gaussian.
+    /// The number in the set of that instance's first Gaussian.
     pub(crate) sequence: u32,
     pub(crate) members: Members<'a>,
     /// True if the cluster holds the append's spherical harmonics.
     pub(crate) has_harmonics: bool,
 }
 
-/// The Gaussians of a group, among those of its instance.
+/// The Gaussians of a group.
 #[derive(Clone, Copy)]
 pub(crate) enum Members<'a> {
-    /// The vertices from this one on.
-    From(u32),
+    /// Consecutive ones, which may go on in the next instances.
+    Run(MemberRun),
+    /// Those of a cluster of the instance.
     Cluster(&'a Cluster),
+}
+
+/// Consecutive Gaussians.
+#[derive(Clone, Copy)]
+pub(crate) struct MemberRun {
+    /// The place of the first one in its instance.
+    pub(crate) start: u32,
+    /// The number of Gaussians, at most [`GROUP`].
+    pub(crate) len: u32,
 }
 
 /// The numbers in the set of a group's Gaussians.
@@ -62,10 +72,7 @@ impl<'a> GroupSource<'a> {
     ) -> GroupAttributes<'b> {
         let streams = &self.append.attributes;
         let vertices = match self.members {
-            Members::From(start) => {
-                let len = (self.append.count - start).min(GROUP as u32) as usize;
-                GroupVertices::new(self.append, self.instance, start, len)
-            }
+            Members::Run(run) => GroupVertices::new(self.append, self.instance, run.start, run.len as usize),
             Members::Cluster(cluster) => GroupVertices::of_cluster(self.append, self.instance, &cluster.numbers),
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
@@ -86,7 +93,7 @@ impl<'a> GroupSource<'a> {
                 // Products of finite numbers may overflow.
                 (&*attributes, false)
             }
-            Members::From(_) => {
+            Members::Run(_) => {
                 fetcher.read_own(streams, &vertices, attributes);
                 fetcher.fade(streams, &vertices, attributes);
                 if is_surfel {
@@ -102,7 +109,7 @@ impl<'a> GroupSource<'a> {
     /// The numbers of the group's Gaussians in the set.
     pub(crate) fn sequence(&self) -> Sequence<'a> {
         match self.members {
-            Members::From(start) => Sequence::From(self.sequence + start),
+            Members::Run(run) => Sequence::From(self.sequence.wrapping_add(run.start)),
             Members::Cluster(cluster) => Sequence::Listed(self.sequence, &cluster.numbers),
         }
     }

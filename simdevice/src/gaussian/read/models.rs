@@ -25,7 +25,7 @@ impl Default for Matrices {
 impl Matrices {
     /// Reads a group's matrices.
     pub(crate) fn read(&mut self, fetcher: &mut Fetcher, rows: &[AttributeStream; 3], group: &GroupVertices<'_>) {
-        self.is_uniform = rows.iter().all(|stream| stream.instance_divisor.is_some());
+        self.is_uniform = rows.iter().all(|stream| group.is_uniform(stream));
         for (stream, row) in rows.iter().zip(&mut self.rows) {
             fetcher.read(stream, group, row.each_mut());
         }

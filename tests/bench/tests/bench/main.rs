@@ -1,6 +1,7 @@
 //! Tests of the benchmark program, and of the quads with which it compares.
 
 mod command_line;
+mod exact;
 mod quads;
 
 use std::process::ExitCode;

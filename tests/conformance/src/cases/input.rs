@@ -177,7 +177,7 @@ fn placements() -> Vec<OracleInstance> {
     (0..6)
         .map(|at| {
             let angle = at as f32;
-            let (sin, cos) = angle.sin_cos();
+            let (sin, cos) = libm::sincosf(angle);
             let size = 0.5 + 0.1 * angle;
             OracleInstance {
                 matrix: [

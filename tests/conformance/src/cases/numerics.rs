@@ -11,7 +11,7 @@ use crate::draw::{Camera, Draw};
 /// A rotation that differs for each Gaussian index.
 fn turned(index: usize) -> [f32; 4] {
     let angle = index as f32;
-    [(0.7 * angle).cos(), (1.3 * angle).sin(), (0.4 * angle).sin(), (0.9 * angle).cos()]
+    [libm::cosf(0.7 * angle), libm::sinf(1.3 * angle), libm::sinf(0.4 * angle), libm::cosf(0.9 * angle)]
 }
 
 /// A position in front of the camera for each Gaussian index, in no particular order.

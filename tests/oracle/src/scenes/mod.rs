@@ -113,7 +113,7 @@ pub fn cloud(seed: u64, count: usize, degree: u32) -> SceneBuffers {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let gaussians = (0..count).map(|_| {
         let z = rng.random_range(2.0_f32..12.0);
-        let size = 0.012 * (rng.random_range(-1.2_f32..1.2) + rng.random_range(-1.2_f32..1.2)).exp();
+        let size = 0.012 * libm::expf(rng.random_range(-1.2_f32..1.2) + rng.random_range(-1.2_f32..1.2));
         let opaque = rng.random_bool(0.4);
         Gaussian {
             position: [z * rng.random_range(-0.75..0.75), z * rng.random_range(-0.75..0.75), z],

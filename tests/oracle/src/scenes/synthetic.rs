@@ -18,8 +18,8 @@ pub fn synthetic(seed: u64, count: usize) -> Scene {
     let mut sh = [[0.0; 3]; 16];
     for _ in 0..count {
         let position = position(&mut rng);
-        let mut scale: [f64; 3] = std::array::from_fn(|_| 0.012 * (0.6 * normal(&mut rng)).exp());
-        scale[2] *= (-0.7 + 0.5 * normal(&mut rng)).exp();
+        let mut scale: [f64; 3] = std::array::from_fn(|_| 0.012 * libm::exp(0.6 * normal(&mut rng)));
+        scale[2] *= libm::exp(-0.7 + 0.5 * normal(&mut rng));
         let rotation: [f64; 4] = std::array::from_fn(|_| normal(&mut rng));
         let length = rotation.iter().map(|c| c * c).sum::<f64>().sqrt();
         let shape = GaussianShape {
@@ -58,7 +58,7 @@ fn position(rng: &mut ChaCha8Rng) -> [f64; 3] {
     match within(1.0) + 0.5 {
         ..0.35 => {
             let y = within(2.0);
-            let (sin, cos) = within(TAU).sin_cos();
+            let (sin, cos) = libm::sincos(within(TAU));
             let ring = (1.0 - y * y).sqrt();
             [ring * cos, y, ring * sin].map(|c| 1.5 * c)
         }

@@ -38,9 +38,9 @@ pub fn trained_like(seed: u64, count: usize, cameras: &[Camera]) -> Scene {
             OBJECT..DENSE => ground(&mut rng, place.radius, count),
             _ => background(&mut rng, place.radius, count),
         };
-        let size = 0.8 * spacing * (0.7 * normal(&mut rng)).exp();
+        let size = 0.8 * spacing * libm::exp(0.7 * normal(&mut rng));
         let shape = GaussianShape {
-            scale: [1.0, (-0.5 * normal(&mut rng).abs()).exp(), (-2.0 + 0.5 * normal(&mut rng)).exp()]
+            scale: [1.0, libm::exp(-0.5 * normal(&mut rng).abs()), libm::exp(-2.0 + 0.5 * normal(&mut rng))]
                 .map(|s| (size * s) as f32),
             rotation: std::array::from_fn(|_| normal(&mut rng) as f32),
             opacity: sigmoid(2.0 * normal(&mut rng)),
@@ -95,7 +95,7 @@ impl Surroundings {
 
 fn direction(rng: &mut ChaCha8Rng) -> DVec3 {
     let up: f64 = rng.random_range(-1.0..1.0);
-    let (sin, cos) = rng.random_range(0.0..TAU).sin_cos();
+    let (sin, cos) = libm::sincos(rng.random_range(0.0..TAU));
     let ring = (1.0 - up * up).sqrt();
     DVec3::new(ring * cos, ring * sin, up)
 }
@@ -115,7 +115,7 @@ fn object(rng: &mut ChaCha8Rng, blobs: &[(DVec3, f64); BLOBS], count: usize) -> 
 /// A point of the ground, which is denser where the cameras are.
 fn ground(rng: &mut ChaCha8Rng, radius: f64, count: usize) -> (DVec3, f64) {
     let distance = 3.0 * radius * rng.random::<f64>();
-    let (sin, cos) = rng.random_range(0.0..TAU).sin_cos();
+    let (sin, cos) = libm::sincos(rng.random_range(0.0..TAU));
     let area = TAU * distance.max(0.1 * radius) * 3.0 * radius;
     let height = -0.35 * radius + 0.02 * radius * normal(rng);
     (DVec3::new(distance * cos, distance * sin, height), spacing(area, GROUND, count))
@@ -123,7 +123,7 @@ fn ground(rng: &mut ChaCha8Rng, radius: f64, count: usize) -> (DVec3, f64) {
 
 /// A point far behind.
 fn background(rng: &mut ChaCha8Rng, radius: f64, count: usize) -> (DVec3, f64) {
-    let distance = 3.0 * radius * 5.0_f64.powf(rng.random());
+    let distance = 3.0 * radius * libm::pow(5.0, rng.random());
     let mut towards = direction(rng);
     towards.z = 0.7 * towards.z.abs() - 0.1;
     let area = TAU * distance * distance;

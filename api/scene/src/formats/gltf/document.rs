@@ -1,6 +1,6 @@
 //! The parts of a glTF document that Gaussians need.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -85,12 +85,12 @@ pub(super) struct Mesh {
 
 #[derive(Deserialize)]
 pub(super) struct Primitive {
-    pub(super) attributes: HashMap<String, usize>,
+    pub(super) attributes: BTreeMap<String, usize>,
     pub(super) mode: Option<u32>,
     pub(super) indices: Option<usize>,
     pub(super) material: Option<usize>,
     #[serde(default)]
-    pub(super) extensions: HashMap<String, serde_json::Value>,
+    pub(super) extensions: BTreeMap<String, serde_json::Value>,
 }
 
 /// The surface of triangles.
@@ -160,7 +160,7 @@ pub(super) struct BufferView {
     pub(super) byte_length: usize,
     pub(super) byte_stride: Option<usize>,
     #[serde(default)]
-    pub(super) extensions: HashMap<String, IgnoredAny>,
+    pub(super) extensions: BTreeMap<String, IgnoredAny>,
 }
 
 #[derive(Deserialize)]

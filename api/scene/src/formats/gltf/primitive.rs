@@ -1,6 +1,6 @@
 //! A primitive with `KHR_gaussian_splatting`: the extension's object, and its attributes.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
@@ -33,7 +33,7 @@ struct Splatting {
     projection: Option<String>,
     sorting_method: Option<String>,
     #[serde(default)]
-    extensions: HashMap<String, serde_json::Value>,
+    extensions: BTreeMap<String, serde_json::Value>,
 }
 
 #[derive(Deserialize)]

@@ -10,8 +10,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use ply_rs_bw::ply::ScalarType;
 
-use super::{columns, inria};
 use super::table::Table;
+use super::{columns, inria};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::SH_C0;
 use crate::scene::Scene;

@@ -90,7 +90,9 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     wide.recentre(&mut scene)?;
     match without_size.into_inner() {
         0 => {}
-        count => scene.metadata_mut().warn(format!("{count} Gaussians have a scale of -inf, and no extent along an axis")),
+        count => {
+            scene.metadata_mut().warn(format!("{count} Gaussians have a scale of -inf, and no extent along an axis"))
+        }
     }
     Ok(scene)
 }
@@ -182,9 +184,9 @@ pub(super) fn unpack_rest(rest: &[f64], sh: &mut [[f32; 3]]) {
 
 /// The degree of `element`, and its columns `f_rest_0`, `f_rest_1`, ...
 pub(super) fn rest_columns(table: &Table<'_, '_>, element: &str) -> Result<(u32, Vec<Column>), Fault> {
-    let count = table
-        .element(element)
-        .map_or(0, |definition| definition.properties.keys().filter(|name| name.starts_with(OTHER_COEFFICIENTS)).count());
+    let count = table.element(element).map_or(0, |definition| {
+        definition.properties.keys().filter(|name| name.starts_with(OTHER_COEFFICIENTS)).count()
+    });
     // A gap in the numbering is reported as a missing property.
     let columns = (0..count).map(|i| table.column(element, &format!("f_rest_{i}"))).collect::<Result<Vec<_>, _>>()?;
     let degree = (0..=MAX_SH_DEGREE)

@@ -42,11 +42,8 @@ pub(super) fn load(mut table: Table<'_, '_>, size: Option<f64>) -> Result<Scene,
     if count == 0 {
         return Err(Reason::Empty.at(place()));
     }
-    let shape = GaussianShape {
-        scale: [(size / WIDTH_AT_HALF) as f32; 3],
-        rotation: [1.0, 0.0, 0.0, 0.0],
-        opacity: 1.0,
-    };
+    let shape =
+        GaussianShape { scale: [(size / WIDTH_AT_HALF) as f32; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 1.0 };
     let mut scene = Scene::try_with_capacity(0, count)?;
     let mut wide = WidePositions::of(&columns[..3]);
     table.read_blocks(VERTEX, &columns, |rows| {

@@ -68,7 +68,7 @@ enum Numbers {
 
 /// `value` as an integer from 0 to `last`; None if it is not one.
 fn whole(value: f64, last: u64) -> Option<u64> {
-    (value.fract() == 0.0 && (0.0..=last as f64).contains(&value)).then_some(value as u64)
+    (libm::trunc(value) == value && (0.0..=last as f64).contains(&value)).then_some(value as u64)
 }
 
 fn fault(name: &str, field: &str, reason: Reason) -> Fault {
@@ -166,7 +166,7 @@ pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<Scene, Fault> {
         let scales = [meta.scales.codebook("scales")?; 3];
         (scales, [meta.sh0.codebook("sh0")?; 3], opacities)
     };
-    let scale_values = scale_values.map(|values| values.map(|log| log.exp() as f32));
+    let scale_values = scale_values.map(|values| values.map(|log| libm::exp(log) as f32));
     let low = meta.means.image("means", 0, files, count)?;
     let high = meta.means.image("means", 1, files, count)?;
     let scales = meta.scales.image("scales", 0, files, count)?;
@@ -228,7 +228,7 @@ fn say_model(model: Option<&str>, metadata: &mut Metadata) {
 
 /// The number whose signed logarithm, sign(x) ln(1 + |x|), is `value`.
 fn unsigned_log(value: f64) -> f64 {
-    (value.abs().exp() - 1.0).copysign(value)
+    (libm::exp(value.abs()) - 1.0).copysign(value)
 }
 
 /// Decodes a quaternion w, x, y, z. Alpha minus 252 is the index of the largest component; None if alpha is smaller.

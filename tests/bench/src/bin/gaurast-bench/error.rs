@@ -9,6 +9,7 @@ use gaurast_scene::{camera::CameraError, camera_files::CameraFileError};
 use thiserror::Error;
 
 use crate::callgrind::CallgrindError;
+use crate::exact::ExactError;
 
 /// A failure of a benchmark. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -27,6 +28,8 @@ pub enum BenchError {
     Quads(#[from] QuadError),
     #[error("{0}")]
     Counts(String),
+    #[error(transparent)]
+    Exact(#[from] ExactError),
     #[error(transparent)]
     Callgrind(#[from] CallgrindError),
     #[error("the driver refused a command: {0}")]

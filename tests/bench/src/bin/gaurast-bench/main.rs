@@ -5,6 +5,7 @@ mod callgrind;
 mod commands;
 mod counts;
 mod error;
+mod exact;
 mod frames;
 mod growth;
 mod judge;
@@ -29,6 +30,7 @@ use arguments::{FramesArguments, OptimizationsArguments, ParetoArguments, PathAr
 use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use error::BenchError;
+use exact::ExactArguments;
 
 /// Measures run time and error of this driver's Gaussians, and of quads on lavapipe and on this driver.
 ///
@@ -57,6 +59,8 @@ enum Command {
     Optimizations(OptimizationsArguments),
     /// Compares instructions, hashes of pictures and sizes of functions with stored ones.
     Counts(CountsArguments),
+    /// Prints hashes of pictures and buffers that are the same on every machine, or compares them with stored ones.
+    Exact(ExactArguments),
     /// Measures the cost of recording draws and creating pipelines, without the device.
     Commands(CommandsArguments),
     /// Draws for the other commands, which start it as a process.
@@ -91,6 +95,7 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::Growth(arguments) => growth::run(arguments),
         Command::Optimizations(arguments) => optimizations::run(arguments),
         Command::Counts(arguments) => counts::run(arguments).map_err(counts_failed),
+        Command::Exact(arguments) => exact::run(arguments).map_err(BenchError::from),
         Command::Worker => worker::run(),
         Command::CountsWorker(arguments) => counts::work(arguments).map_err(counts_failed),
         Command::Commands(arguments) => commands::run(arguments),

@@ -1,12 +1,11 @@
 //! The workloads that are counted, and the process that draws them.
 //!
-//! Scenes are generated. Scenes of triangles and of bodies use only additions and multiplications. Scenes of Gaussians
-//! use binary64 logarithms, exponentials and cosines of the system's mathematical library, whose last bits may differ
-//! between machines. The results are rounded to binary32, so such a difference seldom remains.
+//! Scenes are generated, by additions, multiplications and functions of the crate `libm`, so that they are the same on every machine.
 
 use ash::Entry;
 use clap::{Args, ValueEnum};
 use gaurast_bench::quads::QuadRenderer;
+use gaurast_exact::hash;
 use gaurast_render::Renderer;
 use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
@@ -137,12 +136,6 @@ fn quads(entry: Entry, frames: u32) -> Result<u64, CountsError> {
     Ok(hash(bytemuck::cast_slice(&prepared.picture()?.pixels)))
 }
 
-/// The 64-bit FNV-1a hash.
-fn hash(bytes: &[u8]) -> u64 {
-    let step = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, step)
-}
-
 /// Draws as `arguments` say, and prints a line for each workload: its name and the hash of its last picture.
 pub(super) fn run(arguments: &WorkerArguments) -> Result<(), CountsError> {
     for workload in &arguments.workloads {
@@ -161,12 +154,6 @@ pub(super) fn run(arguments: &WorkerArguments) -> Result<(), CountsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn hashes_are_those_of_fnv_1a() {
-        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(hash(b"foobar"), 0x8594_4171_f739_67e8);
-    }
 
     #[test]
     fn every_workload_draws_the_same_again() {

@@ -4,8 +4,8 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{need, simple};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, depth_test};
-use gaurast_tests::triangles::shapes;
 
 fn four() -> TargetOptions {
     TargetOptions::default().multisampled()

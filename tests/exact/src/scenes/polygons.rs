@@ -4,8 +4,8 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple, with};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test};
-use gaurast_tests::triangles::shapes;
 
 /// Culls each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {

@@ -7,8 +7,8 @@ use ash::vk::PrimitiveTopology as Topology;
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple};
 use gaurast_testkit::shader::Stage;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Gpu, PipelineOptions, TargetOptions, Vertex, blend};
-use gaurast_tests::triangles::shapes;
 
 /// A control shader that passes on `count` vertices and sets the levels.
 fn control(count: u32, levels: &str) -> String {
@@ -245,7 +245,7 @@ fn pot() -> Vec<Vertex> {
         }
     }
     // Seen from above and from the side.
-    let (sin, cos) = (0.45f32.sin(), 0.45f32.cos());
+    let (sin, cos) = libm::sincosf(0.45);
     let seen = |[x, y, z]: [f32; 3]| {
         let (x, z) = (0.9 * x + 0.435 * z, 0.9 * z - 0.435 * x);
         let (y, z) = (cos * y + sin * z, cos * z - sin * y);

@@ -4,10 +4,10 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::cases;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, blend, depth_test,
 };
-use gaurast_tests::triangles::shapes;
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;
 

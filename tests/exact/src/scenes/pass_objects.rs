@@ -4,10 +4,10 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::need_format;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Commands, Gpu, Pipeline, PipelineOptions, Resource, Target, TargetOptions, depth_test,
 };
-use gaurast_tests::triangles::shapes;
 
 /// A render pass with a framebuffer.
 struct Object {

@@ -6,8 +6,8 @@ use ash::vk::PrimitiveTopology as Topology;
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple, with};
 use gaurast_testkit::shader::Stage;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, blend};
-use gaurast_tests::triangles::shapes;
 
 /// Draws with a geometry shader.
 fn drawn(gpu: &Gpu, topology: Topology, geometry: &str, vertices: &[Vertex]) -> Output {

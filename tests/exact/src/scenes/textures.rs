@@ -5,11 +5,11 @@ use rand::Rng;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, need_format};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Output, Pass, Pipeline, PipelineOptions, Resource, Sampler, Target,
     TargetOptions,
 };
-use gaurast_tests::triangles::shapes;
 
 const RGBA8: vk::Format = vk::Format::R8G8B8A8_UNORM;
 
@@ -113,7 +113,7 @@ pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
                 let (x, y) = (turn(index % side), turn(index / side));
                 // The mean of a wave over a texel of a smaller level is less.
                 let height = 100.0 * (1.0 - f32::from(1u16 << level) / 64.0);
-                let waves = [x.sin(), y.cos(), (x + y).sin(), (x - y).cos()];
+                let waves = [libm::sinf(x), libm::cosf(y), libm::sinf(x + y), libm::cosf(x - y)];
                 waves.map(|wave| (128.0 + height * wave).round() as u8)
             };
             (0..side * side).map(texel).collect()

@@ -5,10 +5,10 @@ use ash::vk::CompareOp as Compare;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, need_format, simple};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
-use gaurast_tests::triangles::shapes;
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;
 

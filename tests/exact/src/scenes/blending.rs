@@ -6,8 +6,8 @@ use ash::vk::BlendOp as Op;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, need_format, simple};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions, Vertex, blend, opaque};
-use gaurast_tests::triangles::shapes;
 
 const FACTORS: [Factor; 15] = [
     Factor::ZERO,

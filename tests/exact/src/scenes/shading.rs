@@ -4,8 +4,8 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::simple;
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions};
-use gaurast_tests::triangles::shapes;
 
 fn fragment(gpu: &Gpu, seed: u64, source: &str) -> Output {
     let options = PipelineOptions { fragment: Some(source), ..PipelineOptions::default() };

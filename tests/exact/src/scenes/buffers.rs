@@ -4,11 +4,11 @@ use ash::vk;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Resource, Target, TargetOptions, Vertex, attribute,
     binding,
 };
-use gaurast_tests::triangles::shapes;
 
 /// Draws with colours in a vertex format of their own, from a second binding.
 fn colored(gpu: &Gpu, format: vk::Format, stride: u32, bytes: &[u8], fragment_scale: f32) -> Output {
@@ -215,7 +215,7 @@ pub fn push_constants_between_draws(gpu: &Gpu) -> Drawn {
         commands.push(0, &[0.0f32, 0.0, 0.07, 0.09]);
         for index in 0..30u8 {
             let t = f32::from(index) / 30.0;
-            commands.push(0, &[1.6 * t - 0.8, 0.8 * (9.0 * t).sin()]);
+            commands.push(0, &[1.6 * t - 0.8, 0.8 * libm::sinf(9.0 * t)]);
             commands.push(16, &[t, 1.0 - t, 0.5, 1.0]);
             commands.draw(0..6);
         }

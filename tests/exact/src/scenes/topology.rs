@@ -5,8 +5,8 @@ use ash::vk::PrimitiveTopology as Topology;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::drawn::{cases, need, simple, with};
+use gaurast_testkit::shapes;
 use gaurast_testkit::{Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding};
-use gaurast_tests::triangles::shapes;
 
 fn of(topology: Topology) -> PipelineOptions<'static> {
     PipelineOptions { topology, ..PipelineOptions::default() }

@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use gaurast_testkit::Vertex;
+use crate::Vertex;
 
 /// A random number generator with the same sequence on all machines.
 pub fn rng(seed: u64) -> ChaCha8Rng {
