@@ -309,7 +309,7 @@ pub fn short(number: f64) -> f64 {
 
 /// A point in the form of an option's value, with digits for a ten-thousandth of `distance`.
 fn place(point: [f64; 3], distance: f64) -> String {
-    let digits = (4.0 - distance.log10()).ceil().clamp(0.0, 12.0) as usize;
+    let digits = libm::ceil(4.0 - libm::log10(distance)).clamp(0.0, 12.0) as usize;
     let rounded = point.map(|value| format!("{value:.digits$}").parse::<f64>().unwrap_or(value) + 0.0);
     rounded.map(|value| value.to_string()).join(",")
 }

@@ -208,6 +208,11 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let known = cameras::read(&camera, &source)?;
     let (scene, _) = source.load(progress)?;
     let views = cameras::of_scene(known, &camera, &scene, false)?.views;
+    if !arguments.quiet && !arguments.json {
+        for note in drawing::notes(&arguments.modes, &scene) {
+            eprintln!("gaurast: {note}");
+        }
+    }
     let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, false, None)?;

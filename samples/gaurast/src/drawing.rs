@@ -10,10 +10,10 @@ use thiserror::Error;
 
 use crate::args::{Choice, ModeArguments};
 use crate::cameras::{View, short};
-use crate::info;
 use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
+use crate::sources::axes_and_reason;
 
 /// A failure of drawing. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -61,7 +61,7 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     let mut notes = metadata.warnings.clone();
     notes.extend(metadata.notes.iter().cloned());
     if let Some(axes) = &metadata.axes {
-        notes.push(format!("the file's axes are {} (--axes)", info::axes(axes)));
+        notes.push(format!("the file's axes are {} (--axes)", axes_and_reason(axes)));
     }
     let origin = scene.origin();
     if origin != [0.0; 3] {

@@ -3,15 +3,15 @@
 use std::io::Write;
 
 use clap::Args;
+use gaurast_scene::Subject;
 use gaurast_scene::info::{Bar, Info};
-use gaurast_scene::{AxesReason, FileAxes, Subject};
 use serde_json::json;
 use thiserror::Error;
 
 use crate::args::SceneArguments;
 use crate::progress::Progress;
 use crate::report::{grouped, write_json};
-use crate::sources::{Source, SourceError};
+use crate::sources::{Source, SourceError, axes_and_reason};
 
 /// The number of characters of the longest bar.
 const BAR: usize = 40;
@@ -94,7 +94,7 @@ fn text(info: &Info, subject: &Subject<'_>) -> String {
         line("origin", &format!("{x}, {y}, {z} of the positions in memory"));
     }
     if let Some(file_axes) = &info.metadata.axes {
-        line("axes", &axes(file_axes));
+        line("axes", &axes_and_reason(file_axes));
     }
     let [x, y, z] = extent.centre;
     line("middle", &format!("{x:.4}, {y:.4}, {z:.4} of what is opaque"));
@@ -115,17 +115,6 @@ fn text(info: &Info, subject: &Subject<'_>) -> String {
         text += &histogram(title, bars);
     }
     text
-}
-
-/// The axes that are taken, and why.
-pub fn axes(file_axes: &FileAxes) -> String {
-    let reason = match file_axes.reason {
-        AxesReason::Given => "as --axes says",
-        AxesReason::File => "as the file says",
-        AxesReason::Ground => "with which the ground is below",
-        AxesReason::Format => "the format's, since the file names none",
-    };
-    format!("{}, {reason}", file_axes.axes)
 }
 
 /// A line for each bar, without the empty ones at both ends.

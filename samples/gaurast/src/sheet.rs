@@ -101,6 +101,11 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
         framing.camera(&subject)
     };
     let cameras = AZIMUTHS.as_flattened().iter().map(camera).collect::<Result<Vec<_>, _>>()?;
+    if !arguments.quiet {
+        for note in drawing::notes(&arguments.modes, &scene) {
+            eprintln!("gaurast: {note}");
+        }
+    }
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, false, None)?;
     let background = arguments.background.or(source.background);

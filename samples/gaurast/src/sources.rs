@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use gaurast_picture::Background;
-use gaurast_scene::{Options, Scene, SceneError, Transform};
+use gaurast_scene::{AxesReason, FileAxes, Options, Scene, SceneError, Transform};
 use thiserror::Error;
 
 use crate::args::SceneArguments;
@@ -150,6 +150,17 @@ pub fn check_strictly(scene: &Scene) -> Result<(), SourceError> {
         Some(warning) => Err(SourceError::Strict(warning.clone())),
         None => Ok(()),
     }
+}
+
+/// The axes that are taken, and why.
+pub fn axes_and_reason(file_axes: &FileAxes) -> String {
+    let reason = match file_axes.reason {
+        AxesReason::Given => "as --axes says",
+        AxesReason::File => "as the file says",
+        AxesReason::Ground => "with which the ground is below",
+        AxesReason::Format => "the format's, since the file names none",
+    };
+    format!("{}, {reason}", file_axes.axes)
 }
 
 /// One scene of several.

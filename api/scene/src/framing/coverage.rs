@@ -84,6 +84,16 @@ pub(super) struct Selection {
     pub(super) beyond: f64,
     /// True if opacities make up for the filter.
     pub(super) is_compensated: bool,
+    /// One Gaussian of this many is drawn, and covers as much as that many.
+    pub(super) step: usize,
+}
+
+/// The most Gaussians of a scene that a rough coverage draws.
+const ROUGHLY: usize = 1 << 18;
+
+/// The step of a rough coverage of `scene`.
+pub(super) fn rough_step(scene: &Scene) -> usize {
+    scene.len().div_ceil(ROUGHLY).max(1)
 }
 
 impl Coverage {
@@ -95,7 +105,7 @@ impl Coverage {
             .zip(scene.shapes().par_chunks(size))
             .map(|(positions, shapes)| {
                 let mut pixels = view.empty();
-                for (position, shape) in positions.iter().zip(shapes) {
+                for (position, shape) in positions.iter().zip(shapes).step_by(selection.step) {
                     view.splat(*position, shape, &mut pixels);
                 }
                 pixels
@@ -212,7 +222,10 @@ impl View {
                 let dx = column as f32 + 0.5 - centre[0];
                 let power = (wide_c * dx * dx - 2.0 * b * dx * dy + wide_a * dy * dy) / determinant;
                 if power < reach {
-                    pixel.add(opacity * libm::expf(-0.5 * power), point.z);
+                    let alpha = opacity * libm::expf(-0.5 * power);
+                    let step = self.selection.step;
+                    let all = if step == 1 { alpha } else { 1.0 - libm::powf(1.0 - alpha, step as f32) };
+                    pixel.add(all, point.z);
                 }
             }
         }

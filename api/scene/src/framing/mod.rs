@@ -240,12 +240,20 @@ fn front(up: DVec3) -> DVec3 {
     if towards.length() > 0.1 { towards.normalize() } else { level(DVec3::Y).normalize() }
 }
 
-/// A camera that looks forward at `scene` from a little above, with its opaque parts in a picture of `size` pixels and
-/// a vertical field of view of `fov` degrees (more than 0, less than 180).
+/// A camera that looks forward at `scene` from a little above, in a picture of `size` pixels with a vertical field of view
+/// of `fov` degrees (more than 0, less than 180). An object fills the picture; of other scenes it shows the middle.
 pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
-    let subject = Subject::of(scene);
+    framed_or_at_its_centre(&Subject::of(scene), fov, size)
+}
+
+/// A camera like [`frame`]'s, with the box around the scene's middle in its picture, whatever the scene is.
+pub fn frame_middle(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
+    framed_or_at_its_centre(&Subject::of_box(Extent::of(scene)), fov, size)
+}
+
+fn framed_or_at_its_centre(subject: &Subject<'_>, fov: f64, size: [u32; 2]) -> Camera {
     Framing::new(fov, size)
-        .camera(&subject)
+        .camera(subject)
         .unwrap_or_else(|_| Camera::new([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], subject.extent.centre, fov, size))
 }
 

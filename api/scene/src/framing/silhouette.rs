@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::coverage::{Coverage, Selection};
+use super::coverage::{Coverage, Selection, rough_step};
 use crate::camera::Camera;
 use crate::metadata::Antialiasing;
 use crate::scene::Scene;
@@ -17,12 +17,15 @@ const FILL: f64 = 0.885;
 struct Phase {
     /// The longer side in pixels of the picture in which the silhouette is searched. It has twice the angle.
     side: f64,
+    /// True if a part of a large scene is enough.
+    is_rough: bool,
     /// The phase ends at a step that is less than this part of the distance.
     settled: f64,
 }
 
 /// The phases of the search: first at low resolution, then as finely as the result is measured.
-const PHASES: [Phase; 2] = [Phase { side: 160.0, settled: 0.03 }, Phase { side: 640.0, settled: 0.008 }];
+const PHASES: [Phase; 2] =
+    [Phase { side: 160.0, is_rough: true, settled: 0.03 }, Phase { side: 640.0, is_rough: false, settled: 0.008 }];
 
 /// The greatest angle of that picture, in degrees.
 const WIDEST: f64 = 150.0;
@@ -46,7 +49,6 @@ pub(super) struct Fit {
 /// its picture and fills it. Its direction is kept. None if nothing is covered.
 pub(super) fn fit(scene: &Scene, camera: &Camera, distance: f64) -> Option<Fit> {
     let is_compensated = scene.antialiasing() == Antialiasing::Compensated;
-    let selection = Selection { beyond: 0.0, is_compensated };
     // From world to camera, row by row: its transpose takes the camera's axes to the world's.
     let axes = DMat3::from_cols_array_2d(&camera.rotation);
     let tangents = [0, 1].map(|axis| FILL * camera.principal[axis] / camera.focal[axis]);
@@ -54,6 +56,8 @@ pub(super) fn fit(scene: &Scene, camera: &Camera, distance: f64) -> Option<Fit> 
     let mut distance = distance;
     let mut found = None;
     for phase in PHASES {
+        let step = if phase.is_rough { rough_step(scene) } else { 1 };
+        let selection = Selection { beyond: 0.0, is_compensated, step };
         for _ in 0..STEPS {
             let wide = Camera { eye: eye.to_array(), near: NEAR * distance, ..widened(camera, phase.side) };
             let silhouette = Silhouette::of(&Coverage::of(scene, &wide, selection), &wide)?;

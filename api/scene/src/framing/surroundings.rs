@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::coverage::{Coverage, Selection};
+use super::coverage::{Coverage, Selection, rough_step};
 use super::extent::{Extent, median_distance};
 use crate::camera::Camera;
 use crate::scene::Scene;
@@ -39,12 +39,13 @@ pub(super) fn surrounds(scene: &Scene, extent: &Extent) -> bool {
                 near: 1e-3 * beyond,
                 ..Camera::new(rotation.map(<[f64; 3]>::from), extent.centre, 90.0, [SIDE; 2])
             };
-            let coverage = Coverage::of(scene, &camera, Selection { beyond, is_compensated: true });
+            let coverage =
+                Coverage::of(scene, &camera, Selection { beyond, is_compensated: true, step: rough_step(scene) });
             for (index, pixel) in coverage.pixels.iter().enumerate() {
                 let [column, row] = [index % coverage.width, index / coverage.width].map(|place| place as f64);
                 let (x, y) = ((column + 0.5 - half) / half, (row + 0.5 - half) / half);
                 let direction = x * rotation[0] + y * rotation[1] + rotation[2];
-                let angle = direction.length().powi(-3);
+                let angle = 1.0 / (direction.length() * direction.length_squared());
                 for axis in 0..3 {
                     let side = usize::from(direction[axis] < 0.0);
                     whole[axis][side] += angle;

@@ -1,7 +1,7 @@
 //! glTF files with Gaussians.
 
 use gaurast_runner::data;
-use gaurast_scene::{ColorSpace, Place, Reason, Scene, SortOrder};
+use gaurast_scene::{Axes, ColorSpace, Options, Place, Reason, Scene, SortOrder};
 use serde_json::{Value, json};
 
 use super::support::*;
@@ -480,6 +480,16 @@ fn scales_of_a_draft_are_logarithms() {
     }
     assert!(scene.metadata().notes[0].contains("scales are logarithms"), "{:?}", scene.metadata().notes);
     assert!(plain.metadata().notes.is_empty());
+}
+
+#[gaurast_runner::test]
+fn axes_that_are_given_replace_gltfs_own() {
+    let file = Builder::new().glb();
+    let options = Options { axes: Some(Axes::RIGHT_DOWN_FRONT), ..Options::default() };
+    let path = std::path::Path::new("a.glb");
+    let scene = gaurast_scene::read_with(path, &mut &file[..], file.len() as u64, &options).expect("a good file");
+    assert_eq!(scene.positions().as_flattened(), POSITIONS);
+    assert_eq!(scene.metadata().axes.map(|axes| axes.of_cameras), Some(false));
 }
 
 #[gaurast_runner::test]

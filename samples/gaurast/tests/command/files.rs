@@ -79,8 +79,10 @@ fn picture(folder: &TempDir, name: &str) -> image::RgbaImage {
 
 /// The mean row of the pixels in which one channel dominates.
 fn mean_row(picture: &image::RgbaImage, channel: usize) -> f64 {
-    let is_of =
-        |pixel: &image::Rgba<u8>| (0..3).all(|other| other == channel || pixel.0[channel] > pixel.0[other] + 60);
+    let is_of = |pixel: &image::Rgba<u8>| {
+        let [own, others @ ..] = [channel, (channel + 1) % 3, (channel + 2) % 3].map(|c| i16::from(pixel.0[c]));
+        others.iter().all(|other| own > other + 60)
+    };
     let rows: Vec<f64> = picture.enumerate_pixels().filter(|(.., p)| is_of(p)).map(|(_, y, _)| f64::from(y)).collect();
     assert!(!rows.is_empty(), "no pixel of channel {channel}");
     rows.iter().sum::<f64>() / rows.len() as f64
