@@ -198,8 +198,7 @@ impl View {
         let determinant = wide_a * wide_c - b * b;
         let ratio = if self.selection.is_compensated { (a * c - b * b).max(0.0) / determinant } else { 1.0 };
         let opacity = (shape.opacity * ratio.sqrt()).min(GREATEST_ALPHA);
-        // Also of numbers that are not finite.
-        if !(opacity > LEAST_ALPHA) || !determinant.is_finite() {
+        if !determinant.is_finite() || opacity.is_nan() || opacity <= LEAST_ALPHA {
             return;
         }
         let reach = 2.0 * libm::logf(opacity / LEAST_ALPHA);

@@ -88,11 +88,10 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         wide.add(rows);
     })?;
     wide.recentre(&mut scene)?;
-    match without_size.into_inner() {
-        0 => {}
-        count => {
-            scene.metadata_mut().warn(format!("{count} Gaussians have a scale of -inf, and no extent along an axis"))
-        }
+    let without_size = without_size.into_inner();
+    if without_size > 0 {
+        let metadata = scene.metadata_mut();
+        metadata.warn(format!("{without_size} Gaussians have a scale of -inf, and no extent along an axis"));
     }
     Ok(scene)
 }
@@ -166,10 +165,10 @@ fn gaussian(values: &[f64], layout: Layout, sh: &mut [[f32; 3]]) -> ([f32; 3], G
 fn fuse(scale: [f64; 3], opacity: f64, filter: f64, layout: Layout, shape: &mut GaussianShape) {
     let axes = if layout.is_flat { 2 } else { 3 };
     let mut ratio = 1.0;
-    for axis in 0..axes {
-        let filtered = (scale[axis] * scale[axis] + filter * filter).sqrt();
-        ratio *= if filtered > 0.0 { scale[axis] / filtered } else { 1.0 };
-        shape.scale[axis] = filtered as f32;
+    for (fused, scale) in shape.scale.iter_mut().zip(scale).take(axes) {
+        let filtered = (scale * scale + filter * filter).sqrt();
+        ratio *= if filtered > 0.0 { scale / filtered } else { 1.0 };
+        *fused = filtered as f32;
     }
     shape.opacity = (opacity * ratio) as f32;
 }
