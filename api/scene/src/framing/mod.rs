@@ -352,7 +352,9 @@ mod tests {
         let camera = frame(&scene(0.3, [[5.0, 6.0, 7.0]]), DEFAULT_FOV, [100, 100]);
         let distance = (DVec3::from_array(camera.eye) - DVec3::new(5.0, 6.0, 7.0)).length();
         let pixels = camera.focal[0] * 0.3 / distance;
-        assert!((10.0..40.0).contains(&pixels), "{pixels}");
+        // Its alpha of 0.9 falls to a half at sqrt(2 ln 1.8) standard deviations.
+        let diameter = 2.0 * pixels * (2.0 * 1.8_f64.ln()).sqrt();
+        assert!((86.0..91.0).contains(&diameter), "{diameter}");
     }
 
     #[test]

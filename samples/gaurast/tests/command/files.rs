@@ -265,8 +265,8 @@ fn an_object_fills_its_default_view() {
 fn a_scene_that_surrounds_its_middle_keeps_a_view_of_it() {
     let folder = folder();
     // A small, dense middle on a ground, and a far wall around both, with large Gaussians.
-    let middle = (0..4000).map(|i| {
-        let (turn, height) = (f64::from(i) * 2.399_963, f64::from(i) / 4000.0);
+    let middle = (0..30_000).map(|i| {
+        let (turn, height) = (f64::from(i) * 2.399_963, f64::from(i) / 30_000.0);
         Ball { place: [0.5 * turn.cos(), -height, 0.5 * turn.sin()], size: 0.01, color: RED }
     });
     let around = (0..600).map(|i| {

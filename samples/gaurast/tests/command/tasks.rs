@@ -304,7 +304,7 @@ fn formats_hold_the_same_picture() {
     assert!((middle - distance).abs() < 0.7 && middle < distance, "{middle} {distance}");
     assert_eq!(depth(0, 0), f32::INFINITY);
 
-    succeeds(&folder, &["two.ply", "--size", "64x48", "-o", "t.png", "--background", "transparent"]);
+    succeeds(&folder, &["two.ply", "--size", "64x48", "--zoom", "0.3", "-o", "t.png", "--background", "transparent"]);
     let picture = image::open(folder.path().join("t.png")).expect("a PNG");
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let picture = picture.to_rgba8();
