@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = Path::new(&file);
         let scene = gaurast_scene::open(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+        let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, SIZE).to_vulkan();
         subjects.push((name, SceneBuffers::from(&scene), camera));
     }
 

@@ -242,7 +242,7 @@ pub(crate) fn views(scene: &Scene) -> Vec<View> {
         .into_iter()
         .flat_map(|size| {
             let cameras = [
-                ("whole", gaurast_scene::frame(scene, DEFAULT_FOV, size)),
+                ("whole", gaurast_scene::frame_middle(scene, DEFAULT_FOV, size)),
                 ("side", look([1.4, -0.5, 0.9], [0.0, 0.1, 0.1], 60.0, size)),
                 ("inside", look([0.1, 0.0, 0.1], [-1.0, 0.2, 0.6], 75.0, size)),
             ];

@@ -22,7 +22,7 @@ fn trained_scenes_are_drawn_and_nearly_all_decidable(case: &Case) {
     let file = TRAINED.into_iter().find(|file| *file == case.variant());
     let scene = gaurast_scene::open(data(file.expect("a file"))).unwrap();
     let size = [192, 144];
-    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, size).to_vulkan();
+    let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, size).to_vulkan();
     let reference = render_bounded(
         &SceneBuffers::from(&scene).as_oracle(),
         &OracleCamera::new(&camera, size).unwrap(),

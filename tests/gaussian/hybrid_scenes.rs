@@ -247,7 +247,7 @@ pub(super) fn playbot() -> Hybrid {
     let model = Model::african_head().expect("its files");
     let scene = gaurast_scene::open(data(PLAYBOT)).expect("a scene");
     let (near, far) = (0.1f32, 200.0f32);
-    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE)
+    let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, SIZE)
         .to_vulkan()
         .depth_coefficients([-near / (far - near), near * far / (far - near)]);
     let to_clip = ToClip { camera, size: SIZE };

@@ -260,7 +260,7 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
 #[gaurast_runner::test(needs = [Need::Data(SKULL)])]
 fn skull_pops_by_view_depth_alone() {
     let scene = gaurast_scene::open(data(SKULL)).expect("a scene");
-    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+    let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
     // Tens of thousands of Gaussians cover every sampled pixel.
     let sampling = Sampling { stride: 25, steps: 2 };

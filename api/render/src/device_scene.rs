@@ -7,6 +7,8 @@ use crate::settings::Settings;
 
 /// A scene in device memory, with its pipeline.
 pub struct DeviceScene {
+    /// The point to which its positions are relative.
+    pub(crate) origin: [f64; 3],
     pub(crate) count: u32,
     pub(crate) strides: [u32; BINDINGS],
     pub(crate) stored_degree: u32,

@@ -121,6 +121,7 @@ impl Renderer {
         let over_mesh = mesh.is_some();
         Ok(DeviceScene {
             mesh,
+            origin: scene.origin(),
             count: count as u32,
             strides,
             stored_degree: scene.sh_degree(),
@@ -212,6 +213,8 @@ impl Renderer {
     /// # Errors
     /// Returns an error if the size exceeds the device's limits, modes can't be combined, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
+        let eye = std::array::from_fn(|axis| camera.eye[axis] - scene.origin[axis]);
+        let camera = &Camera { eye, ..camera.clone() };
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
         scene.settings.check(camera)?;

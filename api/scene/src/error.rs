@@ -223,6 +223,11 @@ pub enum Reason {
         /// The range.
         range: &'static str,
     },
+    /// The file holds points without scales, and the caller did not ask for drawing them.
+    #[error(
+        "it holds points without scales, which are no Gaussians: --points SIZE draws them as points of that diameter"
+    )]
+    PointCloud,
     /// There is no Gaussian.
     #[error("it holds no Gaussians")]
     Empty,

@@ -26,6 +26,8 @@ pub struct Info {
     /// The number of Gaussians with a number that is not finite. The device skips those whose shape or position is not
     /// finite.
     pub non_finite: usize,
+    /// The point to which positions in memory are relative.
+    pub origin: [f64; 3],
     /// The least and the greatest coordinates of finite centres; None if there is none.
     pub bounds: Option<Bounds>,
     /// A histogram of the finite Gaussians' opacities, in ten steps from 0 to 1.
@@ -40,10 +42,10 @@ pub struct Info {
 /// A box along the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bounds {
-    /// The least coordinates.
-    pub min: [f32; 3],
-    /// The greatest coordinates.
-    pub max: [f32; 3],
+    /// The least coordinates, in the file's.
+    pub min: [f64; 3],
+    /// The greatest coordinates, in the file's.
+    pub max: [f64; 3],
 }
 
 /// A bar of a histogram.
@@ -69,6 +71,7 @@ impl Info {
                 + size_of_val(scene.shapes())
                 + size_of_val(scene.sh())) as u64,
             non_finite: 0,
+            origin: scene.origin(),
             bounds: None,
             opacities: (0..OPACITY_BARS).map(|step| bar(step as f32 / OPACITY_BARS as f32)).collect(),
             scales: (first..last).map(|power| bar(libm::exp10(power.into()) as f32)).collect(),
@@ -76,15 +79,16 @@ impl Info {
         };
         let coefficients = scene.sh().chunks_exact(scene.sh_stride());
         for ((position, shape), sh) in scene.positions().iter().zip(scene.shapes()).zip(coefficients) {
-            info.add(position, shape, sh);
+            info.add(position, scene.origin(), shape, sh);
         }
         info
     }
 
-    fn add(&mut self, position: &[f32; 3], shape: &GaussianShape, sh: &[[f32; 3]]) {
+    fn add(&mut self, position: &[f32; 3], origin: [f64; 3], shape: &GaussianShape, sh: &[[f32; 3]]) {
         if position.iter().all(|c| c.is_finite()) {
-            let bounds = self.bounds.get_or_insert(Bounds { min: *position, max: *position });
-            for (axis, &value) in position.iter().enumerate() {
+            let place: [f64; 3] = std::array::from_fn(|axis| f64::from(position[axis]) + origin[axis]);
+            let bounds = self.bounds.get_or_insert(Bounds { min: place, max: place });
+            for (axis, &value) in place.iter().enumerate() {
                 bounds.min[axis] = bounds.min[axis].min(value);
                 bounds.max[axis] = bounds.max[axis].max(value);
             }

@@ -5,6 +5,7 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod axes;
 pub mod camera;
 pub mod camera_files;
 pub mod camera_path;
@@ -21,10 +22,11 @@ mod scene;
 mod shape;
 mod transform;
 
+pub use axes::{Axes, AxesReason, FileAxes};
 pub use camera::Camera;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{Options, known_extensions, open, open_with, read, read_with};
-pub use framing::{DEFAULT_UP, Extent, Framing, default_angles, frame, inside};
+pub use framing::{DEFAULT_UP, Extent, Framed, Framing, Subject, default_angles, frame, frame_middle, inside};
 pub use harmonics::{MAX_SH_DEGREE, SH_C0};
 pub use mesh::{Mesh, MeshVertex};
 pub use metadata::{Antialiasing, ColorSpace, Geometry, Metadata, SortOrder};

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::axes::FileAxes;
+
 /// The compensation for the filter of 0.3 px^2 that every Gaussian gets on the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -60,6 +62,11 @@ pub struct Metadata {
     pub color_space: Option<ColorSpace>,
     /// The key by which its Gaussians are to be sorted.
     pub order: Option<SortOrder>,
+    /// The axes of the file's coordinates, unless they are the format's without a doubt.
+    pub axes: Option<FileAxes>,
+    /// Parts of the file that the reader could not take, and without which the picture may be wrong: a sentence each,
+    /// without a full stop.
+    pub warnings: Vec<String>,
     /// Parts of the file that the reader ignored, and its assumptions: a sentence each, without a full stop.
     pub notes: Vec<String>,
 }
@@ -84,8 +91,24 @@ impl Metadata {
         for (what, _) in what.into_iter().zip(agreed).filter(|(_, agreed)| !agreed) {
             self.note(format!("parts of the scene differ in {what}, and none is told"));
         }
-        for note in other.notes {
+        self.take_messages(&mut Self { notes: other.notes, warnings: other.warnings, ..Self::default() });
+    }
+
+    /// Moves the notes and warnings of `other` here.
+    pub(crate) fn take_messages(&mut self, other: &mut Self) {
+        for note in std::mem::take(&mut other.notes) {
             self.note(note);
+        }
+        for warning in std::mem::take(&mut other.warnings) {
+            self.warn(warning);
+        }
+    }
+
+    /// Adds a warning, unless it is there already.
+    pub(crate) fn warn(&mut self, warning: impl Into<String>) {
+        let warning = warning.into();
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
         }
     }
 

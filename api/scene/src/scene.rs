@@ -1,5 +1,6 @@
 //! A set of 3D Gaussians, as parallel arrays, and triangles among them.
 
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::error::{Fault, Place, Reason};
@@ -12,11 +13,17 @@ use crate::transform::{Motion, Transform};
 /// The least number of Gaussians for a thread.
 const PARALLEL: usize = 1 << 12;
 
+/// Positions are relative to an origin of their own if they are at least this far from zero. Nearer ones have steps of
+/// less than a thousandth.
+const FAR: f64 = 10_000.0;
+
 /// A set of 3D Gaussians, held as parallel arrays ready for upload, and the triangles among them.
 ///
 /// Values may be non-finite if the file has such values: the device skips and counts these Gaussians.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
+    /// The point to which positions and triangles are relative.
+    origin: [f64; 3],
     positions: Vec<[f32; 3]>,
     shapes: Vec<GaussianShape>,
     sh_degree: u32,
@@ -33,6 +40,7 @@ impl Scene {
     pub fn with_capacity(sh_degree: u32, count: usize) -> Self {
         assert!(sh_degree <= MAX_SH_DEGREE, "spherical harmonics degree {sh_degree} exceeds {MAX_SH_DEGREE}");
         Self {
+            origin: [0.0; 3],
             positions: Vec::with_capacity(count),
             shapes: Vec::with_capacity(count),
             sh_degree,
@@ -108,16 +116,53 @@ impl Scene {
             .for_each(make);
     }
 
-    /// Transforms every Gaussian and triangle.
+    /// Transforms every Gaussian and triangle. A translation that is so large that positions would lose digits becomes the
+    /// origin.
     pub(crate) fn apply(&mut self, motion: &Motion) {
-        motion.apply_to_mesh(&mut self.mesh);
+        let moved = motion.image(DVec3::from_array(self.origin));
+        let keeps = self.origin == [0.0; 3] && moved.abs().max_element() < FAR;
+        let origin = if keeps { DVec3::ZERO } else { moved };
+        let shift = moved - origin;
+        self.origin = origin.to_array();
+        motion.apply_to_mesh(&mut self.mesh, shift);
         let stride = self.sh_stride();
         self.positions
             .par_iter_mut()
             .zip(&mut self.shapes)
             .zip(self.sh.par_chunks_exact_mut(stride))
             .with_min_len(PARALLEL)
-            .for_each(|((position, shape), sh)| motion.apply(position, shape, sh));
+            .for_each(|((position, shape), sh)| motion.apply(shift, position, shape, sh));
+    }
+
+    /// Replaces the positions by `positions`, which are in binary64, relative to an origin among them if they are far from
+    /// zero: the median of each coordinate, rounded to a whole number.
+    pub(crate) fn recentre(&mut self, positions: &[[f64; 3]]) {
+        let median = |axis: usize| {
+            let mut values: Vec<f64> = positions.iter().map(|p| p[axis]).filter(|value| value.is_finite()).collect();
+            let middle = values.len() / 2;
+            if values.is_empty() { 0.0 } else { libm::round(*values.select_nth_unstable_by(middle, f64::total_cmp).1) }
+        };
+        let origin = DVec3::new(median(0), median(1), median(2));
+        if origin.abs().max_element() < FAR {
+            return;
+        }
+        self.origin = origin.to_array();
+        for (position, wide) in self.positions.iter_mut().zip(positions) {
+            *position = (DVec3::from_array(*wide) - origin).as_vec3().to_array();
+        }
+    }
+
+    /// Makes positions and triangles relative to another origin.
+    fn move_origin(&mut self, origin: [f64; 3]) {
+        let shift = DVec3::from_array(self.origin) - DVec3::from_array(origin);
+        self.origin = origin;
+        if shift == DVec3::ZERO {
+            return;
+        }
+        self.mesh.apply(DMat3::IDENTITY, shift);
+        for position in &mut self.positions {
+            *position = (DVec3::from_array(position.map(f64::from)) + shift).as_vec3().to_array();
+        }
     }
 
     /// Appends the Gaussians and triangles of `other`, transformed by `transform`. Metadata on which the two disagree are dropped,
@@ -148,23 +193,24 @@ impl Scene {
         Ok(())
     }
 
-    /// Appends `other` without a transform.
+    /// Appends `other` without a transform. There is one origin, the first that is not zero.
     fn join(&mut self, mut other: Self) {
+        if self.origin == [0.0; 3] {
+            self.move_origin(other.origin);
+        } else {
+            other.move_origin(self.origin);
+        }
         self.mesh.append(std::mem::take(&mut other.mesh));
         if self.is_empty() {
-            let notes = std::mem::take(&mut self.metadata.notes);
+            let mut metadata = std::mem::take(&mut self.metadata);
             other.mesh = std::mem::take(&mut self.mesh);
             *self = other;
-            for note in notes {
-                self.metadata.note(note);
-            }
+            self.metadata.take_messages(&mut metadata);
             return;
         }
         if other.is_empty() {
             // Triangles alone state nothing of Gaussians.
-            for note in other.metadata.notes {
-                self.metadata.note(note);
-            }
+            self.metadata.take_messages(&mut other.metadata);
             return;
         }
         let degree = self.sh_degree.max(other.sh_degree);
@@ -180,6 +226,7 @@ impl Scene {
     pub(crate) fn range(&self, range: std::ops::Range<usize>) -> Self {
         let stride = self.sh_stride();
         Self {
+            origin: self.origin,
             positions: self.positions[range.clone()].to_vec(),
             shapes: self.shapes[range.clone()].to_vec(),
             sh: self.sh[range.start * stride..range.end * stride].to_vec(),
@@ -201,6 +248,12 @@ impl Scene {
             sh.resize(sh.len() + new - old, [0.0; 3]);
         }
         (self.sh, self.sh_degree) = (sh, degree);
+    }
+
+    /// The point in the file's coordinates to which positions and triangles are relative: zero, unless they lie so far from
+    /// there that binary32 would lose their digits. Cameras are not relative to it.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
     }
 
     /// The triangles among the Gaussians.
@@ -255,7 +308,7 @@ impl Scene {
         self.positions.is_empty()
     }
 
-    /// Centres, in the scene's units.
+    /// Centres, relative to [`Scene::origin`], in the scene's units.
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }

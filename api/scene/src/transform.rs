@@ -72,14 +72,20 @@ impl Motion {
         Self { linear, translation, shape, turn: Turn::new(&orthogonal, degree) }
     }
 
-    /// Transforms triangles.
-    pub(crate) fn apply_to_mesh(&self, mesh: &mut Mesh) {
-        mesh.apply(self.linear, self.translation);
+    /// The image of a point.
+    pub(crate) fn image(&self, point: DVec3) -> DVec3 {
+        self.linear * point + self.translation
     }
 
-    /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first.
-    pub(crate) fn apply(&self, position: &mut [f32; 3], shape: &mut GaussianShape, sh: &mut [[f32; 3]]) {
-        let moved = self.linear * DVec3::from_array(position.map(f64::from)) + self.translation;
+    /// Transforms triangles, and moves them by `shift` instead of the translation.
+    pub(crate) fn apply_to_mesh(&self, mesh: &mut Mesh, shift: DVec3) {
+        mesh.apply(self.linear, shift);
+    }
+
+    /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first. The centre
+    /// is moved by `shift` instead of the translation.
+    pub(crate) fn apply(&self, shift: DVec3, position: &mut [f32; 3], shape: &mut GaussianShape, sh: &mut [[f32; 3]]) {
+        let moved = self.linear * DVec3::from_array(position.map(f64::from)) + shift;
         *position = moved.as_vec3().to_array();
         match &self.shape {
             ShapeMotion::Flip(signs) => {
@@ -220,7 +226,7 @@ mod tests {
             let motion = Motion::new(linear, translation, 0);
             for shape in &shapes {
                 let (mut position, mut moved) = ([0.25, -4.0, 1.5], *shape);
-                motion.apply(&mut position, &mut moved, &mut [[0.5; 3]]);
+                motion.apply(translation, &mut position, &mut moved, &mut [[0.5; 3]]);
                 let expected = linear * DVec3::new(0.25, -4.0, 1.5) + translation;
                 assert!(expected.abs_diff_eq(DVec3::from_array(position.map(f64::from)), 1e-5));
                 let expected = linear * covariance(shape) * linear.transpose();
@@ -235,7 +241,7 @@ mod tests {
     fn a_flat_gaussian_keeps_its_third_axis() {
         let mut shape = GaussianShape { scale: [0.5, 0.25, 0.0], rotation: [0.9, 0.3, -0.2, 0.1], opacity: 1.0 };
         let stretch = DMat3::from_diagonal(DVec3::new(0.5, 2.0, 3.0));
-        Motion::new(stretch, DVec3::ZERO, 0).apply(&mut [0.0; 3], &mut shape, &mut [[0.0; 3]]);
+        Motion::new(stretch, DVec3::ZERO, 0).apply(DVec3::ZERO, &mut [0.0; 3], &mut shape, &mut [[0.0; 3]]);
         assert_eq!(shape.scale[2], 0.0);
         assert!(shape.scale[0] > 0.0 && shape.scale[1] > 0.0);
     }
@@ -246,7 +252,7 @@ mod tests {
             let motion = Motion::new(linear, DVec3::ZERO, 4);
             for bad in [f32::NAN, f32::INFINITY, 0.0] {
                 let mut shape = GaussianShape { scale: [bad; 3], rotation: [bad; 4], opacity: bad };
-                motion.apply(&mut [bad; 3], &mut shape, &mut [[bad; 3]; 25]);
+                motion.apply(DVec3::ZERO, &mut [bad; 3], &mut shape, &mut [[bad; 3]; 25]);
             }
         }
     }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
-use gaurast_scene::{Antialiasing, Geometry, MAX_SH_DEGREE, SortOrder, Transform};
+use gaurast_scene::{Antialiasing, Axes, Geometry, MAX_SH_DEGREE, SortOrder, Transform};
 use glam::{DQuat, DVec3};
 
 use crate::heatmap::Quantity;
@@ -51,9 +51,30 @@ pub struct SceneArguments {
     #[arg(long, value_name = "SPEC", allow_hyphen_values = true)]
     pub transform: Vec<Placement>,
 
+    /// The directions of a file's axes x, y and z, or auto
+    ///
+    /// Three letters of right, left, up, down, front and back: rdf for 3DGS, rub for OpenGL, rfu for z upwards. With auto
+    /// they are what the file says, or, of SPZ, the ones with which the scene's ground is below, or the format's. The first
+    /// value belongs to the first scene, and so on; the last one also belongs to those that follow. --up turns the camera
+    /// alone.
+    #[arg(long, value_name = "XYZ|auto", value_parser = axes)]
+    pub axes: Vec<AxesChoice>,
+
+    /// Draw points without scales as round points of this diameter, in the scene's units
+    #[arg(long, value_name = "SIZE", value_parser = positive)]
+    pub points: Option<f64>,
+
     /// The level of detail of a scene that has several: 0 is the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub level: u32,
+}
+
+/// A value of `--axes`: None is auto.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxesChoice(pub Option<Axes>);
+
+fn axes(text: &str) -> Result<AxesChoice, &'static str> {
+    if text == "auto" { Ok(AxesChoice(None)) } else { text.parse().map(|axes| AxesChoice(Some(axes))) }
 }
 
 /// A value of `--transform`.
@@ -118,8 +139,8 @@ pub struct CameraArguments {
 
     /// The camera's position
     ///
-    /// Without it, the camera is placed so that the whole scene is in the picture; a panorama and a fisheye are placed
-    /// in the scene's middle.
+    /// Without it, the camera is placed so that an object fills most of the picture; of a scene with surroundings, its
+    /// middle. A panorama and a fisheye are placed in the scene's middle.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -259,7 +280,7 @@ pub struct OutputArguments {
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
 
-    /// Replace existing files
+    /// Replace existing files that --output names; the default one is replaced without it
     #[arg(long)]
     pub force: bool,
 
@@ -329,7 +350,10 @@ pub struct ReportArguments {
     #[arg(long)]
     pub json: bool,
 
-    /// Fail if a picture is empty, instead of only reporting it
+    /// Fail if a picture is empty, or if a scene's file holds what the picture may lack, instead of only reporting it
+    ///
+    /// The latter are unknown columns, Gaussians with numbers that are not finite, scales of -inf, and bounds of chunks that
+    /// are not finite.
     #[arg(long)]
     pub strict: bool,
 

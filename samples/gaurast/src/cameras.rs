@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use gaurast_scene::camera::{Camera, CameraError, DEFAULT_FOV, Model};
 use gaurast_scene::camera_files::{self, CameraFileError, CameraFileOptions};
 use gaurast_scene::camera_path::{self, Keyframe};
-use gaurast_scene::{DEFAULT_UP, Extent, Framing, Scene, default_angles};
+use gaurast_scene::{Axes, DEFAULT_UP, Extent, Framing, Scene, Subject, default_angles};
+use glam::DVec3;
 use thiserror::Error;
 
 use crate::args::{CameraArguments, CameraModel};
@@ -40,6 +41,8 @@ pub enum ViewError {
     PathFile { path: PathBuf, source: std::io::Error },
     #[error("{}: not a list of keyframes: {source}", path.display())]
     Path { path: PathBuf, source: serde_json::Error },
+    #[error("--axes {0}: these axes mirror the scene, and a camera file can't be mirrored with it")]
+    Mirrored(Axes),
     #[error("{}: there is no keyframe", path.display())]
     NoKeyframe { path: PathBuf },
 }
@@ -47,7 +50,7 @@ pub enum ViewError {
 impl ViewError {
     /// Returns true if the command line is invalid whatever the files contain.
     pub fn is_misuse(&self) -> bool {
-        matches!(self, Self::NoCameras | Self::Range(_) | Self::FieldOfView(_))
+        matches!(self, Self::NoCameras | Self::Range(_) | Self::FieldOfView(_) | Self::Mirrored(_))
     }
 }
 
@@ -150,6 +153,7 @@ pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden
     let mut views = match known {
         Known::File(mut views) => {
             for view in &mut views.views {
+                view.camera = turned_with(&view.camera, scene)?;
                 view.camera = with_near(&view.camera, false, &extent);
             }
             views
@@ -158,7 +162,7 @@ pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden
             let inside = [Model::Fisheye, Model::Equirectangular].contains(&camera.model);
             with_near(camera, inside || is_inside(arguments.model), &extent)
         })),
-        Known::Scene => by_hand(arguments, &extent, garden)?,
+        Known::Scene => by_hand(arguments, &extent, scene, garden)?,
     };
     if arguments.model == CameraModel::Equirectangular && arguments.fov.is_some() {
         let note = "--fov is of no account: a panorama has 360 by 180 degrees";
@@ -177,6 +181,19 @@ pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden
 fn unnamed(cameras: impl Iterator<Item = Camera>) -> Views {
     let view = |camera| View { name: None, camera };
     Views { views: cameras.map(view).collect(), ..Views::default() }
+}
+
+/// The camera of a file in the axes of `scene`, if the scene was turned and the file's coordinates are those of its cameras.
+fn turned_with(camera: &Camera, scene: &Scene) -> Result<Camera, ViewError> {
+    let Some(file_axes) = scene.metadata().axes.filter(|axes| axes.of_cameras) else {
+        return Ok(camera.clone());
+    };
+    if file_axes.axes.is_mirrored() {
+        return Err(ViewError::Mirrored(file_axes.axes));
+    }
+    let matrix = file_axes.axes.matrix();
+    let turned = |vector: [f64; 3]| (matrix * DVec3::from_array(vector)).to_array();
+    Ok(Camera { rotation: camera.rotation.map(turned), eye: turned(camera.eye), ..camera.clone() })
 }
 
 /// True if a camera of this model sees all around it, and thus stands in the scene.
@@ -215,7 +232,7 @@ fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
 }
 
 /// The camera given by options, or one that fits the scene; or an orbit that starts there.
-fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result<Views, ViewError> {
+fn by_hand(arguments: &CameraArguments, extent: &Extent, scene: &Scene, garden: bool) -> Result<Views, ViewError> {
     let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
     let up = arguments.up.map_or(DEFAULT_UP, |up| up.0);
     let inside = is_inside(arguments.model);
@@ -247,27 +264,28 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
                 azimuth: arguments.azimuth,
                 elevation: arguments.elevation,
                 distance: arguments.distance,
+                target: arguments.target.map(|target| target.0),
                 up,
                 ..Framing::new(fov.unwrap_or(DEFAULT_FOV), size)
             };
-            let around = Extent { centre: arguments.target.map_or(extent.centre, |target| target.0), ..*extent };
-            let camera = framing.camera(&around)?;
+            let subject = Subject::of(scene);
+            let framed = if arguments.orbit.is_some() { framing.orbit(&subject)? } else { framing.framed(&subject)? };
             let (azimuth, elevation) = default_angles();
             let placed = format!(
                 "framed by --azimuth {:.1} --elevation {:.1} --distance {}",
                 arguments.azimuth.unwrap_or(azimuth),
                 arguments.elevation.unwrap_or(elevation),
-                short(distance_ahead(&camera, around.centre)),
+                short(framed.distance),
             );
             let given = [
-                ("--target", arguments.target.map(|target| triple(target.0))),
+                ("--target", Some(place(framed.target, framed.distance))),
                 ("--up", arguments.up.map(|up| triple(up.0))),
                 ("--fov", fov.map(|fov| fov.to_string())),
                 ("--zoom", arguments.zoom.map(|zoom| zoom.to_string())),
             ];
             let given = given.into_iter().filter_map(|(name, value)| Some(format!(" {name} {}", value?)));
             said = Some(given.fold(placed, |said, option| said + &option));
-            (camera, around.centre)
+            (framed.camera, framed.target)
         }
     };
     let mut views = match arguments.orbit {
@@ -287,6 +305,13 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
 /// A number with five significant digits.
 pub fn short(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
+}
+
+/// A point in the form of an option's value, with digits for a ten-thousandth of `distance`.
+fn place(point: [f64; 3], distance: f64) -> String {
+    let digits = libm::ceil(4.0 - libm::log10(distance)).clamp(0.0, 12.0) as usize;
+    let rounded = point.map(|value| format!("{value:.digits$}").parse::<f64>().unwrap_or(value) + 0.0);
+    rounded.map(|value| value.to_string()).join(",")
 }
 
 /// Three numbers in the form of an option's value.

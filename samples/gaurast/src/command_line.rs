@@ -1,6 +1,5 @@
 //! The command line: a command and its arguments.
 
-#[cfg(feature = "completions")]
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
@@ -38,13 +37,11 @@ pub enum Command {
     /// Estimates the cost of a scene on the simulated hardware: time, energy, area
     Simulate(Box<SimulateArguments>),
     /// Prints a script that completes this command's arguments in a shell
-    #[cfg(feature = "completions")]
     Completions {
         /// The shell
         shell: clap_complete::Shell,
     },
     /// Writes manual pages
-    #[cfg(feature = "completions")]
     Man {
         /// The folder for the pages
         folder: PathBuf,

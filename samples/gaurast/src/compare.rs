@@ -59,7 +59,8 @@ impl Error {
 #[command(
     after_help = "PSNR is over red, green and blue, the peak being 1; SSIM is as 3DGS's own evaluation computes \
     it; FLIP is the mean error of the LDR evaluator, 0 to 1. Colours are compared as they are shown, over the background. \
-    Folders are compared file by file, by their names without extensions."
+    Folders are compared file by file, by their names without extensions. The PSNR of equal pictures is infinite, and so is a \
+    mean with one of them; JSON has null for it, and says how many pictures are equal."
 )]
 pub struct CompareArguments {
     /// A picture, or a folder of pictures: .png, .jpg, .webp, .ppm or .exr
@@ -207,6 +208,11 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let known = cameras::read(&camera, &source)?;
     let (scene, _) = source.load(progress)?;
     let views = cameras::of_scene(known, &camera, &scene, false)?.views;
+    if !arguments.quiet && !arguments.json {
+        for note in drawing::notes(&arguments.modes, &scene) {
+            eprintln!("gaurast: {note}");
+        }
+    }
     let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, false, None)?;
@@ -281,7 +287,8 @@ fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result
         };
         let pictures: Vec<_> = compared.iter().map(one).collect();
         let [psnr, ssim, flip] = means;
-        let mean = json!({"psnr": finite(psnr), "ssim": ssim, "flip": flip});
+        let equal = compared.iter().filter(|one| one.statistics.max == 0.0).count();
+        let mean = json!({"psnr": finite(psnr), "ssim": ssim, "flip": flip, "equal": equal});
         write_json(&mut stdout, &json!({"pictures": pictures, "mean": mean}))?;
         return stdout.flush();
     }

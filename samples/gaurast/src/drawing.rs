@@ -13,6 +13,7 @@ use crate::cameras::{View, short};
 use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
+use crate::sources::axes_and_reason;
 
 /// A failure of drawing. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -57,7 +58,18 @@ pub fn has_linear_colors(scene: &Scene) -> bool {
 /// Notes for the user about settings in the scene's file, a sentence each.
 pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     let metadata = scene.metadata();
-    let mut notes = metadata.notes.clone();
+    let mut notes = metadata.warnings.clone();
+    notes.extend(metadata.notes.iter().cloned());
+    if let Some(axes) = &metadata.axes {
+        notes.push(format!("the file's axes are {} (--axes)", axes_and_reason(axes)));
+    }
+    let origin = scene.origin();
+    if origin != [0.0; 3] {
+        let [x, y, z] = origin;
+        notes.push(format!(
+            "positions are kept relative to {x},{y},{z}, so that they keep their digits; cameras are in the file's coordinates"
+        ));
+    }
     if modes.geometry == Choice::Auto && scene.geometry() == Geometry::Surfel {
         notes.push("flat Gaussians are drawn (--geometry 2d), as the file says".to_owned());
     }

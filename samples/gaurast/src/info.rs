@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use clap::Args;
-use gaurast_scene::Extent;
+use gaurast_scene::Subject;
 use gaurast_scene::info::{Bar, Info};
 use serde_json::json;
 use thiserror::Error;
@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::args::SceneArguments;
 use crate::progress::Progress;
 use crate::report::{grouped, write_json};
-use crate::sources::{Source, SourceError};
+use crate::sources::{Source, SourceError, axes_and_reason};
 
 /// The number of characters of the longest bar.
 const BAR: usize = 40;
@@ -41,17 +41,25 @@ pub fn run(arguments: &InfoArguments) -> Result<(), Error> {
     let source = Source::of(&arguments.scene)?;
     let progress = Progress { quiet: arguments.json };
     let (scene, _) = source.load(progress)?;
-    let (info, extent) = (Info::new(&scene), Extent::of(&scene));
+    let (info, subject) = (Info::new(&scene), Subject::of(&scene));
+    let extent = subject.extent;
     let mut stdout = std::io::stdout().lock();
     if arguments.json {
         let mut value = serde_json::to_value(&info).map_err(std::io::Error::from)?;
-        value["framed"] = json!({"centre": extent.centre, "half": extent.half});
-        value["files"] = json!(source.files.iter().map(|(file, _)| file).collect::<Vec<_>>());
+        value["framed"] = json!({
+            "object": subject.is_object(),
+            "centre": extent.centre,
+            "half": extent.half,
+        });
+        value["files"] = json!(source.files.iter().map(|file| &file.path).collect::<Vec<_>>());
         value["notes"] = json!(source.notes);
         write_json(&mut stdout, &value)?;
     } else {
         let notes = source.notes.iter().chain(&info.metadata.notes);
-        stdout.write_all(text(&info, &extent).as_bytes())?;
+        stdout.write_all(text(&info, &subject).as_bytes())?;
+        for warning in &info.metadata.warnings {
+            writeln!(stdout, "warning     {warning}")?;
+        }
         for note in notes {
             writeln!(stdout, "note        {note}")?;
         }
@@ -60,7 +68,8 @@ pub fn run(arguments: &InfoArguments) -> Result<(), Error> {
 }
 
 /// The numbers for people.
-fn text(info: &Info, extent: &Extent) -> String {
+fn text(info: &Info, subject: &Subject<'_>) -> String {
+    let extent = subject.extent;
     let mut text = String::new();
     let mut line = |name: &str, value: &str| {
         text += &format!("{name:<11} {value}\n");
@@ -80,10 +89,18 @@ fn text(info: &Info, extent: &Extent) -> String {
         let axis = |axis: usize| format!("{:.4} to {:.4}", bounds.min[axis], bounds.max[axis]);
         line("x, y, z", &[axis(0), axis(1), axis(2)].join(", "));
     }
+    if info.origin != [0.0; 3] {
+        let [x, y, z] = info.origin;
+        line("origin", &format!("{x}, {y}, {z} of the positions in memory"));
+    }
+    if let Some(file_axes) = &info.metadata.axes {
+        line("axes", &axes_and_reason(file_axes));
+    }
     let [x, y, z] = extent.centre;
     line("middle", &format!("{x:.4}, {y:.4}, {z:.4} of what is opaque"));
     let [x, y, z] = extent.half.map(|half| 2.0 * half);
     line("size", &format!("{x:.4} x {y:.4} x {z:.4} of what is opaque"));
+    line("framed", if subject.is_object() { "as an object" } else { "as surroundings, by the size of the middle" });
     let metadata = &info.metadata;
     let said = [
         ("antialiasing", metadata.antialiasing.map(|said| format!("{said:?}"))),

@@ -76,7 +76,6 @@ fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Info(arguments) => info::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         Command::Simulate(arguments) => simulate::run(&arguments).map_err(|error| failure(error.to_string(), false)),
-        #[cfg(feature = "completions")]
         Command::Completions { shell } => {
             use clap::CommandFactory;
             let mut script = Vec::new();
@@ -84,7 +83,6 @@ fn run(command: Command) -> Result<(), Failure> {
             std::io::Write::write_all(&mut std::io::stdout(), &script)
                 .map_err(|error| failure(format!("output: {error}"), false))
         }
-        #[cfg(feature = "completions")]
         Command::Man { folder } => {
             use clap::CommandFactory;
             std::fs::create_dir_all(&folder)

@@ -126,6 +126,8 @@ fn video_options(path: &Path) -> Option<&'static [&'static str]> {
 /// The destinations of all pictures, checked before anything is drawn.
 pub struct Outputs {
     places: Vec<Place>,
+    /// True if the command line names no place. The default one is replaced without asking.
+    is_default: bool,
     background: Option<Background>,
     quality: u8,
     linear: bool,
@@ -167,6 +169,7 @@ impl Outputs {
         let paths = if arguments.output.is_empty() { &default[..] } else { &arguments.output };
         let outputs = Self {
             places: paths.iter().map(|path| Place::of(path)).collect::<Result<_, _>>()?,
+            is_default: arguments.output.is_empty(),
             background: arguments.background.or(trained),
             quality: arguments.quality,
             linear: arguments.linear,
@@ -230,7 +233,8 @@ impl Outputs {
     }
 
     /// The views in `wanted`, indices of `views`, that must be drawn. With `resume`, these are the views without a
-    /// file. Without `force` and `resume`, none of their files may exist.
+    /// file. Without `force` and `resume`, none of their files may exist, unless it is the
+    /// default one.
     ///
     /// # Errors
     /// If the number of views does not fit the destinations, or a file exists.
@@ -277,7 +281,7 @@ impl Outputs {
                 if streams || !files.iter().all(|path| is_file(path)) {
                     missing.push(index);
                 }
-            } else if let Some(path) = there.filter(|_| !arguments.force) {
+            } else if let Some(path) = there.filter(|_| !arguments.force && !self.is_default) {
                 return Err(WriteError::There { path: path.clone() });
             } else {
                 missing.push(index);

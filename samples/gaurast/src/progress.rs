@@ -1,8 +1,12 @@
-//! Progress of long steps, shown only on a terminal.
+//! Progress of long steps: a bar on a terminal, and elsewhere a line from time to time.
 
-use std::time::Duration;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle, WeakProgressBar};
+
+/// The time between two lines if standard error is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
 /// Shows progress, or nothing.
 #[derive(Clone, Copy)]
@@ -40,6 +44,46 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.with_message(message)
+        let bar = bar.with_message(message);
+        if !std::io::stderr().is_terminal() {
+            let weak = bar.downgrade();
+            // Without the thread there are no lines, which nobody misses.
+            let _ = std::thread::Builder::new().spawn(move || print_lines(&weak, message));
+        }
+        bar
+    }
+}
+
+/// Prints a line from time to time until the step has ended.
+fn print_lines(bar: &WeakProgressBar, message: &str) {
+    let start = Instant::now();
+    loop {
+        std::thread::sleep(BETWEEN_LINES);
+        let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else {
+            return;
+        };
+        eprintln!("gaurast: {}", line(message, bar.position(), bar.length(), start.elapsed()));
+    }
+}
+
+/// What has been done of a step: the part of its length, if that is known, and the time.
+fn line(message: &str, position: u64, length: Option<u64>, time: Duration) -> String {
+    let seconds = time.as_secs();
+    match length.filter(|length| *length > 0) {
+        Some(length) => format!("{message}: {position} of {length} after {seconds} s"),
+        None => format!("{message} since {seconds} s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_has_the_part_that_is_done_and_the_time() {
+        let time = Duration::from_millis(20_400);
+        assert_eq!(line("drawing", 12, Some(240), time), "drawing: 12 of 240 after 20 s");
+        assert_eq!(line("uploading", 0, None, time), "uploading since 20 s");
+        assert_eq!(line("reading", 5, Some(0), time), "reading since 20 s");
     }
 }

@@ -18,7 +18,7 @@ use crate::limits;
 use crate::outputs::{Outputs, WriteError};
 use crate::progress::Progress;
 use crate::report::{self, Contents, Summary};
-use crate::sources::{Source, SourceError};
+use crate::sources::{self, Source, SourceError};
 
 /// A failure of the command. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -83,6 +83,9 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
     let quiet = arguments.report.quiet;
     let progress = Progress { quiet };
     let (scene, loading) = source.load(progress)?;
+    if arguments.report.strict {
+        sources::check_strictly(&scene)?;
+    }
     let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
     let garden = source.is_garden();
     let camera = arguments.modes.cameras(&arguments.camera);

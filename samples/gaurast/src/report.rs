@@ -138,6 +138,7 @@ impl Summary<'_> {
             .map(|drawn| {
                 let view = &self.views[drawn.index];
                 let counters: Vec<_> = (drawn.counters.iter())
+                    .filter(|counter| counter.value != 0.0)
                     .map(|counter| {
                         json!({
                             "group": counter.category,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use gaurast_picture::{Background, OutputError, Picture, Size};
 use gaurast_scene::camera::{CameraError, DEFAULT_FOV};
-use gaurast_scene::{DEFAULT_UP, Extent, Framing};
+use gaurast_scene::{DEFAULT_UP, Framing, Subject};
 use thiserror::Error;
 
 use crate::args::{ModeArguments, SceneArguments, Triple};
@@ -66,7 +66,7 @@ pub struct ViewsArguments {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 
-    /// Replace an existing file
+    /// Replace an existing file that --output names; the default one is replaced without it
     #[arg(long)]
     pub force: bool,
 
@@ -83,22 +83,29 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
         None => format!("{}-views.png", source.name).into(),
     };
     gaurast_picture::check(&path)?;
-    if path.is_file() && !arguments.force {
+    // The default file is replaced without asking.
+    if path.is_file() && arguments.output.is_some() && !arguments.force {
         return Err(Error::There { path });
     }
     let progress = Progress { quiet: arguments.quiet };
     let (scene, _) = source.load(progress)?;
-    let extent = Extent::of(&scene);
+    let subject = Subject::of(&scene);
     let size = arguments.size.map_or(CELL, |size| size.0);
-    let camera = |azimuth: u16| {
+    let camera = |azimuth: &u16| {
         let framing = Framing {
-            azimuth: Some(azimuth.into()),
+            azimuth: Some((*azimuth).into()),
             elevation: arguments.elevation,
             up: arguments.up.map_or(DEFAULT_UP, |up| up.0),
             ..Framing::new(DEFAULT_FOV, size)
         };
-        framing.camera(&extent)
+        framing.camera(&subject)
     };
+    let cameras = AZIMUTHS.as_flattened().iter().map(camera).collect::<Result<Vec<_>, _>>()?;
+    if !arguments.quiet {
+        for note in drawing::notes(&arguments.modes, &scene) {
+            eprintln!("gaurast: {note}");
+        }
+    }
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, false, None)?;
     let background = arguments.background.or(source.background);
@@ -107,7 +114,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     let mut sheet = Sheet::new(size, [4, 2]);
     for (row, azimuths) in AZIMUTHS.iter().enumerate() {
         for (column, azimuth) in azimuths.iter().enumerate() {
-            let view = View { name: None, camera: camera(*azimuth)? };
+            let view = View { name: None, camera: cameras[row * azimuths.len() + column].clone() };
             let frame = drawing.frame(&view)?;
             let cell = [column as u32, row as u32];
             sheet.put(cell, &frame.picture.over(behind));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use gaurast_picture::Background;
-use gaurast_scene::{Options, Scene, SceneError, Transform};
+use gaurast_scene::{AxesReason, FileAxes, Options, Scene, SceneError, Transform};
 use thiserror::Error;
 
 use crate::args::SceneArguments;
@@ -44,15 +44,17 @@ pub enum SourceError {
         path.display()
     )]
     Colmap { path: PathBuf },
-    #[error("--transform is given {transforms} times, and there are {scenes} scenes")]
-    Transforms { scenes: usize, transforms: usize },
+    #[error("{option} is given {values} times, and there are {scenes} scenes")]
+    Values { option: &'static str, scenes: usize, values: usize },
+    #[error("{0} (--strict)")]
+    Strict(String),
 }
 
 /// The scene's files, and the files that belong to them.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
-    /// The files, each with its transform; the generated garden if there is none.
-    pub files: Vec<(PathBuf, Transform)>,
+    /// The files; the generated garden if there is none.
+    pub files: Vec<SourceFile>,
     /// The base name of outputs.
     pub name: String,
     /// Cameras that belong to it.
@@ -63,8 +65,16 @@ pub struct Source {
     pub background: Option<Background>,
     /// Notes about the contents of folders, a sentence each.
     pub notes: Vec<String>,
-    /// The level of detail.
-    level: u32,
+}
+
+/// A file of the scene.
+#[derive(Clone, Debug)]
+pub struct SourceFile {
+    pub path: PathBuf,
+    /// Its place among the others.
+    transform: Transform,
+    /// The options of reading it.
+    options: Options,
 }
 
 impl Source {
@@ -74,19 +84,23 @@ impl Source {
     /// If it is a folder without a scene, or there are more transforms than scenes.
     pub fn of(arguments: &SceneArguments) -> Result<Self, SourceError> {
         let (scenes, transforms) = (&arguments.scenes, &arguments.transform);
-        if transforms.len() > scenes.len() {
-            return Err(SourceError::Transforms { scenes: scenes.len(), transforms: transforms.len() });
+        for (option, values) in [("--transform", transforms.len()), ("--axes", arguments.axes.len())] {
+            if values > scenes.len() {
+                return Err(SourceError::Values { option, scenes: scenes.len(), values });
+            }
         }
-        let mut source = Self { name: DEFAULT_NAME.to_owned(), level: arguments.level, ..Self::default() };
+        let mut source = Self { name: DEFAULT_NAME.to_owned(), ..Self::default() };
         let given = transforms.iter().map(|placement| placement.0);
         let given = given.chain(std::iter::repeat(Transform::default()));
-        for (path, transform) in scenes.iter().zip(given) {
+        for (index, (path, transform)) in scenes.iter().zip(given).enumerate() {
             let Part { name, file, cameras, dataparser, background, notes } = part(path)?;
             if source.files.is_empty() {
                 (source.name, source.cameras) = (name, cameras);
                 (source.dataparser, source.background) = (dataparser, background);
             }
-            source.files.push((file, transform));
+            let axes = arguments.axes.get(index).or(arguments.axes.last()).and_then(|choice| choice.0);
+            let options = Options { level: arguments.level, axes, points: arguments.points };
+            source.files.push(SourceFile { path: file, transform, options });
             source.notes.extend(notes);
         }
         Ok(source)
@@ -108,11 +122,10 @@ impl Source {
             let garden = gaurast_scene::garden::scene(SEED, gaurast_scene::garden::DEFAULT_COUNT);
             return Ok((garden, start.elapsed()));
         }
-        let options = Options { level: self.level };
         let mut scene = Scene::default();
-        for (path, transform) in &self.files {
+        for SourceFile { path, transform, options } in &self.files {
             let bar = progress.bytes("reading", 0);
-            let part = gaurast_scene::open_with(path, &options, |file, len| {
+            let part = gaurast_scene::open_with(path, options, |file, len| {
                 bar.set_length(len);
                 bar.wrap_read(file)
             })?;
@@ -126,6 +139,28 @@ impl Source {
         }
         Ok((scene, start.elapsed()))
     }
+}
+
+/// Checks that no scene's file holds what the picture may lack.
+///
+/// # Errors
+/// The first warning of a file.
+pub fn check_strictly(scene: &Scene) -> Result<(), SourceError> {
+    match scene.metadata().warnings.first() {
+        Some(warning) => Err(SourceError::Strict(warning.clone())),
+        None => Ok(()),
+    }
+}
+
+/// The axes that are taken, and why.
+pub fn axes_and_reason(file_axes: &FileAxes) -> String {
+    let reason = match file_axes.reason {
+        AxesReason::Given => "as --axes says",
+        AxesReason::File => "as the file says",
+        AxesReason::Ground => "with which the ground is below",
+        AxesReason::Format => "the format's, since the file names none",
+    };
+    format!("{}, {reason}", file_axes.axes)
 }
 
 /// One scene of several.
@@ -271,7 +306,7 @@ mod tests {
         touch(folder.path(), "cameras.json", "[]");
         touch(folder.path(), "cfg_args", "Namespace(sh_degree=3, white_background=True)");
         let source = of(folder.path()).expect("a scene");
-        let (file, _) = &source.files[0];
+        let file = &source.files[0].path;
         assert!(file.ends_with("iteration_30000/point_cloud.ply"), "{file:?}");
         assert!(source.cameras.is_some());
         assert_eq!(source.background, Some(Background::Color([1.0; 3])));
@@ -296,7 +331,7 @@ mod tests {
         assert!(refused().contains("one must be named: a.ply, b.spz"), "{}", refused());
         touch(folder.path(), "splat.ply", "");
         let source = of(folder.path()).expect("nerfstudio's");
-        assert!(source.files[0].0.ends_with("splat.ply"));
+        assert!(source.files[0].path.ends_with("splat.ply"));
     }
 
     #[test]

@@ -163,7 +163,9 @@ fn main() -> Outcome<()> {
         Some(file) => gaurast_scene::open(file)?,
         None => garden::scene(0, garden::DEFAULT_COUNT),
     };
-    let (extent, begin) = (Extent::of(&scene), Instant::now());
+    let (mut extent, begin) = (Extent::of(&scene), Instant::now());
+    // The positions on the device are relative to the origin.
+    extent.centre = std::array::from_fn(|axis| extent.centre[axis] - scene.origin()[axis]);
     let mut viewer = Viewer { arguments, scene, extent, shown: None, begin, frames: 0, outcome: Ok(()) };
     EventLoop::new()?.run_app(&mut viewer)?;
     viewer.outcome

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use gaurast_scene::{Camera, Extent, Framing, Scene, Transform, garden};
+use gaurast_scene::{Camera, Extent, Framing, Scene, Subject, Transform, garden};
 use glam::{DQuat, DVec3};
 
 /// Gaussians of a file.
@@ -113,7 +113,7 @@ fn numbers(cameras: &[Camera]) -> Vec<u8> {
 /// Cameras around a scene, and those of other models.
 fn framed() -> Vec<u8> {
     let (scene, size) = (ply(), [160, 90]);
-    let extent = Extent::of(&scene);
+    let subject = Subject::of_box(Extent::of(&scene));
     let angles = (0..12).map(f64::from).map(|at| [30.0 * at - 170.0, 15.0 * at - 80.0]);
     let camera = |[azimuth, elevation]: [f64; 2]| {
         let framing = Framing {
@@ -121,10 +121,10 @@ fn framed() -> Vec<u8> {
             elevation: Some(elevation),
             ..Framing::new(35.0 + elevation / 4.0, size)
         };
-        framing.camera(&extent).expect("a camera")
+        framing.camera(&subject).expect("a camera")
     };
     let mut cameras: Vec<Camera> = angles.map(camera).collect();
-    let first = gaurast_scene::frame(&scene, 50.0, size);
+    let first = gaurast_scene::frame_middle(&scene, 50.0, size);
     cameras.extend([first.orthographic(3.0), first.fisheye(2.8), first.panorama(), first.zoomed(1.7)]);
     cameras.extend(Camera::orbit(9, size));
     numbers(&cameras)

@@ -68,7 +68,7 @@ fn properties(bytes: &[u8]) -> HashMap<String, Vec<f32>> {
 #[gaurast_runner::test(needs = [Need::Data(SKULL)])]
 fn a_trained_file_is_drawn_as_it_is_stored() {
     let scene = gaurast_scene::open(data(SKULL)).expect("a scene");
-    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+    let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
     let columns = properties(&std::fs::read(data(SKULL)).expect("a file"));
     let [x, y, z] = ["scale_0", "scale_1", "scale_2"].map(|name| &columns[name]);

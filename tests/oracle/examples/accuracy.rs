@@ -18,7 +18,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let scene = gaurast_scene::open(scene)?;
     let picture = gaurast_picture::read(Path::new(picture))?;
     let size = [picture.width, picture.height];
-    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, size).to_vulkan();
+    let camera = gaurast_scene::frame_middle(&scene, DEFAULT_FOV, size).to_vulkan();
     let camera = OracleCamera::new(&camera, size).ok_or("a camera that the oracle does not know")?;
     let buffers = SceneBuffers::from(&scene);
     // The state of the picture: 3DGS's defaults, in the order of view depth.

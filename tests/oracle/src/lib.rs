@@ -12,7 +12,7 @@
 //! # let shape = gaurast_scene::GaussianShape { scale: [0.1; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 0.9 };
 //! # scene.push([0.0, 0.0, 2.0], shape, &[[1.0, 0.0, 0.5]]);
 //! // let scene = gaurast_scene::open("scene.ply")?;
-//! let camera = gaurast_scene::frame(&scene, 50.0, [64, 48]);
+//! let camera = gaurast_scene::frame_middle(&scene, 50.0, [64, 48]);
 //! let buffers = SceneBuffers::from(&scene);
 //! let seen = OracleCamera::new(&camera.to_vulkan(), [camera.width, camera.height]).expect("a model that it knows");
 //! let reference = render_bounded(&buffers.as_oracle(), &seen, &OracleState::default());

@@ -8,20 +8,47 @@ use glam::{DMat3, DQuat, DVec3};
 use super::view::{CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError};
 use crate::camera::Model;
 
-/// COLMAP's camera models, by number: the name, and the number of parameters.
-const MODELS: [(&str, usize); 11] = [
-    ("SIMPLE_PINHOLE", 3),
-    ("PINHOLE", 4),
-    ("SIMPLE_RADIAL", 4),
-    ("RADIAL", 5),
-    ("OPENCV", 8),
-    ("OPENCV_FISHEYE", 8),
-    ("FULL_OPENCV", 12),
-    ("FOV", 5),
-    ("SIMPLE_RADIAL_FISHEYE", 4),
-    ("RADIAL_FISHEYE", 5),
-    ("THIN_PRISM_FISHEYE", 12),
+/// A camera model of COLMAP.
+struct CameraModel {
+    name: &'static str,
+    /// The number of parameters, as present versions write them.
+    parameters: usize,
+    /// Another number, as earlier versions wrote them.
+    earlier: Option<usize>,
+}
+
+const fn model(name: &'static str, parameters: usize) -> CameraModel {
+    CameraModel { name, parameters, earlier: None }
+}
+
+/// COLMAP's camera models, by number.
+const MODELS: [CameraModel; 18] = [
+    model("SIMPLE_PINHOLE", 3),
+    model("PINHOLE", 4),
+    model("SIMPLE_RADIAL", 4),
+    model("RADIAL", 5),
+    model("OPENCV", 8),
+    model("OPENCV_FISHEYE", 8),
+    model("FULL_OPENCV", 12),
+    model("FOV", 5),
+    model("SIMPLE_RADIAL_FISHEYE", 4),
+    model("RADIAL_FISHEYE", 5),
+    model("THIN_PRISM_FISHEYE", 12),
+    CameraModel { earlier: Some(14), ..model("RAD_TAN_THIN_PRISM_FISHEYE", 16) },
+    model("SIMPLE_DIVISION", 4),
+    model("DIVISION", 5),
+    model("SIMPLE_FISHEYE", 3),
+    model("FISHEYE", 4),
+    model("EUCM", 6),
+    CameraModel { earlier: Some(3), ..model("EQUIRECTANGULAR", 2) },
 ];
+
+/// The names of coefficients of lens distortion, in the order in which models have them. Of models with a principal point,
+/// they follow it.
+const OPENCV: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+const RADIAL: [&str; 4] = ["k1", "k2", "k3", "k4"];
+const THIN_PRISM: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"];
+const RAD_TAN_THIN_PRISM: [&str; 12] = ["k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"];
 
 /// Bytes of a point of an image: its position and the number of the point in space.
 const POINT: usize = 24;
@@ -56,6 +83,57 @@ struct Intrinsics {
     parameters: Vec<f64>,
 }
 
+/// A camera's projection.
+struct Lens {
+    model: Model,
+    focal: [f64; 2],
+    principal: [f64; 2],
+    distortion: Distortion,
+}
+
+impl Intrinsics {
+    /// The projection, whose distortion is not zero unless the lens is ideal.
+    fn lens(&self) -> Result<Lens, ViewError> {
+        let p = |index: usize| self.parameters.get(index).copied().unwrap_or(0.0);
+        let simple = ([p(0), p(0)], [p(1), p(2)], 3);
+        let full = ([p(0), p(1)], [p(2), p(3)], 4);
+        let none: &[&'static str] = &[];
+        let (model, (focal, principal, first), names) = match self.model.as_str() {
+            "SIMPLE_PINHOLE" => (Model::Pinhole, simple, none),
+            "PINHOLE" => (Model::Pinhole, full, none),
+            "SIMPLE_RADIAL" | "RADIAL" => (Model::Pinhole, simple, &RADIAL[..]),
+            "OPENCV" | "FULL_OPENCV" => (Model::Pinhole, full, &OPENCV[..]),
+            "FOV" => (Model::Pinhole, full, &["omega"][..]),
+            "SIMPLE_DIVISION" => (Model::Pinhole, simple, &["k"][..]),
+            "DIVISION" => (Model::Pinhole, full, &["k"][..]),
+            // A pinhole if alpha is zero, whatever beta is.
+            "EUCM" => (Model::Pinhole, full, &["alpha"][..]),
+            "SIMPLE_FISHEYE" => (Model::Fisheye, simple, none),
+            "FISHEYE" => (Model::Fisheye, full, none),
+            "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" => (Model::Fisheye, simple, &RADIAL[..]),
+            "OPENCV_FISHEYE" => (Model::Fisheye, full, &RADIAL[..]),
+            "THIN_PRISM_FISHEYE" => (Model::Fisheye, full, &THIN_PRISM[..]),
+            "RAD_TAN_THIN_PRISM_FISHEYE" => (Model::Fisheye, full, &RAD_TAN_THIN_PRISM[..]),
+            "EQUIRECTANGULAR" => {
+                // A panorama fills its picture, whatever parameters the file gives.
+                let [width, height] = self.size;
+                let focal = [width / std::f64::consts::TAU, height / std::f64::consts::PI];
+                let distortion = Distortion::default();
+                return Ok(Lens {
+                    model: Model::Equirectangular,
+                    focal,
+                    principal: [width / 2.0, height / 2.0],
+                    distortion,
+                });
+            }
+            other => return Err(ViewError::Model(other.to_owned())),
+        };
+        let coefficients = self.parameters.get(first..).unwrap_or_default();
+        let distortion = names.iter().copied().zip(coefficients.iter().copied()).collect();
+        Ok(Lens { model, focal, principal, distortion })
+    }
+}
+
 /// A photograph's pose: world to camera.
 struct Photograph {
     name: String,
@@ -83,20 +161,28 @@ pub(super) fn read(folder: &Path, options: &CameraFileOptions) -> Result<CameraF
     } else {
         (text_cameras(&cameras), text_images(&images))
     };
-    let cameras = cameras.map_err(|reason| damaged(&cameras_path, reason))?;
+    let cameras = cameras.map_err(|reason| damaged(&cameras_path, &reason))?;
     let mut images = images.map_err(|reason| damaged(&images_path, reason))?;
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let mut file = CameraFile::default();
+    let mut unknown = Vec::new();
     for (view, image) in images.into_iter().enumerate() {
         let camera = cameras
             .get(&image.camera)
             .ok_or_else(|| damaged(&images_path, "an image is of a camera that is not there"))?;
-        let view = image.view(camera, options, &mut file.ignored).map_err(|reason| CameraFileError::View {
-            path: images_path.clone(),
-            view,
-            reason,
-        })?;
-        file.views.push(view);
+        match image.view(camera, options, &mut file.ignored) {
+            Ok(view) => file.views.push(view),
+            Err(ViewError::Model(name)) => unknown.push((view, name)),
+            Err(reason) => return Err(CameraFileError::View { path: images_path, view, reason }),
+        }
+    }
+    // Views of models with unknown names are refused, and the others drawn.
+    if let Some((view, name)) = unknown.first().cloned() {
+        if file.views.is_empty() {
+            return Err(CameraFileError::View { path: images_path, view, reason: ViewError::Model(name) });
+        }
+        let count = unknown.len();
+        file.ignored.push(format!("{count} views are left out, whose camera model is not read, such as {name}"));
     }
     Ok(file)
 }
@@ -108,24 +194,7 @@ impl Photograph {
         options: &CameraFileOptions,
         ignored: &mut Vec<String>,
     ) -> Result<View, ViewError> {
-        let p = |index: usize| camera.parameters.get(index).copied().unwrap_or(0.0);
-        let simple = ([p(0), p(0)], [p(1), p(2)]);
-        let full = ([p(0), p(1)], [p(2), p(3)]);
-        let radial = |radial| Distortion { radial, ..Distortion::default() };
-        let (model, (focal, principal), distortion) = match camera.model.as_str() {
-            "SIMPLE_PINHOLE" => (Model::Pinhole, simple, Distortion::default()),
-            "PINHOLE" => (Model::Pinhole, full, Distortion::default()),
-            "SIMPLE_RADIAL" => (Model::Pinhole, simple, radial([p(3), 0.0, 0.0, 0.0])),
-            "RADIAL" => (Model::Pinhole, simple, radial([p(3), p(4), 0.0, 0.0])),
-            "OPENCV" => {
-                let distortion = Distortion { radial: [p(4), p(5), 0.0, 0.0], tangential: [p(6), p(7)] };
-                (Model::Pinhole, full, distortion)
-            }
-            "OPENCV_FISHEYE" => (Model::Fisheye, full, radial([p(4), p(5), p(6), p(7)])),
-            "SIMPLE_RADIAL_FISHEYE" => (Model::Fisheye, simple, radial([p(3), 0.0, 0.0, 0.0])),
-            "RADIAL_FISHEYE" => (Model::Fisheye, simple, radial([p(3), p(4), 0.0, 0.0])),
-            other => return Err(ViewError::Model(other.to_owned())),
-        };
+        let Lens { model, focal, principal, distortion } = camera.lens()?;
         distortion.check(options.undistorted, ignored)?;
         let [w, x, y, z] = self.rotation;
         let quaternion = DQuat::from_xyzw(x, y, z, w);
@@ -188,19 +257,35 @@ impl<'a> Bytes<'a> {
     }
 }
 
-fn binary_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> {
+/// Parses a binary file of cameras. Models whose number of parameters has changed have the present one, or else the
+/// earlier one with which the file has the right size.
+fn binary_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, String> {
+    let present = binary_cameras_of(bytes, |model| model.parameters);
+    present.or_else(|reason| {
+        binary_cameras_of(bytes, |model| model.earlier.unwrap_or(model.parameters)).map_err(|_| reason)
+    })
+}
+
+fn binary_cameras_of(
+    bytes: &[u8],
+    parameters_of: impl Fn(&CameraModel) -> usize,
+) -> Result<HashMap<u64, Intrinsics>, String> {
     let mut bytes = Bytes(bytes);
     let count = bytes.u64()?;
     let mut cameras = HashMap::new();
     for _ in 0..count {
         let id = bytes.u32()?.into();
-        let model = bytes.u32()? as usize;
-        let (name, parameters) = MODELS.get(model).ok_or("it has an unknown camera model")?;
+        let number = bytes.u32()?;
+        // A record has no length, so that nothing after it could be read.
+        let model = MODELS.get(number as usize).ok_or_else(|| {
+            let last = MODELS.len() - 1;
+            format!("camera {id} is of model {number}, and those up to {last} are known")
+        })?;
         let size = [bytes.u64()? as f64, bytes.u64()? as f64];
-        let parameters = (0..*parameters).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
-        cameras.insert(id, Intrinsics { model: (*name).to_owned(), size, parameters });
+        let parameters = (0..parameters_of(model)).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
+        cameras.insert(id, Intrinsics { model: model.name.to_owned(), size, parameters });
     }
-    Ok(cameras)
+    if bytes.0.is_empty() { Ok(cameras) } else { Err("there is data after its last camera".to_owned()) }
 }
 
 fn binary_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
@@ -239,7 +324,8 @@ fn whole(word: Option<&str>) -> Result<u64, &'static str> {
     word.and_then(|word| word.parse().ok()).ok_or("a line lacks a whole number")
 }
 
-fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> {
+/// Parses a text file of cameras. A model of an unknown name is an error of its views alone.
+fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, String> {
     let mut cameras = HashMap::new();
     for line in lines(bytes)?.filter(|line| !line.trim().is_empty()) {
         let mut words = line.split_whitespace();
@@ -247,10 +333,9 @@ fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> 
         let model = words.next().ok_or("a line lacks the camera model")?;
         let size = [number(words.next())?, number(words.next())?];
         let parameters = words.map(|word| number(Some(word))).collect::<Result<Vec<_>, _>>()?;
-        let known = MODELS.iter().find(|(name, _)| *name == model);
-        let (_, expected) = known.ok_or("it has an unknown camera model")?;
-        if parameters.len() != *expected {
-            return Err("a camera has too many or too few parameters");
+        let known = MODELS.iter().find(|known| known.name == model);
+        if known.is_some_and(|known| ![Some(known.parameters), known.earlier].contains(&Some(parameters.len()))) {
+            return Err(format!("camera {id} has too many or too few parameters"));
         }
         cameras.insert(id, Intrinsics { model: model.to_owned(), size, parameters });
     }
@@ -350,6 +435,73 @@ mod tests {
         let refused = model(CAMERAS.as_bytes(), missing.as_bytes(), "txt").expect_err("missing");
         assert!(refused.to_string().contains("not there"), "{refused}");
         let unknown = CAMERAS.replace("PINHOLE", "MIRROR");
-        assert!(model(unknown.as_bytes(), IMAGES.as_bytes(), "txt").is_err());
+        let refused = model(unknown.as_bytes(), IMAGES.as_bytes(), "txt").expect_err("unknown");
+        assert!(refused.to_string().contains("camera model MIRROR is not read"), "{refused}");
+        // Views of other cameras are drawn.
+        let unknown = CAMERAS.replace("2 OPENCV", "2 MIRROR");
+        let images = IMAGES.replace(" 1 b.png", " 2 b.png");
+        let file = model(unknown.as_bytes(), images.as_bytes(), "txt").expect("the other view");
+        assert_eq!(file.views.len(), 1);
+        assert_eq!(file.views[0].name, "a.png");
+        assert!(file.ignored[0].contains("1 views are left out") && file.ignored[0].contains("MIRROR"));
+    }
+
+    /// A binary file of one camera, 200 by 100 pixels.
+    fn binary_camera(model: u32, parameters: &[f64]) -> Vec<u8> {
+        let mut cameras = 1_u64.to_le_bytes().to_vec();
+        cameras.extend([1, model].iter().flat_map(|word: &u32| word.to_le_bytes()));
+        cameras.extend([200_u64, 100].iter().flat_map(|side| side.to_le_bytes()));
+        cameras.extend(parameters.iter().flat_map(|p| p.to_le_bytes()));
+        cameras
+    }
+
+    /// A binary file of one image of camera 1.
+    fn binary_image() -> Vec<u8> {
+        let mut images = 1_u64.to_le_bytes().to_vec();
+        images.extend(7_u32.to_le_bytes());
+        images.extend([1.0_f64, 0.0, 0.0, 0.0, -1.0, -2.0, -3.0].iter().flat_map(|part| part.to_le_bytes()));
+        images.extend(1_u32.to_le_bytes());
+        images.extend(b"a.png\0");
+        images.extend(0_u64.to_le_bytes());
+        images
+    }
+
+    /// Tests each model, by number, with all coefficients zero, and with the last one not zero.
+    #[test]
+    fn every_model_without_distortion_is_ideal() {
+        let simple = [0, 2, 3, 8, 9, 12, 14];
+        let fisheyes = [5, 8, 9, 10, 11, 14, 15];
+        for (number, entry) in (0..).zip(&MODELS) {
+            for count in [Some(entry.parameters), entry.earlier].into_iter().flatten() {
+                let first: &[f64] =
+                    if simple.contains(&number) { &[50.0, 90.0, 60.0] } else { &[50.0, 80.0, 90.0, 60.0] };
+                let mut parameters = vec![0.0; count.max(first.len())];
+                parameters[..first.len()].copy_from_slice(first);
+                parameters.truncate(count);
+                if entry.name == "EUCM" {
+                    parameters[5] = 1.0;
+                }
+                let read = |parameters: &[f64]| model(&binary_camera(number, parameters), &binary_image(), "bin");
+                let camera = read(&parameters).expect(entry.name).views.remove(0).camera;
+                let expected = match number {
+                    17 => Model::Equirectangular,
+                    _ if fisheyes.contains(&number) => Model::Fisheye,
+                    _ => Model::Pinhole,
+                };
+                assert_eq!(camera.model, expected, "{}", entry.name);
+                if number < 17 {
+                    let focal = if simple.contains(&number) { [50.0; 2] } else { [50.0, 80.0] };
+                    assert_eq!((camera.focal, camera.principal), (focal, [90.0, 60.0]), "{}", entry.name);
+                }
+                if count > first.len() && number < 17 {
+                    let distorted = if number == 16 { 4 } else { count - 1 };
+                    parameters[distorted] = 0.125;
+                    let refused = read(&parameters).expect_err(entry.name).to_string();
+                    assert!(refused.contains("= 0.125"), "{refused}");
+                }
+            }
+        }
+        let refused = model(&binary_camera(18, &[0.0; 4]), &binary_image(), "bin").expect_err("unknown").to_string();
+        assert!(refused.contains("camera 1 is of model 18, and those up to 17 are known"), "{refused}");
     }
 }

@@ -76,7 +76,8 @@ fn parse(
                 let path: CameraPath = serde_json::from_str(text).map_err(json)?;
                 path.views(options)
             } else {
-                let frames = transforms.views(options, dataparser, &mut ignored).ok_or_else(unknown)?;
+                let folder = path.parent().unwrap_or(Path::new(""));
+                let frames = transforms.views(options, folder, dataparser, &mut ignored).ok_or_else(unknown)?;
                 frames.collect()
             }
         }
@@ -144,6 +145,28 @@ mod tests {
     const INRIA: &str = r#"[{"id": 0, "img_name": "a", "width": 200, "height": 100,
         "position": [1, 2, 3], "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
         "fy": 80, "fx": 50}]"#;
+
+    #[test]
+    fn a_transforms_json_without_a_size_has_that_of_its_photographs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("transforms.json");
+        let text = r#"{"camera_angle_x": 1.0, "frames": [{"file_path": "./train/r_0",
+            "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]}"#;
+        fs::write(&path, text).expect("written");
+        let options = CameraFileOptions { size: [640, 480], dataparser: None, undistorted: false };
+        let file = super::read(&path, &options).expect("a camera");
+        assert_eq!((file.views[0].camera.width, file.views[0].camera.height), (640, 480));
+        assert!(file.ignored[0].contains("640x480 is taken"), "{:?}", file.ignored);
+        // The first bytes of a PNG file of 800 by 600 pixels.
+        let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x03\x20\0\0\x02\x58\x08\x06\0\0\0";
+        fs::create_dir(folder.path().join("train")).expect("a folder");
+        fs::write(folder.path().join("train/r_0.png"), png).expect("written");
+        let file = super::read(&path, &options).expect("a camera");
+        let camera = &file.views[0].camera;
+        assert_eq!((camera.width, camera.height), (800, 600));
+        assert!((camera.focal[0] - 400.0 / libm::tan(0.5)).abs() < 1e-9);
+        assert!(file.ignored.is_empty());
+    }
 
     #[test]
     fn inria_camera_projects_known_points() {

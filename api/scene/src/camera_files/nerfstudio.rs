@@ -1,5 +1,7 @@
 //! nerfstudio's files: `transforms.json`, `dataparser_transforms.json` and `camera_path.json`.
 
+use std::path::Path;
+
 use glam::{DMat3, DMat4, DVec3};
 use serde::Deserialize;
 
@@ -28,6 +30,7 @@ impl Transforms {
     pub(super) fn views(
         self,
         options: &CameraFileOptions,
+        folder: &Path,
         dataparser: Option<&Dataparser>,
         ignored: &mut Vec<String>,
     ) -> Option<impl Iterator<Item = Result<View, ViewError>>> {
@@ -39,7 +42,22 @@ impl Transforms {
             }
         });
         let views: Vec<_> = (self.frames?.into_iter())
-            .map(|frame| frame.view(&self.intrinsics, options, placement.as_ref(), ignored))
+            .map(|mut frame| {
+                let given = frame.intrinsics.size(&self.intrinsics);
+                let given = given.or_else(|| size_of_photograph(folder, &frame.file_path));
+                if given.is_none() {
+                    let [width, height] = options.size;
+                    let note = format!(
+                        "the file gives no size of its pictures, and its photographs are not beside it: {width}x{height} is taken"
+                    );
+                    if !ignored.contains(&note) {
+                        ignored.push(note);
+                    }
+                }
+                let [width, height] = given.unwrap_or(options.size.map(f64::from));
+                (frame.intrinsics.w, frame.intrinsics.h) = (Some(width), Some(height));
+                frame.view(&self.intrinsics, options, placement.as_ref(), ignored)
+            })
             .collect();
         Some(views.into_iter())
     }
@@ -83,6 +101,21 @@ struct Intrinsics {
     p2: Option<f64>,
 }
 
+impl Intrinsics {
+    /// The size of the picture in pixels.
+    fn size(&self, shared: &Self) -> Option<[f64; 2]> {
+        Some([self.w.or(shared.w)?, self.h.or(shared.h)?])
+    }
+}
+
+/// The size of the photograph `name` in `folder`. Blender's files name photographs without their extensions.
+fn size_of_photograph(folder: &Path, name: &str) -> Option<[f64; 2]> {
+    let extensions = ["", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG"];
+    let found =
+        extensions.iter().find_map(|extension| imagesize::size(folder.join(format!("{name}{extension}"))).ok())?;
+    Some([found.width, found.height].map(|side| side as f64))
+}
+
 #[derive(Deserialize)]
 struct Frame {
     #[serde(default)]
@@ -102,6 +135,7 @@ impl Frame {
         ignored: &mut Vec<String>,
     ) -> Result<View, ViewError> {
         let own = self.intrinsics;
+        let size = own.size(shared).ok_or(ViewError::Size)?;
         let model = own.camera_model.or_else(|| shared.camera_model.clone());
         let model = match model.as_deref() {
             None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => Model::Pinhole,
@@ -109,10 +143,6 @@ impl Frame {
             Some("EQUIRECTANGULAR") => Model::Equirectangular,
             Some(other) => return Err(ViewError::Model(other.to_owned())),
         };
-        let size = [
-            own.w.or(shared.w).unwrap_or(options.size[0].into()),
-            own.h.or(shared.h).unwrap_or(options.size[1].into()),
-        ];
         let of_angle = |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / libm::tan(angle / 2.0));
         let fx = own.fl_x.or(shared.fl_x).or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
         let fy = own.fl_y.or(shared.fl_y).or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
@@ -126,16 +156,17 @@ impl Frame {
         // Pixels are square unless the file says otherwise.
         let fx = fx.or(fy).ok_or(ViewError::Focal)?;
         let principal = [own.cx.or(shared.cx).unwrap_or(size[0] / 2.0), own.cy.or(shared.cy).unwrap_or(size[1] / 2.0)];
-        let coefficient = |own: Option<f64>, shared: Option<f64>| own.or(shared).unwrap_or(0.0);
-        let distortion = Distortion {
-            radial: [
-                coefficient(own.k1, shared.k1),
-                coefficient(own.k2, shared.k2),
-                coefficient(own.k3, shared.k3),
-                coefficient(own.k4, shared.k4),
-            ],
-            tangential: [coefficient(own.p1, shared.p1), coefficient(own.p2, shared.p2)],
-        };
+        let distortion: Distortion = [
+            ("k1", own.k1.or(shared.k1)),
+            ("k2", own.k2.or(shared.k2)),
+            ("k3", own.k3.or(shared.k3)),
+            ("k4", own.k4.or(shared.k4)),
+            ("p1", own.p1.or(shared.p1)),
+            ("p2", own.p2.or(shared.p2)),
+        ]
+        .into_iter()
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect();
         distortion.check(options.undistorted || whole, ignored)?;
         let rows = self.transform_matrix.first_chunk().ok_or(ViewError::Rotation)?;
         let (rotation, eye) = pose(*rows, placement);

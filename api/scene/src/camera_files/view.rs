@@ -96,7 +96,7 @@ pub enum ViewError {
 /// Options for facts that a camera file doesn't give.
 #[derive(Clone, Debug)]
 pub struct CameraFileOptions {
-    /// The image size, for a transforms.json that doesn't give one.
+    /// The image size, for a transforms.json that doesn't give one and whose photographs are not there.
     pub size: [u32; 2],
     /// nerfstudio's dataparser_transforms.json of a trained model. It maps the cameras of a transforms.json to the
     /// model's world.
@@ -114,20 +114,21 @@ pub struct CameraFile {
     pub ignored: Vec<String>,
 }
 
-/// The distortion of a lens: OpenCV's radial and tangential coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Distortion {
-    pub(super) radial: [f64; 4],
-    pub(super) tangential: [f64; 2],
+/// The distortion of a lens: the names and values of its coefficients.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Distortion(Vec<(&'static str, f64)>);
+
+impl FromIterator<(&'static str, f64)> for Distortion {
+    fn from_iter<I: IntoIterator<Item = (&'static str, f64)>>(coefficients: I) -> Self {
+        Self(coefficients.into_iter().collect())
+    }
 }
 
 impl Distortion {
     /// Checks that there is none, or that it may be left out, which `ignored` is then told.
-    pub(super) fn check(self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
-        let names = ["k1", "k2", "k3", "k4", "p1", "p2"];
-        let values = self.radial.iter().chain(&self.tangential);
-        let coefficients: Vec<String> = (names.iter().zip(values))
-            .filter(|(_, value)| **value != 0.0)
+    pub(super) fn check(&self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
+        let coefficients: Vec<String> = (self.0.iter())
+            .filter(|(_, value)| *value != 0.0)
             .map(|(name, value)| format!("{name} = {value}"))
             .collect();
         if coefficients.is_empty() {

@@ -5,6 +5,7 @@ use std::path::{Component, Path};
 
 use flate2::bufread::GzDecoder;
 
+use crate::axes::Axes;
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 
@@ -15,10 +16,14 @@ pub(super) const MAX_EXPANSION: u64 = 1032;
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// The options of a reader.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// The level of detail of a scene that has several (streamed SOG): 0 is the finest.
     pub level: u32,
+    /// The axes of the file, instead of those that it names and those of its format.
+    pub axes: Option<Axes>,
+    /// The diameter, in the scene's units, with which points without scales are drawn. None refuses them.
+    pub points: Option<f64>,
 }
 
 /// A format of scene files.
@@ -39,7 +44,13 @@ pub(super) trait Format: Sync {
         true
     }
 
-    /// Reads a whole scene.
+    /// Returns true if the file's coordinates are those of its cameras. False if the format has axes of its own, into which
+    /// writers convert scenes; its reader converts them back.
+    fn has_axes_of_cameras(&self) -> bool {
+        true
+    }
+
+    /// Reads a whole scene. A format with the axes of its cameras leaves them as they are.
     ///
     /// # Errors
     /// Returns an error if the input is malformed. A reader allocates nothing that is larger than the input can hold.

@@ -1,6 +1,7 @@
 //! The table of scene formats, the only place that lists them, and reading of scenes.
 
 mod gltf;
+mod ground;
 mod input;
 mod ksplat;
 mod ply;
@@ -12,8 +13,14 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::axes::{AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason, SceneError};
 use crate::scene::Scene;
+use crate::shape::GaussianShape;
+use crate::transform::Motion;
 pub use input::Options;
 use input::{Format, Input, Origin};
 
@@ -88,9 +95,40 @@ pub fn read_with(path: &Path, reader: &mut dyn BufRead, len: u64, options: &Opti
             let format = choose(path, input.peek()?)
                 .ok_or_else(|| Reason::UnknownFormat(known_to_user(path)).at(Place::File))?;
             log::debug!("reading {} as {}", path.display(), format.name());
-            format.load(input)
+            let mut scene = format.load(input)?;
+            if format.has_axes_of_cameras() {
+                turn(&mut scene, options);
+            }
+            name_dropped(&mut scene);
+            Ok(scene)
         })
         .map_err(|fault| fault.of(path))
+}
+
+/// Turns a scene into the axes of scenes: from those that the caller or else the file names.
+fn turn(scene: &mut Scene, options: &Options) {
+    let given = options.axes.map(|axes| FileAxes { axes, reason: AxesReason::Given, of_cameras: true });
+    let named = given.or(scene.metadata().axes);
+    if let Some(FileAxes { axes, .. }) = named {
+        scene.apply(&Motion::new(axes.matrix(), DVec3::ZERO, scene.sh_degree()));
+    }
+    scene.metadata_mut().axes = named;
+}
+
+/// Warns of Gaussians that the device does not draw because of numbers that are not finite.
+fn name_dropped(scene: &mut Scene) {
+    let is_dropped = |(position, shape): (&[f32; 3], &GaussianShape)| {
+        let mut numbers = position.iter().chain(&shape.scale).chain(&shape.rotation).chain([&shape.opacity]);
+        !numbers.all(|number| number.is_finite())
+    };
+    let gaussians = scene.positions().par_iter().zip(scene.shapes());
+    let dropped = gaussians.filter(|gaussian| is_dropped(*gaussian)).count();
+    if dropped > 0 {
+        let all = scene.len();
+        scene.metadata_mut().warn(format!(
+            "{dropped} of {all} Gaussians have a position, scale, rotation or opacity that is not finite, and are not drawn"
+        ));
+    }
 }
 
 /// Every known format, in the order in which they are tried.

@@ -3,16 +3,20 @@
 //! Versions 1 to 3 are one gzip stream. Version 4 has a plain header, extension records, a table of sizes, and a zstd
 //! stream for each array. Positions are 24-bit fixed point (version 1: half floats), scales logarithms in sixteenths,
 //! quaternions their first (versions 1 and 2) or smallest three components, opacities bytes, colours bytes over a range
-//! wider than 0 to 1, other coefficients bytes over -1 to 1. The frame is right-up-back, unless an extension names
-//! another. It is rotated half a turn around x, into that of PLY files, as the format's own library does on request.
+//! wider than 0 to 1, other coefficients bytes over -1 to 1.
+//!
+//! The axes are right, up, back, unless an extension names others. But many writers store a PLY's axes as they are, without
+//! saying so. Therefore the end where the scene's ground is decides, if there is no doubt about it.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use half::f16;
 use ruzstd::decoding::StreamingDecoder;
 
+use super::ground::{End, ground};
 use super::input::{Format, Input, read_growing};
+use crate::axes::{Axes, AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
 use crate::metadata::{Antialiasing, Metadata};
@@ -33,6 +37,9 @@ const PLAIN_HEADER: usize = 32;
 
 /// Bytes of an entry of version 4's table: the compressed size and the size of a stream.
 const ENTRY: usize = 16;
+
+/// The axes of files that name none.
+const DEFAULT_AXES: Axes = Axes::RIGHT_UP_BACK;
 
 const READ_VERSIONS: &str = "1 to 4";
 
@@ -70,18 +77,47 @@ impl Format for Spz {
         Some(MAGIC)
     }
 
+    fn has_axes_of_cameras(&self) -> bool {
+        false
+    }
+
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
-        load_into(input, CoordinateSystem::RIGHT_DOWN_FORWARD)
+        let given = input.origin().options.axes;
+        let mut scene = load_into(input, given, Axes::RIGHT_DOWN_FRONT)?;
+        if scene.metadata().axes.is_some_and(|axes| axes.reason == AxesReason::Format)
+            && let Some(end) = ground(&scene)
+        {
+            let axes = match end {
+                End::Down => DEFAULT_AXES,
+                End::Up => {
+                    let turn = Axes::RIGHT_DOWN_FRONT.matrix() * DEFAULT_AXES.matrix().transpose();
+                    scene.apply(&Motion::new(turn, DVec3::ZERO, scene.sh_degree()));
+                    Axes::RIGHT_DOWN_FRONT
+                }
+            };
+            scene.metadata_mut().axes = Some(FileAxes { axes, reason: AxesReason::Ground, of_cameras: false });
+        }
+        Ok(scene)
     }
 }
 
-/// Reads a scene into the frame `into`.
-pub(super) fn load_into(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
-    input.unpacked(|input| if input.is_compressed() { load_gzip(input, into) } else { load_plain(input, into) })
+/// Reads a scene into the axes `into`, from the axes that are `given`, or that the file names, or that are the format's.
+pub(super) fn load_into(input: &mut Input<'_>, given: Option<Axes>, into: Axes) -> Result<Scene, Fault> {
+    let conversion = Conversion { given, into };
+    input.unpacked(
+        |input| if input.is_compressed() { load_gzip(input, conversion) } else { load_plain(input, conversion) },
+    )
+}
+
+/// The axes from which and into which a file is read.
+#[derive(Clone, Copy)]
+struct Conversion {
+    given: Option<Axes>,
+    into: Axes,
 }
 
 /// Reads versions 1 to 3.
-fn load_gzip(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
+fn load_gzip(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fault> {
     let mut header = [0; HEADER];
     input.fill(&mut header)?;
     let header = Header::parse(&header)?;
@@ -105,11 +141,11 @@ fn load_gzip(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fau
         rest = after;
         array
     });
-    header.unpack(arrays, &Extensions::parse(&records), into)
+    header.unpack(arrays, &Extensions::parse(&records), conversion)
 }
 
 /// Reads version 4. Other versions are an error.
-fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
+fn load_plain(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fault> {
     let size = input.size();
     let start = input.up_to(PLAIN_HEADER as u64)?;
     if !start.starts_with(MAGIC) {
@@ -164,7 +200,7 @@ fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fa
     if input.remaining() > 0 {
         return Err(Reason::Trailing.at(Place::File));
     }
-    parsed.unpack(arrays.each_ref().map(Vec::as_slice), &extensions, into)
+    parsed.unpack(arrays.each_ref().map(Vec::as_slice), &extensions, conversion)
 }
 
 /// The contents of the zstd stream `compressed`, which must be `len` bytes.
@@ -194,7 +230,7 @@ fn version(found: u32) -> Fault {
 /// The contents of the extension records.
 #[derive(Default)]
 struct Extensions {
-    coordinates: Option<CoordinateSystem>,
+    axes: Option<Axes>,
     notes: Metadata,
 }
 
@@ -211,11 +247,11 @@ impl Extensions {
             records = rest;
             let word = content.first_chunk::<4>().map(|word| u32::from_le_bytes(*word));
             match (kind, word) {
-                (COORDINATE_SYSTEM, Some(system @ 1..=16)) => {
-                    extensions.coordinates = Some(CoordinateSystem(system));
-                }
-                (COORDINATE_SYSTEM, _) => {
-                    extensions.notes.note("SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed");
+                (COORDINATE_SYSTEM, number) => {
+                    extensions.axes = number.and_then(Axes::of_spz);
+                    if extensions.axes.is_none() {
+                        extensions.notes.note("SPZ_ADOBE_coordinate_system names no axes");
+                    }
                 }
                 (SAFE_ORBIT_CAMERA, _) => extensions.notes.note("the extension SPZ_ADOBE_safe_orbit_camera is ignored"),
                 (kind, _) => extensions.notes.note(format!("the extension {kind:#010x} is unknown and ignored")),
@@ -225,33 +261,6 @@ impl Extensions {
             extensions.notes.note("bytes that are no extension record are ignored");
         }
         extensions
-    }
-}
-
-/// A frame, by its number in the format's library. The number minus one has three bits: x points right, the height
-/// points up, and the depth's direction. Up to number 8, y is the height and z the depth, which points to the front if
-/// its bit is set; above, z is the height and y the depth, which points to the back if its bit is set.
-#[derive(Clone, Copy)]
-pub(super) struct CoordinateSystem(u32);
-
-impl CoordinateSystem {
-    /// The frame of SPZ files.
-    const RIGHT_UP_BACK: Self = Self(4);
-    /// The frame of [`Scene`]s.
-    pub(super) const RIGHT_DOWN_FORWARD: Self = Self(6);
-    /// The frame that glTF's draft extensions require.
-    pub(super) const LEFT_UP_FRONT: Self = Self(7);
-
-    /// The matrix from this frame to right-up-front.
-    fn matrix(self) -> DMat3 {
-        let sign = |bit: u32| {
-            if (self.0 - 1) >> bit & 1 == 1 { 1.0 } else { -1.0 }
-        };
-        let [right, height, depth] = [0, 1, 2].map(sign);
-        if self.0 <= 8 {
-            return DMat3::from_diagonal(DVec3::new(right, height, depth));
-        }
-        DMat3::from_cols(DVec3::new(right, 0.0, 0.0), DVec3::new(0.0, 0.0, -depth), DVec3::new(0.0, height, 0.0))
     }
 }
 
@@ -313,9 +322,12 @@ impl Header {
     }
 
     /// Decodes `arrays`, which have [`Header::sizes`], to a scene in the frame `into`.
-    fn unpack(&self, arrays: [&[u8]; 6], extensions: &Extensions, into: CoordinateSystem) -> Result<Scene, Fault> {
-        let from = extensions.coordinates.unwrap_or(CoordinateSystem::RIGHT_UP_BACK);
-        let map = into.matrix().transpose() * from.matrix();
+    fn unpack(&self, arrays: [&[u8]; 6], extensions: &Extensions, conversion: Conversion) -> Result<Scene, Fault> {
+        let named = |axes: Option<Axes>, reason| axes.map(|axes| FileAxes { axes, reason, of_cameras: false });
+        let from = named(conversion.given, AxesReason::Given)
+            .or(named(extensions.axes, AxesReason::File))
+            .unwrap_or(FileAxes { axes: DEFAULT_AXES, reason: AxesReason::Format, of_cameras: false });
+        let map = conversion.into.matrix().transpose() * from.axes.matrix();
         let motion = Motion::new(map, DVec3::ZERO, self.sh_degree);
         let strides = self.strides();
         let mut scene = Scene::try_generate(self.sh_degree, self.count as usize, |i, sh| {
@@ -331,11 +343,12 @@ impl Header {
                 *rgb = std::array::from_fn(|c| (f32::from(bytes[c]) - 128.0) / 128.0);
             }
             let mut position = self.position(positions);
-            motion.apply(&mut position, &mut shape, sh);
+            motion.apply(DVec3::ZERO, &mut position, &mut shape, sh);
             (position, shape)
         })?;
         let metadata = scene.metadata_mut();
         metadata.antialiasing = Some(self.antialiasing());
+        metadata.axes = Some(from);
         metadata.notes.clone_from(&extensions.notes.notes);
         Ok(scene)
     }

@@ -1,7 +1,7 @@
 //! glTF files with Gaussians.
 
 use gaurast_runner::data;
-use gaurast_scene::{ColorSpace, Place, Reason, Scene, SortOrder};
+use gaurast_scene::{Axes, ColorSpace, Options, Place, Reason, Scene, SortOrder};
 use serde_json::{Value, json};
 
 use super::support::*;
@@ -469,6 +469,41 @@ fn malformed_binary_gltf_is_refused() {
 }
 
 /// Tests a real file, which has signed scales in four of its primitives; the extension doesn't allow them.
+#[gaurast_runner::test]
+fn scales_of_a_draft_are_logarithms() {
+    let mut builder = Builder::new();
+    builder.floats("KHR_gaussian_splatting:SCALE", 3, &SCALES.map(f32::ln));
+    let scene = builder.load();
+    let plain = Builder::new().load();
+    for (shape, expected) in scene.shapes().iter().zip(plain.shapes()) {
+        close(&shape.scale, &expected.scale, 1e-6);
+    }
+    assert!(scene.metadata().notes[0].contains("scales are logarithms"), "{:?}", scene.metadata().notes);
+    assert!(plain.metadata().notes.is_empty());
+}
+
+#[gaurast_runner::test]
+fn axes_that_are_given_replace_gltfs_own() {
+    let file = Builder::new().glb();
+    let options = Options { axes: Some(Axes::RIGHT_DOWN_FRONT), ..Options::default() };
+    let path = std::path::Path::new("a.glb");
+    let scene = gaurast_scene::read_with(path, &mut &file[..], file.len() as u64, &options).expect("a good file");
+    assert_eq!(scene.positions().as_flattened(), POSITIONS);
+    assert_eq!(scene.metadata().axes.map(|axes| axes.of_cameras), Some(false));
+}
+
+#[gaurast_runner::test]
+fn a_node_far_away_and_unknown_attributes() {
+    let mut builder = Builder::new();
+    builder.node()["translation"] = json!([4_000_000.25, 300_000.5, -5_000_000.125]);
+    builder.floats("_TIME", 1, &[0.0, 1.0]);
+    let scene = builder.load();
+    // From right, up, back to right, down, forward.
+    assert_eq!(scene.origin(), [4_000_000.25, -300_000.5, 5_000_000.125]);
+    assert_eq!(scene.positions(), Builder::new().load().positions());
+    assert!(scene.metadata().warnings[0].contains("_TIME"));
+}
+
 #[gaurast_runner::test]
 fn a_real_gltf_is_read_without_its_signed_scales() {
     for name in ["splats/khr_conformance_matrix.gltf", "splats/khr_conformance_matrix.glb"] {

@@ -1,5 +1,6 @@
 //! Tests of scene files: real ones, small ones with known values, malformed ones, and damaged ones.
 
+mod dialects;
 mod gltf;
 mod ksplat;
 mod meshes;

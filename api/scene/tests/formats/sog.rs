@@ -237,7 +237,7 @@ fn streamed_sog_is_read_at_a_level() {
     streamed(folder.path());
     let unit = read("a.sog", &archive(2)).expect("a good file");
     let load = |level| {
-        let options = Options { level };
+        let options = Options { level, ..Options::default() };
         gaurast_scene::open_with(folder.path(), &options, |file, _| file)
     };
     let positions = |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| unit.positions()[*i]).collect() };

@@ -1,7 +1,7 @@
 //! SPZ files.
 
 use gaurast_runner::data;
-use gaurast_scene::{Place, Reason, SceneError};
+use gaurast_scene::{AxesReason, Place, Reason, SceneError};
 
 use super::support::*;
 
@@ -323,11 +323,16 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
         assert_eq!(scene.positions()[0], expected, "{frame}");
         assert_eq!(scene.shapes()[0].scale, plain.shapes()[0].scale);
         assert!(scene.metadata().notes.is_empty());
+        let taken = scene.metadata().axes.expect("axes");
+        assert_eq!((taken.axes.to_string(), taken.reason), (frame.to_lowercase(), AxesReason::File));
         // The function of degree 2 that is z^2 minus the mean of x^2 and y^2, in the file's frame.
         let energy = |scene: &gaurast_scene::Scene| -> f32 { scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum() };
         close(&[energy(&scene)], &[energy(&plain)], 1e-4);
         if frame == "RUB" {
-            assert_eq!(scene, plain);
+            assert_eq!(
+                (scene.positions(), scene.shapes(), scene.sh()),
+                (plain.positions(), plain.shapes(), plain.sh())
+            );
         }
         // The gradient of degree 1 rotates with the file's axes, as the positions do.
         let gradient = |sh: &[[f32; 3]]| [-sh[3][1], -sh[1][1], sh[2][1]];

@@ -184,8 +184,8 @@ fn sides_distances_and_models() {
     let (_, [r, g, _]) = mean(&[&near[..], &["0,0,1"]].concat());
     assert!(g > 4.0 * r, "green is the target: {r} {g}");
     let (plain, _) = mean(&[]);
-    let (zoomed, _) = mean(&["--zoom", "0.5"]);
-    let (far, _) = mean(&["--distance", "12"]);
+    let (zoomed, _) = mean(&["--zoom", "0.2"]);
+    let (far, _) = mean(&["--distance", "30"]);
     assert!(zoomed < 0.5 * plain && far < 0.5 * plain, "{plain} {zoomed} {far}");
     let (parallel, _) = mean(&["--camera", "orthographic"]);
     assert!((parallel / plain - 1.0).abs() < 0.4, "{plain} {parallel}");
@@ -280,7 +280,8 @@ fn eight_shares_are_one_run() {
 #[gaurast_runner::test]
 fn formats_hold_the_same_picture() {
     let folder = folder();
-    let fixed = ["two.ply", "--size", "64x48", "-o", "a.png", "-o", "a.webp", "-o", "a.jpg", "-o", "a.exr"];
+    let fixed =
+        ["two.ply", "--size", "64x48", "--zoom", "0.3", "-o", "a.png", "-o", "a.webp", "-o", "a.jpg", "-o", "a.exr"];
     succeeds(&folder, &[&fixed[..], &["--depth"]].concat());
     for (name, least) in [("a.webp", f64::INFINITY), ("a.exr", 50.0), ("a.jpg", 28.0)] {
         let json = succeeds(&folder, &["compare", name, "a.png", "--json"]);
@@ -303,7 +304,7 @@ fn formats_hold_the_same_picture() {
     assert!((middle - distance).abs() < 0.7 && middle < distance, "{middle} {distance}");
     assert_eq!(depth(0, 0), f32::INFINITY);
 
-    succeeds(&folder, &["two.ply", "--size", "64x48", "-o", "t.png", "--background", "transparent"]);
+    succeeds(&folder, &["two.ply", "--size", "64x48", "--zoom", "0.3", "-o", "t.png", "--background", "transparent"]);
     let picture = image::open(folder.path().join("t.png")).expect("a PNG");
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let picture = picture.to_rgba8();

@@ -1,7 +1,7 @@
 //! glTF 2.0 with `KHR_gaussian_splatting`, as JSON (`.gltf`) and as a binary file (`.glb`).
 //!
-//! Every primitive with the extension becomes Gaussians, and every one of triangles a mesh, transformed by its node. The frame, right-up-back, is rotated
-//! half a turn around x. Draft extensions that store a primitive's Gaussians as SPZ are read, and a note names them as
+//! Every primitive with the extension becomes Gaussians, and every one of triangles a mesh, transformed by its node. The
+//! axes are right, up, back. Draft extensions that store a primitive's Gaussians as SPZ are read, and a note names them as
 //! drafts.
 
 mod accessor;
@@ -14,6 +14,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::input::{Format, Input, Origin};
 use super::spz::one_line;
+use crate::axes::{Axes, AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 use crate::transform::Motion;
@@ -41,6 +42,10 @@ impl Format for Gltf {
         &["gltf"]
     }
 
+    fn has_axes_of_cameras(&self) -> bool {
+        false
+    }
+
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
         let json = input.rest()?;
         load(&json, None, input.origin())
@@ -58,6 +63,10 @@ impl Format for Glb {
 
     fn magic(&self) -> Option<&'static [u8]> {
         Some(MAGIC)
+    }
+
+    fn has_axes_of_cameras(&self) -> bool {
+        false
     }
 
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
@@ -115,11 +124,13 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
         other_primitives: 0,
         has_textures: false,
     };
-    let to_scene = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
+    let to_scene = DAffine3::from_mat3(origin.options.axes.unwrap_or(Axes::RIGHT_UP_BACK).matrix());
     for root in document.roots()? {
         reader.visit(root, to_scene)?;
     }
     let Reader { mut scene, other_primitives, has_textures, .. } = reader;
+    let named = origin.options.axes;
+    scene.metadata_mut().axes = named.map(|axes| FileAxes { axes, reason: AxesReason::Given, of_cameras: false });
     if scene.is_empty() && scene.mesh().is_empty() {
         let text = "no node of its scene has Gaussians (KHR_gaussian_splatting) or triangles";
         return Err(Reason::Unsupported(text.to_owned()).at(Place::File));

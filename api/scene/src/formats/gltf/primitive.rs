@@ -7,9 +7,10 @@ use serde::Deserialize;
 use super::accessor::{BYTE, Component, Demand, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_SHORT, values};
 use super::buffers::Buffers;
 use super::document::{DRAFTS, EXTENSION, Primitive};
+use crate::axes::Axes;
 use crate::error::{Fault, Place, Reason};
 use crate::formats::input::Input;
-use crate::formats::spz::{self, CoordinateSystem};
+use crate::formats::spz;
 use crate::harmonics::sh_coefficients;
 use crate::metadata::{ColorSpace, Metadata, SortOrder};
 use crate::scene::Scene;
@@ -17,6 +18,9 @@ use crate::shape::GaussianShape;
 
 /// The highest spherical harmonics degree of the extension.
 const MAX_DEGREE: u32 = 3;
+
+/// Attributes of Gaussians that are read, or that repeat others.
+const KNOWN: [&str; 3] = ["POSITION", "COLOR_0", "NORMAL"];
 
 /// The mode of primitives that are points. All primitives with Gaussians have it.
 const POINTS: u32 = 0;
@@ -110,13 +114,9 @@ pub(super) fn gaussians(buffers: &mut Buffers<'_>, primitive: &Primitive, place:
     } else {
         return Ok(None);
     };
-    let notes = std::mem::take(&mut scene.metadata_mut().notes);
-    let antialiasing = scene.metadata().antialiasing;
-    *scene.metadata_mut() = metadata;
-    scene.metadata_mut().antialiasing = antialiasing;
-    for note in notes {
-        scene.metadata_mut().note(note);
-    }
+    let mut of_data = std::mem::replace(scene.metadata_mut(), metadata);
+    scene.metadata_mut().antialiasing = of_data.antialiasing;
+    scene.metadata_mut().take_messages(&mut of_data);
     Ok(Some(scene))
 }
 
@@ -126,7 +126,7 @@ fn from_spz(buffers: &mut Buffers<'_>, view: usize, place: &str) -> Result<Scene
     let (mut bytes, _) = buffers.view(view, place)?;
     let len = bytes.len() as u64;
     let mut input = Input::new(&mut bytes, len, origin);
-    spz::load_into(&mut input, CoordinateSystem::LEFT_UP_FRONT).map_err(|fault| {
+    spz::load_into(&mut input, None, Axes::LEFT_UP_FRONT).map_err(|fault| {
         let place = format!("{place}, the SPZ file in it, {}", fault.place);
         fault.reason.at(Place::Part(place))
     })
@@ -162,11 +162,13 @@ fn attributes(buffers: &mut Buffers<'_>, primitive: &Primitive, place: &str) -> 
             coefficients.push(read(&name(l, n), &COEFFICIENT, same)?);
         }
     }
+    let are_logarithms = are_logarithms(&scales);
+    let scale = |value: f32| if are_logarithms { libm::expf(value) } else { value.abs() };
     let vector = |values: &[f32], i: usize| std::array::from_fn(|axis| values[3 * i + axis]);
     let mut scene = Scene::try_generate(degree, count, |i, sh| {
         let [x, y, z, w] = std::array::from_fn(|c| rotations[4 * i + c]);
         let shape = GaussianShape {
-            scale: vector(&scales, i).map(f32::abs),
+            scale: vector(&scales, i).map(scale),
             rotation: [w, x, y, z],
             opacity: opacities[i].clamp(0.0, 1.0),
         };
@@ -175,13 +177,29 @@ fn attributes(buffers: &mut Buffers<'_>, primitive: &Primitive, place: &str) -> 
         }
         (vector(&positions, i), shape)
     })?;
-    if scales.iter().any(|scale| *scale < 0.0) {
+    if are_logarithms {
+        scene.metadata_mut().note("scales are logarithms, as in a draft of the extension, and are converted");
+    } else if scales.iter().any(|scale| *scale < 0.0) {
         scene.metadata_mut().note("scales are negative, and their magnitudes are taken");
     }
     if opacities.iter().any(|opacity| !(0.0..=1.0).contains(opacity)) {
         scene.metadata_mut().note("opacities lie outside 0 to 1, and are clamped");
     }
+    let mut unknown: Vec<&str> = (primitive.attributes.keys().map(String::as_str))
+        .filter(|name| !KNOWN.contains(name) && !name.starts_with(&format!("{EXTENSION}:")))
+        .collect();
+    if !unknown.is_empty() {
+        unknown.sort_unstable();
+        scene.metadata_mut().warn(format!("unknown attributes are ignored: {}", unknown.join(", ")));
+    }
     Ok(scene)
+}
+
+/// Returns true if `scales` are logarithms, as in a draft of the extension: at least a tenth of them is negative. Scales
+/// themselves are not, and the logarithms of a scene's are unless its Gaussians are large.
+fn are_logarithms(scales: &[f32]) -> bool {
+    let negative = scales.iter().filter(|scale| **scale < 0.0).count();
+    negative > 0 && 10 * negative >= scales.len()
 }
 
 impl Splatting {

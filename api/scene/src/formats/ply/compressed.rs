@@ -10,8 +10,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use ply_rs_bw::ply::ScalarType;
 
-use super::inria;
 use super::table::Table;
+use super::{columns, inria};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::SH_C0;
 use crate::scene::Scene;
@@ -68,6 +68,14 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     }
 
     let mut scene = Scene::try_with_capacity(degree, count)?;
+    if let Some(warning) = columns::warning(&table, "vertex", |name| PACKED.contains(&name)) {
+        scene.metadata_mut().warn(warning);
+    }
+    let unbounded = chunks.iter().filter(|bounds| !bounds.iter().all(|bound| bound.is_finite())).count();
+    if unbounded > 0 {
+        let all = chunks.len();
+        scene.metadata_mut().warn(format!("{unbounded} of {all} chunks of Gaussians have bounds that are not finite"));
+    }
     let mut sh = vec![[0.0; 3]; scene.sh_stride()];
     table.read("vertex", &packed, |index, words| {
         let words = std::array::from_fn(|i| words[i] as u32);

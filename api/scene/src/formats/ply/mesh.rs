@@ -3,11 +3,14 @@
 //! Positions are taken as they are, so that a mesh made from a scene of Gaussians lies where the scene does. Normals
 //! `nx`, `ny`, `nz` and colours `red`, `green`, `blue` are optional. Polygons are triangulated as fans.
 
+use glam::{DMat3, DVec3};
+
 use super::inria::VERTEX;
 use super::table::{Column, Table};
 use crate::error::{Fault, Place, Reason};
 use crate::mesh::{Indexed, fan};
 use crate::scene::Scene;
+use crate::transform::Motion;
 
 const FACE: &str = "face";
 
@@ -31,13 +34,18 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     // Integers are fractions of their greatest value.
     let full = (colors.iter().flatten().next()).map_or(1.0, |red| if red.is_float() { 1.0 } else { red.max() });
     let (has_normals, has_colors) = (normals.is_some(), colors.is_some());
+    let is_wide = columns.iter().any(Column::is_double);
+    let mut origin = None;
     columns.extend(normals.into_iter().chain(colors).flatten());
 
     let mut mesh = Indexed::default();
     table.read(VERTEX, &columns, |_, values| {
         let mut triples = values.chunks_exact(3).map(|v| [v[0], v[1], v[2]]);
         let mut next = || triples.next().unwrap_or_default();
-        mesh.positions.push(next().map(|x| x as f32));
+        let position = next();
+        // Of binary64, the first vertex is the origin, so that the others keep their digits.
+        let origin = origin.get_or_insert(if is_wide { position.map(libm::round) } else { [0.0; 3] });
+        mesh.positions.push(std::array::from_fn(|axis| (position[axis] - origin[axis]) as f32));
         if has_normals {
             mesh.normals.push(next().map(|x| x as f32));
         }
@@ -65,5 +73,6 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     }
     let mut scene = Scene::default();
     *scene.mesh_mut() = mesh.into_mesh(place)?;
+    scene.apply(&Motion::new(DMat3::IDENTITY, DVec3::from_array(origin.unwrap_or_default()), 0));
     Ok(scene)
 }

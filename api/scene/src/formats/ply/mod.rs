@@ -1,9 +1,11 @@
-//! PLY files: the layout of the original 3DGS code, PlayCanvas's compressed one, and meshes.
+//! PLY files: the layout of the original 3DGS code, PlayCanvas's compressed one, meshes, and points.
 
+mod columns;
 mod comments;
 mod compressed;
 mod inria;
 mod mesh;
+mod points;
 mod table;
 
 use super::input::{Format, Input};
@@ -27,12 +29,15 @@ impl Format for Ply {
     }
 
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let options = input.origin().options;
         let table = table::Table::open(input)?;
-        let said = comments::metadata(table.comments());
+        let mut said = comments::metadata(table.comments());
         let mut scene = if table.element("chunk").is_some() {
             compressed::load(table)?
         } else if mesh::is_one(&table) {
-            return mesh::load(table);
+            mesh::load(table)?
+        } else if points::is_one(&table) {
+            points::load(table, options.points)?
         } else {
             inria::load(table)?
         };
@@ -40,9 +45,8 @@ impl Format for Ply {
         // The absence of a third scale is more reliable than a comment.
         metadata.geometry = metadata.geometry.or(said.geometry);
         metadata.antialiasing = said.antialiasing;
-        for note in said.notes {
-            metadata.note(note);
-        }
+        metadata.axes = said.axes;
+        metadata.take_messages(&mut said);
         Ok(scene)
     }
 }

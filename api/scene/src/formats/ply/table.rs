@@ -47,6 +47,11 @@ impl Column {
         matches!(self.kind, ScalarType::Float | ScalarType::Double)
     }
 
+    /// Returns true if the numbers are binary64.
+    pub(super) fn is_double(&self) -> bool {
+        self.kind == ScalarType::Double
+    }
+
     /// The greatest value of the column's type, if it is an integer.
     pub(super) fn max(&self) -> f64 {
         match self.kind {
@@ -374,7 +379,7 @@ enum Source<'a> {
 }
 
 impl Rows<'_> {
-    /// Writes the values of row `row`, one for each column, to `values`. A binary64 holds the values of every type
+    /// Writes the values of row `row`, of as many columns as `values` has, to `values`. A binary64 holds the values of every type
     /// exactly.
     pub(super) fn get(&self, row: usize, values: &mut [f64]) {
         match self.source {
@@ -385,7 +390,7 @@ impl Rows<'_> {
                     *value = number(column, bytes);
                 }
             }
-            Source::Values(found) => values.copy_from_slice(found),
+            Source::Values(found) => values.copy_from_slice(&found[..values.len()]),
         }
     }
 }

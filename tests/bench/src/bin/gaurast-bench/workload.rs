@@ -138,7 +138,7 @@ impl Workload {
                 (0..count).map(|frame| cameras[frame * cameras.len() / count.max(1) % cameras.len()].clone()).collect()
             }
             Source::File { .. } => {
-                let camera = gaurast_scene::frame(scene, DEFAULT_FOV, size);
+                let camera = gaurast_scene::frame_middle(scene, DEFAULT_FOV, size);
                 // The path goes around a point ahead of the camera, at the distance of the scene's centre.
                 let distance = distance_to(scene, &camera);
                 let pivot = std::array::from_fn(|axis| camera.eye[axis] + distance * camera.rotation[2][axis]);

@@ -1,18 +1,20 @@
 //! Cameras for a scene: one that has all of it in its picture, and one that stands inside.
+//!
+//! An object is framed by its silhouette: what it covers of the picture. A scene that surrounds its middle is framed by a
+//! box around most of its opacity, which is that middle. `docs/command.md` says when a scene is which.
 
-use glam::DVec3;
+mod coverage;
+mod extent;
+mod silhouette;
+mod surroundings;
+
+use glam::{DMat3, DVec3};
 
 use crate::camera::{Camera, CameraError, DEFAULT_NEAR};
 use crate::scene::Scene;
+pub use extent::Extent;
 
-/// The part of the scene's opacity that lies outside the framed box at each end of each axis.
-/// Trained scenes have a haze of far-off Gaussians.
-const TAIL: f64 = 0.04;
-
-/// The most Gaussians that the box is computed from.
-const SAMPLE: usize = 1 << 18;
-
-/// The size of the picture relative to the box.
+/// The size of the picture relative to the box, of a scene that surrounds its middle.
 const MARGIN: f64 = 1.2;
 
 /// The direction from the scene's centre to the eye: in front, somewhat to the side and above. Scenes have y down and z
@@ -22,54 +24,49 @@ const FROM: DVec3 = DVec3::new(0.35, -0.35, -1.0);
 /// The default direction upwards, for scenes whose files give none.
 pub const DEFAULT_UP: [f64; 3] = [0.0, -1.0, 0.0];
 
-/// Half of the least side of the framed box, for scenes without extent or sizes.
-const LEAST: f64 = 1e-3;
+/// The number of sides from which an object fits the picture of an orbit.
+const ORBIT_SIDES: u32 = 8;
 
-/// A box around the opaque parts of a scene and its triangles, in the scene's units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
-    /// The middle.
-    pub centre: [f64; 3],
-    /// Half of each side; positive.
-    pub half: [f64; 3],
+/// The size of the picture of an orbit relative to what an object covers of it from these sides.
+const ORBIT_MARGIN: f64 = 1.1;
+
+/// What is framed.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// The box around most of the opacity.
+    pub extent: Extent,
+    /// The scene, if it is an object.
+    object: Option<&'a Scene>,
 }
 
-impl Extent {
-    /// The box around most of `scene`'s opacity and all of its triangles.
-    pub fn of(scene: &Scene) -> Self {
-        let sample = sample(scene);
-        let (mut min, mut max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
-        if let Some((least, greatest)) = scene.mesh().bounds() {
-            let (least, greatest) = (DVec3::from_array(least), DVec3::from_array(greatest));
-            (min, max) = if sample.is_empty() { (least, greatest) } else { (min.min(least), max.max(greatest)) };
-        }
-        let half = (max - min) / 2.0;
-        // A scene of one point gets a box as large as its Gaussian.
-        let size = typical_size(&sample);
-        let least = if size > 0.0 {
-            (2.0 * size).min(1e30)
-        } else if half.max_element() > 0.0 {
-            LEAST * half.max_element()
-        } else {
-            LEAST
-        };
-        Self { centre: ((min + max) / 2.0).into(), half: half.max(DVec3::splat(least)).into() }
+impl<'a> Subject<'a> {
+    /// The scene as an object, or the box around its middle if it surrounds that.
+    pub fn of(scene: &'a Scene) -> Self {
+        let extent = Extent::of(scene);
+        let object = (!surroundings::surrounds(scene, &extent)).then_some(scene);
+        Self { extent, object }
     }
 
-    /// Half of the box's diagonal.
-    pub fn radius(&self) -> f64 {
-        DVec3::from_array(self.half).length()
+    /// A box.
+    pub fn of_box(extent: Extent) -> Self {
+        Self { extent, object: None }
     }
 
-    /// A near plane for cameras in and around the box: that of 3DGS, or nearer where the scene is small.
-    pub fn near(&self) -> f64 {
-        DEFAULT_NEAR.min(self.radius() / 5.0)
+    /// Returns true if it is framed by its silhouette.
+    pub fn is_object(&self) -> bool {
+        self.object.is_some()
     }
+}
 
-    /// The distance from the box's middle to its farthest point in `direction`, a unit vector.
-    fn reach(&self, direction: DVec3) -> f64 {
-        DVec3::from_array(self.half).dot(direction.abs())
-    }
+/// A camera that frames a subject.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Framed {
+    /// The camera.
+    pub camera: Camera,
+    /// The point in the middle of the picture.
+    pub target: [f64; 3],
+    /// The camera's distance from that point.
+    pub distance: f64,
 }
 
 /// A view of a scene from outside. Values that are None are chosen for the scene.
@@ -79,8 +76,10 @@ pub struct Framing {
     pub azimuth: Option<f64>,
     /// The angle in degrees above the horizon, at most 90.
     pub elevation: Option<f64>,
-    /// The distance from the scene's middle, in its units.
+    /// The distance from the target, in the scene's units.
     pub distance: Option<f64>,
+    /// The point in the middle of the picture.
+    pub target: Option<[f64; 3]>,
     /// The magnification relative to the framed picture.
     pub zoom: f64,
     /// The direction upwards in the scene.
@@ -94,18 +93,93 @@ pub struct Framing {
 impl Framing {
     /// A framing with all values chosen for the scene.
     pub fn new(fov: f64, size: [u32; 2]) -> Self {
-        Self { azimuth: None, elevation: None, distance: None, zoom: 1.0, up: DEFAULT_UP, fov, size }
+        Self { azimuth: None, elevation: None, distance: None, target: None, zoom: 1.0, up: DEFAULT_UP, fov, size }
     }
 
-    /// The camera that looks at the middle of `extent`.
+    /// The camera of [`Framing::framed`].
+    ///
+    /// # Errors
+    /// As it.
+    pub fn camera(&self, subject: &Subject<'_>) -> Result<Camera, CameraError> {
+        Ok(self.framed(subject)?.camera)
+    }
+
+    /// The camera that has `subject` in its picture.
     ///
     /// # Errors
     /// [`CameraError::NoUp`] if up is zero, and others for numbers that are not finite.
-    pub fn camera(&self, extent: &Extent) -> Result<Camera, CameraError> {
-        let centre = DVec3::from_array(extent.centre);
+    pub fn framed(&self, subject: &Subject<'_>) -> Result<Framed, CameraError> {
+        let boxed = self.boxed(&subject.extent)?;
+        let needed = self.distance.is_none() || self.target.is_none();
+        let Some(fit) =
+            subject.object.filter(|_| needed).and_then(|scene| silhouette::fit(scene, &boxed.camera, boxed.distance))
+        else {
+            return Ok(self.finished(boxed, &subject.extent, f64::INFINITY));
+        };
+        let forward = DVec3::from_array(boxed.camera.rotation[2]);
+        let ahead = (DVec3::from_array(subject.extent.centre) - fit.eye).dot(forward);
+        // A middle that is not ahead is none: the haze of the scene is elsewhere than its silhouette.
+        let ahead = if ahead > fit.nearest { ahead } else { fit.nearest };
+        let distance = self.distance.unwrap_or(ahead);
+        let target = self.target.map_or(fit.eye + forward * ahead, DVec3::from_array);
+        let camera = Camera { eye: (target - forward * distance).into(), ..boxed.camera };
+        let framed = Framed { camera, target: target.into(), distance };
+        Ok(self.finished(framed, &subject.extent, fit.nearest - ahead + distance))
+    }
+
+    /// The camera with which an orbit of `subject` begins, at a distance at which it fits the picture from all sides.
+    ///
+    /// # Errors
+    /// As [`Framing::framed`].
+    pub fn orbit(&self, subject: &Subject<'_>) -> Result<Framed, CameraError> {
+        let Some(scene) = subject.object.filter(|_| self.distance.is_none()) else {
+            return self.framed(subject);
+        };
+        let boxed = self.boxed(&subject.extent)?;
+        let sides = (0..ORBIT_SIDES).map(|side| {
+            let angle = std::f64::consts::TAU * f64::from(side) / f64::from(ORBIT_SIDES);
+            boxed.camera.turned(boxed.target, self.up, angle)
+        });
+        let sides: Vec<Camera> = sides.collect();
+        let fits: Vec<_> = sides.iter().filter_map(|camera| silhouette::fit(scene, camera, boxed.distance)).collect();
+        let points: Vec<DVec3> = fits.iter().flat_map(|fit| fit.points.iter().copied()).collect();
+        let bounds = points.iter().map(|point| (*point, *point)).reduce(|(min, max), (a, b)| (min.min(a), max.max(b)));
+        let Some((min, max)) = bounds else {
+            return Ok(self.finished(boxed, &subject.extent, f64::INFINITY));
+        };
+        let target = self.target.map_or((min + max) / 2.0, DVec3::from_array);
+        let within = |camera: &Camera| {
+            let axes = DMat3::from_cols_array_2d(&camera.rotation).transpose();
+            let tangents = [0, 1].map(|axis| camera.principal[axis] / camera.focal[axis] / ORBIT_MARGIN);
+            let needed = points.iter().map(|point| {
+                let offset = axes * (*point - target);
+                (offset.x.abs() / tangents[0]).max(offset.y.abs() / tangents[1]) - offset.z
+            });
+            needed.fold(0.0, f64::max)
+        };
+        let distance = sides.iter().map(within).fold(0.0, f64::max);
+        let forward = DVec3::from_array(boxed.camera.rotation[2]);
+        let nearest = points.iter().map(|point| distance - point.distance(target)).fold(f64::INFINITY, f64::min);
+        let camera = Camera { eye: (target - forward * distance).into(), ..boxed.camera };
+        Ok(self.finished(Framed { camera, target: target.into(), distance }, &subject.extent, nearest))
+    }
+
+    /// The camera with its planes and its magnification. `nearest` is the least distance of what is framed.
+    fn finished(&self, framed: Framed, extent: &Extent, nearest: f64) -> Framed {
+        // The near plane is half of the way to what is framed, unless 3DGS's plane is nearer.
+        let forward = DVec3::from_array(framed.camera.rotation[2]);
+        let nearest = nearest.min(framed.distance - extent.reach(forward));
+        let near = if nearest > 0.0 { nearest / 2.0 } else { extent.near() };
+        let camera = framed.camera.with_planes(near.min(DEFAULT_NEAR), f64::INFINITY).zoomed(self.zoom);
+        Framed { camera, ..framed }
+    }
+
+    /// The camera that has the box in its picture.
+    fn boxed(&self, extent: &Extent) -> Result<Framed, CameraError> {
+        let target = DVec3::from_array(self.target.unwrap_or(extent.centre));
         let (from, up) = self.direction()?;
-        let eye = centre + from;
-        let looking = Camera::look_at(eye.into(), centre.into(), up.into(), self.fov, self.size);
+        let eye = target + from;
+        let looking = Camera::look_at(eye.into(), target.into(), up.into(), self.fov, self.size);
         let mut camera = match looking {
             // The scene is so far from the origin that rounding loses the direction.
             Err(CameraError::NoDirection | CameraError::NoUp) => {
@@ -126,11 +200,8 @@ impl Framing {
             })
             .fold(0.0, f64::max);
         let distance = self.distance.unwrap_or(framed);
-        camera.eye = (centre - forward * distance).into();
-        // The near plane is half of the way to the box, unless 3DGS's plane is nearer.
-        let nearest = distance - extent.reach(forward);
-        let near = if nearest > 0.0 { nearest / 2.0 } else { extent.near() };
-        Ok(camera.with_planes(near.min(DEFAULT_NEAR), f64::INFINITY).zoomed(self.zoom))
+        camera.eye = (target - forward * distance).into();
+        Ok(Framed { camera, target: target.into(), distance })
     }
 
     /// The direction from the middle to the eye, and the direction upwards in the picture.
@@ -169,13 +240,21 @@ fn front(up: DVec3) -> DVec3 {
     if towards.length() > 0.1 { towards.normalize() } else { level(DVec3::Y).normalize() }
 }
 
-/// A camera that looks forward at `scene` from a little above, with its opaque parts in a picture of `size` pixels and
-/// a vertical field of view of `fov` degrees (more than 0, less than 180).
+/// A camera that looks forward at `scene` from a little above, in a picture of `size` pixels with a vertical field of view
+/// of `fov` degrees (more than 0, less than 180). An object fills the picture; of other scenes it shows the middle.
 pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
-    let extent = Extent::of(scene);
+    framed_or_at_its_centre(&Subject::of(scene), fov, size)
+}
+
+/// A camera like [`frame`]'s, with the box around the scene's middle in its picture, whatever the scene is.
+pub fn frame_middle(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
+    framed_or_at_its_centre(&Subject::of_box(Extent::of(scene)), fov, size)
+}
+
+fn framed_or_at_its_centre(subject: &Subject<'_>, fov: f64, size: [u32; 2]) -> Camera {
     Framing::new(fov, size)
-        .camera(&extent)
-        .unwrap_or_else(|_| Camera::new([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], extent.centre, fov, size))
+        .camera(subject)
+        .unwrap_or_else(|_| Camera::new([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], subject.extent.centre, fov, size))
 }
 
 /// A camera in the middle of the scene that looks horizontally along `azimuth` degrees (0 looks along +z, as from the
@@ -185,65 +264,9 @@ pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
 /// [`CameraError::NoUp`] if `up` is zero, and others for numbers that are not finite.
 pub fn inside(extent: &Extent, azimuth: f64, up: [f64; 3], fov: f64, size: [u32; 2]) -> Result<Camera, CameraError> {
     let framing = Framing { azimuth: Some(azimuth), elevation: Some(0.0), up, ..Framing::new(fov, size) };
-    let mut camera = framing.camera(extent)?;
+    let mut camera = framing.camera(&Subject::of_box(*extent))?;
     camera.eye = extent.centre;
     Ok(camera.with_planes(extent.near() / 4.0, f64::INFINITY))
-}
-
-/// The data of a Gaussian that framing uses.
-struct Sample {
-    position: DVec3,
-    opacity: f64,
-    /// Its greatest standard deviation.
-    size: f64,
-}
-
-fn sample(scene: &Scene) -> Vec<Sample> {
-    let step = scene.len().div_ceil(SAMPLE).max(1);
-    scene
-        .positions()
-        .iter()
-        .zip(scene.shapes())
-        .step_by(step)
-        .map(|(position, shape)| Sample {
-            position: DVec3::from_array(position.map(f64::from)),
-            opacity: f64::from(shape.opacity),
-            size: shape.scale.iter().copied().fold(0.0, f32::max).into(),
-        })
-        .filter(|s| s.position.is_finite() && s.opacity > 0.0 && s.opacity < 1e6)
-        .collect()
-}
-
-/// The median of the finite sizes; 0 if there are none.
-fn typical_size(sample: &[Sample]) -> f64 {
-    let mut sizes: Vec<f64> = (sample.iter().map(|s| s.size)).filter(|size| size.is_finite()).collect();
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let middle = sizes.len() / 2;
-    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Opposite corners of a box around most of the opacity.
-fn bounds(mut sample: Vec<(DVec3, f64)>) -> (DVec3, DVec3) {
-    let total: f64 = sample.iter().map(|(_, opacity)| opacity).sum();
-    let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
-    for axis in 0..3 {
-        sample.sort_unstable_by(|(a, _), (b, _)| a[axis].total_cmp(&b[axis]));
-        let beyond = |fraction: f64| {
-            let mut sum = 0.0;
-            sample
-                .iter()
-                .find(|(_, opacity)| {
-                    sum += opacity;
-                    sum >= fraction * total
-                })
-                .or(sample.last())
-                .map_or(0.0, |(position, _)| position[axis])
-        };
-        (min[axis], max[axis]) = (beyond(TAIL), beyond(1.0 - TAIL));
-    }
-    (min, max)
 }
 
 #[cfg(test)]
@@ -329,7 +352,9 @@ mod tests {
         let camera = frame(&scene(0.3, [[5.0, 6.0, 7.0]]), DEFAULT_FOV, [100, 100]);
         let distance = (DVec3::from_array(camera.eye) - DVec3::new(5.0, 6.0, 7.0)).length();
         let pixels = camera.focal[0] * 0.3 / distance;
-        assert!((10.0..40.0).contains(&pixels), "{pixels}");
+        // Its alpha of 0.9 falls to a half at sqrt(2 ln 1.8) standard deviations.
+        let diameter = 2.0 * pixels * (2.0 * 1.8_f64.ln()).sqrt();
+        assert!((86.0..91.0).contains(&diameter), "{diameter}");
     }
 
     #[test]
@@ -343,7 +368,7 @@ mod tests {
                 up,
                 ..Framing::new(DEFAULT_FOV, [64, 64])
             };
-            let camera = framing.camera(&extent).expect("a camera");
+            let camera = framing.camera(&Subject::of_box(extent)).expect("a camera");
             DVec3::from_array(camera.eye) - DVec3::from_array(extent.centre)
         };
         let near = |a: DVec3, b: [f64; 3]| assert!(a.abs_diff_eq(b.into(), 1e-9), "{a} {b:?}");
@@ -358,7 +383,7 @@ mod tests {
         let (azimuth, elevation) = default_angles();
         near(at(azimuth, elevation, DEFAULT_UP), (FROM.normalize() * 10.0).to_array());
         let no_up = Framing { up: [0.0; 3], ..Framing::new(DEFAULT_FOV, [64, 64]) };
-        assert_eq!(no_up.camera(&extent), Err(CameraError::NoUp));
+        assert_eq!(no_up.camera(&Subject::of_box(extent)), Err(CameraError::NoUp));
     }
 
     #[test]
