@@ -385,13 +385,11 @@ pub enum Choice<T> {
     Given(T),
 }
 
-impl<T> Choice<T> {
-    /// The given value, or the file's.
-    pub fn or(self, of_file: T) -> T {
-        match self {
-            Self::Auto => of_file,
-            Self::Given(value) => value,
-        }
+/// The given value of a choice, or the file's.
+pub fn chosen<T>(choice: Choice<T>, of_file: T) -> T {
+    match choice {
+        Choice::Auto => of_file,
+        Choice::Given(value) => value,
     }
 }
 

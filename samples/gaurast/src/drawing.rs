@@ -8,7 +8,7 @@ use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, Work
 use gaurast_scene::{Antialiasing, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
 use thiserror::Error;
 
-use crate::args::{Choice, ModeArguments};
+use crate::args::{Choice, ModeArguments, chosen};
 use crate::cameras::{View, short};
 use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
@@ -36,9 +36,9 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     };
     let settings = Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
-        order: modes.order.or(order_of_file),
-        geometry: modes.geometry.or(scene.geometry()),
-        antialiasing: modes.antialiasing.or(scene.antialiasing()),
+        order: chosen(modes.order, order_of_file),
+        geometry: chosen(modes.geometry, scene.geometry()),
+        antialiasing: chosen(modes.antialiasing, scene.antialiasing()),
         precision: modes.precision.into(),
         exponential_error: modes.exponential_error,
         contribution_budget: modes.contribution_budget,
