@@ -142,7 +142,8 @@ fn each_limit_has_cases() {
     const XML: &str = include_str!("../../api/spec/vk_gaurast.xml");
     let name = "category=\"struct\" name=\"VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST\"";
     let start = XML.find(name).expect("the structure of properties");
-    let structure = &XML[start..][..XML[start..].find("</type>").expect("its end")];
+    // Types of members end on the lines of the members.
+    let structure = &XML[start..][..XML[start..].find("\n        </type>").expect("its end")];
     let members = structure.split("<name>").skip(1).filter_map(|rest| rest.split("</name>").next());
     let members: Vec<_> = members.filter(|name| !["sType", "pNext"].contains(name)).collect();
     assert!(members.len() >= 5, "{members:?}");
