@@ -18,12 +18,6 @@ const LEAST: usize = 200;
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/mutants.md");
 
-fn ordinary() -> Vec<Conformance> {
-    let mut cases = all();
-    cases.retain(|case| !case.is_large);
-    cases
-}
-
 /// Runs each mutant of a shard, and returns what became of them.
 fn catches(case: &Case, answers: &Answers, extent: Extent) -> Vec<Catch> {
     let shard = case.shard();
@@ -36,7 +30,7 @@ fn catches(case: &Case, answers: &Answers, extent: Extent) -> Vec<Catch> {
 #[gaurast_runner::test(needs = [Need::VulkanLoader], each = shards(2))]
 fn a_case_catches_each_mutant(case: &Case) {
     with_mutants(case, || {
-        let faults = catches(case, &Answers::new(ordinary()), Extent::UntilCaught);
+        let faults = catches(case, &Answers::new(all()), Extent::UntilCaught);
         let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
         assert!(faults.is_empty(), "{faults:#?}");
     });
@@ -50,7 +44,7 @@ fn the_layer_alone_fails_no_case(case: &Case) {
         let device = Device::open_under("loader", &[gaurast_conformance::mutants::LAYER]).expect("a device");
         let chapters = ["draws", "sets", "vertex_input", "views", "passes", "updates", "descriptors", "queries"];
         let mut failures = Vec::new();
-        for one in ordinary().iter().filter(|one| chapters.contains(&one.chapter)) {
+        for one in all().iter().filter(|one| chapters.contains(&one.chapter)) {
             if let Outcome::Fail(failure) = run(one, &device) {
                 failures.push(format!("{}: {}", one.path(), failure.message));
             }
@@ -81,7 +75,7 @@ fn the_page_is_what_fails(case: &Case) {
         return the_page_has_every_mutant();
     }
     with_mutants(case, || {
-        let answers = Answers::new(ordinary());
+        let answers = Answers::new(all());
         let rows = MUTANTS.iter().map(|mutant| {
             let caught = catch("loader", mutant, &answers, Extent::EveryTenth);
             caught.unwrap_or_else(|error| panic!("{}", error.0)).row() + "\n"
@@ -127,7 +121,7 @@ fn each_feature_has_a_case() {
     use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
     // A type, a pointer, and the bits, which the structure's size rounds up to a multiple of eight bytes.
     assert_eq!(FEATURES.len(), (size_of::<Features<'_>>() - 16) / 4);
-    let needed: BTreeSet<_> = ordinary().iter().flat_map(Conformance::needs).collect();
+    let needed: BTreeSet<_> = all().iter().flat_map(Conformance::needs).collect();
     for (name, offered) in FEATURES {
         assert!(needed.contains(name), "no case needs {name}");
         // The name and the bit belong together.
@@ -147,7 +141,7 @@ fn each_limit_has_cases() {
     let members = structure.split("<name>").skip(1).filter_map(|rest| rest.split("</name>").next());
     let members: Vec<_> = members.filter(|name| !["sType", "pNext"].contains(name)).collect();
     assert!(members.len() >= 5, "{members:?}");
-    let cases = ordinary();
+    let cases = all();
     for member in members {
         let of_member = cases.iter().filter(|case| case.chapter == "limits" && case.name.starts_with(member));
         assert!(of_member.count() >= 2, "{member} has no case");

@@ -8,11 +8,11 @@ use ash::vk;
 
 use crate::facts::Facts;
 use crate::instance::Instance;
-use crate::interface;
 use crate::next::Next;
 use crate::objects::Objects;
 use crate::recording::Recording;
 use crate::report::Faults;
+use gaurast_layer_interface as interface;
 
 /// The greatest number of times that one message is given on a device.
 const REPEATS: u32 = 32;

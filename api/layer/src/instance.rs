@@ -6,8 +6,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use ash::vk;
 
-use crate::interface::{self, GetInstanceProcAddr, InstanceLink};
 use crate::report::Messengers;
+use gaurast_layer_interface::{self as interface, GetInstanceProcAddr, InstanceLink};
 
 /// The next layer's commands. They are looked up as the instance is created, since the loader's end of the chain gives
 /// the first layer's functions later.

@@ -7,7 +7,6 @@
 //!
 //! | module | has |
 //! |---|---|
-//! | `interface` | the loader's structures |
 //! | `hooks` | the commands that are intercepted |
 //! | `next` | the next layer's commands |
 //! | `instance`, `device` | what lives, by the loader's key |
@@ -23,7 +22,6 @@ mod facts;
 mod formats;
 mod hooks;
 mod instance;
-mod interface;
 mod next;
 mod objects;
 mod recording;
@@ -39,8 +37,7 @@ use ash::vk;
 
 use crate::device::Device;
 use crate::instance::Instance;
-use crate::interface::NegotiateLayerInterface;
-use crate::next::Function;
+use gaurast_layer_interface::{LayerFunctions, NegotiateLayerInterface, string};
 
 /// Agrees with the loader on the version of their interface, and gives it the layer's functions.
 ///
@@ -50,18 +47,9 @@ use crate::next::Function;
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
     version: *mut NegotiateLayerInterface,
 ) -> vk::Result {
+    let functions = LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
     // SAFETY: the caller's promise.
-    let Some(version) = (unsafe { version.as_mut() }) else {
-        return vk::Result::ERROR_INITIALIZATION_FAILED;
-    };
-    if version.version < interface::VERSION {
-        return vk::Result::ERROR_INITIALIZATION_FAILED;
-    }
-    version.version = interface::VERSION;
-    version.get_instance_proc_addr = Some(get_instance_proc_addr);
-    version.get_device_proc_addr = Some(get_device_proc_addr);
-    version.get_physical_device_proc_addr = Some(get_physical_device_proc_addr);
-    vk::Result::SUCCESS
+    unsafe { gaurast_layer_interface::negotiate(version, functions) }
 }
 
 /// `vkGetInstanceProcAddr`.
@@ -70,14 +58,14 @@ unsafe extern "system" fn get_instance_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
-    let command = unsafe { interface::string(name) };
+    let command = unsafe { string(name) };
     let get: vk::PFN_vkGetInstanceProcAddr = get_instance_proc_addr;
     if command == c"vkGetInstanceProcAddr" {
         // SAFETY: function pointers have one size, and whoever calls it casts it back.
         return unsafe { transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get) };
     }
     if instance == vk::Instance::null() {
-        return hooks::instance_hook(command).map(plain).filter(|_| command == c"vkCreateInstance");
+        return hooks::instance_hook(command).filter(|_| command == c"vkCreateInstance");
     }
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
@@ -88,13 +76,13 @@ unsafe extern "system" fn get_instance_proc_addr(
         return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device) };
     }
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
-    Some(hook.map_or(next, plain))
+    Some(hook.unwrap_or(next))
 }
 
 /// `vkGetDeviceProcAddr`.
 unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
-    let command = unsafe { interface::string(name) };
+    let command = unsafe { string(name) };
     let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
         // SAFETY: function pointers have one size, and whoever calls it casts it back.
@@ -102,7 +90,7 @@ unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const 
     }
     // SAFETY: the device is valid, and the name is a string.
     let next = unsafe { (Device::of(device)?.get_device_proc_addr)(device, name) }?;
-    Some(hooks::device_hook(command).map_or(next, plain))
+    Some(hooks::device_hook(command).unwrap_or(next))
 }
 
 /// `vk_layerGetPhysicalDeviceProcAddr`.
@@ -112,9 +100,4 @@ unsafe extern "system" fn get_physical_device_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the instance is valid, and the name is a string.
     unsafe { Instance::of(instance)?.next_of_physical_device(CStr::from_ptr(name)) }
-}
-
-/// A function without a type, as ash has it.
-fn plain(function: Function) -> unsafe extern "system" fn() {
-    function
 }

@@ -4,6 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 use gaurast::vk as gvk;
+use gaurast_layer_interface::Function;
 
 /// Calls a macro with a row for each command that the layer intercepts: the name of its hook, its type, and its names,
 /// the promoted one first.
@@ -127,9 +128,6 @@ macro_rules! device_commands {
     };
 }
 pub(crate) use device_commands;
-
-/// A function of any type.
-pub(crate) type Function = unsafe extern "system" fn();
 
 macro_rules! structure {
     ($($name:ident: $type:ty = [$($command:literal),+];)*) => {

@@ -11,8 +11,8 @@ use gaurast::vk::{
 };
 
 use crate::facts::GaussianState;
-use crate::interface::{find, slice, string};
 use crate::objects::{Attribute, Layout, Objects, Subpass, VertexBinding};
+use gaurast_layer_interface::{find, slice, string};
 
 /// A stage: which one, its SPIR-V if that is known, and the name of its entry point.
 pub(crate) struct Stage {

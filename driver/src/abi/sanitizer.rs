@@ -55,7 +55,7 @@ mod valgrind {
 
     /// Asks for the number of emulators that run the program.
     const RUNNING_ON_VALGRIND: usize = 0x1001;
-    /// What the thread did precedes what a thread does that receives the object.
+    /// The thread sends an object: all that it did precedes what a receiver does afterwards.
     const SEND_PRE: usize = 0x4847_0121;
     /// The thread receives an object.
     const RECV_POST: usize = 0x4847_0122;

@@ -27,7 +27,7 @@ const VENDOR_ID: u32 = 0;
 /// The device id, of the vendor's only device.
 const DEVICE_ID: u32 = 1;
 
-/// The most Gaussians of one draw or one sorted set that were tried (docs/testing.md).
+/// The most Gaussians of one draw or one sorted set. So many were drawn: `docs/testing.md` has their time and memory.
 pub(crate) const MAX_GAUSSIANS: u64 = 1 << 26;
 
 /// The greatest degree of spherical harmonics of a pipeline.

@@ -58,7 +58,7 @@ pub struct SceneArguments {
     /// value belongs to the first scene, and so on; the last one also belongs to those that follow. --up turns the camera
     /// alone.
     #[arg(long, value_name = "XYZ|auto", value_parser = axes)]
-    pub axes: Vec<AxesChoice>,
+    pub axes: Vec<Choice<Axes>>,
 
     /// Draw points without scales as round points of this diameter, in the scene's units
     #[arg(long, value_name = "SIZE", value_parser = positive)]
@@ -69,12 +69,8 @@ pub struct SceneArguments {
     pub level: u32,
 }
 
-/// A value of `--axes`: None is auto.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AxesChoice(pub Option<Axes>);
-
-fn axes(text: &str) -> Result<AxesChoice, &'static str> {
-    if text == "auto" { Ok(AxesChoice(None)) } else { text.parse().map(|axes| AxesChoice(Some(axes))) }
+fn axes(text: &str) -> Result<Choice<Axes>, &'static str> {
+    if text == "auto" { Ok(Choice::Auto) } else { text.parse().map(Choice::Given) }
 }
 
 /// A value of `--transform`.

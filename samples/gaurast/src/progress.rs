@@ -66,7 +66,7 @@ fn print_lines(bar: &WeakProgressBar, message: &str) {
     }
 }
 
-/// What has been done of a step: the part of its length, if that is known, and the time.
+/// The line on a step in progress: the part of its length that is done, if that is known, and the time.
 fn line(message: &str, position: u64, length: Option<u64>, time: Duration) -> String {
     let seconds = time.as_secs();
     match length.filter(|length| *length > 0) {

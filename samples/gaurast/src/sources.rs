@@ -7,7 +7,7 @@ use gaurast_picture::Background;
 use gaurast_scene::{AxesReason, FileAxes, Options, Scene, SceneError, Transform};
 use thiserror::Error;
 
-use crate::args::SceneArguments;
+use crate::args::{Choice, SceneArguments};
 use crate::progress::Progress;
 
 /// The generated garden's seed.
@@ -98,7 +98,10 @@ impl Source {
                 (source.name, source.cameras) = (name, cameras);
                 (source.dataparser, source.background) = (dataparser, background);
             }
-            let axes = arguments.axes.get(index).or(arguments.axes.last()).and_then(|choice| choice.0);
+            let axes = match arguments.axes.get(index).or(arguments.axes.last()) {
+                Some(Choice::Given(axes)) => Some(*axes),
+                Some(Choice::Auto) | None => None,
+            };
             let options = Options { level: arguments.level, axes, points: arguments.points };
             source.files.push(SourceFile { path: file, transform, options });
             source.notes.extend(notes);

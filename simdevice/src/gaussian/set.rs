@@ -12,7 +12,7 @@ use isa::machine::Stopped;
 /// The most groups of a set: a splat's index, which is its group and its place there, has 32 bits.
 pub(crate) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 
-/// True if instances of `count` Gaussians share groups: otherwise more than half of each group would be empty.
+/// True if instances of `count` Gaussians share groups: otherwise at least half of each group would be empty.
 pub(crate) const fn is_packed(count: u32) -> bool {
     count as usize <= GROUP / 2
 }
@@ -102,7 +102,7 @@ impl GaussianSet {
 
     /// Adds the Gaussians of a packet to the set, except those [beyond its buffers](GaussianAppend::within_buffers).
     pub fn append(&mut self, append: &GaussianAppend) {
-        let within = append.clone().within_buffers();
+        let within = append.within_buffers();
         self.beyond_buffers = self.beyond_buffers.saturating_add(append.gaussians() - within.gaussians());
         if within.gaussians() > 0 {
             host::push(&mut self.appends, within);

@@ -258,24 +258,37 @@ impl GaussianAppend {
         u64::from(self.count) * u64::from(self.instance_count)
     }
 
-    /// Leaves out the vertices and the instances that have no rotation in its buffer. They would read zeros, and a Gaussian with
-    /// a quaternion of zeros is skipped.
+    /// The number of Gaussians [within the buffers](Self::within_buffers).
+    pub fn gaussians_within_buffers(&self) -> u64 {
+        let [count, instance_count] = self.counts_within_buffers();
+        u64::from(count) * u64::from(instance_count)
+    }
+
+    /// The same without the vertices and the instances that have no rotation in its buffer. They would read zeros, and a Gaussian
+    /// with a quaternion of zeros is skipped.
     #[must_use]
-    pub fn within_buffers(mut self) -> Self {
+    pub fn within_buffers(&self) -> Self {
+        let [count, instance_count] = self.counts_within_buffers();
+        Self { count, instance_count, ..self.clone() }
+    }
+
+    /// The numbers of vertices and of instances within the buffers.
+    fn counts_within_buffers(&self) -> [u32; 2] {
+        let (mut count, mut instance_count) = (self.count, self.instance_count);
         let rotation = &self.attributes.rotation;
         let Some(rotations) = rotation.len() else {
-            return self;
+            return [count, instance_count];
         };
         let most = |first: u32, times: u32| {
             let rest = rotations.saturating_sub(first.into()).saturating_mul(times.into());
             u32::try_from(rest).unwrap_or(u32::MAX)
         };
         match rotation.instance_divisor {
-            None if self.indices.is_none() => self.count = self.count.min(most(self.first, 1)),
+            None if self.indices.is_none() => count = count.min(most(self.first, 1)),
             None | Some(0) => {}
-            Some(divisor) => self.instance_count = self.instance_count.min(most(self.first_instance, divisor)),
+            Some(divisor) => instance_count = instance_count.min(most(self.first_instance, divisor)),
         }
-        self
+        [count, instance_count]
     }
 }
 

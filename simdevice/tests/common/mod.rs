@@ -24,13 +24,18 @@ const OVER_EQUATION: BlendEquation =
 
 /// An image of `layers` layers whose memory holds `byte` everywhere.
 pub fn image(format: Format, layers: u32, byte: u8) -> ImageView {
+    multisampled(format, 1, layers, byte)
+}
+
+/// An image of several samples per pixel whose memory holds `byte` everywhere.
+pub fn multisampled(format: Format, samples: u32, layers: u32, byte: u8) -> ImageView {
     let desc = ImageDesc {
         kind: ImageKind::D2,
         format,
         extent: [WIDTH, HEIGHT, 1],
         mip_levels: 1,
         array_layers: layers,
-        samples: 1,
+        samples,
     };
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     memory.fill(0, memory.len(), byte).unwrap();

@@ -1,13 +1,12 @@
 //! Random Gaussian draws in all modes: every SIMD level, with any number of threads, writes the bytes that SSE2 writes with one
 //! thread, and counts the same.
 
-use crate::common::{EVERYTHING, HEIGHT, OVER, WIDTH, attachment, bytes, rendering};
+use crate::common::{EVERYTHING, HEIGHT, OVER, WIDTH, attachment, bytes, multisampled, rendering};
 use gaurast_runner::{Case, is_long, simd_levels};
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::*;
@@ -23,7 +22,7 @@ use simdevice::state::gaussian::{
 };
 use simdevice::state::{BlendState, CompareOp, DepthStencil, DepthTest, Rect, StencilFace, StencilOp, Viewport};
 use simdevice::stats::counters::{Counter, Unit};
-use simdevice::{Allocation, BufferRange, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{Allocation, BufferRange, CommandProcessor, Config, Device, Format, Packet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -98,8 +97,8 @@ impl Scene {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let views = *[1, 1, 2].choose(&mut rng).unwrap();
         let samples = *[1, 1, 1, 4].choose(&mut rng).unwrap();
-        let color = image(*COLORS.choose(&mut rng).unwrap(), samples, views);
-        let depth = DEPTHS.choose(&mut rng).unwrap().map(|format| image(format, samples, views));
+        let color = multisampled(*COLORS.choose(&mut rng).unwrap(), samples, views, 0);
+        let depth = DEPTHS.choose(&mut rng).unwrap().map(|format| multisampled(format, samples, views, 0));
         if let Some(depth) = &depth {
             let memory = &depth.image.memory;
             // Each is a depth in every format.
@@ -167,26 +166,6 @@ const DEPTHS: [Option<Format>; 5] = [
     Some(Format::D32Sfloat),
     Some(Format::D24UnormS8Uint),
 ];
-
-fn image(format: Format, samples: u32, layers: u32) -> ImageView {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [WIDTH, HEIGHT, 1],
-        mip_levels: 1,
-        array_layers: layers,
-        samples,
-    };
-    let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
-    ImageView {
-        image: Arc::new(Image::new(desc, memory, 0).unwrap()),
-        format,
-        base_mip_level: 0,
-        level_count: 1,
-        base_layer: 0,
-        layer_count: layers,
-    }
-}
 
 /// A state that pipelines may have. Tests are those of a depth attachment of a format, if there is one.
 fn state(rng: &mut ChaCha8Rng, depth: Option<Format>) -> GaussianState {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::Parser;
 use gaurast_conformance::mutants::{self, Answers, Extent};
 use gaurast_conformance::report::{Counts, Result, junit};
-use gaurast_conformance::{Case, Implementation, Outcome, all, cases, mistakes, open, run};
+use gaurast_conformance::{Case, Implementation, Outcome, cases, mistakes, open, run};
 use gaurast_mutants::MUTANTS;
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
@@ -58,8 +58,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A panic is an outcome of a case, with its message.
     std::panic::set_hook(Box::new(|_| {}));
-    let mut cases = all();
-    cases.retain(|case| arguments.large || !case.is_large);
+    let mut cases = if arguments.large { cases::with_largest() } else { cases::all() };
     if !arguments.case.is_empty() {
         cases.retain(|case| arguments.case.iter().any(|pattern| cases::fits(&case.path(), pattern)));
     }

@@ -13,9 +13,9 @@ use gaurast::vk::{
 use crate::device::Device;
 use crate::facts::{Facts, Features};
 use crate::instance::Instance;
-use crate::interface::{DeviceLink, InstanceLink, chain, slice, string, take_link};
 use crate::report::Faults;
 use crate::rules;
+use gaurast_layer_interface::{DeviceLink, InstanceLink, chain, slice, string, take_link};
 
 pub(super) unsafe extern "system" fn create_instance(
     info: *const vk::InstanceCreateInfo<'_>,

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::device::Device;
-use crate::interface::{find, slice};
 use crate::objects::{Buffer, LayoutBinding, Memory, Pipeline, Set, Subpass};
 use crate::report::Faults;
 use crate::request::Request;
 use crate::rules;
+use gaurast_layer_interface::{find, slice};
 
 const FAILED: vk::Result = vk::Result::ERROR_INITIALIZATION_FAILED;
 

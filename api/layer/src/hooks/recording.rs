@@ -8,11 +8,11 @@ use gaurast::vk as gvk;
 use crate::device::Device;
 use crate::facts::Harmonics;
 use crate::hooks::objects::{is_storage, written_buffers};
-use crate::interface::{find, slice};
 use crate::objects::{Objects, Subpass};
 use crate::recording::{BoundSet, Call, IndexBuffer, Operation, Recording, SubpassIndex, VertexBuffer};
 use crate::report::Faults;
 use crate::rules::{self, dynamic};
+use gaurast_layer_interface::{find, slice};
 
 const FAILED: vk::Result = vk::Result::ERROR_INITIALIZATION_FAILED;
 

@@ -10,11 +10,11 @@ use std::sync::atomic::Ordering;
 use ash::vk;
 
 use crate::device::{Device, State};
-use crate::interface::slice;
 use crate::objects::{BufferDescriptor, Objects};
 use crate::recording::{Call, Draw, Operation};
 use crate::report::Faults;
 use crate::rules::contents::{self, Reader};
+use gaurast_layer_interface::slice;
 
 const FAILED: vk::Result = vk::Result::ERROR_INITIALIZATION_FAILED;
 /// The most bytes of a transfer that the layer follows.

@@ -9,7 +9,8 @@ use crate::hooks::instance;
 use crate::hooks::objects::*;
 use crate::hooks::recording::*;
 use crate::hooks::submit::*;
-use crate::next::{Function, device_commands};
+use crate::next::device_commands;
+use gaurast_layer_interface::Function;
 
 macro_rules! lookup {
     ($($name:ident: $type:ty = [$($command:literal),+];)*) => {

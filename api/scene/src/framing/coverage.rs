@@ -28,7 +28,7 @@ const BESIDE: f32 = 1.3;
 const PART: usize = 1 << 15;
 const PARTS: usize = 16;
 
-/// What a scene covers of a pinhole camera's picture.
+/// The pixels of a pinhole camera's picture that a scene covers.
 pub(super) struct Coverage {
     /// The picture's width in pixels.
     pub(super) width: usize,

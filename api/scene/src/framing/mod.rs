@@ -30,7 +30,7 @@ const ORBIT_SIDES: u32 = 8;
 /// The size of the picture of an orbit relative to what an object covers of it from these sides.
 const ORBIT_MARGIN: f64 = 1.1;
 
-/// What is framed.
+/// The subject of a picture: an object, or the box around the middle of a scene.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
     /// The box around most of the opacity.

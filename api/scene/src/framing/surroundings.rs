@@ -7,7 +7,7 @@ use super::extent::{Extent, median_distance};
 use crate::camera::Camera;
 use crate::scene::Scene;
 
-/// What surrounds the middle is farther away than this many times the distance within which half of the opacity lies.
+/// The least distance of surroundings from the middle, relative to the distance within which half of the opacity lies.
 const FAR: f64 = 2.0;
 
 /// The part of each half of the sphere of directions that surroundings cover at least.

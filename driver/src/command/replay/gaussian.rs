@@ -101,7 +101,7 @@ pub(crate) fn append(
         first_instance: draw.first_instance,
         instance_count: draw.instance_count,
     };
-    check(append.clone().within_buffers().gaussians())?;
+    check(append.gaussians_within_buffers())?;
     Ok(Packet::GaussianAppend(Box::new(append)))
 }
 
@@ -111,10 +111,9 @@ pub(crate) fn beyond_buffers(packets: &[Packet]) -> Option<String> {
         Packet::GaussianAppend(append) => Some(&**append),
         _ => None,
     })?;
-    let drawn = append.clone().within_buffers().gaussians();
-    let beyond = append.gaussians() - drawn;
+    let all = append.gaussians();
+    let beyond = all - append.gaussians_within_buffers();
     (beyond > 0).then(|| {
-        let all = append.gaussians();
         format!("a draw of {all} Gaussians leaves out {beyond} of them, which lie beyond the buffer of their rotations")
     })
 }

@@ -23,9 +23,9 @@ pub(crate) struct GroupSource<'a> {
 /// The Gaussians of a group.
 #[derive(Clone, Copy)]
 pub(crate) enum Members<'a> {
-    /// Consecutive ones, which may go on in the next instances.
+    /// Consecutive Gaussians, which may go on in the next instances.
     Run(MemberRun),
-    /// Those of a cluster of the instance.
+    /// The Gaussians of a cluster of the instance.
     Cluster(&'a Cluster),
 }
 

@@ -10,7 +10,8 @@ const RUNNER: &str = "tests/runner";
 
 /// The folders on which packages of a folder may depend. Folders match by prefix, and the first matching row counts.
 const LAYERS: &[(&str, &[&str])] = &[
-    ("api/layer", &["api/gaurast"]),
+    ("api/layer/interface", &[]),
+    ("api/layer", &["api/gaurast", "api/layer/interface"]),
     ("api", &["api"]),
     ("simdevice/devmem", &[]),
     ("simdevice/isa", &["simdevice/devmem"]),

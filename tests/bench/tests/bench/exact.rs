@@ -2,24 +2,34 @@
 
 use std::process::Command;
 
-use gaurast_exact::{Device, all, stored};
+use gaurast_exact::{Case as ExactCase, Device, all, stored};
 use gaurast_runner::{Case, Need, Variant, is_long, simd_levels};
 use gaurast_testkit::shader::GLSLANG;
 
 /// The stored lines.
 const STORED: &str = include_str!("../../stored/exact.tsv");
 
-/// One case of so many is made by default.
+/// One case of so many is made by default, and one operation of so many with each number of threads and mode.
 const EVERY: usize = 12;
+const EVERY_OPERATION: usize = 3;
+
+/// The cases that are made with the first, the second and so on of some numbers of threads or modes: each has others.
+fn chosen(cases: &[ExactCase], number: usize) -> impl Iterator<Item = &ExactCase> {
+    let of = |is_operation: bool, every: usize| {
+        let every = if is_long() { 1 } else { every };
+        let cases = cases.iter().filter(move |case| (case.chapter == "operations") == is_operation);
+        cases.skip(number % every).step_by(every)
+    };
+    of(true, EVERY_OPERATION).chain(of(false, EVERY))
+}
 
 #[gaurast_runner::test(needs = [GLSLANG], each = simd_levels())]
 fn pictures_and_buffers_are_the_stored_ones(level: &Case) {
     let expected = stored(STORED).expect("the list is well-formed");
-    let (cases, every) = (all(), if is_long() { 1 } else { EVERY });
-    // Each number of threads makes other cases, unless all are made.
-    for (first, threads) in [1, 2, 7].into_iter().enumerate() {
+    let cases = all();
+    for (number, threads) in [1, 2, 7].into_iter().enumerate() {
         let device = Device::open(level.variant(), threads).expect("a device");
-        for case in cases.iter().skip(first % every).step_by(every) {
+        for case in chosen(&cases, number) {
             let line = case.line(&device).expect("the device has all features");
             assert!(expected.contains(&line), "{threads} threads: {line} is not in the list");
         }
@@ -34,19 +44,18 @@ fn pictures_and_buffers_are_the_stored_ones(level: &Case) {
 fn the_modes_of_the_applications_threads_change_nothing() {
     use gaurast_testkit::control::{Control, FLUSH, ROUNDING};
     let expected = stored(STORED).expect("the list is well-formed");
-    let (cases, every) = (all(), if is_long() { 1 } else { EVERY });
-    for (first, mode) in ROUNDING.into_iter().enumerate() {
+    let cases = all();
+    for (number, mode) in ROUNDING.into_iter().enumerate() {
         let _control = Control::with(mode | FLUSH);
         let device = Device::open("best", 2).expect("a device");
-        let operations = cases.iter().filter(|case| case.chapter == "operations");
-        for case in operations.skip(first % every).step_by(every) {
+        for case in chosen(&cases, number).filter(|case| case.chapter == "operations") {
             let line = case.line(&device).expect("the device has all features");
             assert!(expected.contains(&line), "{mode:#x}: {line} is not in the list");
         }
     }
     let _control = Control::with(FLUSH);
     let device = Device::open("best", 2).expect("a device");
-    for case in cases.iter().filter(|case| case.chapter != "files").step_by(every) {
+    for case in chosen(&cases, 0).filter(|case| case.chapter != "files") {
         let line = case.line(&device).expect("the device has all features");
         assert!(expected.contains(&line), "flushed denormals: {line} is not in the list");
     }

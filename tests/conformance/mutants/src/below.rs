@@ -4,9 +4,9 @@ use std::sync::{PoisonError, RwLock};
 
 use ash::vk;
 
-use crate::interface::GetInstanceProcAddr;
+use gaurast_layer_interface::GetInstanceProcAddr;
 
-/// Those functions, and the instance for which they are.
+/// The functions of the next layer by which commands are looked up, and the instance for which they are.
 #[derive(Clone, Copy)]
 pub(crate) struct Below {
     pub(crate) instance: vk::Instance,

@@ -15,7 +15,6 @@
 //! | `request` | a pipeline that is created, as a copy that may be changed |
 //! | `recording` | what is known of each command buffer |
 //! | `next` | the next layer's commands |
-//! | `interface` | the loader's structures |
 //!
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid
 //! usage, so that what pointers name is there, and what a mutant changes keeps it where it is passed on.
@@ -23,7 +22,6 @@
 mod below;
 pub mod environment;
 mod hooks;
-mod interface;
 pub mod mutant;
 mod next;
 mod recording;
@@ -39,7 +37,7 @@ pub use crate::mutant::Mutant;
 pub use crate::table::MUTANTS;
 
 use crate::below::below;
-use crate::interface::{Function, NegotiateLayerInterface};
+use gaurast_layer_interface::{LayerFunctions, NegotiateLayerInterface, string};
 
 /// Agrees with the loader on the version of their interface, and gives it the layer's functions.
 ///
@@ -49,18 +47,9 @@ use crate::interface::{Function, NegotiateLayerInterface};
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
     version: *mut NegotiateLayerInterface,
 ) -> vk::Result {
+    let functions = LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
     // SAFETY: the caller's promise.
-    let Some(version) = (unsafe { version.as_mut() }) else {
-        return vk::Result::ERROR_INITIALIZATION_FAILED;
-    };
-    if version.version < interface::VERSION {
-        return vk::Result::ERROR_INITIALIZATION_FAILED;
-    }
-    version.version = interface::VERSION;
-    version.get_instance_proc_addr = Some(get_instance_proc_addr);
-    version.get_device_proc_addr = Some(get_device_proc_addr);
-    version.get_physical_device_proc_addr = Some(get_physical_device_proc_addr);
-    vk::Result::SUCCESS
+    unsafe { gaurast_layer_interface::negotiate(version, functions) }
 }
 
 /// `vkGetInstanceProcAddr`.
@@ -69,7 +58,7 @@ unsafe extern "system" fn get_instance_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
-    let command = unsafe { interface::string(name) };
+    let command = unsafe { string(name) };
     let (get, get_device): (vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkGetDeviceProcAddr) =
         (get_instance_proc_addr, get_device_proc_addr);
     // SAFETY: function pointers have one size, and whoever calls it casts it back.
@@ -82,18 +71,18 @@ unsafe extern "system" fn get_instance_proc_addr(
         }
     }
     if instance == vk::Instance::null() {
-        return hooks::instance_hook(command).map(plain).filter(|_| command == c"vkCreateInstance");
+        return hooks::instance_hook(command).filter(|_| command == c"vkCreateInstance");
     }
     // SAFETY: the instance is valid, and the name is a string.
     let next = unsafe { (below()?.get_instance_proc_addr)(instance, name) }?;
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
-    Some(hook.map_or(next, plain))
+    Some(hook.unwrap_or(next))
 }
 
 /// `vkGetDeviceProcAddr`.
 unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
-    let command = unsafe { interface::string(name) };
+    let command = unsafe { string(name) };
     let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
         // SAFETY: function pointers have one size, and whoever calls it casts it back.
@@ -101,7 +90,7 @@ unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const 
     }
     // SAFETY: the device is valid, and the name is a string.
     let next = unsafe { (below()?.get_device_proc_addr?)(device, name) }?;
-    Some(hooks::device_hook(command).map_or(next, plain))
+    Some(hooks::device_hook(command).unwrap_or(next))
 }
 
 /// `vk_layerGetPhysicalDeviceProcAddr`.
@@ -111,9 +100,4 @@ unsafe extern "system" fn get_physical_device_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the instance is valid, and the name is a string.
     unsafe { (below()?.get_physical_device_proc_addr?)(instance, name) }
-}
-
-/// A function without a type, as ash has it.
-fn plain(function: Function) -> unsafe extern "system" fn() {
-    function
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use ash::vk;
 use gaurast::vk as gvk;
 
-use crate::interface::Function;
+use gaurast_layer_interface::Function;
 
 /// Calls a macro with a row for each command that the layer intercepts: the name of its hook, its type, and its names,
 /// the promoted one first.

@@ -7,7 +7,7 @@ use gaurast::vk::{
     PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
 };
 
-use crate::interface::slice;
+use gaurast_layer_interface::slice;
 
 /// The copy. Its parts are joined by [`Request::join`].
 #[derive(Default)]

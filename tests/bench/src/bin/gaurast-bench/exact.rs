@@ -88,7 +88,7 @@ pub fn run(arguments: &ExactArguments) -> Result<(), ExactError> {
     Ok(())
 }
 
-/// What the expected lines say about a case.
+/// The words on a case whose line is not among the expected ones.
 fn was(expected: &[Line], line: &Line) -> String {
     let found = expected.iter().find(|other| (&other.chapter, &other.name) == (&line.chapter, &line.name));
     found.map_or_else(|| "is new".to_owned(), |line| format!("was {:016x}", line.hash))

@@ -3,10 +3,10 @@
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
 
-use crate::interface::slice;
 use crate::next::next;
 use crate::recording::of;
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 pub(super) unsafe extern "system" fn cmd_bind_pipeline(
     commands: vk::CommandBuffer,

@@ -2,11 +2,11 @@
 
 use ash::vk;
 
-use crate::interface::slice;
 use crate::mutant::Mutant;
 use crate::next::next;
 use crate::recording::{Deferred, Recording, of};
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 /// The kind of a draw command.
 #[derive(Clone, Copy, PartialEq)]

@@ -6,10 +6,10 @@ use gaurast::vk::{
     GaussianOrderGAURAST, GaussianSphericalHarmonicsBufferGAURAST as Harmonics,
 };
 
-use crate::interface::slice;
 use crate::next::next;
 use crate::recording::{Deferred, of};
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 /// Makes the active mutant's change to a camera.
 fn changed(mut camera: Camera<'_>) -> Camera<'_> {

@@ -10,9 +10,9 @@ use gaurast::vk::{
 };
 
 use crate::below::{Below, below, remember};
-use crate::interface::{DeviceLink, InstanceLink, find, take_link};
 use crate::table::*;
 use crate::{environment, next};
+use gaurast_layer_interface::{DeviceLink, InstanceLink, find_mut, take_link};
 
 /// What the layer below says of a physical device. The commands are looked up as the instance is created, since the
 /// loader gives the first layer's functions later.
@@ -124,7 +124,7 @@ pub(super) unsafe extern "system" fn get_physical_device_features2(
     // SAFETY: see the crate.
     unsafe {
         (answers.features)(physical_device, features);
-        if let Some(own) = find::<Features<'_>>((*features).p_next) {
+        if let Some(own) = find_mut::<Features<'_>>((*features).p_next) {
             BASE_FEATURE.replaces(&mut own.gaussian_primitive_topology, vk::FALSE);
         }
     }
@@ -140,7 +140,7 @@ pub(super) unsafe extern "system" fn get_physical_device_properties2(
     // SAFETY: see the crate.
     unsafe {
         (answers.properties)(physical_device, properties);
-        if let Some(own) = find::<Properties<'_>>((*properties).p_next) {
+        if let Some(own) = find_mut::<Properties<'_>>((*properties).p_next) {
             TILE_SIZE.replaces(&mut own.tile_size, vk::Extent2D::default());
             MAX_DEGREE.replaces(&mut own.max_spherical_harmonics_degree, 2);
             SAMPLE_COUNTS.replaces(&mut own.gaussian_sample_counts, vk::SampleCountFlags::TYPE_4);

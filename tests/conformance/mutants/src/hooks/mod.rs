@@ -14,8 +14,8 @@ use std::ffi::CStr;
 use ash::vk;
 use gaurast::vk as gvk;
 
-use crate::interface::Function;
 use crate::next::device_commands;
+use gaurast_layer_interface::Function;
 
 use bind::*;
 use draw::*;

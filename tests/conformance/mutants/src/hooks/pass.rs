@@ -2,10 +2,10 @@
 
 use ash::vk;
 
-use crate::interface::slice;
 use crate::next::next;
 use crate::recording::{forget, of};
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 use super::gaussian::end_open_set;
 

@@ -13,11 +13,11 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
 };
 
-use crate::interface::slice;
 use crate::mutant::Mutant;
 use crate::next::next;
 use crate::request::Request;
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 pub(super) unsafe extern "system" fn create_graphics_pipelines(
     device: vk::Device,

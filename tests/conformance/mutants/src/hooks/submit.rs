@@ -6,9 +6,9 @@ use std::sync::{Mutex, PoisonError};
 
 use ash::vk;
 
-use crate::interface::slice;
 use crate::next::next;
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 /// Memory that the host writes.
 #[derive(Clone, Copy)]

@@ -2,11 +2,11 @@
 
 use ash::vk;
 
-use crate::interface::slice;
 use crate::mutant::Mutant;
 use crate::next::next;
 use crate::recording::of;
 use crate::table::*;
+use gaurast_layer_interface::slice;
 
 /// Records a command, but not if one mutant is active, and late if another is.
 fn record(

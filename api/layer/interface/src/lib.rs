@@ -1,24 +1,60 @@
-//! The loader's interface to layers: the structures of `vk_layer.h`, which the registry does not have.
+//! The interface between Vulkan's loader and layers: the structures of `vk_layer.h`, which the registry does not have, and what
+//! a layer does with them and with chains of structures.
 
 use std::ffi::{CStr, c_char, c_void};
 
 use ash::vk;
 
-/// The version of the interface that this layer speaks.
-pub(crate) const VERSION: u32 = 2;
+/// The version of the interface that layers speak.
+const VERSION: u32 = 2;
 
 /// `PFN_vkGetInstanceProcAddr`, and that of commands whose first parameter is a physical device.
-pub(crate) type GetInstanceProcAddr = vk::PFN_vkGetInstanceProcAddr;
+pub type GetInstanceProcAddr = vk::PFN_vkGetInstanceProcAddr;
+
+/// A function of any type.
+pub type Function = unsafe extern "system" fn();
 
 /// `VkNegotiateLayerInterface`.
 #[repr(C)]
+#[derive(Debug)]
 pub struct NegotiateLayerInterface {
-    pub(crate) s_type: i32,
-    pub(crate) p_next: *mut c_void,
-    pub(crate) version: u32,
-    pub(crate) get_instance_proc_addr: Option<GetInstanceProcAddr>,
-    pub(crate) get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
-    pub(crate) get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
+    s_type: i32,
+    p_next: *mut c_void,
+    version: u32,
+    get_instance_proc_addr: Option<GetInstanceProcAddr>,
+    get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
+    get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
+}
+
+/// The functions of a layer by which commands are looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct LayerFunctions {
+    /// `vkGetInstanceProcAddr`.
+    pub get_instance_proc_addr: GetInstanceProcAddr,
+    /// `vkGetDeviceProcAddr`.
+    pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+    /// `vk_layerGetPhysicalDeviceProcAddr`.
+    pub get_physical_device_proc_addr: GetInstanceProcAddr,
+}
+
+/// Agrees with the loader on the version of their interface, and gives it the layer's functions: all that a layer's
+/// `vkNegotiateLoaderLayerInterfaceVersion` does.
+///
+/// # Safety
+/// `structure` points at the loader's structure, or is null.
+pub unsafe fn negotiate(structure: *mut NegotiateLayerInterface, functions: LayerFunctions) -> vk::Result {
+    // SAFETY: the caller's promise.
+    let Some(structure) = (unsafe { structure.as_mut() }) else {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    };
+    if structure.version < VERSION {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    }
+    structure.version = VERSION;
+    structure.get_instance_proc_addr = Some(functions.get_instance_proc_addr);
+    structure.get_device_proc_addr = Some(functions.get_device_proc_addr);
+    structure.get_physical_device_proc_addr = Some(functions.get_physical_device_proc_addr);
+    vk::Result::SUCCESS
 }
 
 /// `VK_LAYER_LINK_INFO`: the structure holds the next layer's functions.
@@ -35,24 +71,28 @@ struct CreateInfo<L> {
 
 /// `VkLayerInstanceLink`.
 #[repr(C)]
-#[derive(Clone, Copy)]
-pub(crate) struct InstanceLink {
+#[derive(Clone, Copy, Debug)]
+pub struct InstanceLink {
     next: *mut InstanceLink,
-    pub(crate) get_instance_proc_addr: GetInstanceProcAddr,
-    pub(crate) get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
+    /// The next layer's `vkGetInstanceProcAddr`.
+    pub get_instance_proc_addr: GetInstanceProcAddr,
+    /// The next layer's `vk_layerGetPhysicalDeviceProcAddr`, if it has it.
+    pub get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
 }
 
 /// `VkLayerDeviceLink`.
 #[repr(C)]
-#[derive(Clone, Copy)]
-pub(crate) struct DeviceLink {
+#[derive(Clone, Copy, Debug)]
+pub struct DeviceLink {
     next: *mut DeviceLink,
-    pub(crate) get_instance_proc_addr: GetInstanceProcAddr,
-    pub(crate) get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+    /// The next layer's `vkGetInstanceProcAddr`.
+    pub get_instance_proc_addr: GetInstanceProcAddr,
+    /// The next layer's `vkGetDeviceProcAddr`.
+    pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
 }
 
 /// A link of the chain, which knows the next one.
-pub(crate) trait Link: Copy {
+pub trait Link: Copy {
     /// The type of the structure that holds it.
     const HOLDER: vk::StructureType;
 
@@ -80,7 +120,7 @@ impl Link for DeviceLink {
 ///
 /// # Safety
 /// `chain` is the chain of a creation info that the loader has passed.
-pub(crate) unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
+pub unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
     let mut structure = chain.cast::<CreateInfo<L>>().cast_mut();
     while !structure.is_null() {
         // SAFETY: every structure of a chain begins with its type and the next one's address; those of the holder's
@@ -101,7 +141,7 @@ pub(crate) unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
 ///
 /// # Safety
 /// `first` is null or begins a valid chain that outlives `'a`.
-pub(crate) unsafe fn chain<'a>(first: *const c_void) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
+pub unsafe fn chain<'a>(first: *const c_void) -> impl Iterator<Item = &'a vk::BaseInStructure<'a>> {
     let mut next = first.cast::<vk::BaseInStructure<'a>>();
     std::iter::from_fn(move || {
         // SAFETY: the caller's promise; every structure of a chain begins as `VkBaseInStructure` does.
@@ -115,7 +155,7 @@ pub(crate) unsafe fn chain<'a>(first: *const c_void) -> impl Iterator<Item = &'a
 ///
 /// # Safety
 /// As [`chain`].
-pub(crate) unsafe fn find<'a, T: vk::TaggedStructure>(first: *const c_void) -> Option<&'a T> {
+pub unsafe fn find<'a, T: vk::TaggedStructure>(first: *const c_void) -> Option<&'a T> {
     // SAFETY: the caller's promise.
     let mut structures = unsafe { chain(first) };
     let found = structures.find(|structure| structure.s_type == T::STRUCTURE_TYPE)?;
@@ -123,11 +163,30 @@ pub(crate) unsafe fn find<'a, T: vk::TaggedStructure>(first: *const c_void) -> O
     Some(unsafe { &*std::ptr::from_ref(found).cast::<T>() })
 }
 
+/// The first structure of a type in the chain of an answer, which the layer may change.
+///
+/// # Safety
+/// `first` is null or begins a valid chain that nobody else uses during `'a`.
+pub unsafe fn find_mut<'a, T: vk::TaggedStructure>(first: *mut c_void) -> Option<&'a mut T> {
+    let mut structure = first.cast::<vk::BaseOutStructure<'a>>();
+    while !structure.is_null() {
+        // SAFETY: the caller's promise; every structure of a chain begins as `VkBaseOutStructure` does, and one of
+        // this type is a `T`.
+        unsafe {
+            if (*structure).s_type == T::STRUCTURE_TYPE {
+                return Some(&mut *structure.cast::<T>());
+            }
+            structure = (*structure).p_next;
+        }
+    }
+    None
+}
+
 /// An array of a structure's; null or nothing is empty.
 ///
 /// # Safety
 /// `first` is null or begins `count` values that live as long as `'a`.
-pub(crate) unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
+pub unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
     if first.is_null() || count == 0 {
         return &[];
     }
@@ -139,7 +198,7 @@ pub(crate) unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
 ///
 /// # Safety
 /// `text` is null or a string that lives as long as `'a`.
-pub(crate) unsafe fn string<'a>(text: *const c_char) -> &'a CStr {
+pub unsafe fn string<'a>(text: *const c_char) -> &'a CStr {
     if text.is_null() {
         return c"";
     }
@@ -152,7 +211,7 @@ pub(crate) unsafe fn string<'a>(text: *const c_char) -> &'a CStr {
 ///
 /// # Safety
 /// The handle is valid, and the loader has seen it.
-pub(crate) unsafe fn key<H: vk::Handle>(handle: H) -> usize {
+pub unsafe fn key<H: vk::Handle>(handle: H) -> usize {
     let object = handle.as_raw() as *const usize;
     if object.is_null() {
         return 0;
