@@ -22,6 +22,22 @@ pub(crate) struct Accumulator {
     pub(crate) median: [[u32; BLOCK_PIXELS]; BLOCKS],
     /// The sums of weighted depths and of weights, if a fragment program reads their ratio.
     pub(crate) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
+    /// The Gaussians that are shown, where covered, if a fragment program reads them.
+    pub(crate) tracked: Tracked,
+}
+
+/// The Gaussians that a tile's pixels, or one sample of each, show: numbers of Gaussians in the set, and depth variables.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct Tracked {
+    /// The number of the first Gaussian that contributed.
+    pub(crate) nearest: [[u32; BLOCK_PIXELS]; BLOCKS],
+    /// The number of the one whose depth is the median.
+    pub(crate) median: [[u32; BLOCK_PIXELS]; BLOCKS],
+    /// The depth variable of the median.
+    pub(crate) median_z: [[f32; BLOCK_PIXELS]; BLOCKS],
+    /// The sums of weighted depth variables. [`Accumulator::means`] has those of weights.
+    pub(crate) z_sums: [[f32; BLOCK_PIXELS]; BLOCKS],
 }
 
 /// The transmittance of a pixel that is not to be touched: nothing is left of it, and it is below every floor.
@@ -56,6 +72,12 @@ impl Accumulator {
         covered: [0; BLOCKS],
         median: [[0; BLOCK_PIXELS]; BLOCKS],
         means: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2],
+        tracked: Tracked {
+            nearest: [[0; BLOCK_PIXELS]; BLOCKS],
+            median: [[0; BLOCK_PIXELS]; BLOCKS],
+            median_z: [[0.0; BLOCK_PIXELS]; BLOCKS],
+            z_sums: [[0.0; BLOCK_PIXELS]; BLOCKS],
+        },
     };
 
     /// Makes the pixels in `lanes` fresh, and the others finished.
@@ -75,7 +97,18 @@ impl Accumulator {
 
     /// Makes the sums of depths fresh.
     pub(crate) fn clear_means(&mut self) {
-        self.means = [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2];
+        self.means.iter_mut().for_each(clear_sums);
+        clear_sums(&mut self.tracked.z_sums);
+    }
+
+    /// The mean depth variable of a block's lanes, weighted by contributions; undefined where nothing is covered.
+    pub(crate) fn mean_z(&self, block: usize) -> [f32; BLOCK_PIXELS] {
+        let (tracked, [_, weights]) = (&self.tracked, &self.means);
+        std::array::from_fn(|lane| {
+            let weight = weights[block][lane];
+            // An alpha that underflows weighs nothing.
+            if weight > 0.0 { tracked.z_sums[block][lane] / weight } else { tracked.median_z[block][lane] }
+        })
     }
 
     /// The expected and the median depth of a block's lanes; zero where nothing is covered.

@@ -21,7 +21,7 @@ use super::by_block::block_kernel::composite_by_block;
 use super::by_block::block_lists::BlockLists;
 use super::by_block::in_order::InOrder;
 use super::by_block::per_pixel::{PerPixel, composite_per_pixel};
-use super::by_block::tracking::{Tracked, Tracking};
+use super::by_block::tracking::Tracking;
 use super::by_block::wide_sums::WideSums;
 use super::depth_ranges::DepthRanges;
 use super::fast;
@@ -37,7 +37,7 @@ use crate::limits::{MAX_SAMPLES, TILE_SIZE};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::{Optimization, Optimizations};
 use crate::stats::recorder::{Run, TileWork};
-use devmem::{dispatch, host};
+use devmem::dispatch;
 use fearless_simd::Level;
 
 /// Primitives of a piece of a sorted walk. The fast kernel goes on where it was, so that pieces change no bit.
@@ -51,8 +51,6 @@ const ACCUMULATORS: usize = MAX_SAMPLES as usize + 1;
 pub struct GaussianTile {
     pub(crate) accumulators: [Accumulator; ACCUMULATORS],
     pub(crate) ranges: DepthRanges,
-    /// By accumulator, what a fragment program reads of Gaussians, if it does.
-    pub(crate) tracked: Vec<Tracked>,
     compositor: Compositor,
 }
 
@@ -72,7 +70,6 @@ impl Default for GaussianTile {
         Self {
             accumulators: [Accumulator::EMPTY; ACCUMULATORS],
             ranges: DepthRanges::default(),
-            tracked: Vec::new(),
             compositor: Compositor::default(),
         }
     }
@@ -109,9 +106,6 @@ impl GaussianTile {
         self.accumulators[accumulator].clear(lanes);
         if M::DEPTH.finds_mean() {
             self.accumulators[accumulator].clear_means();
-            if draw.identities().is_some() {
-                self.clear_tracked(accumulator);
-            }
         }
         if list.is_empty() && draw.sorted.tiles.walk().is_none() {
             return;
@@ -119,6 +113,7 @@ impl GaussianTile {
         let kernel = Kernel::of(draw);
         let inputs = TileInputs {
             splats: &draw.sorted.splats,
+            identities: draw.identities(),
             kernel,
             list,
             optimizations: draw.optimizations,
@@ -130,11 +125,11 @@ impl GaussianTile {
             ranges: &self.ranges,
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let (compositor, tracked) = (&mut self.compositor, self.tracked.get_mut(accumulator));
+        let compositor = &mut self.compositor;
         let accumulator = &mut self.accumulators[accumulator];
         let counts = match draw.sorted.tiles.walk() {
-            None => compositor.composite_list::<M>(level, &inputs, accumulator, tracked, runs.as_mut()),
-            Some(walk) => compositor.composite_walk::<M>(level, &inputs, walk, accumulator, tracked, runs.as_mut()),
+            None => compositor.composite_list::<M>(level, &inputs, accumulator, runs.as_mut()),
+            Some(walk) => compositor.composite_walk::<M>(level, &inputs, walk, accumulator, runs.as_mut()),
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -160,14 +155,6 @@ impl GaussianTile {
         counters.add(Counter::PixelContributions, counts.contributions);
     }
 
-    /// Resets what is tracked of an accumulator's pixels.
-    fn clear_tracked(&mut self, accumulator: usize) {
-        if self.tracked.len() <= accumulator {
-            host::resize(&mut self.tracked, accumulator + 1, Tracked::EMPTY);
-        }
-        self.tracked[accumulator] = Tracked::EMPTY;
-    }
-
     /// The pixels of `lanes` that some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its
     /// depth.
     pub(crate) fn reached(
@@ -181,6 +168,7 @@ impl GaussianTile {
         accumulator.clear(lanes);
         let inputs = TileInputs {
             splats: &draw.sorted.splats,
+            identities: None,
             kernel: Kernel::of(draw).in_list_order(),
             list: draw.sorted.tiles.list(tile_x, tile_y),
             optimizations: Optimizations::ALL,
@@ -197,8 +185,8 @@ impl GaussianTile {
         };
         let compositor = &mut self.compositor;
         match draw.sorted.tiles.walk() {
-            None => compositor.composite_list::<FindReached>(level, &inputs, accumulator, None, None),
-            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None, None),
+            None => compositor.composite_list::<FindReached>(level, &inputs, accumulator, None),
+            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None),
         };
         let finished = accumulator.finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
@@ -222,13 +210,12 @@ impl GaussianTile {
 }
 
 impl Compositor {
-    /// Composites a tile's list by the draw's kernel. `tracked` goes with the accumulator.
+    /// Composites a tile's list by the draw's kernel.
     fn composite_list<M: Mode>(
         &mut self,
         level: Level,
         inputs: &TileInputs<'_>,
         accumulator: &mut Accumulator,
-        tracked: Option<&mut Tracked>,
         runs: Option<&mut Vec<Run>>,
     ) -> TileCounts {
         let exponential = inputs.approximation.exponential;
@@ -240,7 +227,7 @@ impl Compositor {
                 let fast = &mut self.fast;
                 dispatch!(level, simd => fast::composite::<_, M>(fast, simd, inputs, accumulator, runs))
             }
-            _ => self.composite_by_block(level, inputs, accumulator, tracked, runs),
+            _ => self.composite_by_block(level, inputs, accumulator, runs),
         };
         TileCounts { listed: inputs.list.len() as u64, ..counts }
     }
@@ -269,7 +256,6 @@ impl Compositor {
         level: Level,
         inputs: &TileInputs<'_>,
         accumulator: &mut Accumulator,
-        tracked: Option<&mut Tracked>,
         runs: Option<&mut Vec<Run>>,
     ) -> TileCounts {
         let lists = &mut self.lists;
@@ -278,11 +264,8 @@ impl Compositor {
                 let kernel = Half::new(&inputs.thresholds);
                 dispatch!(level, simd => composite_by_block(simd, kernel, inputs, lists, accumulator, runs))
             }
-            Kernel::Exact { identities: Some(identities), .. } => {
-                let Some(tracked) = tracked else {
-                    return TileCounts::default();
-                };
-                let kernel = Tracking::new(identities, tracked);
+            Kernel::Exact { .. } if let Some(identities) = inputs.identities => {
+                let kernel = Tracking::new(identities);
                 dispatch!(level, simd => composite_by_block(simd, kernel, inputs, lists, accumulator, runs))
             }
             Kernel::Exact { depths: Some(depths), .. } => {
@@ -309,7 +292,6 @@ impl Compositor {
         inputs: &TileInputs<'_>,
         walk: &SortedWalk,
         accumulator: &mut Accumulator,
-        mut tracked: Option<&mut Tracked>,
         mut runs: Option<&mut Vec<Run>>,
     ) -> TileCounts {
         let most = match inputs.kernel {
@@ -332,8 +314,7 @@ impl Compositor {
                 break;
             }
             let inputs = TileInputs { list: &piece, ..*inputs };
-            let (tracked, runs) = (tracked.as_deref_mut(), runs.as_deref_mut());
-            counts.add(&self.composite_list::<M>(level, &inputs, accumulator, tracked, runs));
+            counts.add(&self.composite_list::<M>(level, &inputs, accumulator, runs.as_deref_mut()));
         }
         self.piece = piece;
         counts

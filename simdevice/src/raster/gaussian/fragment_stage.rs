@@ -4,7 +4,7 @@
 //! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not
 //! covered help with derivatives: they hold what their own pixels accumulated.
 
-use super::by_block::tracking::Tracked;
+use super::accumulator::Accumulator;
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
 use super::samples::{SAMPLES, Samples};
@@ -228,20 +228,13 @@ impl<'a> FragmentStageDraw<'a> {
             _ => CENTER[0],
         };
         let bits = |lanes: [f32; BLOCK_PIXELS]| lanes.map(f32::to_bits);
-        let of_gaussians = |index: u32| {
-            let number = samples.accumulators[group.leader][block];
-            let tracked = tools.gaussian_tile.tracked.get(number).filter(|_| self.is_tracking());
-            tracked.map_or([0; BLOCK_PIXELS], |tracked| {
-                self.tracked_input(tracked, accumulator.covered[block], block, index)
-            })
-        };
         for &(slot, input, _) in &self.stage.interface.inputs {
             let value = match input {
                 FragmentInput::Varying { index, .. } => match index {
                     0..4 => bits(accumulated[index as usize]),
                     resolve::EXPECTED_DEPTH => bits(depths[0]),
                     resolve::MEDIAN_DEPTH => bits(depths[1]),
-                    resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA => of_gaussians(index),
+                    resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA => self.tracked_input(accumulator, block, index),
                     _ => [self.camera_input(index).to_bits(); BLOCK_PIXELS],
                 },
                 FragmentInput::FragCoord(axis @ (0 | 1)) => {
@@ -277,15 +270,17 @@ impl<'a> FragmentStageDraw<'a> {
     }
 
     /// The inputs that a block's lanes read of the Gaussians that they show; zeros where nothing is covered.
-    fn tracked_input(&self, tracked: &Tracked, covered: u32, block: usize, index: u32) -> [u32; BLOCK_PIXELS] {
+    fn tracked_input(&self, accumulator: &Accumulator, block: usize, index: u32) -> [u32; BLOCK_PIXELS] {
+        let (tracked, covered) = (&accumulator.tracked, accumulator.covered[block]);
+        let mean_z = accumulator.mean_z(block);
         let located = |sequences: &[u32; BLOCK_PIXELS], lane: usize, part: u32| {
             let origins = self.draw.origins.as_ref();
             let place = origins.map_or([0; 2], |origins| origins.locate(sequences[lane]));
             place[usize::from(part != 0)]
         };
         let value = |lane: usize| match index {
-            resolve::EXPECTED_LINEAR_DEPTH => tracked.linear[0][block][lane].to_bits(),
-            resolve::MEDIAN_LINEAR_DEPTH => tracked.linear[1][block][lane].to_bits(),
+            resolve::EXPECTED_LINEAR_DEPTH => mean_z[lane].to_bits(),
+            resolve::MEDIAN_LINEAR_DEPTH => tracked.median_z[block][lane].to_bits(),
             resolve::MEDIAN_GAUSSIAN..resolve::NEAREST_GAUSSIAN => {
                 let part = index - resolve::MEDIAN_GAUSSIAN;
                 located(&tracked.median[block], lane, part)

@@ -6,6 +6,7 @@ use super::kernel::Kernel;
 use super::mode::{DepthMode, Exponential};
 use crate::format::depth::DepthEncoding;
 use crate::gaussian::BinnedDraw;
+use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::{Splat, SplatIndex};
 use crate::gaussian::view::center_depth::DepthTrend;
 use crate::stats::optimizations::Optimizations;
@@ -63,6 +64,8 @@ impl Thresholds {
 #[derive(Clone, Copy)]
 pub(crate) struct TileInputs<'a> {
     pub(crate) splats: &'a [Vec<Splat>],
+    /// By group, as the splats, if the Gaussians that pixels show are found.
+    pub(crate) identities: Option<&'a [Vec<Identity>]>,
     pub(crate) kernel: Kernel<'a>,
     /// The numbers of the splats, in the order of the draw.
     pub(crate) list: &'a [u32],
@@ -92,6 +95,12 @@ impl<'a> TileInputs<'a> {
         let splat = self.splat(primitive);
         devmem::prefetch(slice::from_ref(splat));
         splat
+    }
+
+    /// The identity of a primitive's Gaussian; zeros if identities are not found.
+    #[inline(always)]
+    pub(crate) fn identity(&self, primitive: u32) -> Identity {
+        self.identities.map_or(Identity::default(), |identities| *SplatIndex::new(primitive).of(identities))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::cut_off::CutOff;
 use crate::gaussian::BinnedDraw;
-use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::ray_depth::RayDepths;
 use crate::gaussian::splats::splat::SplatIndex;
 use crate::gaussian::splats::surfel::Surfel;
@@ -27,8 +26,6 @@ pub(crate) enum Kernel<'a> {
         wide_sums: bool,
         /// The shape outside which nothing contributes, if there is one.
         cut_off: Option<CutOff>,
-        /// By group, as the splats, if which they are is tracked. They are in the order of the list then.
-        identities: Option<&'a [Vec<Identity>]>,
     },
 }
 
@@ -37,11 +34,9 @@ impl<'a> Kernel<'a> {
     pub(crate) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
         let cut_off = CutOff::of(draw).filter(|_| !draw.are_lists_cut);
-        let identities = draw.identities();
-        let is_plain = cut_off.is_none() && identities.is_none();
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half
-        } else if surfels.is_none() && depths.is_none() && is_plain && !needs_f64_sums(&draw.state) {
+        } else if surfels.is_none() && depths.is_none() && cut_off.is_none() && !needs_f64_sums(&draw.state) {
             Self::Fast
         } else {
             let variance = f64::from(draw.state.low_pass_variance);
@@ -51,16 +46,15 @@ impl<'a> Kernel<'a> {
                 depths,
                 wide_sums: needs_f64_sums(&draw.state),
                 cut_off,
-                identities,
             }
         }
     }
 
-    /// The same kernel, except that pixels take the list's order and nothing is tracked.
+    /// The same kernel, except that pixels take the list's order.
     pub(crate) fn in_list_order(self) -> Self {
         match self {
             Self::Exact { surfels, inverse_low_pass, wide_sums, cut_off, .. } => {
-                Self::Exact { surfels, inverse_low_pass, depths: None, wide_sums, cut_off, identities: None }
+                Self::Exact { surfels, inverse_low_pass, depths: None, wide_sums, cut_off }
             }
             other => other,
         }

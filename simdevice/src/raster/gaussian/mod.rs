@@ -40,7 +40,7 @@ use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
 use isa::machine::Stopped;
-use mode::{Composite, FindMean, FindMedian, Mode, TestDepth};
+use mode::{Composite, FindMean, FindMedian, Mode, TestDepth, Track};
 use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 
@@ -113,12 +113,12 @@ impl<'a> GaussianTileDraw<'a> {
             buffers.stencil.load_or_clear(target, self.draw.layer, tile);
         }
         let mut samples = self.test_first(tile, buffers);
-        let reads_more = self.resolve.as_ref().is_some_and(|resolve| {
-            // Whatever else a program reads of the Gaussians goes with their mean.
-            resolve.reads_depth() || resolve.is_tracking()
-        });
+        let resolve = self.resolve.as_ref();
         match self.tests.depth {
-            _ if reads_more => {
+            _ if resolve.is_some_and(FragmentStageDraw::is_tracking) => {
+                self.composite::<Track>(tile, &mut samples, buffers, gaussian_tile, counters);
+            }
+            _ if resolve.is_some_and(FragmentStageDraw::reads_depth) => {
                 self.composite::<FindMean>(tile, &mut samples, buffers, gaussian_tile, counters);
             }
             None => self.composite::<Composite>(tile, &mut samples, buffers, gaussian_tile, counters),

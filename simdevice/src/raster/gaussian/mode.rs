@@ -13,25 +13,33 @@ pub(crate) enum DepthMode {
     FindMedian,
     /// The sums that make the mean depth are found.
     FindMean,
+    /// The Gaussians that pixels show are found, and the sums that make the mean depth variable.
+    Track,
 }
 
 impl DepthMode {
     /// True if depths are tested.
     #[inline(always)]
     pub(crate) const fn tests(self) -> bool {
-        matches!(self, Self::Test | Self::FindMedian | Self::FindMean)
+        matches!(self, Self::Test) || self.finds_median()
     }
 
     /// True if the median depth is found.
     #[inline(always)]
     pub(crate) const fn finds_median(self) -> bool {
-        matches!(self, Self::FindMedian | Self::FindMean)
+        matches!(self, Self::FindMedian) || self.finds_mean()
     }
 
     /// True if the sums of the mean depth are found.
     #[inline(always)]
     pub(crate) const fn finds_mean(self) -> bool {
-        matches!(self, Self::FindMean)
+        matches!(self, Self::FindMean) || self.tracks()
+    }
+
+    /// True if the Gaussians that pixels show are found.
+    #[inline(always)]
+    pub(crate) const fn tracks(self) -> bool {
+        matches!(self, Self::Track)
     }
 
     /// True if only reached pixels are found.
@@ -82,6 +90,8 @@ pub(crate) struct TestDepth;
 pub(crate) struct FindMedian;
 /// The mode that finds the median and the mean depth.
 pub(crate) struct FindMean;
+/// The mode that finds depths, and the Gaussians that pixels show.
+pub(crate) struct Track;
 
 impl Mode for FindReached {
     const DEPTH: DepthMode = DepthMode::FindReached;
@@ -111,4 +121,8 @@ impl Mode for FindMedian {
 
 impl Mode for FindMean {
     const DEPTH: DepthMode = DepthMode::FindMean;
+}
+
+impl Mode for Track {
+    const DEPTH: DepthMode = DepthMode::Track;
 }

@@ -3,9 +3,12 @@
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::exponent::power;
+use super::grid::{BLOCK_PIXELS, BLOCKS};
 use super::inputs::Thresholds;
 use super::masks::only;
 use super::mode::{DepthMode, Exponential};
+use crate::format::depth::DepthEncoding;
+use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::SplatLook;
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -94,42 +97,158 @@ pub(crate) fn alpha<S: Simd>(
     only(simd, reached, power(simd, exponential, neg_log2_alpha).min(ceiling))
 }
 
-/// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-neg_log2_alpha`; returns
-/// how many pixels accepted it.
+/// A Gaussian as pixels show it.
+#[derive(Clone, Copy)]
+pub(crate) struct ShownGaussian {
+    pub(crate) look: SplatLook,
+    /// Zeros, if the mode does not find Gaussians.
+    pub(crate) identity: Identity,
+}
+
+/// The depths and the Gaussians that a block's pixels show, as far as a mode finds them; the rest is zero.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown<S: Simd> {
+    mode: DepthMode,
+    depth_unit: DepthEncoding,
+    median_depth: u32x16<S>,
+    depth_sum: f32x16<S>,
+    weight_sum: f32x16<S>,
+    nearest: u32x16<S>,
+    median: u32x16<S>,
+    median_z: f32x16<S>,
+    z_sum: f32x16<S>,
+}
+
+impl<S: Simd> Shown<S> {
+    /// The values of a block as they are in `accumulator`.
+    #[inline(always)]
+    pub(crate) fn load(
+        accumulator: &Accumulator,
+        simd: S,
+        block: usize,
+        mode: DepthMode,
+        depth_unit: DepthEncoding,
+    ) -> Self {
+        let (zeros, none) = (u32x16::splat(simd, 0), f32x16::splat(simd, 0.0));
+        let numbers = |found: bool, from: &[[u32; BLOCK_PIXELS]; BLOCKS]| {
+            if found { u32x16::from_slice(simd, &from[block]) } else { zeros }
+        };
+        let floats = |found: bool, from: &[[f32; BLOCK_PIXELS]; BLOCKS]| {
+            if found { f32x16::from_slice(simd, &from[block]) } else { none }
+        };
+        let Accumulator { means: [depths, weights], tracked, .. } = accumulator;
+        Self {
+            mode,
+            depth_unit,
+            median_depth: numbers(mode.finds_median(), &accumulator.median),
+            depth_sum: floats(mode.finds_mean(), depths),
+            weight_sum: floats(mode.finds_mean(), weights),
+            nearest: numbers(mode.tracks(), &tracked.nearest),
+            median: numbers(mode.tracks(), &tracked.median),
+            median_z: floats(mode.tracks(), &tracked.median_z),
+            z_sum: floats(mode.tracks(), &tracked.z_sums),
+        }
+    }
+
+    /// Puts the values back.
+    #[inline(always)]
+    pub(crate) fn keep(self, accumulator: &mut Accumulator, block: usize) {
+        let Accumulator { means: [depths, weights], tracked, .. } = accumulator;
+        if self.mode.finds_median() {
+            self.median_depth.store_slice(&mut accumulator.median[block]);
+        }
+        if self.mode.finds_mean() {
+            self.depth_sum.store_slice(&mut depths[block]);
+            self.weight_sum.store_slice(&mut weights[block]);
+        }
+        if self.mode.tracks() {
+            self.nearest.store_slice(&mut tracked.nearest[block]);
+            self.median.store_slice(&mut tracked.median[block]);
+            self.median_z.store_slice(&mut tracked.median_z[block]);
+            self.z_sum.store_slice(&mut tracked.z_sums[block]);
+        }
+    }
+
+    /// True if some pixel of such transmittance may get another median or nearest Gaussian.
+    #[inline(always)]
+    pub(crate) fn may_choose(self, transmittance: f32x16<S>) -> bool {
+        self.mode.finds_median() && transmittance.simd_ge(0.5).any_true()
+    }
+
+    /// Makes a Gaussian the median and the nearest where it is, by its `weight` and the transmittance before it.
+    #[inline(always)]
+    pub(crate) fn choose(
+        &mut self,
+        simd: S,
+        transmittance: f32x16<S>,
+        weight: f32x16<S>,
+        ShownGaussian { look, identity }: ShownGaussian,
+    ) {
+        if !self.mode.finds_median() {
+            return;
+        }
+        let is_median = only(simd, transmittance.simd_ge(0.5), weight).simd_gt(0.0);
+        self.median_depth = is_median.select(u32x16::splat(simd, look.depth), self.median_depth);
+        if self.mode.tracks() {
+            let sequence = u32x16::splat(simd, identity.sequence);
+            self.median = is_median.select(sequence, self.median);
+            self.median_z = is_median.select(f32x16::splat(simd, identity.z), self.median_z);
+            let is_nearest = only(simd, transmittance.simd_ge(1.0), weight).simd_gt(0.0);
+            self.nearest = is_nearest.select(sequence, self.nearest);
+        }
+    }
+
+    /// Adds so much of a Gaussian to the sums.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, simd: S, weight: f32x16<S>, ShownGaussian { look, identity }: ShownGaussian) {
+        if !self.mode.finds_mean() {
+            return;
+        }
+        let depth = f32x16::splat(simd, self.depth_unit.decode(look.depth));
+        self.depth_sum = weight.mul_add_precise(depth, self.depth_sum);
+        self.weight_sum += weight;
+        if self.mode.tracks() {
+            self.z_sum = weight.mul_add_precise(f32x16::splat(simd, identity.z), self.z_sum);
+        }
+    }
+}
+
+/// Composites a Gaussian in a block, where alpha is 2 to the power of `-neg_log2_alpha`; returns how many pixels accepted it.
 #[inline(always)]
 pub(crate) fn accumulate<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
     block: usize,
     neg_log2_alpha: f32x16<S>,
-    look: SplatLook,
+    gaussian: ShownGaussian,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let mut pixels = pixels(accumulator, simd, block);
-    let neg_log2_floor = f32x16::splat(simd, thresholds.neg_log2_floor);
     let depth_mode = thresholds.depth_mode;
-    let reached = reached(simd, depth_mode, block, look.depth, neg_log2_alpha, ranges, neg_log2_floor);
+    let mut shown = Shown::load(accumulator, simd, block, depth_mode, thresholds.depth_unit);
+    let neg_log2_floor = f32x16::splat(simd, thresholds.neg_log2_floor);
+    let reached = reached(simd, depth_mode, block, gaussian.look.depth, neg_log2_alpha, ranges, neg_log2_floor);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = alpha(simd, thresholds.exponential, reached, neg_log2_alpha, ceiling);
-    let goes_on = composite_one(accumulator, simd, block, &mut pixels, alpha, look, thresholds);
+    let goes_on = composite_one(simd, &mut pixels, &mut shown, alpha, gaussian, thresholds);
     keep(accumulator, block, pixels);
+    shown.keep(accumulator, block);
     let accepted = goes_on.to_bitmask() & reached.to_bitmask();
     accepted.count_ones().into()
 }
 
-/// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
+/// Composites a Gaussian in a block; returns which pixels it does not finish.
 ///
 /// A Gaussian that does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out
 /// would take longer.
 #[inline(always)]
 pub(crate) fn composite_one<S: Simd>(
-    accumulator: &mut Accumulator,
     simd: S,
-    block: usize,
     pixels: &mut Pixels<S>,
+    shown: &mut Shown<S>,
     alpha: f32x16<S>,
-    SplatLook { color, depth }: SplatLook,
+    gaussian: ShownGaussian,
     thresholds: Thresholds,
 ) -> mask32x16<S> {
     let t = pixels.transmittance;
@@ -144,20 +263,8 @@ pub(crate) fn composite_one<S: Simd>(
     let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
     pixels.transmittance = goes_on.select(rest, finished);
     let weight = only(simd, goes_on, weight);
-    if thresholds.depth_mode.finds_median() {
-        let median = u32x16::from_slice(simd, &accumulator.median[block]);
-        let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
-        let median = first_half.select(u32x16::splat(simd, depth), median);
-        median.store_slice(&mut accumulator.median[block]);
-    }
-    if thresholds.depth_mode.finds_mean() {
-        let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
-        let [depths, weights] = &mut accumulator.means;
-        let sum = f32x16::from_slice(simd, &depths[block]);
-        weight.mul_add_precise(depth, sum).store_slice(&mut depths[block]);
-        let sum = f32x16::from_slice(simd, &weights[block]) + weight;
-        sum.store_slice(&mut weights[block]);
-    }
-    pixels.add(simd, weight, color);
+    shown.choose(simd, t, weight, gaussian);
+    shown.add(simd, weight, gaussian);
+    pixels.add(simd, weight, gaussian.look.color);
     goes_on
 }

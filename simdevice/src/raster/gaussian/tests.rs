@@ -2,6 +2,7 @@ mod approximation;
 mod half;
 mod per_pixel;
 mod streamed;
+mod tracking;
 mod whole_draws;
 
 use super::grid::TILE;
@@ -139,6 +140,7 @@ struct Naive {
     reached: bool,
     fragment: Option<[f32; 4]>,
     median: u32,
+    tracked: tracking::NaiveTracked,
 }
 
 /// 2 to the power of `x`, by a table.
@@ -237,6 +239,9 @@ fn naive_sample(draw: &BinnedDraw, tile: [u32; 2], [x, y]: [usize; 2], passes: i
         }
         if t >= 0.5 {
             out.median = g.look.depth;
+        }
+        if let Some(identities) = draw.identities() {
+            out.tracked.add(*index.of(identities), t, weight);
         }
         for (c, color) in c.iter_mut().zip(g.look.color) {
             *c = weight.mul_add(color, *c);

@@ -2,10 +2,11 @@
 
 use super::block_kernel::BlockKernel;
 use super::exponents::neg_log2_alphas;
+use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::SplatIndex;
 use crate::raster::gaussian::accumulator::Accumulator;
 use crate::raster::gaussian::inputs::TileInputs;
-use crate::raster::gaussian::pixels::accumulate;
+use crate::raster::gaussian::pixels::{ShownGaussian, accumulate};
 use fearless_simd::Simd;
 
 /// Compositing in the order of the list, by sums in binary32.
@@ -23,7 +24,7 @@ impl BlockKernel for InOrder {
     ) -> u64 {
         let splat = index.of(inputs.splats);
         let neg_log2_alpha = neg_log2_alphas(simd, inputs, index, block);
-        let (look, ranges) = (splat.look, inputs.ranges);
-        accumulate(accumulator, simd, block, neg_log2_alpha, look, ranges, inputs.thresholds)
+        let gaussian = ShownGaussian { look: splat.look, identity: Identity::default() };
+        accumulate(accumulator, simd, block, neg_log2_alpha, gaussian, inputs.ranges, inputs.thresholds)
     }
 }

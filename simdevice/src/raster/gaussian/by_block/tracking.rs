@@ -1,36 +1,15 @@
-//! The kernel of draws whose resolve shader asks which Gaussians a pixel shows, or how far away they are: in the order of the
-//! list, pixel by pixel, with sums in binary64.
+//! The kernel of draws that the fast kernel does not serve, whose resolve shader asks which Gaussians a pixel shows, or how far
+//! away they are: in the order of the list, pixel by pixel, with sums in binary64.
 
 use super::block_kernel::BlockKernel;
 use super::exponents::neg_log2_alphas;
 use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::SplatIndex;
 use crate::raster::gaussian::accumulator::Accumulator;
-use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS};
+use crate::raster::gaussian::grid::BLOCK_PIXELS;
 use crate::raster::gaussian::inputs::TileInputs;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, prelude::*};
-
-/// The Gaussians that a tile's pixels, or one sample of each, show: numbers of Gaussians in the set, and depth
-/// variables.
-#[derive(Clone, Debug)]
-pub(crate) struct Tracked {
-    /// The number of the first Gaussian that contributed.
-    pub(crate) nearest: [[u32; BLOCK_PIXELS]; BLOCKS],
-    /// The number of the one whose depth is the median.
-    pub(crate) median: [[u32; BLOCK_PIXELS]; BLOCKS],
-    /// The mean depth variable, weighted by contributions, and that of the median.
-    pub(crate) linear: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
-}
-
-impl Tracked {
-    /// Nothing contributed.
-    pub(crate) const EMPTY: Self = Self {
-        nearest: [[0; BLOCK_PIXELS]; BLOCKS],
-        median: [[0; BLOCK_PIXELS]; BLOCKS],
-        linear: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2],
-    };
-}
 
 /// The sums of a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +46,6 @@ impl Sum {
 pub(crate) struct Tracking<'a> {
     /// By group, as the splats.
     identities: &'a [Vec<Identity>],
-    tracked: &'a mut Tracked,
     /// The pixels of a block that were to be touched.
     open: u32,
     sums: [Sum; BLOCK_PIXELS],
@@ -75,8 +53,8 @@ pub(crate) struct Tracking<'a> {
 
 impl<'a> Tracking<'a> {
     /// Compositing of Gaussians that have these identities, into what was empty.
-    pub(crate) fn new(identities: &'a [Vec<Identity>], tracked: &'a mut Tracked) -> Self {
-        Self { identities, tracked, open: 0, sums: [Sum::new(false); BLOCK_PIXELS] }
+    pub(crate) fn new(identities: &'a [Vec<Identity>]) -> Self {
+        Self { identities, open: 0, sums: [Sum::new(false); BLOCK_PIXELS] }
     }
 }
 
@@ -166,12 +144,11 @@ impl BlockKernel for Tracking<'_> {
             let [depths, distances, weights] = sum.means;
             accumulator.means[0][block][lane] = depths as f32;
             accumulator.means[1][block][lane] = weights as f32;
-            self.tracked.nearest[block][lane] = sum.nearest_identity.sequence;
-            self.tracked.median[block][lane] = sum.median_identity.sequence;
-            let [mean, median] = &mut self.tracked.linear;
-            median[block][lane] = sum.median_identity.z;
-            // An alpha that underflows weighs nothing.
-            mean[block][lane] = if weights > 0.0 { (distances / weights) as f32 } else { sum.median_identity.z };
+            let tracked = &mut accumulator.tracked;
+            tracked.nearest[block][lane] = sum.nearest_identity.sequence;
+            tracked.median[block][lane] = sum.median_identity.sequence;
+            tracked.median_z[block][lane] = sum.median_identity.z;
+            tracked.z_sums[block][lane] = distances as f32;
         }
     }
 }

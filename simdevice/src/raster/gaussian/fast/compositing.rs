@@ -9,7 +9,7 @@ use crate::raster::gaussian::grid::{BLOCK_PIXELS, BLOCKS};
 use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
 use crate::raster::gaussian::masks::Tally;
 use crate::raster::gaussian::mode::Mode;
-use crate::raster::gaussian::pixels::{accumulate, composite_one, keep, pixels};
+use crate::raster::gaussian::pixels::{Pixels, Shown, ShownGaussian, accumulate, composite_one, keep, pixels};
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
@@ -92,8 +92,7 @@ fn composite_all<S: Simd, M: Mode>(
                 }
                 let of_block = BlockAlphas { block, reaching, alphas };
                 if M::DEPTH.finds_reached()
-                    || M::DEPTH.finds_median()
-                    || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
+                    || !composite_far_from_floor::<_, M>(accumulator, simd, of_block, round, thresholds)
                 {
                     let more = composite_near_floor::<_, M>(accumulator, simd, of_block, round, thresholds);
                     if let Some(more) = more {
@@ -109,14 +108,14 @@ fn composite_all<S: Simd, M: Mode>(
 /// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing.
 /// Returns whether it did.
 #[inline(always)]
-fn composite_far_from_floor<S: Simd>(
+fn composite_far_from_floor<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
     of_block: BlockAlphas<'_>,
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> bool {
-    let BlockAlphas { block, mut reaching, alphas } = of_block;
+    let block = of_block.block;
     let floor = thresholds.transmittance_floor;
     let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
@@ -128,12 +127,11 @@ fn composite_far_from_floor<S: Simd>(
     }
     // What is finished has alphas of zero.
     pixels.transmittance = before.max(0.0);
-    for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize];
-        reaching &= reaching.wrapping_sub(1);
-        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
-        pixels.transmittance = passed.rest;
-        pixels.add(simd, passed.weight, look.color);
+    let mut shown = Shown::load(accumulator, simd, block, M::DEPTH, thresholds.depth_unit);
+    if shown.may_choose(pixels.transmittance) {
+        composite_open::<_, M, true>(simd, &mut pixels, &mut shown, of_block, round);
+    } else {
+        composite_open::<_, M, false>(simd, &mut pixels, &mut shown, of_block, round);
     }
     let signs: i32x16<S> = before.bitcast();
     let below = pixels.transmittance.simd_lt(floor).to_vector();
@@ -143,7 +141,30 @@ fn composite_far_from_floor<S: Simd>(
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
+    shown.keep(accumulator, block);
     true
+}
+
+/// Composites a block's alphas, as if no pixel were finished by them. With `CHOOSES`, some may be the median or the nearest.
+#[inline(always)]
+fn composite_open<S: Simd, M: Mode, const CHOOSES: bool>(
+    simd: S,
+    pixels: &mut Pixels<S>,
+    shown: &mut Shown<S>,
+    BlockAlphas { mut reaching, alphas, .. }: BlockAlphas<'_>,
+    round: &StagedRound,
+) {
+    for alpha in alphas {
+        let gaussian = round.gaussian::<M>(reaching.trailing_zeros() as usize);
+        reaching &= reaching.wrapping_sub(1);
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        if CHOOSES {
+            shown.choose(simd, pixels.transmittance, passed.weight, gaussian);
+        }
+        shown.add(simd, passed.weight, gaussian);
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, gaussian.look.color);
+    }
 }
 
 /// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of
@@ -160,8 +181,8 @@ fn composite_near_floor<S: Simd, M: Mode>(
         #[inline(always)]
         || {
             let mut rest = of_block;
-            if !M::DEPTH.finds_reached() && !M::DEPTH.finds_median() {
-                rest = composite_until_finished(accumulator, simd, rest, round, thresholds);
+            if !M::DEPTH.finds_reached() {
+                rest = composite_until_finished::<_, M>(accumulator, simd, rest, round, thresholds);
                 if rest.alphas.is_empty() {
                     return None;
                 }
@@ -174,7 +195,7 @@ fn composite_near_floor<S: Simd, M: Mode>(
 
 /// Composites the first of a block's alphas, up to one that finishes a pixel, and returns the others.
 #[inline(always)]
-fn composite_until_finished<'a, S: Simd>(
+fn composite_until_finished<'a, S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
     of_block: BlockAlphas<'a>,
@@ -184,6 +205,7 @@ fn composite_until_finished<'a, S: Simd>(
     let BlockAlphas { block, mut reaching, mut alphas } = of_block;
     let floor = f32x16::splat(simd, thresholds.transmittance_floor);
     let mut pixels = pixels(accumulator, simd, block);
+    let mut shown = Shown::load(accumulator, simd, block, M::DEPTH, thresholds.depth_unit);
     let before = pixels.transmittance;
     let signs: i32x16<S> = before.bitcast();
     // What is finished has alphas of zero: here its transmittance stays the greatest.
@@ -194,14 +216,17 @@ fn composite_until_finished<'a, S: Simd>(
         if passed.rest.simd_lt(floor).any_true() {
             break;
         }
-        let look = &round.looks[reaching.trailing_zeros() as usize];
+        let gaussian = round.gaussian::<M>(reaching.trailing_zeros() as usize);
         reaching &= reaching.wrapping_sub(1);
         alphas = rest;
+        shown.choose(simd, pixels.transmittance, passed.weight, gaussian);
+        shown.add(simd, passed.weight, gaussian);
         pixels.transmittance = passed.rest;
-        pixels.add(simd, passed.weight, look.color);
+        pixels.add(simd, passed.weight, gaussian.look.color);
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
+    shown.keep(accumulator, block);
     BlockAlphas { block, reaching, alphas }
 }
 
@@ -217,15 +242,17 @@ fn composite_carefully<S: Simd, M: Mode>(
     let BlockAlphas { block, mut reaching, alphas } = of_block;
     let thresholds = Thresholds { depth_mode: M::DEPTH, ..thresholds };
     let mut pixels = pixels(accumulator, simd, block);
+    let mut shown = Shown::load(accumulator, simd, block, M::DEPTH, thresholds.depth_unit);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize];
+        let gaussian = round.gaussian::<M>(reaching.trailing_zeros() as usize);
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
-        let goes_on = composite_one(accumulator, simd, block, &mut pixels, alpha, *look, thresholds);
+        let goes_on = composite_one(simd, &mut pixels, &mut shown, alpha, gaussian, thresholds);
         refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
     keep(accumulator, block, pixels);
+    shown.keep(accumulator, block);
     accumulator.find_neg_log2_floors(simd, block, thresholds.neg_log2_floor);
     refused.total()
 }
@@ -236,6 +263,7 @@ pub(crate) fn composite_in_f64<S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     simd: S,
     splat: &Splat,
+    gaussian: ShownGaussian,
     blocks: u64,
     inputs: &TileInputs<'_>,
 ) -> u64 {
@@ -243,8 +271,7 @@ pub(crate) fn composite_in_f64<S: Simd, M: Mode>(
     let mut contributions = 0;
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let neg_log2_alpha = neg_log2_alphas_f64(simd, splat, inputs, block);
-        let look = splat.look;
-        contributions += accumulate(accumulator, simd, block, neg_log2_alpha, look, inputs.ranges, thresholds);
+        contributions += accumulate(accumulator, simd, block, neg_log2_alpha, gaussian, inputs.ranges, thresholds);
         accumulator.find_neg_log2_floors(simd, block, thresholds.neg_log2_floor);
     }
     contributions

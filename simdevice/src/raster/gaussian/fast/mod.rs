@@ -13,6 +13,7 @@ use super::accumulator::{Accumulator, NOT_TERMINATED};
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{TileCounts, TileInputs};
 use super::mode::Mode;
+use super::pixels::ShownGaussian;
 use super::reached_blocks::hidden_blocks;
 use crate::gaussian::splats::splat::Splat;
 use crate::stats::optimizations::Optimization;
@@ -80,7 +81,7 @@ pub(crate) fn composite<S: Simd, M: Mode>(
         }
         let next = rest.get(ROUND..).unwrap_or_default();
         let before = counts;
-        let round = Round { splats, next, open, is_recorded: runs.is_some() };
+        let round = Round { splats, primitives, next, open, is_recorded: runs.is_some() };
         let outcome = composite_round::<_, M>(scratch, simd, inputs, accumulator, &round, &mut ahead, &mut counts);
         known = (!outcome.may_have_finished).then_some(bits);
         if let Some(runs) = &mut runs {
@@ -164,7 +165,8 @@ fn composite_round<'a, S: Simd, M: Mode>(
         counts.open += blocks;
         counts.blocks_hidden += blocks - exact;
         counts.items += exact;
-        counts.contributions += composite_in_f64::<_, M>(accumulator, simd, splat, shown, inputs);
+        let gaussian = ShownGaussian { look: splat.look, identity: round.identity::<M>(inputs, placed.end) };
+        counts.contributions += composite_in_f64::<_, M>(accumulator, simd, splat, gaussian, shown, inputs);
         outcome.may_have_finished = true;
         from = placed.end + 1;
     }

@@ -1,12 +1,14 @@
 //! Phase 1 of the fast kernel: the numbers of a round's Gaussians that the other phases need, and the blocks that each may reach.
 
 use super::round::Round;
+use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::{Splat, SplatLook};
 use crate::raster::gaussian::grid::{
     BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
 };
 use crate::raster::gaussian::inputs::{Thresholds, TileInputs};
 use crate::raster::gaussian::mode::Mode;
+use crate::raster::gaussian::pixels::ShownGaussian;
 use crate::raster::gaussian::reached_blocks::{RANGE_FACTOR, hidden_blocks};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, i32x16, mask32x16, prelude::*, u32x16};
@@ -31,7 +33,9 @@ pub(crate) struct StagedRound {
     from_u: [[[f32; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
     /// By Gaussian, the addition of a pixel's offset from the middle of its block to `v` there.
     along: [[f32; BLOCK_PIXELS]; PLACES],
-    pub(crate) looks: [SplatLook; PLACES],
+    pub(super) looks: [SplatLook; PLACES],
+    /// Set if the mode finds Gaussians.
+    identities: [Identity; PLACES],
     gathered: Gathered,
 }
 
@@ -47,6 +51,7 @@ impl Default for StagedRound {
             from_u: [[[0.0; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
             along: [[0.0; BLOCK_PIXELS]; PLACES],
             looks: [SplatLook::default(); PLACES],
+            identities: [Identity::default(); PLACES],
         }
     }
 }
@@ -164,6 +169,9 @@ impl StagedRound {
                     any &= any - 1;
                     if let Some(splat) = round.splats.get(number) {
                         self.record(simd, number, splat);
+                        if M::DEPTH.tracks() {
+                            self.identities[number] = round.identity::<M>(inputs, number);
+                        }
                     }
                 }
                 placed.reaching = reaching.to_array();
@@ -270,6 +278,13 @@ impl StagedRound {
             }
         }
         capped
+    }
+
+    /// Gaussian `number` as pixels show it.
+    #[inline(always)]
+    pub(super) fn gaussian<M: Mode>(&self, number: usize) -> ShownGaussian {
+        let identity = if M::DEPTH.tracks() { self.identities[number] } else { Identity::default() };
+        ShownGaussian { look: self.looks[number], identity }
     }
 
     /// The squares of `u` in a block's column of blocks.
