@@ -467,7 +467,8 @@ fn private_variables_begin_as_pointers_to_other_variables() {
 #[gaurast_runner::test]
 fn constants_are_quantized_as_running_values_are() {
     // Halves, binary16's greatest denormal and least normal number, and numbers that round up to the latter or overflow.
-    for bits in [0x3f00_0000, 0x387f_c000, 0xb87f_c000, 0x3880_0000, 0xb87f_ffff, 0x3300_0000, 0x477f_f000, 0xff80_0000] {
+    for bits in [0x3f00_0000, 0x387f_c000, 0xb87f_c000, 0x3880_0000, 0xb87f_ffff, 0x3300_0000, 0x477f_f000, 0xff80_0000]
+    {
         let mut specialization = Specialization::default();
         specialization.set(0, &u32::to_le_bytes(bits));
         let shader = translated("quantized_constants.comp", &specialization);
