@@ -6,13 +6,14 @@ use crate::abi::sanitizer;
 use crate::abi::valid;
 use crate::device_addresses::Addresses;
 use crate::device_sync::DeviceSync;
+use crate::enabled::Enabled;
 use crate::instance::{EnabledExtensions, Instance, PhysicalDevice, resolve_extensions};
-use crate::options::Dump;
+use crate::options::{self, Dump};
 use crate::physical_device::memory::{self, Heap};
 use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILIES};
 use crate::queue::Queue;
 use crate::registry;
-use crate::registry::features::{Features, SUPPORTED, extension_of};
+use crate::registry::features::Features;
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
@@ -27,8 +28,7 @@ const HEAP_PER_CLUSTER_BUDGET: u64 = 8;
 /// A logical device with a simulated device of its own.
 pub(crate) struct Device {
     instance: Arc<Instance>,
-    extensions: Vec<&'static CStr>,
-    features: Features,
+    enabled: Arc<Enabled>,
     simulated: Arc<simdevice::Device>,
     dump: Dump,
     sync: Arc<DeviceSync>,
@@ -54,8 +54,7 @@ impl Device {
     /// [`Error::InitializationFailed`] if the host can't start a queue's thread, or an environment variable is invalid.
     pub(crate) fn new(
         instance: Arc<Instance>,
-        extensions: Vec<&'static CStr>,
-        features: Features,
+        enabled: Enabled,
         simulated: simdevice::Device,
         families: &[u32],
     ) -> Result<Arc<Self>, Error> {
@@ -64,8 +63,7 @@ impl Device {
         }
         let device = Arc::new(Self {
             instance,
-            extensions,
-            features,
+            enabled: Arc::new(enabled),
             simulated: Arc::new(simulated),
             dump: Dump::of_environment()?,
             sync: Arc::default(),
@@ -86,14 +84,19 @@ impl Device {
         Ok(device)
     }
 
+    /// The features and extensions that the application enabled.
+    pub(crate) fn enabled(&self) -> &Arc<Enabled> {
+        &self.enabled
+    }
+
     /// The features that the application enabled.
     pub(crate) fn features(&self) -> &Features {
-        &self.features
+        self.enabled.features()
     }
 
     /// Reports whether the application enabled an extension.
     pub(crate) fn has(&self, extension: &CStr) -> bool {
-        self.extensions.contains(&extension)
+        self.enabled.extensions().contains(&extension)
     }
 
     /// The simulated device.
@@ -137,8 +140,8 @@ impl Device {
     }
 
     /// The version and extensions under which commands are looked up through this device.
-    pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
-        EnabledExtensions { device_extensions: &self.extensions, ..self.instance.enabled() }
+    pub(crate) fn enabled_extensions(&self) -> EnabledExtensions<'_> {
+        EnabledExtensions { device_extensions: self.enabled.extensions(), ..self.instance.enabled() }
     }
 
     /// Executes the work of its queues and joins their threads.
@@ -166,58 +169,6 @@ impl Drop for Device {
                 log::error!("a queue's handle was overwritten: {error}");
             }
         }
-    }
-}
-
-/// The features that the application asks `vkCreateDevice` to enable, with `extensions`.
-///
-/// # Errors
-/// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose
-/// extension isn't enabled.
-///
-/// # Safety
-/// The creation info is valid.
-unsafe fn requested_features(info: &vk::DeviceCreateInfo<'_>, extensions: &[&CStr]) -> Result<Features, Error> {
-    let mut enabled = Features::NONE;
-    // SAFETY: the pointer is null or valid in a valid creation info.
-    if let Some(features) = unsafe { info.p_enabled_features.as_ref() } {
-        enabled.add_core(features);
-        require_supported(&enabled)?;
-    }
-    // SAFETY: the chain of a valid creation info is valid.
-    for structure in unsafe { valid::chain(info.p_next) } {
-        if let Some(features) = valid::cast::<vk::PhysicalDeviceFeatures2<'_>>(structure) {
-            enabled.add_core(&features.features);
-        } else {
-            require_extension(structure, extensions)?;
-            enabled.add(structure);
-        }
-        require_supported(&enabled)?;
-    }
-    Ok(enabled)
-}
-
-/// Refuses features that are not supported.
-fn require_supported(requested: &Features) -> Result<(), Error> {
-    match requested.list().zip(SUPPORTED.list()).find(|((_, is_requested), (_, works))| *is_requested && !works) {
-        None => Ok(()),
-        Some(((name, _), _)) => Err(Error::FeatureNotPresent(format!("the feature {name}"))),
-    }
-}
-
-/// Refuses features of an extension that isn't enabled.
-fn require_extension(structure: &vk::BaseInStructure<'_>, extensions: &[&CStr]) -> Result<(), Error> {
-    let Some(needed) = extension_of(structure.s_type).filter(|name| !extensions.contains(name)) else {
-        return Ok(());
-    };
-    let mut requested = Features::NONE;
-    requested.add(structure);
-    match requested.list().find(|(_, is_on)| *is_on) {
-        None => Ok(()),
-        Some((feature, _)) => Err(Error::usage(
-            "VUID-VkDeviceCreateInfo-pNext-pNext",
-            format!("the feature {feature} needs {needed:?}, which is not enabled"),
-        )),
     }
 }
 
@@ -278,15 +229,17 @@ pub(crate) unsafe fn create_device(
     unsafe {
         let names = valid::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?;
         let extensions = resolve_extensions(registry::extensions::DEVICE, &names)?;
-        let features = requested_features(info, &extensions)?;
         let instance = physical_device.require_instance()?;
         if extensions.contains(&gaussian_primitive_topology::NAME)
             && valid::find_in_chain::<GaussianFeatures<'_>>(info.p_next).is_none()
         {
             warn_of_lost_features(&instance);
         }
+        options::device_type()?;
+        let mut enabled = Enabled::new(extensions, options::is_strict()?, Arc::clone(&instance) as _);
+        enabled.enable_features(info)?;
         let simulated = open_simulated(&instance)?;
-        Device::new(instance, extensions, features, simulated, &queue_families(info)?)
+        Device::new(instance, enabled, simulated, &queue_families(info)?)
     }
 }
 
@@ -305,7 +258,7 @@ fn open_simulated(instance: &Arc<Instance>) -> Result<simdevice::Device, Error> 
 fn warn_of_lost_features(instance: &Instance) {
     let text = format!(
         "vkCreateDevice: {} is enabled, but the pNext chain has no \
-         VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, so that no pipeline may draw Gaussians. The Khronos \
+         VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, so that none of its features is enabled. The Khronos \
          validation layer drops structures that it does not know: name them in VK_LAYER_CUSTOM_STYPE_LIST",
         gaussian_primitive_topology::NAME.to_string_lossy()
     );
@@ -397,8 +350,7 @@ pub(crate) unsafe fn get_private_data(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registry::features::MANDATORY;
-    use gaurast::gaussian_primitive_topology;
+    use crate::registry::features::{MANDATORY, SUPPORTED};
     use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
     use std::collections::HashMap;
 
@@ -482,37 +434,5 @@ mod tests {
         let mut missing: Vec<_> = MANDATORY.iter().map(|(name, _)| *name).filter(|name| !supported[name]).collect();
         missing.sort_unstable();
         assert_eq!(missing, REQUIRED_BUT_MISSING);
-    }
-
-    #[test]
-    fn requests_are_checked_wherever_they_stand() {
-        let request = |info: &vk::DeviceCreateInfo<'_>| {
-            // SAFETY: ash built the creation info.
-            unsafe { requested_features(info, &[gaussian_primitive_topology::NAME]) }
-        };
-        let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
-        let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
-        let info = vk::DeviceCreateInfo::default().enabled_features(&core).push_next(&mut works);
-        let enabled = request(&info).unwrap();
-        assert!(enabled.dynamic_rendering && enabled.robust_buffer_access);
-        assert!(!enabled.synchronization2);
-
-        let refused = |result: Result<Features, Error>, name: &str| {
-            let error = result.unwrap_err();
-            assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
-            assert!(error.to_string().contains(name), "{error}");
-        };
-        let core = vk::PhysicalDeviceFeatures::default().sparse_residency_buffer(true);
-        refused(request(&vk::DeviceCreateInfo::default().enabled_features(&core)), "sparseResidencyBuffer");
-        let mut core = vk::PhysicalDeviceFeatures2::default();
-        core.features.sparse_binding = vk::TRUE;
-        refused(request(&vk::DeviceCreateInfo::default().push_next(&mut core)), "sparseBinding");
-        let mut missing =
-            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).texture_compression_astc_hdr(true);
-        refused(request(&vk::DeviceCreateInfo::default().push_next(&mut missing)), "textureCompressionASTC_HDR");
-
-        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default().performance_counter_query_pools(true);
-        let error = request(&vk::DeviceCreateInfo::default().push_next(&mut other)).unwrap_err();
-        assert!(error.is_usage(), "{error}");
     }
 }

@@ -164,6 +164,10 @@ impl Reporter for Instance {
     fn report_error(&self, command: &str, error: &Error) {
         self.send(&Message::of_error(command, error));
     }
+
+    fn report_warning(&self, error: &Error) {
+        self.send(&Message::of_warning(error));
+    }
 }
 
 impl Drop for Instance {

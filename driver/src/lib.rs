@@ -17,6 +17,7 @@ mod device;
 mod device_addresses;
 mod device_sync;
 mod dispatch;
+mod enabled;
 mod instance;
 mod listeners;
 pub mod loader;

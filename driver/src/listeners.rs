@@ -41,6 +41,16 @@ impl Message {
         )
     }
 
+    /// The message about a use that breaks a rule, and that the device does all the same.
+    pub(crate) fn of_warning(error: &Error) -> Self {
+        Self::new(
+            vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
+            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION,
+            error.message_id(),
+            &format!("{error}: the device does it all the same"),
+        )
+    }
+
     /// Its kind for callbacks of `VK_EXT_debug_report`.
     fn flags(&self) -> vk::DebugReportFlagsEXT {
         use vk::DebugReportFlagsEXT as Flags;

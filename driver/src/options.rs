@@ -29,6 +29,8 @@ const OPTIMIZATIONS: &str = "GAURAST_OPTIMIZATIONS";
 const TRACE: &str = "GAURAST_TRACE";
 const TIMESTAMPS: &str = "GAURAST_TIMESTAMPS";
 const DUMP: &str = "GAURAST_DUMP";
+const STRICT: &str = "GAURAST_STRICT";
+const DEVICE_TYPE: &str = "GAURAST_DEVICE_TYPE";
 const LOG: &str = "GAURAST_LOG";
 
 /// The options that a program chains to `VkInstanceCreateInfo` as `VkDriverOptionsGAURAST`.
@@ -228,6 +230,44 @@ pub fn log_filter() -> String {
     std::env::var(LOG).unwrap_or_else(|_| "warn".to_owned())
 }
 
+/// Reports whether devices refuse the use of what they support and the application did not enable.
+///
+/// # Errors
+/// [`Error::InitializationFailed`] for another value than 0 and 1.
+pub(crate) fn is_strict() -> Result<bool, Error> {
+    parse_switch(STRICT, variable(STRICT)?.as_deref())
+}
+
+/// A switch that is off, unless it is set.
+fn parse_switch(name: &str, value: Option<&str>) -> Result<bool, Error> {
+    match value {
+        None | Some("0") => Ok(false),
+        Some("1") => Ok(true),
+        Some(other) => Err(wrong_variable(name, other, "it is neither 0 nor 1")),
+    }
+}
+
+/// The type of device that applications are told of. It is that of a processor unless another one is asked for.
+///
+/// # Errors
+/// [`Error::InitializationFailed`] for an unknown name.
+pub(crate) fn device_type() -> Result<vk::PhysicalDeviceType, Error> {
+    parse_device_type(variable(DEVICE_TYPE)?.as_deref())
+}
+
+fn parse_device_type(name: Option<&str>) -> Result<vk::PhysicalDeviceType, Error> {
+    match name {
+        None | Some("cpu") => Ok(vk::PhysicalDeviceType::CPU),
+        Some("discrete") => Ok(vk::PhysicalDeviceType::DISCRETE_GPU),
+        Some("integrated") => Ok(vk::PhysicalDeviceType::INTEGRATED_GPU),
+        Some("virtual") => Ok(vk::PhysicalDeviceType::VIRTUAL_GPU),
+        Some("other") => Ok(vk::PhysicalDeviceType::OTHER),
+        Some(name) => {
+            Err(wrong_variable(DEVICE_TYPE, name, "it is none of cpu, discrete, integrated, virtual and other"))
+        }
+    }
+}
+
 /// The texts that are printed for readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dump {
@@ -344,6 +384,12 @@ mod tests {
         refused(|it| it.timeout = some("soon"), "GAURAST_TIMEOUT_MS=soon");
         refused(|it| it.optimizations = some("blocks,much"), "GAURAST_OPTIMIZATIONS=blocks,much: \"much\" is");
         refused(|it| it.timestamps = some("device"), "GAURAST_TIMESTAMPS=device");
+        assert_eq!(parse_device_type(None).unwrap(), vk::PhysicalDeviceType::CPU);
+        assert_eq!(parse_device_type(Some("integrated")).unwrap(), vk::PhysicalDeviceType::INTEGRATED_GPU);
+        assert!(parse_device_type(Some("gpu")).unwrap_err().to_string().contains("none of cpu"));
+        assert!(parse_switch(STRICT, Some("1")).unwrap() && !parse_switch(STRICT, None).unwrap());
+        assert!(!parse_switch(STRICT, Some("0")).unwrap());
+        assert!(parse_switch(STRICT, Some("yes")).is_err());
         assert!(Dump::parse("ir").unwrap().ir);
         assert!(!Dump::parse("").unwrap().ir);
         assert!(Dump::parse("ir,everything").is_err());

@@ -1,10 +1,11 @@
 //! Shader modules: SPIR-V, kept as words until a pipeline uses it; and the shader stages of pipelines, which are entry
-//! points of modules. A module may declare only capabilities that its device has enabled.
+//! points of modules. A module may declare only capabilities that its device has; those that are not enabled are warned of.
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::device::Device;
+use crate::enabled::Enabled;
 use crate::instance::device_extension_names;
 use crate::physical_device::limits;
 use crate::registry::features::{Features, SUPPORTED};
@@ -32,13 +33,12 @@ impl ShaderModule {
     /// Keeps a copy of SPIR-V.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares
-    /// a capability whose feature isn't enabled.
-    fn new(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<Self, Error> {
+    /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; otherwise as [`check_capabilities`].
+    fn new(words: &[u32], enabled: &Enabled) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
             return Err(Error::usage("VUID-VkShaderModuleCreateInfo-pCode-08738", "the code is not SPIR-V"));
         }
-        check_capabilities(words, features, extensions)?;
+        check_capabilities(words, enabled)?;
         Ok(Self { words: host::boxed(words) })
     }
 
@@ -59,19 +59,21 @@ impl ShaderModule {
     }
 }
 
-/// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are
-/// left for it to refuse.
+/// Checks that a module declares only capabilities that the device has, and warns of those that are not enabled.
+/// Capabilities that the translator doesn't know are left for it to refuse.
 ///
 /// # Errors
-/// [`Error::FeatureNotEnabled`] names the capability and the features or extensions that enable it.
-fn check_capabilities(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<(), Error> {
-    match declared(words)
-        .filter(|&capability| is_supported(capability))
-        .find(|&capability| !is_enabled(capability, features, extensions))
-    {
-        None => Ok(()),
-        Some(capability) => Err(not_enabled(capability)),
+/// [`Error::FeatureNotEnabled`] names a capability that the device lacks, and the features or extensions that enable it;
+/// on a strict device also one that is not enabled.
+fn check_capabilities(words: &[u32], enabled: &Enabled) -> Result<(), Error> {
+    for capability in declared(words).filter(|&capability| is_supported(capability)) {
+        if !is_enabled(capability, &SUPPORTED, device_extension_names()) {
+            return Err(not_enabled(capability, "which this device does not support"));
+        }
+        let is_enabled = is_enabled(capability, enabled.features(), enabled.extensions());
+        enabled.require(is_enabled, || not_enabled(capability, "which is not enabled"))?;
     }
+    Ok(())
 }
 
 /// Reports whether one of the features or extensions that enable a capability is enabled.
@@ -86,7 +88,8 @@ fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr])
         })
 }
 
-fn not_enabled(capability: Capability) -> Error {
+/// The error of a capability whose features are absent, in the way that `how` says.
+fn not_enabled(capability: Capability, how: &str) -> Error {
     // Things that the device doesn't support are named only if it supports none.
     let known: Vec<_> = enables(capability)
         .iter()
@@ -103,15 +106,10 @@ fn not_enabled(capability: Capability) -> Error {
         })
         .collect();
     let needed = if known.is_empty() { absent } else { known };
-    let what = if is_enabled(capability, &SUPPORTED, device_extension_names()) {
-        "which is not enabled"
-    } else {
-        "which this device does not support"
-    };
     Error::FeatureNotEnabled {
         vuid: "VUID-VkShaderModuleCreateInfo-pCode-08740",
         message: format!(
-            "the shader module declares the capability {capability:?}, which needs the feature {}, {what}",
+            "the shader module declares the capability {capability:?}, which needs the feature {}, {how}",
             needed.join(" or ")
         ),
     }
@@ -226,12 +224,12 @@ unsafe fn module(device: &Device, info: &vk::PipelineShaderStageCreateInfo<'_>) 
         if let Some(module) = handle::get_optional(info.module)? {
             return Ok(Arc::clone(module));
         }
-        if !device.features().graphics_pipeline_library {
-            return Err(Error::usage(
+        device.enabled().require(device.features().graphics_pipeline_library, || {
+            Error::usage(
                 "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
                 "module is VK_NULL_HANDLE, and graphicsPipelineLibrary is not enabled",
-            ));
-        }
+            )
+        })?;
         let code = valid::find_in_chain::<vk::ShaderModuleCreateInfo<'_>>(info.p_next);
         let code = code.ok_or_else(|| {
             Error::usage(
@@ -295,7 +293,7 @@ pub(crate) unsafe fn create_shader_module(
     let words = u32::try_from(create_info.code_size / 4).unwrap_or(0);
     // SAFETY: the caller's promise.
     let words = unsafe { valid::slice(create_info.p_code, words)? };
-    ShaderModule::new(words, device.features(), device.enabled().device_extensions).map(Arc::new)
+    ShaderModule::new(words, device.enabled()).map(Arc::new)
 }
 
 #[cfg(test)]
@@ -317,7 +315,8 @@ mod tests {
     #[test]
     fn capabilities_need_their_features() {
         let enabled = Features { shader_int64: true, shader_output_layer: true, ..Features::NONE };
-        let check = |capability| check_capabilities(&module(&[Capability::Shader, capability]), &enabled, &[]);
+        let enabled = Enabled::strict_with(enabled, &[]);
+        let check = |capability| check_capabilities(&module(&[Capability::Shader, capability]), &enabled);
         assert!(check(Capability::Int64).is_ok());
         assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
         assert!(check(Capability::GroupNonUniformArithmetic).is_ok());
@@ -329,6 +328,8 @@ mod tests {
             assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
             assert!(error.to_string().contains(words), "{error}");
         }
+        let lacking = check(Capability::StorageInputOutput16).unwrap_err().to_string();
+        assert!(lacking.contains("storageInputOutput16, which this device does not support"), "{lacking}");
     }
 
     #[test]
@@ -364,7 +365,7 @@ mod tests {
     #[test]
     fn what_is_malformed_declares_nothing() {
         for words in [&[][..], &[0x0723_0203], &[0; 6], &module(&[])[..6]] {
-            assert!(check_capabilities(words, &Features::NONE, &[]).is_ok());
+            assert!(check_capabilities(words, &Enabled::strict()).is_ok());
         }
     }
 }

@@ -1,10 +1,14 @@
 #!/usr/bin/env bash
 # Runs dEQP-VK, Khronos' conformance tests, on this driver, or on the one that VK_DRIVER_FILES names.
 #
-#   GAURAST_DEQP=PATH/TO/deqp-vk bash tests/conformance/deqp.sh [MODULE...] [--cases N] [--seed N] [--jobs N] [--results FILE]
+#   GAURAST_DEQP=PATH/TO/deqp-vk bash tests/conformance/deqp.sh [MODULE...] [--families] [--cases N] [--seed N] [--jobs N] [--results FILE] [--list]
 #
 # MODULE is the beginning of a case's name without `dEQP-VK.`, such as `api.info`; without one, all modules are run. Of each module
 # (of each first part of a name, such as `api`), N cases are drawn at random by the seed (1 by default); without --cases, all are run.
+# With --families, N cases (14 by default) are drawn of each family: of each first three parts of a name, or four or five in large modules
+# (`depth` below), so that rare kinds are not missed. What no feature of this driver concerns is left out: ray queries and ray tracing,
+# sparse resources, `info`, and shader objects. --list prints the cases that would be run, and runs none.
+#
 # GAURAST_DEQP_CASES names a file of cases, such as one of `mustpass`; without it, the cases are those that deqp-vk lists.
 #
 # A process runs up to 200 cases. After a crash or a time-out, the next process goes on behind the case. The results are lines of a
@@ -13,9 +17,11 @@
 set -euo pipefail
 repository=$(realpath "$(dirname "$0")/../..")
 
-modules=() drawn=0 seed=1 jobs=$(nproc) results=
+modules=() families= drawn= seed=1 jobs=$(nproc) results= list=
 while [ $# -gt 0 ]; do
     case $1 in
+    --families) families=1 ;;
+    --list) list=1 ;;
     --cases) drawn=$2 && shift ;;
     --seed) seed=$2 && shift ;;
     --jobs) jobs=$2 && shift ;;
@@ -28,11 +34,14 @@ while [ $# -gt 0 ]; do
     esac
     shift
 done
-if [ ! -x "${GAURAST_DEQP:-}" ]; then
+drawn=${drawn:-${families:+14}}
+drawn=${drawn:-0}
+if [ -x "${GAURAST_DEQP:-}" ]; then
+    GAURAST_DEQP=$(realpath "$GAURAST_DEQP")
+elif [ -z "$list" ] || [ -z "${GAURAST_DEQP_CASES:-}" ]; then
     echo "GAURAST_DEQP must name deqp-vk, built from VK-GL-CTS (docs/clients.md says how)" >&2
     exit 2
 fi
-GAURAST_DEQP=$(realpath "$GAURAST_DEQP")
 export GAURAST_DEQP VK_DRIVER_FILES=${VK_DRIVER_FILES:-$repository/driver/icd/gaurast_icd.json}
 
 work=$(mktemp -d)
@@ -48,18 +57,38 @@ if [ -z "$cases" ]; then
     sed -n 's/^TEST: //p' "$cases.listed" >"$cases"
 fi
 
-# Draws the cases: those of each module in a random order.
-awk -v modules="${modules[*]}" -v drawn="$drawn" -v seed="$seed" '
-    BEGIN { count = split(modules, wanted, " "); srand(seed) }
+# Draws the cases: those of each module, or family, in a random order.
+awk -v modules="${modules[*]}" -v families="$families" -v seed="$seed" '
+    BEGIN {
+        count = split(modules, wanted, " "); srand(seed)
+        depth["pipeline"] = depth["renderpasses"] = depth["draw"] = depth["compute"] = 4; depth["spirv_assembly"] = 5
+        without["sparse_resources"]; without["ray_query"]; without["ray_tracing_pipeline"]; without["info"]
+        linked["monolithic"]; linked["pipeline_library"]; linked["fast_linked_library"]
+    }
+    # The family of a name of n parts; empty for what is left out.
+    function family(n, last, name, i) {
+        if (parts[2] in without || parts[2] == "pipeline" && !(parts[3] in linked)) return ""
+        last = parts[2] in depth ? depth[parts[2]] : 3
+        if (last > n - 1) last = n - 1
+        name = parts[2]
+        for (i = 3; i <= last; i++) name = name "." parts[i]
+        return name
+    }
     {
         keep = count == 0
         for (i = 1; i <= count; i++) keep = keep || index($0 ".", "dEQP-VK." wanted[i] ".") == 1
-        if (keep) { split($0, parts, "."); printf "%s\t%.9f\t%s\n", parts[2], rand(), $0 }
-    }' "$cases" | sort -k1,1 -k2,2 |
-    awk -F '\t' -v drawn="$drawn" 'drawn == 0 || number[$1]++ < drawn { print $3 }' | sort >"$work/cases"
+        n = split($0, parts, ".")
+        group = families ? family(n) : parts[2]
+        if (keep && group != "") printf "%s\t%.9f\t%s\n", group, rand(), $0
+    }' "$cases" | LC_ALL=C sort -k1,1 -k2,2 |
+    awk -F '\t' -v drawn="$drawn" 'drawn == 0 || number[$1]++ < drawn { print $3 }' | LC_ALL=C sort >"$work/cases"
 if [ ! -s "$work/cases" ]; then
     echo "no case has a name that begins so" >&2
     exit 2
+fi
+if [ -n "$list" ]; then
+    cat "$work/cases"
+    exit
 fi
 split -l 200 "$work/cases" "$work/part."
 

@@ -8,8 +8,10 @@ use gaurast::vk::{
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::Case;
 use gaurast_testkit::devices::{gaussian, open, without_modes};
 use gaurast_testkit::scene::{Scene, camera, splat, splats};
+use gaurast_testkit::settings::strictly;
 use gaurast_testkit::{Gpu, Graphics, Shader};
 use std::collections::BTreeSet;
 
@@ -263,7 +265,11 @@ fn refused(gpu: &Gpu, request: &Graphics<'_>, result: vk::Result, what: &str) ->
 }
 
 #[gaurast_runner::test]
-fn every_statement_is_reported_by_its_id() {
+fn every_statement_is_reported_by_its_id(case: &Case) {
+    strictly(case, report_every_statement);
+}
+
+fn report_every_statement() {
     let mut tested = BTreeSet::new();
     let mut heard = |id: &'static str, messages: String| {
         assert!(messages.contains(&format!("({id})")), "{id}: {messages:?}");
@@ -373,7 +379,11 @@ fn without_the_topology() -> String {
 }
 
 #[gaurast_runner::test]
-fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
+fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so(case: &Case) {
+    strictly(case, draw_through_cameras_that_are_not_enabled);
+}
+
+fn draw_through_cameras_that_are_not_enabled() {
     let scene = Scene::on(without_modes(), &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], &splats());
     for model in [
         GaussianCameraModelGAURAST::ORTHOGRAPHIC,
@@ -393,4 +403,43 @@ fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
         let id = "VUID-VkGaussianCameraGAURAST-model-90079";
         assert!(messages.contains(id), "{messages:?}");
     }
+}
+
+/// Modes that are not enabled draw what they draw where they are, each with one warning.
+#[gaurast_runner::test]
+fn modes_that_are_not_enabled_draw_the_same() {
+    let request = with(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE));
+    let dynamic = request.with_dynamic(gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST);
+    let splats = [splat([0.0, 0.0, 5.0], 0.5, 0.8, [0.5, 0.2, 0.1]), splat([1.0, 0.0, 4.9], 0.5, 0.6, [0.1, 0.9, 0.3])];
+    let draw = |gpu: Gpu| {
+        let scene = Scene::on(gpu, &splats, &dynamic);
+        let pixels = scene.draw([0.25; 4], |device, commands| {
+            let extension = gaussian(&scene.gpu);
+            // SAFETY: see the crate.
+            unsafe {
+                extension.cmd_set_gaussian_cameras(commands, &[camera().model(GaussianCameraModelGAURAST::FISHEYE)]);
+                extension.cmd_set_gaussian_order(commands, GaussianOrderGAURAST::PRIMITIVE);
+                extension.cmd_begin_gaussian_set(commands);
+                device.cmd_draw(commands, 1, 1, 0, 0);
+                device.cmd_draw(commands, 1, 1, 1, 0);
+                extension.cmd_end_gaussian_set(commands);
+            }
+        });
+        (pixels, scene.gpu.messages())
+    };
+    let (expected, nothing) = draw(open());
+    assert!(nothing.is_empty() && expected.iter().any(|pixel| *pixel != [0.25; 4]), "{nothing:?}");
+    let (drawn, mut warnings) = draw(without_modes());
+    assert!(drawn == expected);
+    warnings.sort_by(|a, b| a.id.cmp(&b.id));
+    let ids: Vec<_> = warnings.iter().map(|warning| warning.id.as_str()).collect();
+    assert_eq!(
+        ids,
+        [
+            "VUID-VkGaussianCameraGAURAST-model-90079",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-90036",
+            "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
+        ]
+    );
 }

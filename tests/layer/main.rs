@@ -24,7 +24,7 @@ mod stage;
 use std::collections::{BTreeMap, BTreeSet};
 
 use gaurast_runner::{Case, Need, Variant};
-use gaurast_testkit::loader::{LAYER, with_the_layer};
+use gaurast_testkit::loader::{LAYER, strictly_with_the_layer, with_the_layer};
 use gaurast_testkit::{Driver, Gpu, Opening};
 
 use crate::stage::{Mistake, Stage, said_by_the_driver, said_by_the_layer};
@@ -86,7 +86,7 @@ fn every_statement_has_a_mistake_or_a_reason() {
 /// Each mistake is made; the page of all is what the layer and the driver say.
 #[gaurast_runner::test(needs = [Need::VulkanLoader])]
 fn each_mistake_has_its_message_and_no_other(case: &Case) {
-    with_the_layer(case, None, || {
+    strictly_with_the_layer(case, || {
         let stage = Stage::new();
         let mut wrong = Vec::new();
         let mut rows = Vec::new();

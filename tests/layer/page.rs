@@ -12,7 +12,8 @@ type Row = (&'static str, &'static str, Option<Message>, Message);
 const HEAD: &str = "# Mistakes\n\n\
     What this driver and the layer [`VK_LAYER_GAURAST_validation`](layer.md) say of mistakes. The layer's ids that begin with\n\
     `GAURAST` are of what is valid and surely not meant; so is most of what the driver says nothing of. Each row is made by\n\
-    `tests/layer`, which compares the page; `GAURAST_BLESS=1` has it written.\n";
+    `tests/layer`, which compares the page; `GAURAST_BLESS=1` has it written. The driver is strict here (`GAURAST_STRICT=1`): otherwise\n\
+    what is not enabled is a warning ([refusals.md](refusals.md)).\n";
 
 fn cell(text: &str) -> String {
     text.replace('|', "\\|").replace('\n', " ")

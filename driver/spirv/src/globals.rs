@@ -56,6 +56,8 @@ pub(crate) struct GlobalVariable {
     pub class: StorageClass,
     pub pointee: u32,
     pub initializer: Option<u32>,
+    /// The initializer, if it is a variable, to which this one then points. It is declared before this one.
+    pub initial_variable: Option<u32>,
 }
 
 /// All declarations before the functions of a module.
@@ -113,7 +115,8 @@ impl Globals {
             let ty = instruction.ty()?;
             let (class, pointee) = self.types.pointer(ty)?;
             let initializer = instruction.id(1).ok();
-            let variable = GlobalVariable { ty, class, pointee, initializer };
+            let initial_variable = initializer.filter(|id| self.variables.contains_key(id));
+            let variable = GlobalVariable { ty, class, pointee, initializer, initial_variable };
             self.variables.insert(instruction.result()?, variable);
             return Ok(());
         }

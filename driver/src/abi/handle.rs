@@ -40,6 +40,8 @@ pub(crate) trait Object: Send + Sync + 'static {
 pub(crate) trait Reporter {
     /// Receives an error of the Vulkan command `command`.
     fn report_error(&self, command: &str, error: &Error);
+    /// Receives a use that breaks a rule, and that the device does all the same.
+    fn report_warning(&self, error: &Error);
 }
 
 /// The handle type of an [`Object`]. Implemented by [`objects!`](crate::objects).

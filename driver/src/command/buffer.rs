@@ -8,6 +8,7 @@ use crate::abi::guard::guard;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid;
 use crate::device::Device;
+use crate::enabled::Enabled;
 use crate::physical_device::formats;
 use ash::vk;
 use simdevice::{Format, Packet, host};
@@ -282,14 +283,11 @@ impl Recorder {
     /// Starts a new recording.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if it is pending or recording.
-    pub(crate) fn begin(&mut self, flags: BeginFlags) -> Result<(), Error> {
-        if self.status == Status::Recording {
-            return Err(Error::usage(
-                "VUID-vkBeginCommandBuffer-commandBuffer-00049",
-                "the command buffer is already recording",
-            ));
-        }
+    /// [`Error::InvalidUsage`] if it is pending; a use of what is not allowed if it is recording.
+    pub(crate) fn begin(&mut self, enabled: &Enabled, flags: BeginFlags) -> Result<(), Error> {
+        enabled.require(self.status != Status::Recording, || {
+            Error::usage("VUID-vkBeginCommandBuffer-commandBuffer-00049", "the command buffer is already recording")
+        })?;
         self.reset()?;
         self.status = Status::Recording;
         self.pass = flags.inherited_pass.clone().map(|formats| RenderScope::Inherited { formats });
@@ -342,20 +340,21 @@ impl Recorder {
     /// Returns the recorded commands, for execution.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if it is not executable, or pending and not for simultaneous use.
-    pub(crate) fn submit(&mut self) -> Result<(Arc<Vec<Command>>, PendingUse), Error> {
+    /// [`Error::InvalidUsage`] if it is not executable; a use of what is not allowed if it is pending and not for
+    /// simultaneous use.
+    pub(crate) fn submit(&mut self, enabled: &Enabled) -> Result<(Arc<Vec<Command>>, PendingUse), Error> {
         let Some(commands) = self.finished.as_ref().filter(|_| self.status == Status::Executable) else {
             return Err(Error::usage(
                 "VUID-vkQueueSubmit-pCommandBuffers-00070",
                 format!("a command buffer is {:?}, not executable", self.status),
             ));
         };
-        if self.pending.load(Ordering::Acquire) > 0 && !self.flags.simultaneous {
-            return Err(Error::usage(
+        enabled.require(self.flags.simultaneous || self.pending.load(Ordering::Acquire) == 0, || {
+            Error::usage(
                 "VUID-vkQueueSubmit-pCommandBuffers-00071",
                 "a command buffer without VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT is pending already",
-            ));
-        }
+            )
+        })?;
         if self.flags.one_time {
             self.status = Status::Invalid;
         }
@@ -535,13 +534,14 @@ pub(crate) unsafe fn begin_command_buffer(
         },
     };
     let mut recorder = command_buffer.recorder();
-    if !recorder.is_initial() && !command_buffer.allows_reset() {
-        return Err(Error::usage(
+    let enabled = command_buffer.device().enabled();
+    enabled.require(recorder.is_initial() || command_buffer.allows_reset(), || {
+        Error::usage(
             "VUID-vkBeginCommandBuffer-commandBuffer-00050",
             "the command buffer's pool lacks VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT",
-        ));
-    }
-    recorder.begin(flags)
+        )
+    })?;
+    recorder.begin(enabled, flags)
 }
 
 #[doc(alias = "vkEndCommandBuffer")]
@@ -551,12 +551,12 @@ pub(crate) fn end_command_buffer(command_buffer: &CommandBuffer) -> Result<(), E
 
 #[doc(alias = "vkResetCommandBuffer")]
 pub(crate) fn reset_command_buffer(command_buffer: &CommandBuffer) -> Result<(), Error> {
-    if !command_buffer.allows_reset() {
-        return Err(Error::usage(
+    command_buffer.device().enabled().require(command_buffer.allows_reset(), || {
+        Error::usage(
             "VUID-vkResetCommandBuffer-commandBuffer-00046",
             "the command buffer's pool lacks VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT",
-        ));
-    }
+        )
+    })?;
     command_buffer.recorder().reset()
 }
 
@@ -593,11 +593,10 @@ mod tests {
     use super::*;
     use crate::instance::Instance;
     use crate::options::Options;
-    use crate::registry::features::Features;
 
     fn record(flags: BeginFlags) -> Recorder {
         let mut recorder = Recorder::new();
-        recorder.begin(flags).unwrap();
+        recorder.begin(&Enabled::strict(), flags).unwrap();
         recorder.packet(Packet::Barrier);
         recorder.end().unwrap();
         recorder
@@ -607,43 +606,43 @@ mod tests {
     fn a_recording_is_executable_again_and_again() {
         let mut recorder = record(BeginFlags::default());
         for _ in 0..2 {
-            let (commands, _pending) = recorder.submit().unwrap();
+            let (commands, _pending) = recorder.submit(&Enabled::strict()).unwrap();
             assert_eq!(commands.len(), 1);
         }
-        let pending = recorder.submit().unwrap();
-        assert!(recorder.submit().is_err(), "pending");
+        let pending = recorder.submit(&Enabled::strict()).unwrap();
+        assert!(recorder.submit(&Enabled::strict()).is_err(), "pending");
         assert!(recorder.reset().is_err(), "pending");
         drop(pending);
         recorder.reset().unwrap();
-        assert!(recorder.submit().is_err(), "initial");
+        assert!(recorder.submit(&Enabled::strict()).is_err(), "initial");
     }
 
     #[test]
     fn a_one_time_recording_is_submitted_once() {
         let mut recorder = record(BeginFlags { one_time: true, ..BeginFlags::default() });
-        drop(recorder.submit().unwrap());
-        assert!(recorder.submit().is_err());
-        recorder.begin(BeginFlags::default()).unwrap();
+        drop(recorder.submit(&Enabled::strict()).unwrap());
+        assert!(recorder.submit(&Enabled::strict()).is_err());
+        recorder.begin(&Enabled::strict(), BeginFlags::default()).unwrap();
     }
 
     #[test]
     fn simultaneous_use_allows_several_submissions() {
         let mut recorder = record(BeginFlags { simultaneous: true, ..BeginFlags::default() });
-        let _first = recorder.submit().unwrap();
-        recorder.submit().unwrap();
+        let _first = recorder.submit(&Enabled::strict()).unwrap();
+        recorder.submit(&Enabled::strict()).unwrap();
     }
 
     #[test]
     fn the_first_error_ends_up_at_the_end() {
         let mut recorder = Recorder::new();
         assert!(recorder.end().is_err(), "not recording");
-        recorder.begin(BeginFlags::default()).unwrap();
+        recorder.begin(&Enabled::strict(), BeginFlags::default()).unwrap();
         recorder.fail(Error::OutOfDeviceMemory("first".into()));
         recorder.fail(Error::OutOfDeviceMemory("second".into()));
         let error = recorder.end().unwrap_err();
         assert!(error.to_string().contains("first"));
-        assert!(recorder.submit().is_err(), "invalid");
-        recorder.begin(BeginFlags::default()).unwrap();
+        assert!(recorder.submit(&Enabled::strict()).is_err(), "invalid");
+        recorder.begin(&Enabled::strict(), BeginFlags::default()).unwrap();
         recorder.end().unwrap();
     }
 
@@ -651,19 +650,18 @@ mod tests {
     fn a_panic_while_recording_fails_the_recording() {
         let instance = Instance::new(vk::API_VERSION_1_3, &[], Options::default()).unwrap();
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        let features = Features::NONE;
-        let device = Device::new(instance, Vec::new(), features, simulated, &[]).unwrap();
+        let device = Device::new(instance, Enabled::strict(), simulated, &[]).unwrap();
         let buffer = CommandBuffer {
             device,
             level: vk::CommandBufferLevel::PRIMARY,
             allows_reset: true,
             recorder: Mutex::new(Recorder::new()),
         };
-        buffer.recorder().begin(Default::default()).unwrap();
+        buffer.recorder().begin(&Enabled::strict(), Default::default()).unwrap();
         let record = || buffer.record("vkCmdDraw", |_| panic!("in a test"));
         assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(record)).is_err());
         assert!(matches!(buffer.end(), Err(Error::Panic(_))));
-        buffer.recorder().begin(Default::default()).unwrap();
+        buffer.recorder().begin(&Enabled::strict(), Default::default()).unwrap();
         buffer.end().unwrap();
     }
 }

@@ -3,17 +3,16 @@
 use super::Command;
 use super::buffer::{CommandBuffer, Recorder};
 use crate::abi::error::Error;
+use std::sync::Arc;
 
 #[doc(alias = "vkCmdBeginGaussianSetGAURAST")]
 pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(), Error> {
-    let is_enabled = command_buffer.device().features().merged_draws;
+    let enabled = Arc::clone(command_buffer.device().enabled());
     command_buffer.record("vkCmdBeginGaussianSetGAURAST", |recorder| {
-        if !is_enabled {
-            return Err(Error::FeatureNotEnabled {
-                vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
-                message: "a set of draws is begun, but the feature mergedDraws is not enabled".into(),
-            });
-        }
+        enabled.require(enabled.features().merged_draws, || Error::FeatureNotEnabled {
+            vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
+            message: "a set of draws is begun, but the feature mergedDraws is not enabled".into(),
+        })?;
         recorder.require_pass()?;
         if recorder.has_gaussian_set {
             return Err(Error::usage(

@@ -185,11 +185,12 @@ fn not_begun(what: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::enabled::Enabled;
 
     #[test]
     fn passes_are_begun_and_ended() {
         let mut recorder = Recorder::new();
-        recorder.begin(Default::default()).unwrap();
+        recorder.begin(&Enabled::strict(), Default::default()).unwrap();
         assert!(cmd_end_rendering(&mut recorder).is_err());
         assert!(recorder.require_pass().is_err());
         begin_rendering(&mut recorder, Packet::Barrier).unwrap();

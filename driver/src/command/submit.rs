@@ -172,7 +172,7 @@ unsafe fn commands(command_buffers: impl Iterator<Item = vk::CommandBuffer>) -> 
                     "a secondary command buffer is submitted",
                 ));
             }
-            command_buffer.recorder().submit()
+            command_buffer.recorder().submit(command_buffer.device().enabled())
         })
         .collect()
 }
@@ -213,6 +213,7 @@ pub(crate) unsafe fn queue_submit2(
 mod tests {
     use super::*;
     use crate::device_sync::WaitResult;
+    use crate::enabled::Enabled;
     use crate::options::Options;
     use crate::queue::Queue;
     use simdevice::Allocation;
@@ -243,11 +244,14 @@ mod tests {
                 move || sync.wait(None, || fence.is_signaled())
             });
             let mut recorder = super::super::buffer::Recorder::new();
-            recorder.begin(Default::default()).unwrap();
+            recorder.begin(&Enabled::strict(), Default::default()).unwrap();
             commands.into_iter().for_each(|c| recorder.push(c));
             recorder.end().unwrap();
             let submission = Submission {
-                batches: vec![Batch { commands: vec![recorder.submit().unwrap()], ..Batch::default() }],
+                batches: vec![Batch {
+                    commands: vec![recorder.submit(&Enabled::strict()).unwrap()],
+                    ..Batch::default()
+                }],
                 fence: Some(fence),
                 sync: Arc::clone(&self.sync),
                 instance: Arc::clone(&self.instance),

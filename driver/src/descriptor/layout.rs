@@ -149,6 +149,21 @@ impl DescriptorSetLayout {
         last.filter(|_| self.has_variable_count)
     }
 
+    /// The most descriptors that the variable binding may have beside those of the other bindings (bytes, for an inline
+    /// uniform block); 0 without one.
+    fn max_variable_count(&self) -> u32 {
+        match self.variable_binding() {
+            None => 0,
+            Some(binding) if binding.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK => {
+                limits::MAX_INLINE_UNIFORM_BLOCK_SIZE
+            }
+            Some(binding) => {
+                let others = self.count() - binding.count as usize;
+                (limits::MAX_PER_SET_DESCRIPTORS as usize).saturating_sub(others) as u32
+            }
+        }
+    }
+
     /// The kinds of a set's descriptors, each with the number that it takes from its pool (bytes, for inline uniform
     /// blocks). The variable binding has `variable_count`.
     pub(crate) fn kinds(&self, variable_count: u32) -> impl Iterator<Item = (vk::DescriptorType, u64)> {
@@ -362,9 +377,7 @@ pub(crate) unsafe fn get_descriptor_set_layout_support(
     let most = limits::MAX_PER_SET_DESCRIPTORS as usize;
     let layout = layout.ok().filter(|layout| layout.count() <= most);
     support.supported = layout.is_some().into();
-    // The layout is supported, so its variable binding may have as many descriptors as it says.
-    let variable = layout.as_ref().and_then(|layout| layout.variable_binding());
-    let max_variable_count = variable.map_or(0, |binding| binding.count.max(binding.inline_bytes));
+    let max_variable_count = layout.map_or(0, |layout| layout.max_variable_count());
     support.for_each_chained(|mut structure| {
         if let Some(variable) = structure.cast::<vk::DescriptorSetVariableDescriptorCountLayoutSupport<'_>>() {
             variable.max_variable_descriptor_count = max_variable_count;
@@ -407,6 +420,23 @@ mod tests {
         assert_eq!(layout.binding(2).unwrap().first_dynamic, None);
         assert!(layout.index(4, 0).is_err(), "reserved only");
         assert!(layout.index(3, 0).is_err());
+    }
+
+    #[test]
+    fn a_variable_binding_may_have_what_the_others_leave() {
+        let kind = vk::DescriptorType::STORAGE_BUFFER;
+        let with_last = |kind, count| {
+            let flags = vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
+            let last = BindingInfo { flags, ..info(7, kind, count) };
+            DescriptorSetLayout::new(vec![info(1, vk::DescriptorType::SAMPLER, 5), last], NONE).unwrap()
+        };
+        for count in [0, 1, 100] {
+            assert_eq!(with_last(kind, count).max_variable_count(), limits::MAX_PER_SET_DESCRIPTORS - 5);
+            let inline = with_last(vk::DescriptorType::INLINE_UNIFORM_BLOCK, 4 * count);
+            assert_eq!(inline.max_variable_count(), limits::MAX_INLINE_UNIFORM_BLOCK_SIZE);
+        }
+        let fixed = DescriptorSetLayout::new(vec![info(1, kind, 5)], NONE).unwrap();
+        assert_eq!(fixed.max_variable_count(), 0);
     }
 
     #[test]

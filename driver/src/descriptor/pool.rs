@@ -5,6 +5,8 @@ use super::set::DescriptorSet;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
+use crate::device::Device;
+use crate::enabled::Enabled;
 use ash::vk;
 use std::collections::HashSet;
 use std::mem::MaybeUninit;
@@ -88,9 +90,10 @@ impl DescriptorPool {
     ///
     /// # Errors
     /// [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
-    /// [`Error::InvalidUsage`] if sets of the layout are updated after bind and those of the pool are not.
+    /// a use of what is not enabled if sets of the layout are updated after bind and those of the pool are not.
     pub(crate) fn allocate(
         &self,
+        enabled: &Enabled,
         layouts: Vec<Arc<DescriptorSetLayout>>,
         variable_counts: &[u32],
     ) -> Result<Vec<vk::DescriptorSet>, Error> {
@@ -98,12 +101,12 @@ impl DescriptorPool {
         let mut wanted = allocated.counts;
         let after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
         for (index, layout) in layouts.iter().enumerate() {
-            if layout.is_updated_after_bind() && !self.flags.contains(after_bind) {
-                return Err(Error::usage(
+            enabled.require(!layout.is_updated_after_bind() || self.flags.contains(after_bind), || {
+                Error::usage(
                     "VUID-VkDescriptorSetAllocateInfo-pSetLayouts-03044",
                     "a set that is updated after bind is wanted of a pool of other sets",
-                ));
-            }
+                )
+            })?;
             let variable = variable_counts.get(index).copied().unwrap_or(0);
             wanted = wanted.plus(DescriptorCounts::of(layout.kinds(variable)));
         }
@@ -133,19 +136,19 @@ impl DescriptorPool {
     /// Frees sets of this pool. Null handles are ignored.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if sets of this pool are not freed individually, or one is not of this pool; it is not
-    /// freed.
+    /// A use of what is not enabled if sets of this pool are not freed individually; [`Error::InvalidUsage`] if one is not
+    /// of this pool; it is not freed.
     ///
     /// # Safety
     /// Nothing uses the handles any more.
-    pub(crate) unsafe fn free(&self, sets: &[vk::DescriptorSet]) -> Result<(), Error> {
+    pub(crate) unsafe fn free(&self, enabled: &Enabled, sets: &[vk::DescriptorSet]) -> Result<(), Error> {
         let frees = vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET;
-        if !self.flags.contains(frees) {
-            return Err(Error::usage(
+        enabled.require(self.flags.contains(frees), || {
+            Error::usage(
                 "VUID-vkFreeDescriptorSets-descriptorPool-00312",
                 "the pool was made without VK_DESCRIPTOR_POOL_CREATE_FREE_DESCRIPTOR_SET_BIT",
-            ));
-        }
+            )
+        })?;
         let null = vk::DescriptorSet::null();
         let mut allocated = self.lock();
         for &set in sets.iter().filter(|&&set| set != null) {
@@ -215,6 +218,7 @@ pub(crate) unsafe fn reset_descriptor_pool(descriptor_pool: &DescriptorPool) -> 
 /// The allocate info and its handles are valid.
 #[doc(alias = "vkAllocateDescriptorSets")]
 pub(crate) unsafe fn allocate_descriptor_sets(
+    device: &Device,
     allocate_info: &vk::DescriptorSetAllocateInfo<'_>,
     descriptor_sets: &mut [MaybeUninit<vk::DescriptorSet>],
 ) -> Result<(), Error> {
@@ -236,7 +240,7 @@ pub(crate) unsafe fn allocate_descriptor_sets(
             "a set is allocated whose layout is for pushed descriptors",
         ));
     }
-    for (place, set) in descriptor_sets.iter_mut().zip(pool.allocate(layouts, variable_counts)?) {
+    for (place, set) in descriptor_sets.iter_mut().zip(pool.allocate(device.enabled(), layouts, variable_counts)?) {
         place.write(set);
     }
     Ok(())
@@ -246,9 +250,10 @@ pub(crate) unsafe fn allocate_descriptor_sets(
 /// Nothing uses the sets any more.
 #[doc(alias = "vkFreeDescriptorSets")]
 pub(crate) unsafe fn free_descriptor_sets(
+    device: &Device,
     descriptor_pool: &DescriptorPool,
     descriptor_sets: &[vk::DescriptorSet],
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
-    unsafe { descriptor_pool.free(descriptor_sets) }
+    unsafe { descriptor_pool.free(device.enabled(), descriptor_sets) }
 }

@@ -1821,6 +1821,7 @@ unsafe extern "system" fn vkAllocateDescriptorSets(
     // SAFETY: the application follows Vulkan's valid usage.
     guard(device, "vkAllocateDescriptorSets", || unsafe {
         descriptor::pool::allocate_descriptor_sets(
+            handle::get(device)?,
             valid::input(p_allocate_info)?,
             valid::output_slice(p_descriptor_sets, valid::input(p_allocate_info)?.descriptor_set_count as usize)?,
         )
@@ -1836,6 +1837,7 @@ unsafe extern "system" fn vkFreeDescriptorSets(
     // SAFETY: the application follows Vulkan's valid usage.
     guard(device, "vkFreeDescriptorSets", || unsafe {
         descriptor::pool::free_descriptor_sets(
+            handle::get(device)?,
             handle::get(descriptor_pool)?,
             valid::slice(p_descriptor_sets, descriptor_set_count)?,
         )

@@ -158,5 +158,5 @@ pub(super) fn get_device_proc_addr(
     device: &Device,
     name: &CStr,
 ) -> Result<vk::PFN_vkVoidFunction, Error> {
-    Ok(commands.device_command(name, &device.enabled()))
+    Ok(commands.device_command(name, &device.enabled_extensions()))
 }

@@ -37,8 +37,8 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
-/// Reports whether components are integers that are read as floating point. Such formats are for vertex attributes
-/// only.
+/// Reports whether components are integers that are read as floating point. Such formats are for vertex attributes,
+/// copies and blits.
 fn is_scaled(format: Format) -> bool {
     matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
 }
@@ -57,7 +57,10 @@ const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
 /// The features of images of the format, of either tiling.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_scaled(format) {
-        return vk::FormatFeatureFlags::empty();
+        return vk::FormatFeatureFlags::TRANSFER_SRC
+            | vk::FormatFeatureFlags::TRANSFER_DST
+            | vk::FormatFeatureFlags::BLIT_SRC
+            | vk::FormatFeatureFlags::BLIT_DST;
     }
     if is_compressed(format) {
         return vk::FormatFeatureFlags::TRANSFER_SRC
@@ -138,11 +141,8 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
     let Some(format) = device_format(format) else {
         return vk::FormatProperties::default();
     };
-    let linear = if is_color(format) && !is_compressed(format) {
-        image_features(format)
-    } else {
-        vk::FormatFeatureFlags::empty()
-    };
+    // Texels, or blocks of them, lie in rows with either tiling.
+    let linear = if is_color(format) { image_features(format) } else { vk::FormatFeatureFlags::empty() };
     vk::FormatProperties {
         linear_tiling_features: linear,
         optimal_tiling_features: image_features(format),
@@ -211,6 +211,22 @@ fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) 
     supported.contains(usage)
 }
 
+/// The flags of images whose usage may be that of any format that their views may have.
+const VIEWED_FORMATS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
+    vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw() | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw(),
+);
+
+/// The features of all formats that views of an image of the format may have. Uncompressed colours of one size are
+/// compatible.
+fn features_of_views(format: Format) -> vk::FormatFeatureFlags {
+    let is_plain = |format: Format| is_color(format) && !is_compressed(format);
+    if !is_plain(format) {
+        return image_features(format);
+    }
+    let compatible = Format::ALL.iter().filter(|&&it| is_plain(it) && it.texel_size() == format.texel_size());
+    compatible.fold(vk::FormatFeatureFlags::empty(), |features, &it| features | image_features(it))
+}
+
 /// The description of a queried image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImageQuery {
@@ -238,6 +254,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         vk::ImageTiling::OPTIMAL => properties.optimal_tiling_features,
         vk::ImageTiling::LINEAR => properties.linear_tiling_features,
         _ => return refuse(format!("image tiling {tiling:?} is not supported")),
+    };
+    let features = match device_format(format) {
+        Some(format) if !features.is_empty() && flags.contains(VIEWED_FORMATS) => features | features_of_views(format),
+        _ => features,
     };
     if features.is_empty() {
         return refuse(format!("{tiling:?} images of format {format:?} are not supported"));
@@ -269,13 +289,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         && !is_linear
         && ty == vk::ImageType::TYPE_2D
         && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
-    if is_linear && ty != vk::ImageType::TYPE_2D {
-        return refuse("linear images have two dimensions".to_owned());
-    }
     Ok(vk::ImageFormatProperties {
         max_extent,
-        max_mip_levels: if is_linear { 1 } else { max_extent.width.ilog2() + 1 },
-        max_array_layers: if is_linear { 1 } else { layers },
+        max_mip_levels: max_extent.width.ilog2() + 1,
+        max_array_layers: layers,
         sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
         max_resource_size: memory::heap_size(),
     })

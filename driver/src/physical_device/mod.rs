@@ -9,6 +9,7 @@ use self::formats::ImageQuery;
 use crate::abi::error::Error;
 use crate::abi::valid::{self, OutputChain, Structures};
 use crate::instance::extension_properties;
+use crate::options;
 use crate::registry::{self, features::SUPPORTED};
 use ash::vk;
 use std::ffi::CStr;
@@ -54,16 +55,24 @@ fn image_format_answer(query: ImageQuery, out: &mut vk::ImageFormatProperties) -
     }
 }
 
+/// The core properties, with the type of device that the environment asks for. A wrong value is refused when a device is
+/// created.
+fn core_properties() -> vk::PhysicalDeviceProperties {
+    let mut properties = limits::properties().core();
+    properties.device_type = options::device_type().unwrap_or(properties.device_type);
+    properties
+}
+
 #[doc(alias = "vkGetPhysicalDeviceProperties")]
 pub(crate) fn get_physical_device_properties() -> Result<vk::PhysicalDeviceProperties, Error> {
-    Ok(limits::properties().core())
+    Ok(core_properties())
 }
 
 #[doc(alias = "vkGetPhysicalDeviceProperties2")]
 pub(crate) fn get_physical_device_properties2(
     mut properties: OutputChain<'_, vk::PhysicalDeviceProperties2<'_>>,
 ) -> Result<(), Error> {
-    properties.properties = limits::properties().core();
+    properties.properties = core_properties();
     properties.for_each_chained(|out| limits::properties().write(out));
     Ok(())
 }

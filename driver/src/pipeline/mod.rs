@@ -126,12 +126,12 @@ unsafe fn libraries<'a>(info: &'a vk::GraphicsPipelineCreateInfo<'_>) -> Result<
 /// The create info and its chain are valid.
 unsafe fn new_graphics_pipeline(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<Pipeline, Error> {
     let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
-    if is_library && !device.features().graphics_pipeline_library {
-        return Err(Error::FeatureNotEnabled {
+    device.enabled().require(!is_library || device.features().graphics_pipeline_library, || {
+        Error::FeatureNotEnabled {
             vuid: "VUID-VkGraphicsPipelineCreateInfo-graphicsPipelineLibrary-06606",
             message: "flags has VK_PIPELINE_CREATE_LIBRARY_BIT_KHR, and graphicsPipelineLibrary is not enabled".into(),
-        });
-    }
+        }
+    })?;
     // SAFETY: the caller's promise.
     let mut graphics = unsafe {
         write_empty_creation_feedback(info.p_next)?;

@@ -67,7 +67,7 @@ impl PrimitivePipeline {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(device: &Device, graphics: &GraphicsState) -> Result<Self, Error> {
         if !device.features().primitive_topology_list_restart {
-            graphics.require_no_list_restart()?;
+            graphics.require_no_list_restart().or_else(|error| device.enabled().tolerate(error))?;
         }
         let mut fixed = FixedFunctionState::new(graphics)?;
         fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
@@ -212,25 +212,24 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Refuses stages whose features are not enabled.
+/// Requires the features of stages.
 fn require_features(device: &Device, tessellates: bool, has_geometry: bool) -> Result<(), Error> {
-    let features = device.features();
-    if tessellates && !features.tessellation_shader {
-        return Err(Error::usage(
+    let (enabled, features) = (device.enabled(), device.features());
+    enabled.require(!tessellates || features.tessellation_shader, || {
+        Error::usage(
             "VUID-VkPipelineShaderStageCreateInfo-stage-00705",
             "the pipeline has tessellation stages, and tessellationShader is not enabled",
-        ));
-    }
-    if has_geometry && !features.geometry_shader {
-        return Err(Error::usage(
+        )
+    })?;
+    enabled.require(!has_geometry || features.geometry_shader, || {
+        Error::usage(
             "VUID-VkPipelineShaderStageCreateInfo-stage-00704",
             "the pipeline has a geometry stage, and geometryShader is not enabled",
-        ));
-    }
-    Ok(())
+        )
+    })
 }
 
-/// Refuses a topology with adjacent vertices if its feature is not enabled.
+/// Requires the feature of a topology with adjacent vertices.
 fn check_adjacency(device: &Device, topology: vk::PrimitiveTopology) -> Result<(), Error> {
     use vk::PrimitiveTopology as T;
     let is_adjacent = matches!(
@@ -240,13 +239,12 @@ fn check_adjacency(device: &Device, topology: vk::PrimitiveTopology) -> Result<(
             | T::TRIANGLE_LIST_WITH_ADJACENCY
             | T::TRIANGLE_STRIP_WITH_ADJACENCY
     );
-    if is_adjacent && !device.features().geometry_shader {
-        return Err(Error::usage(
+    device.enabled().require(!is_adjacent || device.features().geometry_shader, || {
+        Error::usage(
             "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-00429",
             format!("the topology is {topology:?}, and geometryShader is not enabled"),
-        ));
-    }
-    Ok(())
+        )
+    })
 }
 
 /// Refuses patches without tessellation, and tessellation of other primitives.

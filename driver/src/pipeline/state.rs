@@ -131,13 +131,18 @@ fn attachment_states(graphics: &GraphicsState) -> Result<Vec<AttachmentState>, E
         let states = (0..count).map(|index| with_enables(index, AttachmentState::WRITTEN));
         return Ok(states.collect());
     }
-    if graphics.fragment_output.blend.len() != graphics.fragment_output.color_formats.len() {
+    let formats = &graphics.fragment_output.color_formats;
+    if graphics.fragment_output.blend.is_empty() && formats.iter().all(|&format| format == vk::Format::UNDEFINED) {
+        // No attachment is used, so there need be no blend state.
+        return Ok(vec![AttachmentState::WRITTEN; formats.len()]);
+    }
+    if graphics.fragment_output.blend.len() != formats.len() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
             format!(
                 "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
                 graphics.fragment_output.blend.len(),
-                graphics.fragment_output.color_formats.len()
+                formats.len()
             ),
         ));
     }

@@ -93,7 +93,7 @@ struct Open {
 impl Open {
     fn new() -> Self {
         let settings = Settings { timeout: Some(TIMEOUT), ..Settings::default() };
-        let opening = Opening { settings, robust: true, ..Opening::of(Driver::Embedded) };
+        let opening = Opening { settings, robust: true, bare: true, ..Opening::of(Driver::Embedded) };
         let gpu = Gpu::open(&opening).expect("a device");
         Self { buffer: Buffer::new(&gpu, BYTES as u64), gpu }
     }

@@ -103,6 +103,18 @@ pub fn with_the_layer(case: &Case, settings: Option<&str>, inside: impl FnOnce()
     loaded(case, add, inside);
 }
 
+/// As [`with_the_layer`], where devices refuse the use of what is not enabled.
+///
+/// # Panics
+/// As [`through_the_loader`].
+pub fn strictly_with_the_layer(case: &Case, inside: impl FnOnce()) {
+    let add = |command: &mut Command, folder: &Path| {
+        layer_manifest(folder);
+        command.env("VK_ADD_LAYER_PATH", folder).env("GAURAST_STRICT", "1");
+    };
+    loaded(case, add, inside);
+}
+
 fn loaded(case: &Case, add: impl FnOnce(&mut Command, &Path), inside: impl FnOnce()) {
     if case.is_alone() {
         return inside();

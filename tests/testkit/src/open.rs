@@ -72,6 +72,8 @@ pub struct Opening<'a> {
     pub gaussian: Option<GaussianFeatures<'static>>,
     /// True to make access beyond a resource's end robust. It costs time.
     pub robust: bool,
+    /// True to enable nothing else but [`Opening::extensions`], without their features.
+    pub bare: bool,
 }
 
 impl Opening<'_> {
@@ -86,6 +88,7 @@ impl Opening<'_> {
             all_extensions: false,
             gaussian: None,
             robust: false,
+            bare: false,
         }
     }
 }
@@ -269,7 +272,7 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
     let mut divisor = vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::default();
     let has_gaussians = has_gaussians(instance, physical_device);
     let mut names: Vec<_> = opening.extensions.iter().map(|name| name.as_ptr()).collect();
-    if has_gaussians {
+    if has_gaussians && !opening.bare {
         names.push(gaussian_primitive_topology::NAME.as_ptr());
     }
     let mut features = vk::PhysicalDeviceFeatures2::default()
@@ -305,6 +308,16 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
             vulkan_1_3.robust_image_access = vk::FALSE;
         }
         gaussian = opening.gaussian.unwrap_or(gaussian);
+        if opening.bare {
+            core = vk::PhysicalDeviceFeatures { robust_buffer_access: core.robust_buffer_access, ..Default::default() };
+            vulkan_1_1 = vk::PhysicalDeviceVulkan11Features::default();
+            vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
+            vulkan_1_3 = vk::PhysicalDeviceVulkan13Features {
+                robust_image_access: vulkan_1_3.robust_image_access,
+                ..Default::default()
+            };
+            gaussian = opening.gaussian.unwrap_or_default();
+        }
         let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_features(&core)
@@ -312,7 +325,7 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
             .push_next(&mut vulkan_1_1)
             .push_next(&mut vulkan_1_2)
             .push_next(&mut vulkan_1_3);
-        if has_gaussians {
+        if has_gaussians && (!opening.bare || opening.gaussian.is_some()) {
             info = info.push_next(&mut gaussian);
         }
         if opening.all_extensions {

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use gaurast::WorkTrace;
 use gaurast::vk::{DriverOptionsGAURAST, SimdLevelGAURAST};
+use gaurast_runner::Case;
 
 /// The settings of a device: the options of this driver, `VkDriverOptionsGAURAST`. `None` is an option's default.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,6 +53,19 @@ impl Settings<'_> {
         }
         options
     }
+}
+
+/// Runs `inside` in a process of its own, where devices refuse the use of what is not enabled.
+///
+/// # Panics
+/// If it fails there.
+pub fn strictly(case: &Case, inside: impl FnOnce()) {
+    if case.is_alone() {
+        return inside();
+    }
+    case.run_alone(|command| {
+        command.env("GAURAST_STRICT", "1");
+    });
 }
 
 /// The SIMD level of a name of the variable `GAURAST_SIMD`.

@@ -1,6 +1,7 @@
 //! The chapter *Devices and Queues*.
 //!
-//! Unit tests: `driver/src/device.rs`, `driver/src/queue.rs`.
+//! Unit tests: `driver/src/device.rs`, `driver/src/enabled.rs`, `driver/src/queue.rs`.
 
+mod not_enabled;
 mod queues;
 mod watchdog;

@@ -135,6 +135,42 @@ fn the_environment_wins(case: &Case) {
     assert_eq!(use_device(&context), expected);
 }
 
+/// A variant for each value of `GAURAST_DEVICE_TYPE`.
+fn device_types() -> Vec<Variant> {
+    ["cpu", "discrete", "integrated", "virtual", "other", "gpu"].map(Variant::new).into()
+}
+
+/// The device reports the type that the environment asks for, and no device is created for an unknown one.
+#[gaurast_runner::test(each = device_types())]
+fn the_device_reports_another_type(case: &Case) {
+    if !case.is_alone() {
+        return case.run_alone(|command| {
+            command.env("GAURAST_DEVICE_TYPE", case.variant());
+        });
+    }
+    let messages = Messages::default();
+    let context = instance(vulkan_gaurast::entry(), &[], DriverOptionsGAURAST::default(), &messages);
+    let expected = match case.variant() {
+        "discrete" => vk::PhysicalDeviceType::DISCRETE_GPU,
+        "integrated" => vk::PhysicalDeviceType::INTEGRATED_GPU,
+        "virtual" => vk::PhysicalDeviceType::VIRTUAL_GPU,
+        "other" => vk::PhysicalDeviceType::OTHER,
+        _ => vk::PhysicalDeviceType::CPU,
+    };
+    let mut second = vk::PhysicalDeviceProperties2::default();
+    // SAFETY: the physical device is the instance's.
+    let first = unsafe {
+        context.instance.get_physical_device_properties2(context.physical_device, &mut second);
+        context.instance.get_physical_device_properties(context.physical_device)
+    };
+    assert_eq!((first.device_type, second.properties.device_type), (expected, expected));
+    let created = match case.variant() {
+        "gpu" => Err(vk::Result::ERROR_INITIALIZATION_FAILED),
+        _ => Ok(()),
+    };
+    assert_eq!(use_device(&context), created);
+}
+
 /// A function that is null, and options of zeros, are the defaults.
 #[gaurast_runner::test]
 fn zeros_are_the_defaults() {

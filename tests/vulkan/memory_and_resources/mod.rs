@@ -3,3 +3,5 @@
 //! Unit tests: `driver/src/resource`.
 
 mod device_memory;
+mod extended_usage;
+mod linear_images;

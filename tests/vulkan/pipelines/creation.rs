@@ -1,9 +1,11 @@
 //! Valid pipelines of points, lines and triangles, and the messages about invalid ones.
 
 use ash::vk;
+use gaurast_runner::Case;
 use gaurast_testkit::canvas::colored;
 use gaurast_testkit::devices::open;
 use gaurast_testkit::scene::replace;
+use gaurast_testkit::settings::strictly;
 use gaurast_testkit::shader::spirv;
 use gaurast_testkit::{Gpu, Graphics, Shader};
 
@@ -26,7 +28,11 @@ fn assert_refused(gpu: &Gpu, request: &Graphics<'_>, error: vk::Result, word: &s
 }
 
 #[gaurast_runner::test]
-fn every_topology_has_pipelines() {
+fn every_topology_has_pipelines(case: &Case) {
+    strictly(case, create_pipelines_of_every_topology);
+}
+
+fn create_pipelines_of_every_topology() {
     let gpu = open();
     use vk::PrimitiveTopology as T;
     for topology in [
@@ -82,6 +88,18 @@ fn stages_are_those_that_the_device_has() {
     request.shaders[1].stage = vk::ShaderStageFlags::FRAGMENT;
     let invalid = vk::Result::ERROR_INVALID_SHADER_NV;
     assert_refused(&gpu, &request, invalid, "no vertex entry point");
+}
+
+/// Without used colour attachments there need be no blend state; with one, there must be.
+#[gaurast_runner::test]
+fn unused_attachments_need_no_blend_state() {
+    let gpu = open();
+    let unused = vk::Format::UNDEFINED;
+    for formats in [vec![], vec![unused], vec![unused; 3]] {
+        assert_made(&gpu, &Graphics { formats, blend: Vec::new(), ..colored() });
+    }
+    let formats = vec![unused, gaurast_testkit::scene::FORMAT];
+    assert_refused(&gpu, &Graphics { formats, blend: Vec::new(), ..colored() }, USAGE, "attachmentCount is 0");
 }
 
 #[gaurast_runner::test]

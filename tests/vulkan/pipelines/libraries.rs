@@ -8,7 +8,9 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::scenes;
+use gaurast_runner::Case;
 use gaurast_testkit::devices::own;
+use gaurast_testkit::settings::strictly;
 use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::shader::{Stage, compile};
 use gaurast_testkit::{
@@ -512,7 +514,11 @@ fn pipelines_of_gaussians_are_linked() {
 
 /// Stages without libraries may have their shader's code, too, in pipelines of any kind.
 #[gaurast_runner::test(needs = [GLSLANG])]
-fn stages_have_code_in_place_of_modules() {
+fn stages_have_code_in_place_of_modules(case: &Case) {
+    strictly(case, create_stages_with_code);
+}
+
+fn create_stages_with_code() {
     let gpu = device();
     let target = target(gpu);
     let plain = plain(&target);
@@ -557,7 +563,11 @@ fn refused(gpu: &Gpu, graphics: &Graphics<'_>, result: vk::Result, id: &str) {
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]
-fn invalid_use_is_refused() {
+fn invalid_use_is_refused(case: &Case) {
+    strictly(case, use_libraries_wrongly);
+}
+
+fn use_libraries_wrongly() {
     let gpu = device();
     let target = target(gpu);
     let plain = plain(&target);

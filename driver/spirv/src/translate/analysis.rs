@@ -103,10 +103,12 @@ impl Analysis {
 
     fn instruction(&mut self, module: &Module, globals: &Globals, instruction: &Instruction) -> Result<()> {
         for index in 0..instruction.operands.len() {
-            if let Ok(id) = instruction.id(index)
-                && globals.variables.contains_key(&id)
+            let mut used = instruction.id(index).ok();
+            while let Some(id) = used
+                && let Some(variable) = globals.variables.get(&id)
             {
                 self.used.insert(id);
+                used = variable.initial_variable;
             }
         }
         if let (Some(id), Some(ty)) = (instruction.result_id, instruction.result_type) {

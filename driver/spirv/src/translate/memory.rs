@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use isa::ir::{Format, Reg};
 use isa::op::Op as Ir;
+use spirv::{BuiltIn, Decoration, MemoryAccess};
 
 use super::descriptors::mark_written;
 use super::promoted::PromotedPart;
@@ -38,8 +39,26 @@ pub fn load(t: &mut Translator, instruction: &Instruction) -> Result<()> {
         };
         return t.define_as(instruction, value);
     }
+    if is_current_helper(t, instruction, &pointer) {
+        let helper = t.emit.builder.is_helper();
+        return t.define(instruction, vec![helper]);
+    }
     let regs = load_from(t, &pointer)?;
     t.define(instruction, regs)
+}
+
+/// Reports whether a load is of `HelperInvocation` and volatile, by its operands or the variable's decoration: then it
+/// reads whether the invocation is a helper now. Otherwise it reads what was so at the beginning.
+fn is_current_helper(t: &Translator, instruction: &Instruction, pointer: &Pointer) -> bool {
+    let Pointer::PromotedVariable { variable, .. } = pointer else {
+        return false;
+    };
+    let Some(input) = t.promoted.variables[*variable].input else {
+        return false;
+    };
+    let is_helper = t.module.built_in(input) == Some(BuiltIn::HelperInvocation);
+    let access = instruction.enumerant(1, MemoryAccess::from_bits).unwrap_or(MemoryAccess::NONE);
+    is_helper && (access.contains(MemoryAccess::VOLATILE) || t.module.has(input, Decoration::Volatile))
 }
 
 /// Translates `OpStore`.

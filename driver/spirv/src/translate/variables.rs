@@ -44,8 +44,11 @@ pub fn global_variables(t: &mut Translator) -> Result<(), Error> {
     Ok(())
 }
 
-/// The pointer to a variable outside functions.
+/// The pointer to a variable outside functions, which is created once.
 fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
+    if let Some(value) = t.values.get(&id) {
+        return Ok(value.clone());
+    }
     let Some(variable) = t.globals.variables.get(&id).copied() else {
         return malformed(format!("%{id} isn't a variable"));
     };
@@ -88,6 +91,9 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
     if let Some(initializer) = variable.initializer
         && class != StorageClass::Workgroup
     {
+        if let Some(target) = variable.initial_variable {
+            global_variable(t, target)?;
+        }
         let regs = t.regs(initializer)?;
         store_to(t, &pointer, &regs)?;
     }

@@ -454,3 +454,30 @@ fn capabilities_that_need_no_feature_are_accepted() {
         assert!(translated.is_ok(), "{capability:?}: {:?}", translated.err());
     }
 }
+
+#[gaurast_runner::test]
+fn private_variables_begin_as_pointers_to_other_variables() {
+    let found = run("pointer_initializers.comp", &[], LANES);
+    for (lane, found) in found.iter().enumerate() {
+        let other = (LANES - 1 - lane) as u32;
+        assert_eq!(*found, other + other * other, "lane {lane}");
+    }
+}
+
+#[gaurast_runner::test]
+fn constants_are_quantized_as_running_values_are() {
+    // Halves, binary16's greatest denormal and least normal number, and numbers that round up to the latter or overflow.
+    for bits in [0x3f00_0000, 0x387f_c000, 0xb87f_c000, 0x3880_0000, 0xb87f_ffff, 0x3300_0000, 0x477f_f000, 0xff80_0000]
+    {
+        let mut specialization = Specialization::default();
+        specialization.set(0, &u32::to_le_bytes(bits));
+        let shader = translated("quantized_constants.comp", &specialization);
+        let results = buffer(&[0xdead_beef; 2 * LANES]);
+        Dispatch { buffers: &[((0, 0, 0), &results)], ..Dispatch::new(&shader, [1, 1, 1]) }.run().unwrap();
+        let value = f32::from_bits(bits);
+        let rounded = half::f16::from_f32(value).to_f32();
+        let is_denormal = rounded.abs() < 2.0_f32.powi(-14);
+        let expected = if is_denormal { 0.0_f32.copysign(value) } else { rounded };
+        assert_eq!(contents(&results), [expected.to_bits(); 2 * LANES], "{value}");
+    }
+}

@@ -125,3 +125,18 @@ fn initialized_outputs_are_written_though_no_code_names_them() {
     let values = outputs.iter().map(|lanes| lanes.map(|output| output[0]));
     assert!(values.eq([[0.5; LANES], [0.25; LANES]]), "{outputs:?}");
 }
+
+#[gaurast_runner::test]
+fn a_volatile_load_reads_whether_the_invocation_is_a_helper_now() {
+    let shader = translated("volatile_helper.frag", &Specialization::default());
+    let outputs = run(&shader, |source, lane| match source {
+        InputSource::BuiltIn { built_in: BuiltIn::FragCoord, component } => {
+            (pixel(lane)[component as usize] + 0.5).to_bits()
+        }
+        other => panic!("{other:?}"),
+    });
+    for (lane, found) in outputs[0].iter().enumerate() {
+        let demoted = (lane % 2) as f32;
+        assert_eq!(*found, [0.0, 0.0, demoted, demoted], "lane {lane}");
+    }
+}

@@ -39,8 +39,8 @@ pub(crate) enum DrawError {
         cameras: usize,
     },
     /// The camera's model is not enabled.
-    #[error("the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-90079)")]
-    CameraModel(CameraModel),
+    #[error("{0}")]
+    CameraModel(String),
     /// The camera's model doesn't support the pipeline's modes.
     #[error(
         "the pipeline's geometry and precision do not go with a camera whose model is {0:?} \

@@ -167,9 +167,8 @@ fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Cam
 
 /// Refuses a camera whose model is not enabled, or doesn't support the pipeline's modes.
 fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), DrawError> {
-    if !gaussian.camera_models.have(camera.model) {
-        return Err(DrawError::CameraModel(camera.model));
-    }
+    let required = gaussian.dynamic_rules.require_camera_model(camera.model);
+    required.map_err(|error| DrawError::CameraModel(error.to_string()))?;
     let state = &gaussian.state;
     let is_supported = match camera.model {
         CameraModel::Pinhole | CameraModel::Orthographic => true,

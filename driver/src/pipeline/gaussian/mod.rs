@@ -13,7 +13,7 @@ use crate::abi::error::Error;
 use crate::convert;
 use crate::descriptor::layout::LayoutBinding;
 use crate::device::Device;
-use crate::registry::features::Features;
+use crate::enabled::Enabled;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
@@ -22,8 +22,7 @@ use gaurast::vk::{
 };
 use simdevice::packet::Activations;
 use simdevice::state::gaussian::{
-    CameraModel, GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision,
-    GaussianState,
+    GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
 };
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -37,7 +36,7 @@ pub(crate) struct GaussianPipeline {
     pub(crate) fixed: FixedFunctionState,
     /// The dynamic states of fragment operations.
     pub(crate) dynamic: Vec<vk::DynamicState>,
-    /// The limits and features for the values of these states.
+    /// The limits and enabled features for the values of these states, and for cameras.
     pub(crate) dynamic_rules: DynamicRules,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,
@@ -47,8 +46,6 @@ pub(crate) struct GaussianPipeline {
     pub(crate) camera: CameraSource,
     /// The views of the passes in which it draws, a bit each; 0 without views.
     pub(crate) view_mask: u32,
-    /// The models that the camera may have.
-    pub(crate) camera_models: CameraModels,
     /// The source of Gaussians.
     pub(crate) source: GaussianSource,
     /// The stage that computes colours from accumulated values.
@@ -112,40 +109,11 @@ pub(crate) enum CameraSource {
     },
 }
 
-/// The camera models whose features are enabled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct CameraModels {
-    orthographic: bool,
-    fisheye: bool,
-    equirectangular: bool,
-}
-
-impl CameraModels {
-    /// The enabled models of a device.
-    pub(crate) fn of(features: &Features) -> Self {
-        Self {
-            orthographic: features.orthographic_camera,
-            fisheye: features.fisheye_camera,
-            equirectangular: features.equirectangular_camera,
-        }
-    }
-
-    /// Reports whether a camera of this model may be used.
-    pub(crate) fn have(self, model: CameraModel) -> bool {
-        match model {
-            CameraModel::Pinhole => true,
-            CameraModel::Orthographic => self.orthographic,
-            CameraModel::Fisheye => self.fisheye,
-            CameraModel::Equirectangular => self.equirectangular,
-        }
-    }
-}
-
 impl GaussianPipeline {
     /// Validates and converts the Gaussian part of a pipeline.
     pub(crate) fn new(device: &Device, graphics: &GraphicsState) -> Result<Self, Error> {
-        let features = device.features();
-        require(features, &TOPOLOGY, "the topology is the Gaussian list")?;
+        let enabled = device.enabled();
+        require(enabled, &TOPOLOGY, "the topology is the Gaussian list")?;
         let Some(gaussian) = &graphics.pre_rasterization.gaussian else {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
@@ -158,17 +126,17 @@ impl GaussianPipeline {
         };
         let view_mask = graphics.pre_rasterization.view_mask;
         if view_mask != 0 {
-            require(features, &MULTIVIEW, "the view mask is not 0")?;
+            require(enabled, &MULTIVIEW, "the view mask is not 0")?;
         }
         let gaussian = &without_dynamic(graphics, gaussian);
         let allowed = Modes::new(graphics, gaussian);
         allowed.check()?;
-        stages(graphics, gaussian, features)?;
-        modes(gaussian, features)?;
+        stages(graphics, gaussian, enabled)?;
+        modes(gaussian, enabled)?;
         numbers(gaussian)?;
         let approximation = approximation(graphics)?;
-        let footprint = footprint(graphics, features)?;
-        fixed_state(graphics, features)?;
+        let footprint = footprint(graphics, enabled)?;
+        fixed_state(graphics, enabled)?;
         let mut fragments = FixedFunctionState::of_gaussians(graphics)?;
         let taken = graphics.dynamic.iter().copied();
         let taken = taken.filter(|&state| {
@@ -177,12 +145,12 @@ impl GaussianPipeline {
             is_taken_by_gaussians(state) && !(is_shaded(gaussian) && is_ignored)
         });
         let state = GaussianState { approximation, footprint, ..state(gaussian, fragments.draw_state())? };
-        require_modes(features, &state)?;
+        require_modes(enabled, &state)?;
         fragments.gaussian = Some(Box::new(state.clone()));
         Ok(Self {
             source: source(device, graphics, gaussian)?,
             resolve: ResolveStage::new(device, graphics, gaussian, &fragments)?,
-            dynamic_rules: DynamicRules::new(allowed, features, state.sh_degree),
+            dynamic_rules: DynamicRules::new(allowed, enabled, state.sh_degree),
             state: Arc::new(state),
             dynamic: taken.collect(),
             fixed: fragments,
@@ -200,9 +168,8 @@ impl GaussianPipeline {
                 &graphics.pre_rasterization.scissors,
             )?
             .map(convert::rect),
-            camera: camera_source(graphics, gaussian, features)?,
+            camera: camera_source(graphics, gaussian, enabled)?,
             view_mask,
-            camera_models: CameraModels::of(features),
         })
     }
 }
@@ -222,7 +189,7 @@ fn source(
         [("firstModelMatrix", locations.first_model_matrix), ("modelOpacity", locations.model_opacity)]
     {
         if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
-            require(device.features(), &INSTANCING, &format!("{name} is used"))?;
+            require(device.enabled(), &INSTANCING, &format!("{name} is used"))?;
         }
     }
     let degree = gaussian.spherical_harmonics_degree;
@@ -230,7 +197,7 @@ fn source(
     let in_buffer = gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
     if in_buffer {
         let what = "flags has SPHERICAL_HARMONICS_BUFFER";
-        require(device.features(), &HARMONICS_BUFFER, what)?;
+        require(device.enabled(), &HARMONICS_BUFFER, what)?;
     }
     distinct_locations(locations, if in_buffer { 0 } else { coefficients })?;
     let first = locations.first_spherical_harmonics;
@@ -322,7 +289,7 @@ fn state(gaussian: &PipelineGaussianStateCreateInfoGAURAST, fragments: DrawState
 fn camera_source(
     graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &Features,
+    enabled: &Enabled,
 ) -> Result<CameraSource, Error> {
     match gaussian.camera_source {
         _ if is_shaded(gaussian) => return Ok(CameraSource::None),
@@ -330,7 +297,7 @@ fn camera_source(
         GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
         other => return Err(unknown("cameraSource", &other)),
     }
-    require(features, &UNIFORM_BUFFER_CAMERA, "cameraSource is UNIFORM_BUFFER")?;
+    require(enabled, &UNIFORM_BUFFER_CAMERA, "cameraSource is UNIFORM_BUFFER")?;
     let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
     let is_there = graphics.layout.as_ref().is_some_and(|layout| {
         let found = layout.set_layout(set).ok();

@@ -2,6 +2,7 @@
 
 use super::values;
 use crate::abi::error::Error;
+use crate::enabled::Enabled;
 use crate::physical_device::limits::MAX_SPHERICAL_HARMONICS_DEGREE;
 use crate::pipeline::dynamic_state::{GaussianStates, is_of_gaussians, may_gaussians_have};
 use crate::pipeline::parts::GraphicsState;
@@ -15,9 +16,10 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::state::gaussian::{
-    GaussianApproximation, GaussianCutOff, GaussianFootprint, GaussianOrder, GaussianState,
+    CameraModel, GaussianApproximation, GaussianCutOff, GaussianFootprint, GaussianOrder, GaussianState,
 };
 use std::ops::Range;
+use std::sync::Arc;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
@@ -142,12 +144,9 @@ pub(super) const DYNAMIC_STATE: Feature = Feature {
     vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
 };
 
-/// Refuses `what` unless its feature is enabled. A feature that the device lacks can't be enabled.
-pub(super) fn require(features: &Features, feature: &Feature, what: &str) -> Result<(), Error> {
-    if (feature.is_enabled)(features) {
-        return Ok(());
-    }
-    Err(not_enabled(feature, what))
+/// Requires the feature of `what`. The device has all of the extension's features.
+pub(super) fn require(enabled: &Enabled, feature: &Feature, what: &str) -> Result<(), Error> {
+    enabled.require((feature.is_enabled)(enabled.features()), || not_enabled(feature, what))
 }
 
 fn not_enabled(feature: &Feature, what: &str) -> Error {
@@ -287,18 +286,36 @@ impl Modes {
     }
 }
 
-/// The limits and features for the values of dynamic states when a draw executes.
+/// The limits and enabled features for the values of dynamic states, and for cameras, when a draw executes.
 #[derive(Debug)]
 pub(crate) struct DynamicRules {
     modes: Modes,
-    features: Box<Features>,
+    enabled: Arc<Enabled>,
     /// The greatest degree for which the pipeline has coefficients.
     max_degree: u32,
 }
 
 impl DynamicRules {
-    pub(super) fn new(modes: Modes, features: &Features, max_degree: u32) -> Self {
-        Self { modes, features: Box::new(features.clone()), max_degree }
+    pub(super) fn new(modes: Modes, enabled: &Arc<Enabled>, max_degree: u32) -> Self {
+        Self { modes, enabled: Arc::clone(enabled), max_degree }
+    }
+
+    /// Requires the feature of a camera's model.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the feature that is not enabled.
+    pub(crate) fn require_camera_model(&self, model: CameraModel) -> Result<(), Error> {
+        let features = self.enabled.features();
+        let (is_enabled, name) = match model {
+            CameraModel::Pinhole => return Ok(()),
+            CameraModel::Orthographic => (features.orthographic_camera, "orthographicCamera"),
+            CameraModel::Fisheye => (features.fisheye_camera, "fisheyeCamera"),
+            CameraModel::Equirectangular => (features.equirectangular_camera, "equirectangularCamera"),
+        };
+        self.enabled.require(is_enabled, || Error::FeatureNotEnabled {
+            vuid: "VUID-VkGaussianCameraGAURAST-model-90079",
+            message: format!("the camera's model is {model:?}, but the feature {name} is not enabled"),
+        })
     }
 
     /// Refuses a state with dynamic values that a pipeline could not have.
@@ -308,7 +325,7 @@ impl DynamicRules {
     pub(crate) fn check(&self, state: &GaussianState) -> Result<(), Error> {
         let modes = Modes { order: state.order, is_compensated: state.opacity_compensated, ..self.modes };
         modes.check()?;
-        require_modes(&self.features, state)?;
+        require_modes(&self.enabled, state)?;
         ceiling_over_floor(state.alpha_floor, state.alpha_ceiling)?;
         if state.sh_degree > self.max_degree {
             return Err(Error::usage(
@@ -323,23 +340,23 @@ impl DynamicRules {
     }
 }
 
-/// Refuses modes whose features are not enabled, among those that may be dynamic.
-pub(super) fn require_modes(features: &Features, state: &GaussianState) -> Result<(), Error> {
+/// Requires the features of modes, among those that may be dynamic.
+pub(super) fn require_modes(enabled: &Enabled, state: &GaussianState) -> Result<(), Error> {
     if state.opacity_compensated {
         let what = "antialiasing is OPACITY_COMPENSATED";
-        require(features, &OPACITY_COMPENSATION, what)?;
+        require(enabled, &OPACITY_COMPENSATION, what)?;
     }
     match state.order {
         GaussianOrder::ViewDepth => {}
         GaussianOrder::RadialDistance => {
-            require(features, &RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
+            require(enabled, &RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
         }
-        GaussianOrder::Primitive => require(features, &PRIMITIVE_ORDER, "order is PRIMITIVE")?,
-        GaussianOrder::PerPixel => require(features, &PER_PIXEL_ORDER, "order is PER_PIXEL")?,
+        GaussianOrder::Primitive => require(enabled, &PRIMITIVE_ORDER, "order is PRIMITIVE")?,
+        GaussianOrder::PerPixel => require(enabled, &PER_PIXEL_ORDER, "order is PER_PIXEL")?,
     }
     if state.approximation != GaussianApproximation::default() {
         let what = "exponentialError or contributionBudget is not 0";
-        require(features, &APPROXIMATION, what)?;
+        require(enabled, &APPROXIMATION, what)?;
     }
     Ok(())
 }
@@ -383,13 +400,13 @@ pub(super) fn without_dynamic<'a>(
 pub(super) fn stages(
     graphics: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &Features,
+    enabled: &Enabled,
 ) -> Result<(), Error> {
     match gaussian.projection_mode {
         GaussianProjectionModeGAURAST::FIXED_FUNCTION => {}
         GaussianProjectionModeGAURAST::VERTEX_SHADER => {
             let what = "projectionMode is VERTEX_SHADER";
-            require(features, &VERTEX_SHADER_PROJECTION, what)?;
+            require(enabled, &VERTEX_SHADER_PROJECTION, what)?;
         }
         other => return Err(unknown("projectionMode", &other)),
     }
@@ -398,10 +415,10 @@ pub(super) fn stages(
         let indices = [inputs.median_gaussian, inputs.nearest_gaussian];
         if indices != [GAUSSIAN_LOCATION_UNUSED_GAURAST; 2] {
             let what = "medianGaussian or nearestGaussian is used";
-            require(features, &RESOLVE_INDICES, what)?;
+            require(enabled, &RESOLVE_INDICES, what)?;
         }
         let what = "the pipeline has a fragment stage";
-        require(features, &RESOLVE_FRAGMENT_SHADER, what)?;
+        require(enabled, &RESOLVE_FRAGMENT_SHADER, what)?;
     }
     let shaded = is_shaded(gaussian);
     let of = |wanted| graphics.stages().filter(move |(stage, _)| *stage == wanted);
@@ -433,32 +450,32 @@ pub(super) fn stages(
 }
 
 /// Checks the state that only fixed-function projection uses.
-fn projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features: &Features) -> Result<(), Error> {
+fn projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST, enabled: &Enabled) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
-            require(features, &GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
+            require(enabled, &GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
         }
         other => return Err(unknown("geometry", &other)),
     }
     match gaussian.linearization {
         GaussianLinearizationGAURAST::JACOBIAN => {}
         GaussianLinearizationGAURAST::UNSCENTED => {
-            require(features, &UNSCENTED_PROJECTION, "linearization is UNSCENTED")?;
+            require(enabled, &UNSCENTED_PROJECTION, "linearization is UNSCENTED")?;
         }
         other => return Err(unknown("linearization", &other)),
     }
     Ok(())
 }
 
-pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features: &Features) -> Result<(), Error> {
+pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, enabled: &Enabled) -> Result<(), Error> {
     if !is_shaded(gaussian) {
-        projection(gaussian, features)?;
+        projection(gaussian, enabled)?;
     }
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
         GaussianPrecisionGAURAST::FLOAT16 => {
-            require(features, &RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
+            require(enabled, &RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
         }
         other => return Err(unknown("precision", &other)),
     }
@@ -468,7 +485,7 @@ pub(super) fn modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST, features:
     }
     if gaussian.flags.intersects(activations) && !is_shaded(gaussian) {
         let what = "flags has LOG_SCALE or LOGIT_OPACITY";
-        require(features, &ATTRIBUTE_ACTIVATION, what)?;
+        require(enabled, &ATTRIBUTE_ACTIVATION, what)?;
     }
     Ok(())
 }
@@ -531,7 +548,7 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
 }
 
 /// Refuses fixed-function state that a Gaussian pipeline doesn't support.
-pub(super) fn fixed_state(graphics: &GraphicsState, features: &Features) -> Result<(), Error> {
+pub(super) fn fixed_state(graphics: &GraphicsState, enabled: &Enabled) -> Result<(), Error> {
     use vk::DynamicState as S;
     let depth_stencil = graphics.depth_stencil().copied().unwrap_or_default();
     let tests = [
@@ -540,12 +557,12 @@ pub(super) fn fixed_state(graphics: &GraphicsState, features: &Features) -> Resu
         (depth_stencil.stencil_test_enable, S::STENCIL_TEST_ENABLE),
     ];
     if tests.iter().any(|&(enable, state)| enable != vk::FALSE || graphics.is_dynamic(state)) {
-        require(features, &DEPTH_STENCIL, "the pipeline has a depth, depth bounds or stencil test")?;
+        require(enabled, &DEPTH_STENCIL, "the pipeline has a depth, depth bounds or stencil test")?;
     }
     let multisample = &graphics.fragment_output.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
-        require(features, &MULTISAMPLE, "the pipeline has several samples per pixel")?;
+        require(enabled, &MULTISAMPLE, "the pipeline has several samples per pixel")?;
     }
     if graphics.pre_rasterization.rasterization.rasterizer_discard_enable != vk::FALSE {
         return Err(Error::usage(
@@ -555,7 +572,7 @@ pub(super) fn fixed_state(graphics: &GraphicsState, features: &Features) -> Resu
     }
     if graphics.dynamic.iter().copied().any(is_of_gaussians) {
         let what = "a dynamic state of Gaussians is used";
-        require(features, &DYNAMIC_STATE, what)?;
+        require(enabled, &DYNAMIC_STATE, what)?;
     }
     let shades = has_fragment_stage(graphics);
     if let Some(state) = graphics.dynamic.iter().find(|state| !may_gaussians_have(**state)) {
@@ -579,7 +596,7 @@ pub(super) fn fixed_state(graphics: &GraphicsState, features: &Features) -> Resu
 }
 
 /// Validates and converts the chain's structure of footprints, if it has one.
-pub(super) fn footprint(graphics: &GraphicsState, features: &Features) -> Result<GaussianFootprint, Error> {
+pub(super) fn footprint(graphics: &GraphicsState, enabled: &Enabled) -> Result<GaussianFootprint, Error> {
     let Some(given) = graphics.pre_rasterization.footprint else {
         return Ok(GaussianFootprint::default());
     };
@@ -590,7 +607,7 @@ pub(super) fn footprint(graphics: &GraphicsState, features: &Features) -> Result
         )
     })?;
     if cut_off != GaussianCutOff::None {
-        require(features, &CUT_OFF, "cutOff is not NONE")?;
+        require(enabled, &CUT_OFF, "cutOff is not NONE")?;
         values::CUT_OFF_DEVIATIONS.check(
             given.cut_off_deviations,
             "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
@@ -601,7 +618,7 @@ pub(super) fn footprint(graphics: &GraphicsState, features: &Features) -> Result
         "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
     )?;
     if given.compensation_floor != 0.0 {
-        require(features, &COMPENSATION_FLOOR, "compensationFloor is not 0")?;
+        require(enabled, &COMPENSATION_FLOOR, "compensationFloor is not 0")?;
     }
     Ok(GaussianFootprint {
         cut_off,

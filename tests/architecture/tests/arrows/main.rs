@@ -12,6 +12,7 @@ mod bindings;
 mod graph;
 mod harness;
 mod layers;
+mod refusals;
 mod source;
 mod workspace;
 

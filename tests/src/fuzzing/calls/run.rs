@@ -96,17 +96,14 @@ impl Run {
                 .gaussian_multisample(true)
                 .gaussian_approximation(true);
             let mut core = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
-            let features = instance.get_physical_device_features(physical);
+            // Core features and resets of command buffers are used without being enabled.
             let info = vk::DeviceCreateInfo::default()
-                .enabled_features(&features)
                 .queue_create_infos(&queues)
                 .enabled_extension_names(&extensions)
                 .push_next(&mut core)
                 .push_next(&mut gaussian);
             let device = instance.create_device(physical, &info, None).expect("a device");
-            let flags = vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER;
-            let pool = vk::CommandPoolCreateInfo::default().flags(flags);
-            let pool = device.create_command_pool(&pool, None).expect("a pool");
+            let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).expect("a pool");
             let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
             let commands = device.allocate_command_buffers(&info).expect("a command buffer")[0];
             let constants = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::VERTEX).size(16)];
