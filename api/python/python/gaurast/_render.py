@@ -7,7 +7,7 @@ import os
 import struct
 import zlib
 from collections.abc import Sequence
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,14 @@ _GEOMETRIES = {"3d": "volume", "2d": "surfel"}
 _PRECISIONS = {"fp32": "Fp32", "fp16": "Fp16"}
 
 
-class Pictures(npt.NDArray[np.float32]):
+if TYPE_CHECKING:
+    _Array = np.ndarray[Any, np.dtype[np.float32]]
+else:
+    # Newer versions of NumPy have aliases with arguments that can't be base classes.
+    _Array = np.ndarray
+
+
+class Pictures(_Array):
     """C pictures as a NumPy array `[C, H, W, 4]` of binary32: colours times alpha, and alpha.
 
     Attributes:
