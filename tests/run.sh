@@ -30,6 +30,7 @@ need yosys yosys
 need xvfb Xvfb
 need qemu-user qemu-x86_64
 if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
+if ! python3 -c 'import ensurepip' >/dev/null 2>&1; then missing+=(python3-venv); fi
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
         echo "installing: ${missing[*]}"
@@ -113,6 +114,19 @@ step "build tests" cargo build "${tests[@]}" "${samples[@]}" --quiet
 GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")
 export GAURAST_TEST_LIBRARIES
 step tests cargo test "${tests[@]}" --quiet --no-fail-fast
+# The Python package on the libraries that the tests built.
+python_tests() {
+    if python3 -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
+        api/python/tests/run.sh "$GAURAST_TEST_LIBRARIES" | tee "$work/pytest"
+        sed -n 's/^SKIPPED \[[0-9]*\] [^ ]* /ignored\t/p' "$work/pytest" >>"$GAURAST_TEST_REPORT"
+    elif [ -n "${GAURAST_TEST_REQUIRE:-}" ]; then
+        echo "Python 3.9 is missing" >&2
+        return 1
+    else
+        printf 'ignored\tPython 3.9 is missing\n' >>"$GAURAST_TEST_REPORT"
+    fi
+}
+step python python_tests
 step "documentation tests" cargo test --workspace --profile checked --doc --quiet
 # Counts the instructions of frames, since times depend on the machine.
 step "build benchmarks" cargo build --profile profiling --quiet -p gaurast-bench

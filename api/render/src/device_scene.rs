@@ -16,6 +16,15 @@ pub struct DeviceScene {
     pub(crate) pipeline: GaussianPipeline,
     /// A buffer for each of [`BINDINGS`].
     pub(crate) buffers: [Buffer; BINDINGS],
+    /// Copies of them in the device's own memory, which are drawn instead.
+    pub(crate) resident: Option<[Buffer; BINDINGS]>,
     /// The triangles among the Gaussians, if there are any.
     pub(crate) mesh: Option<DeviceMesh>,
+}
+
+impl DeviceScene {
+    /// The buffers that are drawn.
+    pub(crate) fn vertices(&self) -> &[Buffer; BINDINGS] {
+        self.resident.as_ref().unwrap_or(&self.buffers)
+    }
 }

@@ -6,6 +6,7 @@ use gaurast::gaussian_primitive_topology;
 use crate::device::Device;
 use crate::device_scene::DeviceScene;
 use crate::mesh;
+use crate::modes::Kept;
 use crate::pipeline::BINDINGS;
 use crate::resource::{Buffer, Image};
 use crate::target::Target;
@@ -25,7 +26,7 @@ impl Recorder<'_> {
     pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
         let mut vulkan = camera.to_vulkan();
-        if target.depths.is_some() {
+        if matches!(target.kept, Some((Kept::Depths, ..))) {
             vulkan = vulkan.depth_coefficients(DepthScale::of(camera).coefficients);
         }
         if scene.mesh.is_some() {
@@ -41,8 +42,8 @@ impl Recorder<'_> {
                 .load_op(vk::AttachmentLoadOp::CLEAR)
                 .store_op(vk::AttachmentStoreOp::STORE)
         };
-        let depths = target.depths.as_ref().map(|(image, _)| image);
-        let attachments: Vec<_> = [image].into_iter().chain(depths).map(attachment).collect();
+        let kept = target.kept.as_ref().map(|(_, image, _)| image);
+        let attachments: Vec<_> = [image].into_iter().chain(kept).map(attachment).collect();
         let mut rendering =
             vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
         // Depth 0, of what is infinitely far, is what attachments are cleared to.
@@ -54,9 +55,9 @@ impl Recorder<'_> {
         if let Some(tested) = &tested {
             rendering = rendering.depth_attachment(tested);
         }
-        let buffers = scene.buffers.each_ref().map(Buffer::handle);
+        let buffers = scene.vertices().each_ref().map(Buffer::handle);
         use vk::PipelineStageFlags as Stage;
-        for image in [image].into_iter().chain(depths) {
+        for image in [image].into_iter().chain(kept) {
             let to_attachment = image
                 .barrier(vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);

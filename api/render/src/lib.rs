@@ -28,6 +28,7 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod arrays;
 pub mod device;
 mod device_scene;
 mod draw;
@@ -43,6 +44,7 @@ pub mod resource;
 mod settings;
 mod target;
 
+pub use arrays::{Arrays, Colors};
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
 pub use gaurast::WorkTrace;

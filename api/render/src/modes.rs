@@ -1,8 +1,9 @@
 //! Modes of the pipeline that change the picture, not the cost.
 
+use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST,
+    GaussianPrecisionGAURAST, GaussianResolveInputLocationsGAURAST,
 };
 use gaurast_scene::{Antialiasing, Geometry, SortOrder};
 use serde::{Deserialize, Serialize};
@@ -70,7 +71,46 @@ pub(crate) fn raw_geometry(geometry: Geometry) -> GaussianGeometryGAURAST {
     }
 }
 
-/// The variance of the screen filter for a shape, in px^2.
+/// Two numbers that a frame keeps of each pixel besides its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kept {
+    /// The expected and the median depth, as a depth buffer has them.
+    Depths,
+    /// The mean and the median depth.
+    LinearDepths,
+    /// The numbers of the Gaussian of the median depth and of the nearest one, from 1 on.
+    Gaussians,
+}
+
+impl Kept {
+    /// The format of the attachment.
+    pub(crate) fn format(self) -> vk::Format {
+        match self {
+            Self::Depths | Self::LinearDepths => vk::Format::R32G32_SFLOAT,
+            Self::Gaussians => vk::Format::R32G32_UINT,
+        }
+    }
+
+    /// The SPIR-V module that writes it.
+    pub(crate) fn shader(self) -> &'static [u8] {
+        match self {
+            Self::Depths | Self::LinearDepths => include_bytes!("shaders/depths.frag.spv"),
+            Self::Gaussians => include_bytes!("shaders/gaussians.frag.spv"),
+        }
+    }
+
+    /// The locations of that module's inputs.
+    pub(crate) fn locations(self) -> GaussianResolveInputLocationsGAURAST {
+        let locations = GaussianResolveInputLocationsGAURAST::default().accumulated_color(0);
+        match self {
+            Self::Depths => locations.depth(1),
+            Self::LinearDepths => locations.linear_depth(1),
+            Self::Gaussians => locations.median_gaussian(1).nearest_gaussian(2),
+        }
+    }
+}
+
+/// The variance of 3DGS's screen filter for a shape, in px^2.
 pub(crate) fn low_pass_variance(geometry: Geometry) -> f32 {
     match geometry {
         Geometry::Volume => 0.3,

@@ -4,16 +4,16 @@ use std::sync::Arc;
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, GaussianResolveInputLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::device::Device;
 use crate::error::{During, RenderError};
-use crate::modes;
+use crate::modes::{self, Kept};
 use crate::settings::Settings;
-use crate::target::{DEPTH_FORMAT, DEPTHS_FORMAT};
+use crate::target::DEPTH_FORMAT;
 use gaurast_scene::GaussianShape;
 
 /// The number of vertex buffers: positions, shapes, spherical harmonics.
@@ -32,8 +32,8 @@ pub(super) struct GaussianPipeline {
 
 impl GaussianPipeline {
     /// A pipeline for vertex buffers of `strides`. It draws with `settings`, whose degree must be stored, into an
-    /// attachment of `format`, whose contents it replaces. If the settings have depths, it writes them to a second
-    /// attachment, of [`DEPTHS_FORMAT`]. If there are triangles (`over_mesh`), Gaussians are blended over them, and a
+    /// attachment of `format`, whose contents it replaces. If the settings keep a value, it writes that to a second
+    /// attachment, of [`Kept::format`]. If there are triangles (`over_mesh`), Gaussians are blended over them, and a
     /// depth test leaves out those behind them.
     pub(super) fn new(
         device: &Arc<Device>,
@@ -73,14 +73,13 @@ impl GaussianPipeline {
         let depth_test = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(over_mesh)
             .depth_compare_op(vk::CompareOp::GREATER);
-        let formats = [format, DEPTHS_FORMAT];
-        let count = if settings.depth { 2 } else { 1 };
+        let kept = settings.kept();
+        let formats = [format, kept.map_or(vk::Format::UNDEFINED, Kept::format)];
+        let count = if kept.is_some() { 2 } else { 1 };
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments[..count]);
-        let module = if settings.depth {
-            let words = shader_words(include_bytes!("shaders/depths.frag.spv"));
-            Some(ShaderModule::new(device, &words)?)
-        } else {
-            None
+        let module = match kept {
+            Some(kept) => Some(ShaderModule::new(device, &shader_words(kept.shader()))?),
+            None => None,
         };
         let stages: Vec<_> = (module.iter()).map(|module| module.stage(vk::ShaderStageFlags::FRAGMENT)).collect();
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -98,7 +97,7 @@ impl GaussianPipeline {
             .geometry(modes::raw_geometry(settings.geometry))
             .precision(settings.precision.raw())
             .antialiasing(modes::raw_antialiasing(settings.antialiasing))
-            .low_pass_variance(modes::low_pass_variance(settings.geometry))
+            .low_pass_variance(settings.low_pass_variance.unwrap_or(modes::low_pass_variance(settings.geometry)))
             .attribute_locations(
                 GaussianAttributeLocationsGAURAST::default()
                     .position(0)
@@ -107,9 +106,8 @@ impl GaussianPipeline {
                     .opacity(3)
                     .first_spherical_harmonics(FIRST_SH),
             );
-        if settings.depth {
-            gaussian = gaussian
-                .resolve_input_locations(GaussianResolveInputLocationsGAURAST::default().accumulated_color(0).depth(1));
+        if let Some(kept) = kept {
+            gaussian = gaussian.resolve_input_locations(kept.locations());
         }
         let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
             .exponential_error(settings.exponential_error)

@@ -13,6 +13,7 @@ use crate::device_scene::DeviceScene;
 use crate::draw::{DepthScale, Recorder};
 use crate::error::RenderError;
 use crate::mesh::{self, DeviceMesh, MeshPipeline};
+use crate::modes::Kept;
 use crate::options::DeviceOptions;
 use crate::pipeline::{BINDINGS, GaussianPipeline};
 use crate::process_stats::processor_time;
@@ -50,6 +51,9 @@ pub struct Frame {
     /// is the reciprocal of the mean reciprocal depth, weighted as colours are (the mean depth itself if orthographic).
     /// The median depth is that of the Gaussian at which transmittance falls below one half, or of the last one.
     pub depth: Option<Vec<[f32; 2]>>,
+    /// The numbers of the Gaussian of the median depth and of the nearest one at every pixel, if the settings ask for
+    /// them; [`u32::MAX`] where nothing is drawn.
+    pub gaussians: Option<Vec<[u32; 2]>>,
 }
 
 impl Renderer {
@@ -99,11 +103,7 @@ impl Renderer {
     /// If the scene is too large for the device, or Vulkan fails.
     pub fn upload(&mut self, scene: &Scene, sh_degree: Option<u32>) -> Result<DeviceScene, RenderError> {
         let settings = Settings { sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE), ..Settings::default() };
-        let max = self.device.max_gaussians().min(u32::MAX.into());
-        let count = scene.len() as u64;
-        if count > max {
-            return Err(RenderError::TooMany { count, max });
-        }
+        let count = self.checked_count(scene.len())?;
         let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), scene.sh_stride() * size_of::<[f32; 3]>()]
             .map(|stride| stride as u32);
         let lit = mesh::lit(scene);
@@ -122,11 +122,12 @@ impl Renderer {
         Ok(DeviceScene {
             mesh,
             origin: scene.origin(),
-            count: count as u32,
+            count,
             strides,
             stored_degree: scene.sh_degree(),
             settings,
             pipeline: self.pipeline(strides, scene.sh_degree(), settings, over_mesh)?,
+            resident: None,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
@@ -155,7 +156,19 @@ impl Renderer {
         Ok(())
     }
 
-    fn pipeline(
+    /// The device that draws.
+    pub(crate) fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// The number of Gaussians of a draw, if the device draws that many.
+    pub(crate) fn checked_count(&self, count: usize) -> Result<u32, RenderError> {
+        let max = self.device.max_gaussians().min(u32::MAX.into());
+        let too_many = RenderError::TooMany { count: count as u64, max };
+        u32::try_from(count).ok().filter(|count| u64::from(*count) <= max).ok_or(too_many)
+    }
+
+    pub(crate) fn pipeline(
         &self,
         strides: [u32; BINDINGS],
         stored_degree: u32,
@@ -179,33 +192,37 @@ impl Renderer {
         for chunk in bytes.chunks(staging_size as usize) {
             staging.write(chunk)?;
             let region = vk::BufferCopy::default().dst_offset(offset).size(chunk.len() as u64);
-            self.commands.record(0, |device, commands| {
-                // SAFETY: the command buffer is recording, and the regions lie within both
-                // buffers, which live until the submission below has ended.
-                unsafe {
-                    device.cmd_copy_buffer(commands, staging.handle(), buffer.handle(), &[region]);
-                }
-                // The next submission's draws read it as vertices.
-                let barrier = vk::MemoryBarrier::default()
-                    .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                    .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ);
-                // SAFETY: the command buffer is recording, outside a render pass.
-                unsafe {
-                    device.cmd_pipeline_barrier(
-                        commands,
-                        vk::PipelineStageFlags::TRANSFER,
-                        vk::PipelineStageFlags::VERTEX_INPUT,
-                        vk::DependencyFlags::empty(),
-                        &[barrier],
-                        &[],
-                        &[],
-                    );
-                }
-            })?;
-            self.commands.submit_and_wait(&[0])?;
+            self.copy(&[(&staging, &buffer, region)])?;
             offset += chunk.len() as u64;
         }
         Ok(buffer)
+    }
+
+    /// Copies regions of buffers to others, from which the next submission's draws read vertices.
+    pub(crate) fn copy(&mut self, regions: &[(&Buffer, &Buffer, vk::BufferCopy)]) -> Result<(), RenderError> {
+        self.commands.record(0, |device, commands| {
+            for (from, to, region) in regions {
+                // SAFETY: the command buffer is recording, and the regions lie within both buffers, which live until the
+                // submission below has ended.
+                unsafe { device.cmd_copy_buffer(commands, from.handle(), to.handle(), &[*region]) };
+            }
+            let barrier = vk::MemoryBarrier::default()
+                .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ);
+            // SAFETY: the command buffer is recording, outside a render pass.
+            unsafe {
+                device.cmd_pipeline_barrier(
+                    commands,
+                    vk::PipelineStageFlags::TRANSFER,
+                    vk::PipelineStageFlags::VERTEX_INPUT,
+                    vk::DependencyFlags::empty(),
+                    &[barrier],
+                    &[],
+                    &[],
+                );
+            }
+        })?;
+        self.commands.submit_and_wait(&[0])
     }
 
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
@@ -222,16 +239,16 @@ impl Renderer {
         if tested {
             scene.settings.check_mesh(camera)?;
         }
-        let depth = scene.settings.depth;
+        let kept = scene.settings.kept();
         let target = match self.target.take() {
             Some(target)
                 if target.image.extent() == vk::Extent2D { width, height }
-                    && target.depths.is_some() == depth
+                    && target.kept.as_ref().map(|(kept, ..)| *kept) == kept
                     && target.tested.is_some() == tested =>
             {
                 target
             }
-            _ => Target::with_depths(&self.device, width, height, depth, tested)?,
+            _ => Target::keeping(&self.device, width, height, kept, tested)?,
         };
         let target = self.target.insert(target);
 
@@ -258,19 +275,27 @@ impl Renderer {
         let processor_time = processor.and_then(|start| Some(processor_time()? - start));
 
         let pixels: Vec<[f32; 4]> = (target.readback).read_new(width as usize * height as usize)?;
-        let depth = match &target.depths {
-            None => None,
-            Some((_, readback)) => {
-                let mut depths = vec![[0.0; 2]; width as usize * height as usize];
-                readback.read(&mut depths)?;
-                let scale = DepthScale::of(camera);
-                for (depths, [.., alpha]) in depths.iter_mut().zip(&pixels) {
-                    let reached = *alpha > 0.0;
-                    *depths = depths.map(|value| scale.depth(if reached { value } else { 0.0 }));
-                }
-                Some(depths)
+        let (mut depth, mut gaussians) = (None, None);
+        match &target.kept {
+            None => {}
+            Some((Kept::Gaussians, _, readback)) => {
+                let mut numbers: Vec<[u32; 2]> = readback.read_new(pixels.len())?;
+                numbers.iter_mut().flatten().for_each(|number| *number = number.wrapping_sub(1));
+                gaussians = Some(numbers);
             }
-        };
+            Some((kept, _, readback)) => {
+                let mut depths: Vec<[f32; 2]> = readback.read_new(pixels.len())?;
+                let scale = DepthScale::of(camera);
+                let of_value = |value: f32| match kept {
+                    Kept::LinearDepths => value,
+                    _ => scale.depth(value),
+                };
+                for (depths, [.., alpha]) in depths.iter_mut().zip(&pixels) {
+                    *depths = if *alpha > 0.0 { depths.map(of_value) } else { [f32::INFINITY; 2] };
+                }
+                depth = Some(depths);
+            }
+        }
         let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
         Ok(Frame {
             picture: Picture { width, height, pixels },
@@ -278,6 +303,7 @@ impl Renderer {
             processor_time,
             counters: counters.unwrap_or_default(),
             depth,
+            gaussians,
         })
     }
 }

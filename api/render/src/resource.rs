@@ -160,6 +160,25 @@ impl Buffer {
         })
     }
 
+    /// Lets `look` read the first `count` elements of the buffer, which must be in host memory and unused by the device.
+    ///
+    /// # Errors
+    /// If the memory cannot be mapped.
+    ///
+    /// # Panics
+    /// If the buffer is smaller.
+    pub fn look<T: Pod, R>(&self, count: usize, look: impl FnOnce(&[T]) -> R) -> Result<R, RenderError> {
+        assert!((count * size_of::<T>()) as u64 <= self.size, "the buffer holds the elements");
+        let mut result = None;
+        self.mapped(|mapped| {
+            assert!(mapped.cast::<T>().is_aligned(), "memory is mapped at 64");
+            // SAFETY: `mapped` points to `size` bytes of memory, aligned for `T`, which nothing writes meanwhile, and every
+            // pattern of bits is a `T` (`Pod`).
+            result = Some(look(unsafe { std::slice::from_raw_parts(mapped.cast(), count) }));
+        })?;
+        Ok(result.expect("the memory was mapped"))
+    }
+
     /// The size in bytes.
     pub fn size(&self) -> u64 {
         self.size

@@ -5,7 +5,7 @@ use gaurast_scene::{Antialiasing, Camera, Geometry, MAX_SH_DEGREE, SortOrder};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{CutOff, Precision};
+use crate::modes::{CutOff, Kept, Precision};
 
 /// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,8 +37,14 @@ pub struct Settings {
     pub cut_off: CutOff,
     /// The size of that shape in standard deviations.
     pub cut_off_deviations: f32,
+    /// The variance of the screen filter in px^2; `None` is 3DGS's 0.3, or 0.5 of flat Gaussians.
+    pub low_pass_variance: Option<f32>,
     /// Keep depths, too: see [`Frame::depth`](crate::Frame::depth).
     pub depth: bool,
+    /// Keep depths whose expected value is the mean depth itself, not the reciprocal of the mean reciprocal.
+    pub linear_depth: bool,
+    /// Keep the numbers of Gaussians, too: see [`Frame::gaussians`](crate::Frame::gaussians).
+    pub gaussians: bool,
 }
 
 impl Default for Settings {
@@ -58,12 +64,25 @@ impl Default for Settings {
             compensation_floor: 0.0,
             cut_off: CutOff::None,
             cut_off_deviations: 3.0,
+            low_pass_variance: None,
             depth: false,
+            linear_depth: false,
+            gaussians: false,
         }
     }
 }
 
 impl Settings {
+    /// The value that a frame keeps of each pixel besides its colour.
+    pub(crate) fn kept(&self) -> Option<Kept> {
+        match self {
+            Self { depth: true, .. } => Some(Kept::Depths),
+            Self { linear_depth: true, .. } => Some(Kept::LinearDepths),
+            Self { gaussians: true, .. } => Some(Kept::Gaussians),
+            _ => None,
+        }
+    }
+
     /// Checks that triangles are drawn with these modes and `camera`.
     ///
     /// # Errors
@@ -74,7 +93,7 @@ impl Settings {
                 matches!(camera.model, Model::Fisheye | Model::Equirectangular),
                 "meshes are drawn by pinhole and orthographic cameras alone",
             ),
-            (self.depth, "depths are not kept of scenes with meshes"),
+            (self.kept().is_some(), "depths are not kept of scenes with meshes"),
             (
                 camera.model == Model::Orthographic && camera.far.is_infinite(),
                 "meshes seen by an orthographic camera need a far plane",
@@ -112,8 +131,12 @@ impl Settings {
                 self.cut_off != CutOff::None && (surfels || half),
                 "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32)",
             ),
-            (self.depth && half, "depths are not kept in binary16 (fp16)"),
-            (self.depth && per_pixel, "depths are not kept in the order per-pixel"),
+            (self.kept().is_some() && half, "depths are not kept in binary16 (fp16)"),
+            (self.kept().is_some() && per_pixel, "depths are not kept in the order per-pixel"),
+            (
+                [self.depth, self.linear_depth, self.gaussians].iter().filter(|kept| **kept).count() > 1,
+                "a frame keeps depths, linear depths or the numbers of Gaussians, one of them",
+            ),
             (
                 self.depth && camera.model == Model::Orthographic && camera.far.is_infinite(),
                 "depths of an orthographic camera need a far plane",

@@ -6,13 +6,11 @@ use ash::vk;
 
 use crate::device::Device;
 use crate::error::RenderError;
+use crate::modes::Kept;
 use crate::resource::{Buffer, Image, Memory};
 
 /// The colour attachment's format, which stores a draw's result unchanged.
 pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
-
-/// The format of the attachment of expected and median depths.
-pub(crate) const DEPTHS_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
 
 /// The format of the attachment by which triangles hide Gaussians.
 pub(crate) const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
@@ -23,8 +21,8 @@ pub struct Target {
     pub image: Image,
     /// The buffer in host memory to which the pixels are copied.
     pub readback: Buffer,
-    /// The attachment of depths and its buffer, if depths are drawn.
-    pub(crate) depths: Option<(Image, Buffer)>,
+    /// The attachment of a kept value and its buffer, if one is kept.
+    pub(crate) kept: Option<(Kept, Image, Buffer)>,
     /// The depth attachment, if triangles are drawn.
     pub(crate) tested: Option<Image>,
 }
@@ -47,15 +45,15 @@ impl Target {
     /// # Errors
     /// If there is no memory for it, or Vulkan fails.
     pub fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
-        Self::with_depths(device, width, height, false, false)
+        Self::keeping(device, width, height, None, false)
     }
 
-    /// A target with an attachment for the depths of pixels, or with a depth attachment for tests.
-    pub(crate) fn with_depths(
+    /// A target with an attachment for a kept value of pixels, or with a depth attachment for tests.
+    pub(crate) fn keeping(
         device: &Arc<Device>,
         width: u32,
         height: u32,
-        depth: bool,
+        kept: Option<Kept>,
         tested: bool,
     ) -> Result<Self, RenderError> {
         let extent = vk::Extent2D { width, height };
@@ -73,7 +71,10 @@ impl Target {
         Ok(Self {
             image: image(COLOR_FORMAT)?,
             readback: readback(size_of::<[f32; 4]>())?,
-            depths: if depth { Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?)) } else { None },
+            kept: match kept {
+                Some(kept) => Some((kept, image(kept.format())?, readback(size_of::<[f32; 2]>())?)),
+                None => None,
+            },
             tested: if tested {
                 let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
                 Some(Image::new(device, extent, DEPTH_FORMAT, usage)?)
@@ -84,10 +85,10 @@ impl Target {
     }
 }
 
-/// Copies the drawn picture, and depths if there are any, to the buffers that the host reads.
+/// Copies the drawn picture, and the kept values if there are any, to the buffers that the host reads.
 pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
     copy_image(device, commands, &target.image, &target.readback);
-    if let Some((image, readback)) = &target.depths {
+    if let Some((_, image, readback)) = &target.kept {
         copy_image(device, commands, image, readback);
     }
 }

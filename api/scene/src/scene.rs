@@ -256,6 +256,11 @@ impl Scene {
         self.origin
     }
 
+    /// Declares the point to which positions and triangles are relative. It leaves their numbers as they are.
+    pub fn set_origin(&mut self, origin: [f64; 3]) {
+        self.origin = origin;
+    }
+
     /// The triangles among the Gaussians.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh

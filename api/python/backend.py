@@ -1,0 +1,141 @@
+"""Builds the Python package: maturin's backend (PEP 517), which first builds the driver, the layer and the command.
+
+`python backend.py wheel FOLDER` builds the wheel of a release: by zig, for manylinux2014, with a Vulkan loader if GAURAST_LOADER
+names one's file. It needs maturin, cargo-zigbuild and ziglang from PyPI. `python backend.py sdist FOLDER` makes the source archive.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+_HERE = Path(__file__).resolve().parent
+# The source archive has this file in its own root.
+_ROOT = _HERE if (_HERE / "Cargo.lock").exists() else _HERE.parent.parent
+_PACKAGE = _ROOT / "api/python"
+_TARGET = "x86_64-unknown-linux-gnu"
+_PACKAGES = ["vulkan_gaurast-icd", "gaurast-layer", "gaurast-cli"]
+_MANIFESTS = {"gaurast_icd.json": "driver/icd", "gaurast_layer.json": "api/layer"}
+_LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so"]
+
+
+def _target_folder() -> Path:
+    return Path(os.environ.get("CARGO_TARGET_DIR", _ROOT / "target"))
+
+
+def _build(subcommand: list[str], target: list[str]) -> Path:
+    """Builds the driver, the layer and the command, and returns their folder."""
+    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+        sys.exit("gaurast: the driver is built for Linux on x86-64 alone")
+    packages = [word for package in _PACKAGES for word in ("-p", package)]
+    command = ["cargo", *subcommand, "--locked", "--profile", "dist", *target, *packages]
+    subprocess.run(command, cwd=_ROOT, check=True)
+    return _target_folder() / (_TARGET if target else "") / "dist"
+
+
+def collect(built: Path, package: Path = _PACKAGE / "python/gaurast") -> None:
+    """Copies what the module needs from `built` into the package: libraries, manifests beside them, the command, and the loader
+    that GAURAST_LOADER names."""
+    libraries, programs = package / "lib", package / "bin"
+    for folder in (libraries, programs):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+    for name in _LIBRARIES:
+        shutil.copy(built / name, libraries)
+    shutil.copy(built / "gaurast", programs)
+    for name, folder in _MANIFESTS.items():
+        text = (_ROOT / folder / name).read_text()
+        (libraries / name).write_text(re.sub(r'("library_path": ")[^"]*/', r"\1./", text))
+    loader = os.environ.get("GAURAST_LOADER")
+    if loader:
+        (libraries / "loader").mkdir()
+        shutil.copy(loader, libraries / "loader/libvulkan.so.1")
+        notice = "libvulkan.so.1 is the Vulkan loader of the Khronos Group and LunarG, under the Apache License 2.0.\n"
+        (libraries / "loader/NOTICE").write_text(notice)
+
+
+def _licences() -> None:
+    if _ROOT != _PACKAGE:
+        for name in ("LICENSE-MIT", "LICENSE-APACHE"):
+            shutil.copy(_ROOT / name, _PACKAGE)
+
+
+def _version() -> str:
+    match = re.search(r'^version = "(.*)"', (_ROOT / "Cargo.toml").read_text(), re.MULTILINE)
+    assert match is not None
+    return match[1]
+
+
+def _sources() -> list[str]:
+    """The files of the source archive: the workspace without its pictures."""
+    folders = ["api", "driver", "samples", "simdevice", "tests"]
+    files = ["Cargo.toml", "Cargo.lock", "README.md", "LICENSE-MIT", "LICENSE-APACHE", "clippy.toml"]
+    if (_ROOT / ".git").exists():
+        listed = subprocess.run(["git", "ls-files", *folders], cwd=_ROOT, check=True, capture_output=True, text=True)
+        names = listed.stdout.splitlines()
+    else:
+        names = [str(path.relative_to(_ROOT)) for folder in folders for path in (_ROOT / folder).rglob("*") if path.is_file()]
+    built = ("api/python/python/gaurast/lib/", "api/python/python/gaurast/bin/", "samples/pictures/", "tests/fuzz/")
+    return sorted(files + [name for name in names if not name.startswith(built)])
+
+
+def build_sdist(sdist_directory: str, config_settings: object = None) -> str:
+    """Makes the source archive. Its root has the package's pyproject.toml, with paths from there."""
+    name = f"gaurast-{_version()}"
+    project = (_PACKAGE / "pyproject.toml").read_text()
+    project = project.replace('python-source = "python"', 'python-source = "api/python/python"\nmanifest-path = "api/python/Cargo.toml"')
+    project = project.replace('path = "python/', 'path = "api/python/python/').replace('"README.md"', '"api/python/README.md"')
+    project = project.replace('dynamic = ["version"]', f'version = "{_version()}"')
+    metadata = f"Metadata-Version: 2.1\nName: gaurast\nVersion: {_version()}\nRequires-Python: >=3.9\nLicense: MIT OR Apache-2.0\n"
+    path = Path(sdist_directory) / f"{name}.tar.gz"
+    with tarfile.open(path, "w:gz", format=tarfile.PAX_FORMAT) as archive:
+        for file in _sources():
+            archive.add(_ROOT / file, f"{name}/{file}", recursive=False)
+        texts = {"pyproject.toml": project, "PKG-INFO": metadata, "backend.py": (_PACKAGE / "backend.py").read_text()}
+        for file, text in texts.items():
+            data = text.encode()
+            info = tarfile.TarInfo(f"{name}/{file}")
+            info.size = len(data)
+            archive.addfile(info, io.BytesIO(data))
+    return path.name
+
+
+def build_wheel(wheel_directory: str, config_settings: object = None, metadata_directory: object = None) -> str:
+    """Builds the wheel for this machine, as pip does."""
+    import maturin
+
+    _licences()
+    collect(_build(["build"], []))
+    name: str = maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
+    return name
+
+
+def get_requires_for_build_wheel(config_settings: object = None) -> list[str]:
+    """Nothing more than what pyproject.toml requires."""
+    return []
+
+
+get_requires_for_build_sdist = get_requires_for_build_wheel
+
+
+def release_wheel(folder: str) -> None:
+    """Builds the wheel of a release, for glibc 2.17 or later."""
+    _licences()
+    collect(_build(["zigbuild"], ["--target", f"{_TARGET}.2.17"]))
+    command = ["maturin", "build", "--zig", "--locked", "--target", _TARGET, "--compatibility", "manylinux2014"]
+    subprocess.run([*command, "--out", str(Path(folder).resolve())], cwd=_PACKAGE, check=True)
+
+
+if __name__ == "__main__":
+    kinds = {"wheel": release_wheel, "sdist": build_sdist}
+    if len(sys.argv) != 3 or sys.argv[1] not in kinds:
+        sys.exit(f"usage: {sys.argv[0]} wheel|sdist FOLDER")
+    os.makedirs(sys.argv[2], exist_ok=True)
+    kinds[sys.argv[1]](sys.argv[2])
