@@ -86,6 +86,7 @@ pub enum BuiltIn {
     SamplePosition,
     SampleMask,
     FragDepth,
+    FragStencilRef,
     WorkgroupId,
     NumWorkgroups,
 }

@@ -347,6 +347,7 @@ fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<Fra
         OutputTarget::BuiltIn { built_in, component } => match built_in {
             BuiltIn::FragDepth => Some(FragmentOutput::Depth),
             BuiltIn::SampleMask if component == 0 => Some(FragmentOutput::SampleMask),
+            BuiltIn::FragStencilRef => Some(FragmentOutput::StencilReference),
             _ => None,
         },
         OutputTarget::VertexCount => None,

@@ -69,6 +69,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_shader_atomic_float", 1),
     (c"VK_EXT_shader_atomic_float2", 1),
     (c"VK_EXT_shader_demote_to_helper_invocation", 1),
+    (c"VK_EXT_shader_stencil_export", 1),
     (c"VK_EXT_shader_subgroup_ballot", 1),
     (c"VK_EXT_shader_subgroup_vote", 1),
     (c"VK_EXT_shader_viewport_index_layer", 1),

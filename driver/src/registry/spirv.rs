@@ -83,7 +83,7 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::VariablePointersStorageBuffer => &[Feature("variablePointersStorageBuffer")],
         Capability::VariablePointers => &[Feature("variablePointers")],
         Capability::ShaderClockKHR => &[Extension(c"VK_KHR_shader_clock")],
-        Capability::StencilExportEXT => &[Absent("VK_EXT_shader_stencil_export")],
+        Capability::StencilExportEXT => &[Extension(c"VK_EXT_shader_stencil_export")],
         Capability::ImageReadWriteLodAMD => &[Absent("VK_AMD_shader_image_load_store_lod")],
         Capability::ImageGatherBiasLodAMD => &[Absent("VK_AMD_texture_gather_bias_lod")],
         Capability::FragmentMaskAMD => &[Absent("VK_AMD_shader_fragment_mask")],

@@ -34,6 +34,7 @@ pub(crate) struct Interface {
     pub colors: Vec<ColorSlots>,
     pub depth: Option<u32>,
     pub sample_mask: Option<u32>,
+    pub stencil_reference: Option<u32>,
     pub early_tests: bool,
     pub discards: bool,
     pub per_sample: bool,
@@ -136,6 +137,7 @@ impl Interface {
                 }
                 FragmentOutput::Depth => interface.depth = Some(output.slot),
                 FragmentOutput::SampleMask => interface.sample_mask = Some(output.slot),
+                FragmentOutput::StencilReference => interface.stencil_reference = Some(output.slot),
             }
         }
         interface

@@ -331,6 +331,8 @@ pub enum FragmentOutput {
     Depth,
     /// The mask of samples to keep.
     SampleMask,
+    /// The reference value of the stencil test and of the operation that replaces.
+    StencilReference,
 }
 
 /// The value that the device gives to an input of a compute program.

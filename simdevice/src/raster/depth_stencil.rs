@@ -39,6 +39,11 @@ impl Tests {
         }
     }
 
+    /// The tests with another stencil reference, for both faces.
+    pub fn with_stencil_reference(&self, reference: u8) -> Self {
+        Self { stencil: self.stencil.map(|faces| faces.map(|face| StencilFace { reference, ..face })), ..*self }
+    }
+
     /// True if there is any test.
     pub fn any(&self) -> bool {
         self.reads_depth() || self.stencil.is_some()

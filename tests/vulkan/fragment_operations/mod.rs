@@ -1,3 +1,4 @@
 //! The chapters *Fragment Operations* and *The Framebuffer*.
 
 mod attachments;
+mod stencil_export;

@@ -463,6 +463,7 @@ pub fn output_target(location: IoLocation) -> Result<OutputTarget> {
                 Spirv::TessLevelOuter => BuiltIn::TessLevelOuter,
                 Spirv::TessLevelInner => BuiltIn::TessLevelInner,
                 Spirv::FragDepth => BuiltIn::FragDepth,
+                Spirv::FragStencilRefEXT => BuiltIn::FragStencilRef,
                 Spirv::SampleMask => BuiltIn::SampleMask,
                 other => return unsupported(format!("output built-in {other:?}")),
             },

@@ -127,17 +127,19 @@ fn translate_here(
 /// The interface of an entry point with its execution modes, still without inputs and outputs.
 fn execution_modes(module: &Module, globals: &Globals, entry: u32, stage: Stage) -> Result<Interface, Error> {
     let mut interface = empty_interface(stage);
-    let mut is_early_and_late = false;
+    let (mut is_early_and_late, mut replaces_stencil) = (false, false);
     for instruction in &module.sections.execution_modes {
         if instruction.id(0).ok() == Some(entry) {
             execution_mode(globals, instruction, &mut interface)
                 .map_err(|diagnostic| diagnostic.locate(instruction.reference()))?;
             let mode = instruction.enumerant(1, ExecutionMode::from_u32);
             is_early_and_late |= mode == Some(ExecutionMode::EarlyAndLateFragmentTestsAMD);
+            replaces_stencil |= mode == Some(ExecutionMode::StencilRefReplacingEXT);
         }
     }
-    // Late tests are needed for a written depth only, and early ones are optional then.
-    interface.early_fragment_tests |= is_early_and_late && interface.depth == DepthMode::NotWritten;
+    // Late tests are needed for a written depth or stencil reference only, and early ones are optional then.
+    let writes_tested = interface.depth != DepthMode::NotWritten || replaces_stencil;
+    interface.early_fragment_tests |= is_early_and_late && !writes_tested;
     if stage == Stage::Compute {
         if let Some(size) = built_in_workgroup_size(module, globals) {
             interface.workgroup_size = size;
@@ -403,6 +405,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::VulkanMemoryModel
             | C::VulkanMemoryModelDeviceScope
             | C::DemoteToHelperInvocation
+            | C::StencilExportEXT
             | C::ShaderClockKHR
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT

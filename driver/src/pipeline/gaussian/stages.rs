@@ -211,15 +211,18 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
             ));
         }
     }
-    let writes_depth = interface.outputs.iter().any(|output| {
-        let built_in = BuiltIn::FragDepth;
-        matches!(output.target, OutputTarget::BuiltIn { built_in: b, .. } if b == built_in)
-    });
-    if writes_depth {
+    let writes = |wanted| {
+        let mut outputs = interface.outputs.iter();
+        outputs.any(|output| matches!(output.target, OutputTarget::BuiltIn { built_in, .. } if built_in == wanted))
+    };
+    if writes(BuiltIn::FragDepth) {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
             "the fragment shader writes FragDepth, but the depth of Gaussians is the median's",
         ));
+    }
+    if writes(BuiltIn::FragStencilRef) {
+        return Err(Error::FeatureNotPresent("a stencil reference from the fragment shader of Gaussians".into()));
     }
     Ok(())
 }

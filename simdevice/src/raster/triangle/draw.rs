@@ -166,13 +166,14 @@ struct ShadingEffects {
 impl ShadingEffects {
     fn new(interface: &Interface, state: &DrawState, tests: &Tests) -> Self {
         let removes = interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
-        let changes_depth = interface.depth.is_some();
+        let changes_tests =
+            interface.depth.is_some() || interface.stencil_reference.is_some() && tests.stencil.is_some();
         let tests_late = !interface.early_tests
-            && (changes_depth || interface.has_side_effects && tests.any() || removes && tests.writes());
+            && (changes_tests || interface.has_side_effects && tests.any() || removes && tests.writes());
         Self {
             removes,
             tests_late,
-            filter: tests.filter().filter(|_| !changes_depth && !interface.has_side_effects),
+            filter: tests.filter().filter(|_| !changes_tests && !interface.has_side_effects),
             counts_late: tests_late || removes && !interface.early_tests,
         }
     }

@@ -91,7 +91,13 @@ pub fn write<S: Simd>(
                     let number = turn.trailing_zeros() as usize / 4;
                     let quad = &batch.chunk_quads(chunk)[number];
                     let front = batch.records[usize::from(quad.record)].front;
-                    *lanes = test(simd, &draw.tests, *lanes, front, code, &quads, buffers);
+                    *lanes = match stencil_references(interface, machine, chunk) {
+                        None => test(simd, &draw.tests, *lanes, front, code, &quads, buffers),
+                        Some(references) => super::coverage::bits((*lanes).into()).fold(0, |passed, lane| {
+                            let tests = draw.tests.with_stencil_reference(references[lane] as u8);
+                            passed | test(simd, &tests, 1 << lane, front, code, &quads, buffers)
+                        }),
+                    };
                 }
                 passed += u64::from(lanes.count_ones());
                 write_colors(simd, draw, &sources, chunk, *lanes, &quads, buffers);
@@ -99,6 +105,12 @@ pub fn write<S: Simd>(
         }
     }
     if draw.counts_late { passed } else { 0 }
+}
+
+/// The stencil references that the program writes for the lanes of a chunk, if it does.
+fn stencil_references(interface: &Interface, machine: &Machine, chunk: usize) -> Option<[u32; 16]> {
+    let slot = interface.stencil_reference?;
+    machine.output_vectors(slot).get(chunk).map(|references| references.0)
 }
 
 /// Writes a batch's results as [`write`] does, for draws without removal of samples or tests after shading.
