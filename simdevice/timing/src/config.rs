@@ -56,6 +56,8 @@ pub struct Rasterizer {
     pub gaussian_latency: u32,
     /// Cycles from operands to weights and depth.
     pub triangle_latency: u32,
+    /// The same with numbers of at most two bytes.
+    pub half_triangle_latency: u32,
     /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel can't begin closer to each
     /// other.
     pub carried_latency: u32,
@@ -82,7 +84,8 @@ pub struct Rasterizer {
     pub numbers_in: u32,
     /// Numbers that are written for a pixel.
     pub numbers_out: u32,
-    /// Bytes of a number.
+    /// Bytes of a number. Units of at most two bytes have the latencies, energies and areas whose names begin with
+    /// `half`.
     pub number_bytes: u32,
     /// Bytes of an entry of a tile's list.
     pub index_bytes: u32,
@@ -119,6 +122,7 @@ impl Rasterizer {
     /// Cycles from operands to results.
     pub fn latency(&self, mode: Mode) -> u32 {
         match mode {
+            Mode::Triangle if self.is_half() => self.half_triangle_latency,
             Mode::Triangle => self.triangle_latency,
             Mode::Gaussian => self.gaussian_latency,
         }
@@ -149,6 +153,22 @@ impl Rasterizer {
     /// Cycles of the controller for a primitive that is evaluated at no pixel.
     pub fn looking_cycles(groups: u64) -> u64 {
         u64::from(groups == 0)
+    }
+
+    /// True if the units are those of 16-bit numbers.
+    pub fn is_half(&self) -> bool {
+        self.number_bytes <= 2
+    }
+
+    /// Bytes of a module's two halves for primitives.
+    pub fn primitive_buffer_bytes(&self) -> f64 {
+        2.0 * f64::from(self.batch) * f64::from(self.primitive_bytes())
+    }
+
+    /// Bytes of a module's two halves for pixels: a pixel has its numbers and its transmittance.
+    pub fn pixel_buffer_bytes(&self) -> f64 {
+        let pixels = f64::from(self.tile_side).powi(2);
+        2.0 * pixels * f64::from(self.number_bytes) * f64::from(self.numbers_out + 1)
     }
 
     /// Bytes read for a primitive of a tile's list.
@@ -232,22 +252,28 @@ pub struct ScheduleConfig {
     pub frames_in_flight: u32,
 }
 
-/// Energy: picojoules of the reference technology, unless a field says otherwise.
+/// Energy: picojoules of the reference technology, unless a field says otherwise. The voltage is the same at every
+/// clock.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the operation or byte is in the name")]
 pub struct EnergyConfig {
-    /// The power of a module in W at the calibration frames' mean activity; 0 if unknown.
-    pub module_power_w: f64,
-    /// The static share of that power.
-    pub static_share: f64,
-    /// Rasterizer pJ per pJ of this table; 0 to calibrate it.
+    /// Rasterizer pJ per pJ of this table, for operations and buffers.
     pub scale: f64,
+    /// Leakage of a module in W per mm2 of its units and buffers, in the rasterizer's technology.
+    pub leakage_w_per_mm2: f64,
     pub add_pj: f64,
     pub mul_pj: f64,
     pub div_pj: f64,
     pub exp_pj: f64,
-    pub buffer_pj_per_byte: f64,
+    pub half_add_pj: f64,
+    pub half_mul_pj: f64,
+    pub half_div_pj: f64,
+    pub half_exp_pj: f64,
+    /// A bit read from a buffer of 8 kB or written to it. A buffer of another size takes the square root of the ratio
+    /// of the sizes.
+    pub sram_pj_per_bit: f64,
+    /// Main memory, in pJ of its own technology.
     pub dram_pj_per_byte: f64,
     /// The share of the calibration frames' evaluations that are blended.
     pub blended_share: f64,
@@ -267,6 +293,8 @@ pub struct AreaConfig {
     pub exp_um2: f64,
     pub half_add_um2: f64,
     pub half_mul_um2: f64,
+    /// The area of a bit of a buffer, with its share of decoders and amplifiers.
+    pub sram_um2_per_bit: f64,
     /// Area added for Gaussians over the area of the triangle units.
     pub enhanced_ratio: f64,
 }
@@ -375,6 +403,7 @@ const RANGES: &[(&str, &str, Range)] = {
         ("rasterizer", "triangle_interval", From(1.0, 1000.0)),
         ("rasterizer", "gaussian_latency", From(0.0, 10_000.0)),
         ("rasterizer", "triangle_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "half_triangle_latency", From(0.0, 10_000.0)),
         ("rasterizer", "carried_latency", From(0.0, 10_000.0)),
         ("rasterizer", "neighbour_sharing", From(0.0, 1.0)),
         ("rasterizer", "tile_side", OneOf(&TILE_SIDES)),
@@ -404,14 +433,17 @@ const RANGES: &[(&str, &str, Range)] = {
         ("soc", "area_mm2", Above(0.0, 100_000.0)),
         ("soc", "node_scaling", From(0.001, 1000.0)),
         ("schedule", "frames_in_flight", From(1.0, 64.0)),
-        ("energy", "module_power_w", From(0.0, 1000.0)),
-        ("energy", "static_share", From(0.0, 0.99)),
         ("energy", "scale", From(0.0, 1000.0)),
+        ("energy", "leakage_w_per_mm2", From(0.0, 1000.0)),
         ("energy", "add_pj", Above(0.0, 1e6)),
         ("energy", "mul_pj", Above(0.0, 1e6)),
         ("energy", "div_pj", From(0.0, 1e6)),
         ("energy", "exp_pj", From(0.0, 1e6)),
-        ("energy", "buffer_pj_per_byte", From(0.0, 1e6)),
+        ("energy", "half_add_pj", Above(0.0, 1e6)),
+        ("energy", "half_mul_pj", Above(0.0, 1e6)),
+        ("energy", "half_div_pj", From(0.0, 1e6)),
+        ("energy", "half_exp_pj", From(0.0, 1e6)),
+        ("energy", "sram_pj_per_bit", From(0.0, 1e6)),
         ("energy", "dram_pj_per_byte", From(0.0, 1e6)),
         ("energy", "blended_share", From(0.0, 1.0)),
         ("area", "technology_nm", From(1.0, 1000.0)),
@@ -422,6 +454,7 @@ const RANGES: &[(&str, &str, Range)] = {
         ("area", "exp_um2", From(0.0, 1e9)),
         ("area", "half_add_um2", Above(0.0, 1e9)),
         ("area", "half_mul_um2", Above(0.0, 1e9)),
+        ("area", "sram_um2_per_bit", From(0.0, 1e6)),
         ("area", "enhanced_ratio", From(0.0, 10.0)),
     ]
 };

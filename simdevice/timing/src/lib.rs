@@ -5,6 +5,7 @@
 //! (the paper's numbers, sweeps, a cycle-stepped model) are the crate `timing-studies`.
 #![forbid(unsafe_code)]
 
+pub mod area;
 pub mod config;
 pub mod energy;
 pub mod fast;

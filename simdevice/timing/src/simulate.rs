@@ -1,7 +1,7 @@
 //! The simulation of one frame on one configuration: all models of this crate combined.
 
 use crate::config::{Config, Lists, Rasterizer};
-use crate::energy::{self, Changed, Energy};
+use crate::energy::{self, Changed, Energy, Power};
 use crate::fast;
 use crate::plan::{self, Division, Task};
 use crate::raster::RasterReport;
@@ -56,6 +56,8 @@ pub struct Simulation {
     pub speedup: f64,
     /// Millijoules of a frame.
     pub energy: Energy,
+    /// Mean powers of the frame and of its raster stage.
+    pub power: Power,
     /// Millijoules of a frame without a rasterizer for Gaussians.
     pub baseline_mj: f64,
 }
@@ -293,12 +295,13 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
         }
     }
     let changed = of_rasterizer.rasterizer_work(&config.rasterizer).changed;
+    let fps = if policy.collaborative { fps_collaborative } else { fps_serial };
+    let frame_ms = if fps > 0.0 { 1e3 / fps } else { 0.0 };
     let mut energy = Energy::default();
     if policy.has_rasterizer {
-        energy = energy::rasterizer(&chosen.raster, changed, config);
+        energy = energy::rasterizer(&chosen.raster, changed, frame_ms, config);
     }
     energy.shader_cores = energy::shader_cores_mj(shader_ms, config);
-    let fps = if policy.collaborative { fps_collaborative } else { fps_serial };
     let stages = chosen.stages();
     let [compute, preprocess, sort, shade] = chosen.shader;
     let busy_ms =
@@ -331,6 +334,7 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
         baseline_fps: if baseline_ms > 0.0 { 1e3 / baseline_ms } else { 0.0 },
         raster_speedup: if stages.raster > 0.0 { baseline_raster_ms / stages.raster } else { 1.0 },
         speedup: fps * baseline_ms * 1e-3,
+        power: Power::of(&energy, frame_ms, stages.raster, config),
         energy,
         baseline_mj: energy::shader_cores_mj(baseline_ms, config),
         raster: chosen.raster,

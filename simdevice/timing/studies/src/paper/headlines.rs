@@ -5,7 +5,7 @@ use super::numbers::{
     RASTER_ENERGY, RASTER_SHARE, RASTER_SPEEDUP, SCENES, SOC_W, SPEEDUP, mean,
 };
 use super::table::{Label, Row, Section};
-use crate::area;
+use timing::area;
 use timing::config::{Config, ConfigError};
 use timing::schedule::{self, Policy, Stages};
 use timing::shader_cores;

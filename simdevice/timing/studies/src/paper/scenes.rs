@@ -102,7 +102,7 @@ fn model() -> Result<Vec<Section>, ConfigError> {
                 result.contention_gb_s,
             )),
         );
-        let spent = energy::rasterizer(alone, energy::Changed::both(blended), &config);
+        let spent = energy::rasterizer(alone, energy::Changed::both(blended), result.stages_alone.raster, &config);
         let baseline = scene.baseline_ms * config.soc.power_w;
         energy_rows.push(
             Row::new(
