@@ -3,7 +3,7 @@
 //! The work is that of a real run: of the scene, which this program draws, or of any Vulkan program that ran with
 //! `GAURAST_TRACE` set.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -15,7 +15,8 @@ use timing::fast::{self, TileSpan};
 use timing::raster::RasterReport;
 use timing::schedule::{self, Engine, ModuleSpan, Span};
 use timing::simulate::{self, Simulation};
-use timing::work::{Trace, TraceError};
+use timing::trace_file::{self, FileError};
+use timing::work::Trace;
 use timing_studies::what_if::{WhatIf, what_ifs};
 use timing_studies::{paper, rtl, stepped};
 
@@ -32,10 +33,8 @@ pub enum Error {
     Config(#[from] ConfigError),
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    #[error("{}: not a trace of work: {source}", path.display())]
-    Trace { path: PathBuf, source: serde_json::Error },
     #[error("{}: {source}", path.display())]
-    Work { path: PathBuf, source: TraceError },
+    Trace { path: PathBuf, source: FileError },
     #[error("{0}: there is no frame in the trace")]
     Empty(String),
     #[error("{0}: the last frame has no work, so there is nothing to simulate")]
@@ -68,7 +67,7 @@ pub enum Format {
 
 #[derive(Args)]
 pub struct SimulateArguments {
-    /// The scene file, or a trace of work (.json); a generated garden if there is none
+    /// The scene file, or a trace of work (.json, or a binary one of any name); a generated garden if there is none
     pub scene: Option<PathBuf>,
 
     /// The hardware: paper-15x16, paper-pipeline, paper-300, single-module, fp16, orin-nx-10w, orin-nx-maxn or m2-pro
@@ -289,7 +288,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Error> {
 /// The work of the scene, from drawing it or from a file.
 fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     match &arguments.scene {
-        Some(path) if path.extension().is_some_and(|extension| extension == "json") => load(path),
+        Some(path) if is_trace(path) => load(path),
         _ => {
             let folder = tempfile::tempdir()?;
             draw(arguments, folder.path())
@@ -297,11 +296,18 @@ fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     }
 }
 
+/// True if a file is a trace, by its name or by its first bytes.
+fn is_trace(path: &Path) -> bool {
+    let is_binary = || {
+        let mut first = [0; trace_file::MAGIC.len()];
+        let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut first));
+        read.is_ok() && first == trace_file::MAGIC
+    };
+    path.extension().is_some_and(|extension| extension == "json") || is_binary()
+}
+
 fn load(path: &Path) -> Result<Trace, Error> {
-    let trace: Trace =
-        serde_json::from_slice(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })?;
-    trace.check().map_err(|source| Error::Work { path: path.to_owned(), source })?;
-    Ok(trace)
+    Trace::from_bytes(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })
 }
 
 /// Draws the scene, and returns the work. The picture goes to `folder`.

@@ -1,7 +1,7 @@
 //! The configuration of the hardware, read from a typed TOML file, and the presets. `presets/paper-15x16.toml` gives
 //! the source of each number; a preset may inherit from another.
 
-use crate::work::{Mode, Saturation, TILE_SIDES};
+use crate::work::{INTERVALS, Mode, Saturation, Segment, TILE_SIDES};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use toml::{Table, Value};
@@ -148,6 +148,25 @@ impl Rasterizer {
             return most;
         }
         (most as f64 * self.neighbour_sharing).round() as u64
+    }
+
+    /// Cycles in which the PEs wait for transmittances in a segment whose waits are known: those of the interval that
+    /// [`Self::carried_latency`] is, in evaluations of a group.
+    pub fn known_waiting_cycles(&self, mode: Mode, segment: &Segment) -> Option<u64> {
+        let waits = segment.waits.filter(|_| mode == Mode::Gaussian)?;
+        let cycles = self.busy_cycles(mode, 1);
+        let interval = usize::try_from(u64::from(self.carried_latency).div_ceil(cycles)).ok()?;
+        let evaluations = match interval.checked_sub(2) {
+            None => 0,
+            Some(index) if index < INTERVALS => u64::from(waits[index]),
+            Some(index) => {
+                // Beyond the longest interval of the trace, each further evaluation costs what the last one did.
+                let [before, longest] = [waits[INTERVALS - 2], waits[INTERVALS - 1]].map(u64::from);
+                let further = (index - INTERVALS + 1) as u64;
+                longest + further * longest.saturating_sub(before)
+            }
+        };
+        Some(evaluations * cycles)
     }
 
     /// Cycles of the controller for a primitive that is evaluated at no pixel.
@@ -770,6 +789,23 @@ mod tests {
         assert_eq!(gaussian(&wide, 16), 13, "256 pixels on 20 PEs");
         let unfolded = Rasterizer { opacity_folded: false, ..raster };
         assert_eq!(gaussian(&unfolded, 16), 32, "11 multiplications on 10 units");
+    }
+
+    #[test]
+    fn waits_of_the_trace_are_those_of_the_latency() {
+        let segment = Segment { primitives: 9, groups: 9, open: 16, waits: Some([1, 2, 4, 7, 11, 16, 22, 29]) };
+        let with = |setting: &str| {
+            let config = Config::preset("paper-15x16", &[setting.to_owned()]).unwrap();
+            config.rasterizer.known_waiting_cycles(Mode::Gaussian, &segment)
+        };
+        for (latency, cycles) in [(0, 0), (1, 0), (2, 1), (7, 16), (9, 29), (11, 43)] {
+            assert_eq!(with(&format!("carried_latency={latency}")), Some(cycles), "{latency}");
+        }
+        // A group takes two cycles, so that seven cycles are four evaluations.
+        assert_eq!(with("pes_per_module=8"), Some(8));
+        let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
+        assert_eq!(raster.known_waiting_cycles(Mode::Triangle, &segment), None);
+        assert_eq!(raster.known_waiting_cycles(Mode::Gaussian, &Segment { waits: None, ..segment }), None);
     }
 
     #[test]

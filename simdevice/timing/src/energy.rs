@@ -63,7 +63,12 @@ impl Units {
     fn of(config: &Config) -> Self {
         let table: &EnergyConfig = &config.energy;
         if config.rasterizer.is_half() {
-            return Self { add: table.half_add_pj, mul: table.half_mul_pj, div: table.half_div_pj, exp: table.half_exp_pj };
+            return Self {
+                add: table.half_add_pj,
+                mul: table.half_mul_pj,
+                div: table.half_div_pj,
+                exp: table.half_exp_pj,
+            };
         }
         Self { add: table.add_pj, mul: table.mul_pj, div: table.div_pj, exp: table.exp_pj }
     }
@@ -213,7 +218,8 @@ pub struct Power {
 impl Power {
     /// The powers of a frame after which the next begins in `frame_ms`, and whose stage 3 takes `raster_ms`.
     pub fn of(energy: &Energy, frame_ms: f64, raster_ms: f64, config: &Config) -> Self {
-        let over = |millijoules: f64, milliseconds: f64| if milliseconds > 0.0 { millijoules / milliseconds } else { 0.0 };
+        let over =
+            |millijoules: f64, milliseconds: f64| if milliseconds > 0.0 { millijoules / milliseconds } else { 0.0 };
         let dynamic = energy.arithmetic + energy.buffers + energy.memory;
         let raster_w = if dynamic > 0.0 { over(dynamic, raster_ms) + leakage_w(config) } else { 0.0 };
         Self { frame_w: over(energy.total(), frame_ms), raster_w }
@@ -292,7 +298,8 @@ mod tests {
 
     #[test]
     fn dearer_adders_cost_their_share() {
-        let (paper, dear) = (spent(&machine(DEFAULT_PRESET, &[])), spent(&machine(DEFAULT_PRESET, &["energy.add_pj=9"])));
+        let (paper, dear) =
+            (spent(&machine(DEFAULT_PRESET, &[])), spent(&machine(DEFAULT_PRESET, &["energy.add_pj=9"])));
         // 11 additions and 10 multiplications, of which 3 of each are gated for three quarters of the evaluations; an
         // exponential.
         let [adders, multipliers] = [11.0 - 3.0 * 0.75, 10.0 - 3.0 * 0.75];
@@ -312,7 +319,8 @@ mod tests {
         assert!((ratio - 2.0).abs() < 1e-12, "four times the size");
         assert!(large.buffers > paper.buffers, "{large:?} {paper:?}");
         assert!(leakage_w(&machine(DEFAULT_PRESET, &["batch=128"])) > leakage_w(&machine(DEFAULT_PRESET, &[])));
-        let sizes = [8192.0, 32768.0, 1_048_576.0].map(|size| 8.0 * sram_pj_per_byte(size, &machine(DEFAULT_PRESET, &[])));
+        let sizes =
+            [8192.0, 32768.0, 1_048_576.0].map(|size| 8.0 * sram_pj_per_byte(size, &machine(DEFAULT_PRESET, &[])));
         // Horowitz's three sizes: 10, 20 and 100 pJ for 8 bytes.
         for (ours, published) in sizes.into_iter().zip([10.0, 20.0, 100.0]) {
             assert!((ours / published - 1.0_f64).abs() < 0.14, "{ours} {published}");

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod area;
+pub mod check;
 pub mod config;
 pub mod energy;
 pub mod fast;
@@ -16,6 +17,7 @@ pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;
 pub mod stages;
+pub mod trace_file;
 pub mod work;
 
 pub use config::{Config, ConfigError};

@@ -130,11 +130,19 @@ impl GaussianTile {
             ranges: &self.ranges,
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
+        let mut ids = draw.keeps_ids.then(Vec::new);
         let (compositor, tracked) = (&mut self.compositor, self.tracked.get_mut(accumulator));
         let accumulator = &mut self.accumulators[accumulator];
         let counts = match draw.sorted.tiles.walk() {
-            None => compositor.composite_list::<M>(level, &inputs, accumulator, tracked, runs.as_mut()),
-            Some(walk) => compositor.composite_walk::<M>(level, &inputs, walk, accumulator, tracked, runs.as_mut()),
+            None => {
+                if let Some(ids) = &mut ids {
+                    host::extend(ids, list);
+                }
+                compositor.composite_list::<M>(level, &inputs, accumulator, tracked, runs.as_mut())
+            }
+            Some(walk) => {
+                compositor.composite_walk::<M>(level, &inputs, walk, accumulator, tracked, runs.as_mut(), ids.as_mut())
+            }
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -145,6 +153,7 @@ impl GaussianTile {
                 contributions: counts.contributions,
                 terminated: count(&accumulator.finished()).saturating_sub(outside),
                 hidden_rest: counts.hidden_rest,
+                ids: ids.unwrap_or_default(),
                 ..TileWork::default()
             });
         }
@@ -198,7 +207,7 @@ impl GaussianTile {
         let compositor = &mut self.compositor;
         match draw.sorted.tiles.walk() {
             None => compositor.composite_list::<FindReached>(level, &inputs, accumulator, None, None),
-            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None, None),
+            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None, None, None),
         };
         let finished = accumulator.finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
@@ -302,7 +311,8 @@ impl Compositor {
         }
     }
 
-    /// Composites what a tile finds in the sorted sequence, until nothing more can contribute.
+    /// Composites what a tile finds in the sorted sequence, until nothing more can contribute, and appends it to `ids`.
+    #[expect(clippy::too_many_arguments, reason = "the inputs and the record of one tile")]
     fn composite_walk<M: Mode>(
         &mut self,
         level: Level,
@@ -311,6 +321,7 @@ impl Compositor {
         accumulator: &mut Accumulator,
         mut tracked: Option<&mut Tracked>,
         mut runs: Option<&mut Vec<Run>>,
+        mut ids: Option<&mut Vec<u32>>,
     ) -> TileCounts {
         let most = match inputs.kernel {
             Kernel::Fast => PIECE,
@@ -330,6 +341,9 @@ impl Compositor {
             walk.next(tile, &mut from, most, &mut piece);
             if piece.is_empty() {
                 break;
+            }
+            if let Some(ids) = &mut ids {
+                host::extend(ids, &piece);
             }
             let inputs = TileInputs { list: &piece, ..*inputs };
             let (tracked, runs) = (tracked.as_deref_mut(), runs.as_deref_mut());
