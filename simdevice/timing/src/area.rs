@@ -1,6 +1,6 @@
 //! Area from the paper's component counts: the triangle units of a PE, the units added for Gaussians, and buffers.
 
-use crate::config::{AreaConfig, Config};
+use crate::config::{AreaConfig, Config, Records};
 use serde::Serialize;
 
 /// Areas in mm2 of the rasterizer's technology, unless a field says otherwise.
@@ -14,6 +14,8 @@ pub struct Area {
     pub exponential: f64,
     /// A module's PEs and buffers.
     pub module: f64,
+    /// The list writer, if the machine has one.
+    pub list_writer: f64,
     /// The module's buffers for primitives and pixels, which are part of `module`.
     pub buffers: f64,
     /// The area added for Gaussians in all PEs.
@@ -81,6 +83,10 @@ pub fn area(config: &Config) -> Area {
         pe_added: units.added() * shrink,
         exponential: units.exp * shrink,
         module: module_pes * (units.there() + units.added()) * shrink + buffers,
+        list_writer: match config.rasterizer.records {
+            Records::Gathered => 0.0,
+            Records::Listed => config.list_writer.area_mm2,
+        },
         buffers,
         added: units.added() * shrink * pes,
         added_in_soc: in_soc,

@@ -12,6 +12,8 @@ use toml::{Table, Value};
 pub struct Config {
     /// The rasterizer modules.
     pub rasterizer: Rasterizer,
+    /// The unit that writes records into lists.
+    pub list_writer: ListWriter,
     /// Main memory, shared by all units.
     pub memory: Memory,
     /// The shader cores.
@@ -36,6 +38,28 @@ pub enum Lists {
     Exact,
     /// Tiles that the square around a Gaussian's 3-sigma circle touches, as the original 3DGS code makes them.
     Squares,
+}
+
+/// The place from which the rasterizer reads a primitive's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Records {
+    /// A list has indices, as the sort leaves them, and the rasterizer reads the records that they name.
+    Gathered,
+    /// A unit writes the records into the lists, one after the other, as the module in SystemVerilog reads them.
+    Listed,
+}
+
+/// The unit that writes records into lists, for [`Records::Listed`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListWriter {
+    /// Cycles of the rasterizer's clock for a pair.
+    pub cycles_per_pair: f64,
+    /// Its area in mm2 of the rasterizer's technology.
+    pub area_mm2: f64,
+    /// The energy of a byte that passes through it, in pJ of the table's technology.
+    pub pj_per_byte: f64,
 }
 
 /// The rasterizer modules.
@@ -80,6 +104,8 @@ pub struct Rasterizer {
     pub batch: u32,
     /// The kind of the tile lists.
     pub lists: Lists,
+    /// The place from which primitives' numbers are read.
+    pub records: Records,
     /// Numbers that are read for a primitive.
     pub numbers_in: u32,
     /// Numbers that are written for a pixel.
@@ -193,6 +219,14 @@ impl Rasterizer {
     /// Bytes read for a primitive of a tile's list.
     pub fn primitive_bytes(&self) -> u32 {
         self.numbers_in * self.number_bytes + self.index_bytes
+    }
+
+    /// Bytes that the list writer moves for a pair: it reads an index and its record, and writes the entry.
+    pub fn written_bytes(&self) -> u32 {
+        match self.records {
+            Records::Gathered => 0,
+            Records::Listed => 2 * self.primitive_bytes(),
+        }
     }
 
     /// Bytes written for a tile.
@@ -434,6 +468,9 @@ const RANGES: &[(&str, &str, Range)] = {
         ("rasterizer", "port_bytes_per_cycle", From(0.01, 65_536.0)),
         ("rasterizer", "tile_overhead", From(0.0, 100_000.0)),
         ("rasterizer", "mode_switch", From(0.0, 100_000.0)),
+        ("list_writer", "cycles_per_pair", From(0.0, 1e6)),
+        ("list_writer", "area_mm2", From(0.0, 1e5)),
+        ("list_writer", "pj_per_byte", From(0.0, 1e6)),
         ("memory", "bandwidth_gb_s", From(0.01, 1e5)),
         ("memory", "efficiency", SHARE),
         ("memory", "latency_ns", From(0.0, 1e6)),

@@ -22,6 +22,8 @@ pub struct Energy {
     pub leakage: f64,
     /// Main memory, for the rasterizer.
     pub memory: f64,
+    /// The list writer, with its main memory.
+    pub list_writer: f64,
     /// Shader cores, stages 1 and 2 (and 3, without a rasterizer).
     pub shader_cores: f64,
 }
@@ -34,16 +36,17 @@ impl Energy {
 
     /// The sum over all components.
     pub fn total(&self) -> f64 {
-        self.modules() + self.memory + self.shader_cores
+        self.modules() + self.memory + self.list_writer + self.shader_cores
     }
 
     /// Names and values, for tables.
-    pub fn by_component(&self) -> [(&'static str, f64); 5] {
+    pub fn by_component(&self) -> [(&'static str, f64); 6] {
         [
             ("PE arithmetic", self.arithmetic),
             ("tile buffers", self.buffers),
             ("module leakage", self.leakage),
             ("main memory", self.memory),
+            ("list writer", self.list_writer),
             ("shader cores", self.shader_cores),
         ]
     }
@@ -164,9 +167,10 @@ pub fn calibration(config: &Config) -> Calibration {
     }
 }
 
-/// The leakage of all modules in W: that of their area.
+/// The leakage of all modules and of the list writer in W: that of their area.
 pub fn leakage_w(config: &Config) -> f64 {
-    config.energy.leakage_w_per_mm2 * area::area(config).module * f64::from(config.rasterizer.modules)
+    let area = area::area(config);
+    config.energy.leakage_w_per_mm2 * (area.module * f64::from(config.rasterizer.modules) + area.list_writer)
 }
 
 /// Shares of evaluations that changed a pixel.
@@ -204,6 +208,12 @@ pub fn rasterizer(report: &RasterReport, changed: Changed, frame_ms: f64, config
     energy.leakage = leakage_w(config) * frame_ms;
     energy.memory = (report.bytes_in + report.bytes_out) * config.energy.dram_pj_per_byte * 1e-9;
     energy
+}
+
+/// The energy in mJ of the list writer that moves `bytes`.
+pub fn list_writer_mj(bytes: f64, config: &Config) -> f64 {
+    let through = config.list_writer.pj_per_byte * config.energy.scale;
+    bytes * (through + config.energy.dram_pj_per_byte) * 1e-9
 }
 
 /// Mean powers in W.

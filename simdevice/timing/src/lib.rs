@@ -8,6 +8,7 @@
 pub mod area;
 pub mod check;
 pub mod config;
+pub mod dram;
 pub mod energy;
 pub mod fast;
 pub mod pe;
