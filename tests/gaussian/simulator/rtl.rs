@@ -196,7 +196,7 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
         // In the module, pixels in the pipeline finish later than in the model.
         assert!(busy[0] >= busy[1]);
         near(busy, 0.04);
-        near(dependency, if setting.masked { 0.12 } else { 0.0 });
+        near(dependency, if setting.masked { 0.02 } else { 0.0 });
         near(memory, 0.12);
         near(controller, 0.01);
         near(modes, 0.04);
