@@ -22,7 +22,7 @@ use timing_studies::{paper, rtl, stepped};
 
 use crate::args::RenderArguments;
 use crate::render;
-use crate::simulate_machines::{Document, MAX_MACHINES, Machine, Simulated, simulate_all, sweep};
+use crate::simulate_machines::{Document, Machine, MachineResult, SweepError, simulate_all, sweep};
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 
@@ -43,10 +43,8 @@ pub enum Error {
     TooLong(u64),
     #[error("drawing the scene: {0}")]
     Draw(#[from] render::Error),
-    #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
-    Sweep(String),
-    #[error("--sweep: {0} machines, and at most {MAX_MACHINES}")]
-    TooManyMachines(u64),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -208,9 +206,9 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
 }
 
 /// The last frame on the hardware with each of the device's skips.
-fn variants(trace: &Trace, config: &Config) -> Vec<Simulated> {
+fn variants(trace: &Trace, config: &Config) -> Vec<MachineResult> {
     let last = trace.frames.len().saturating_sub(1);
-    let simulated = |variant: WhatIf| Simulated {
+    let simulated = |variant: WhatIf| MachineResult {
         frame: last,
         machine: Machine { name: variant.name.to_owned(), config: variant.config },
         simulation: variant.simulation,
@@ -220,8 +218,8 @@ fn variants(trace: &Trace, config: &Config) -> Vec<Simulated> {
 }
 
 /// Every frame of the trace on one machine.
-fn every_frame(trace: &Trace, machine: &Machine) -> Vec<Simulated> {
-    let simulated = |(number, frame)| Simulated {
+fn every_frame(trace: &Trace, machine: &Machine) -> Vec<MachineResult> {
+    let simulated = |(number, frame)| MachineResult {
         frame: number,
         machine: Machine { name: format!("frame {number}"), ..machine.clone() },
         simulation: simulate::simulate(frame, &machine.config),

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::Serialize;
+use thiserror::Error;
 use timing::area::{self, Area};
 use timing::config::{Config, ConfigError};
 use timing::simulate::{Shared, Simulation};
@@ -10,7 +11,16 @@ use timing::work::{FrameWork, TRACE_VERSION, Trace};
 use timing_studies::rivals::{self, Quads};
 use timing_studies::simt::{self, Simt};
 
-use crate::simulate::Error;
+/// The reason that a sweep has no machines. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum SweepError {
+    #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
+    Form(String),
+    #[error("--sweep: {0} machines, and at most {MAX_MACHINES}")]
+    TooMany(u64),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
 
 /// A configuration of the hardware, with its name in tables.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +31,7 @@ pub struct Machine {
 
 /// A frame of a trace on a machine.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Simulated {
+pub struct MachineResult {
     /// The frame's number, from 0.
     pub frame: usize,
     pub machine: Machine,
@@ -29,7 +39,7 @@ pub struct Simulated {
 }
 
 /// Simulates the trace's last frame on every machine. Each of the host's cores takes the next machine when it is free.
-pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<Simulated> {
+pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<MachineResult> {
     let Some(frame) = trace.frames.last() else {
         return Vec::new();
     };
@@ -41,7 +51,7 @@ pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<Simulated> {
         let index = next.fetch_add(1, Ordering::Relaxed);
         let machine = machines.get(index)?;
         let simulation = shared.simulate(&machine.config);
-        Some((index, Simulated { frame: number, machine: machine.clone(), simulation }))
+        Some((index, MachineResult { frame: number, machine: machine.clone(), simulation }))
     };
     let mut results: Vec<_> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..cores.min(machines.len()))
@@ -61,20 +71,20 @@ pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<Simulated> {
 pub const MAX_MACHINES: u64 = 10_000;
 
 /// The configuration with every combination of the values of sweeps; the last one changes fastest.
-pub fn sweep(sweeps: &[String], config: &Config) -> Result<Vec<Machine>, Error> {
+pub fn sweep(sweeps: &[String], config: &Config) -> Result<Vec<Machine>, SweepError> {
     let machine = |settings: Vec<String>| Ok(Machine { name: settings.join(" "), config: config.with(&settings)? });
     let machines: Result<Vec<_>, ConfigError> = combinations(sweeps)?.into_iter().map(machine).collect();
     Ok(machines?)
 }
 
 /// The settings of every combination.
-fn combinations(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
+fn combinations(sweeps: &[String]) -> Result<Vec<Vec<String>>, SweepError> {
     let mut combinations = vec![Vec::new()];
     for sweep in sweeps {
         let values = sweep_values(sweep)?;
         let count = combinations.len() as u64 * values.len() as u64;
         if count > MAX_MACHINES {
-            return Err(Error::TooManyMachines(count));
+            return Err(SweepError::TooMany(count));
         }
         let with = |settings: &Vec<String>| {
             let settings = settings.clone();
@@ -86,8 +96,8 @@ fn combinations(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
 }
 
 /// The settings of a sweep: the values of a list, or every number of a range.
-fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
-    let wrong = || Error::Sweep(sweep.to_owned());
+fn sweep_values(sweep: &str) -> Result<Vec<String>, SweepError> {
+    let wrong = || SweepError::Form(sweep.to_owned());
     let (name, values) = sweep.split_once('=').ok_or_else(wrong)?;
     let Some((first, last)) = values.split_once("..") else {
         return Ok(values.split(',').map(|value| format!("{name}={value}")).collect());
@@ -99,7 +109,7 @@ fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
     }
     let count = u64::from(last - first) + 1;
     if count > MAX_MACHINES {
-        return Err(Error::TooManyMachines(count));
+        return Err(SweepError::TooMany(count));
     }
     Ok((first..=last).map(|value| format!("{name}={value}")).collect())
 }
@@ -130,9 +140,9 @@ struct Entry<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub fn of(trace: &Trace, results: &'a [Simulated]) -> Self {
+    pub fn of(trace: &Trace, results: &'a [MachineResult]) -> Self {
         let squares: Vec<_> = trace.frames.iter().map(FrameWork::with_squares).collect();
-        let entry = |result: &'a Simulated| Entry {
+        let entry = |result: &'a MachineResult| Entry {
             machine: &result.machine.name,
             frame: result.frame,
             config: &result.machine.config,
@@ -175,7 +185,7 @@ pub mod tests {
         for bad in ["modules", "modules=4..2", "modules=a..b"] {
             assert!(sweep_values(bad).is_err(), "{bad}");
         }
-        assert!(matches!(sweep_values("batch=0..4294967295"), Err(Error::TooManyMachines(4_294_967_296))));
+        assert!(matches!(sweep_values("batch=0..4294967295"), Err(SweepError::TooMany(4_294_967_296))));
     }
 
     #[test]
@@ -189,7 +199,7 @@ pub mod tests {
         assert_eq!(all[1], ["modules=2", "batch=32"]);
         assert_eq!(all[5], ["modules=3", "batch=64"]);
         let many = ["modules=1..64", "batch=1..64", "pes_per_module=1..64"];
-        assert!(matches!(of(&many), Err(Error::TooManyMachines(262_144))));
+        assert!(matches!(of(&many), Err(SweepError::TooMany(262_144))));
     }
 
     #[test]

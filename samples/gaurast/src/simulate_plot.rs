@@ -13,7 +13,7 @@ use timing::work::FrameWork;
 use timing_studies::chart::{self, Chart, Corner, Curve};
 use timing_studies::scatter::{self, Axis, Line, Plot, Point};
 
-use crate::simulate_machines::Simulated;
+use crate::simulate_machines::MachineResult;
 
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 380];
@@ -32,14 +32,14 @@ const ENERGY: [Number; 3] = [
 ];
 
 /// An SVG of the machines' results. `swept` names the parameter that differs, and each machine is named by its value.
-pub fn svg(swept: &str, results: &[Simulated]) -> String {
+pub fn svg(swept: &str, results: &[MachineResult]) -> String {
     chart::svg(&[
         panel([swept, "speed-up over the shader cores"], &SPEED, results),
         panel([swept, "mJ a frame"], &ENERGY, results),
     ])
 }
 
-fn panel(axes: [&str; 2], numbers: &[Number], results: &[Simulated]) -> Chart {
+fn panel(axes: [&str; 2], numbers: &[Number], results: &[MachineResult]) -> Chart {
     let value = |name: &str| name.split_once('=').map_or(name, |(_, value)| value).to_owned();
     let curve = |(&(label, of), color): (&Number, &'static str)| Curve {
         label,
@@ -57,11 +57,11 @@ fn panel(axes: [&str; 2], numbers: &[Number], results: &[Simulated]) -> Chart {
 }
 
 /// A plot of machines by area and raster time. Those on the Pareto front are named and joined by a line.
-pub fn pareto(results: &[Simulated]) -> String {
-    let place = |result: &Simulated| [area::area(&result.machine.config).added, result.simulation.stages.raster];
+pub fn pareto(results: &[MachineResult]) -> String {
+    let place = |result: &MachineResult| [area::area(&result.machine.config).added, result.simulation.stages.raster];
     let places: Vec<_> = results.iter().map(place).collect();
     let front = scatter::pareto(&places);
-    let point = |(index, result): (usize, &Simulated)| Point {
+    let point = |(index, result): (usize, &MachineResult)| Point {
         at: places[index],
         name: format!("{}: {:.2} mJ", result.machine.name, result.simulation.energy.total()),
         labelled: front.contains(&index) && front.len() <= 12,

@@ -13,7 +13,7 @@ use timing::work::{FrameWork, TileWork};
 use timing_studies::paper::Section;
 use timing_studies::{rivals, simt};
 
-use crate::simulate_machines::Simulated;
+use crate::simulate_machines::MachineResult;
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -197,7 +197,7 @@ fn longest(spans: &[TileSpan]) -> Option<&TileSpan> {
 }
 
 /// The main numbers of a result, each with its name and its number of digits.
-fn summary(result: &Simulated) -> [(&'static str, f64, usize); 17] {
+fn summary(result: &MachineResult) -> [(&'static str, f64, usize); 17] {
     let area = area::area(&result.machine.config);
     let result = &result.simulation;
     [
@@ -222,7 +222,7 @@ fn summary(result: &Simulated) -> [(&'static str, f64, usize); 17] {
 }
 
 /// A row for each machine, and a warning if the power of some exceeds their budgets.
-pub fn many(results: &[Simulated]) -> String {
+pub fn many(results: &[MachineResult]) -> String {
     let mut table = new_table();
     for result in results {
         let summary = summary(result);
@@ -295,7 +295,7 @@ fn field(text: &str) -> String {
 }
 
 /// A CSV line for each machine.
-pub fn csv(results: &[Simulated]) -> String {
+pub fn csv(results: &[MachineResult]) -> String {
     let mut out = String::new();
     for (index, result) in results.iter().enumerate() {
         let summary = summary(result);

@@ -6,7 +6,6 @@
 #![forbid(unsafe_code)]
 
 pub mod area;
-pub mod check;
 pub mod config;
 pub mod dram;
 pub mod energy;
@@ -18,8 +17,7 @@ pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;
 pub mod stages;
-pub mod trace_file;
 pub mod work;
 
 pub use config::{Config, ConfigError};
-pub use work::{FrameWork, Trace};
+pub use work::{FrameWork, Trace, trace_file};

@@ -1,7 +1,7 @@
 //! The bytes of a trace: JSON, or postcard's binary encoding for a trace of many pairs.
 
-use crate::check::TraceError;
 use crate::work::Trace;
+use crate::work::check::TraceError;
 
 /// The first bytes of a binary trace, before postcard's encoding of [`Trace`].
 pub const MAGIC: [u8; 8] = *b"gaurast\n";
