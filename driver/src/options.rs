@@ -14,6 +14,7 @@ use simdevice::Config;
 use simdevice::runtime::SimdLevel;
 use simdevice::stats::optimizations::{Optimizations, UnknownOptimization};
 use simdevice::stats::recorder::{Recorder, Trace};
+use simdevice::timing::trace_file;
 use std::ffi::{CString, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -278,7 +279,7 @@ struct TraceReceivers {
 impl TraceReceivers {
     /// Gives the trace to the program's function and writes it to the file. A failure is reported.
     fn give(&self, trace: &Trace) {
-        let bytes = match trace.to_bytes() {
+        let bytes = match trace_file::to_bytes(trace) {
             Ok(bytes) => bytes,
             Err(error) => return self.report(&error.to_string()),
         };

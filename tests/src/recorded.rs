@@ -23,7 +23,7 @@ const MACHINES: [(&str, &[&str]); 6] = [
 /// If there is none, or it is invalid.
 pub fn recorded(trace: &WorkTrace) -> Trace {
     let bytes = trace.take().expect("the device gave its trace");
-    Trace::from_bytes(&bytes).expect("a trace")
+    simdevice::timing::trace_file::from_bytes(&bytes).expect("a trace")
 }
 
 /// The differences between the fast model and the stepped model.

@@ -67,7 +67,7 @@ pub fn work(arguments: &RenderArguments) -> Result<Trace, Error> {
 
 /// The work that the device has left; none if it has drawn nothing.
 fn parse(trace: &WorkTrace) -> Result<Trace, Error> {
-    Trace::from_bytes(&trace.take().unwrap_or_default()).map_err(Error::Trace)
+    timing::trace_file::from_bytes(&trace.take().unwrap_or_default()).map_err(Error::Trace)
 }
 
 /// Draws a scene and writes the pictures. `trace` receives the device's work.

@@ -305,7 +305,7 @@ fn is_trace(path: &Path) -> bool {
 }
 
 fn load(path: &Path) -> Result<Trace, Error> {
-    Trace::from_bytes(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })
+    trace_file::from_bytes(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })
 }
 
 /// Draws the scene, and returns the work. The picture goes to `folder`.

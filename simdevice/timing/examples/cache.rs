@@ -1,7 +1,8 @@
 //! Replays the reads of a trace's last frame into a cache: `cargo run -p timing --example cache -- work.json [KIB]`.
 //! A module reads an entry of its tile's list, then the record that the entry names.
 
-use timing::work::{ENTRY_BYTES, RECORD_BYTES, Trace};
+use timing::trace_file;
+use timing::work::{ENTRY_BYTES, RECORD_BYTES};
 
 const LINE_BYTES: u64 = 64;
 const WAYS: usize = 8;
@@ -37,7 +38,7 @@ impl Cache {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let trace = Trace::from_bytes(&std::fs::read(arguments.next().ok_or("no trace")?)?)?;
+    let trace = trace_file::from_bytes(&std::fs::read(arguments.next().ok_or("no trace")?)?)?;
     let kib: u64 = arguments.next().map_or(Ok(512), |text| text.parse())?;
     let mut cache = Cache::new(kib * 1024);
     for draw in trace.frames.last().ok_or("no frame")?.draws.iter() {

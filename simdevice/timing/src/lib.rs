@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod area;
+pub mod check;
 pub mod config;
 pub mod dram;
 pub mod energy;
@@ -17,7 +18,8 @@ pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;
 pub mod stages;
+pub mod trace_file;
 pub mod work;
 
 pub use config::{Config, ConfigError};
-pub use work::{FrameWork, Trace, trace_file};
+pub use work::{FrameWork, Trace};

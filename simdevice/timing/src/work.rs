@@ -1,9 +1,6 @@
 //! The trace of work: the work of a device for a frame, in the units that hardware spends time and energy on. It does
 //! not say how long the work takes; every model in this crate reads it and none changes it.
 
-pub mod check;
-pub mod trace_file;
-
 use serde::{Deserialize, Serialize};
 
 /// The side in pixels of a trace's tiles, and the number of rows (or 4x4 blocks) of one.

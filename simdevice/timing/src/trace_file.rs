@@ -1,7 +1,7 @@
 //! The bytes of a trace: JSON, or postcard's binary encoding for a trace of many pairs.
 
+use crate::check::{self, TraceError};
 use crate::work::Trace;
-use crate::work::check::TraceError;
 
 /// The first bytes of a binary trace, before postcard's encoding of [`Trace`].
 pub const MAGIC: [u8; 8] = *b"gaurast\n";
@@ -23,31 +23,29 @@ pub enum FileError {
     Trace(#[from] TraceError),
 }
 
-impl Trace {
-    /// The trace as bytes: binary if it has more than [`MOST_JSON_PAIRS`] pairs.
-    ///
-    /// # Errors
-    /// Returns a [`FileError`] if memory does not suffice.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, FileError> {
-        let pairs: u64 = self.frames.iter().map(|frame| frame.pairs()).sum();
-        if pairs > MOST_JSON_PAIRS {
-            return Ok(postcard::to_extend(self, MAGIC.to_vec())?);
-        }
-        Ok(serde_json::to_vec(self)?)
+/// The trace as bytes: binary if it has more than [`MOST_JSON_PAIRS`] pairs.
+///
+/// # Errors
+/// Returns a [`FileError`] if memory does not suffice.
+pub fn to_bytes(trace: &Trace) -> Result<Vec<u8>, FileError> {
+    let pairs: u64 = trace.frames.iter().map(|frame| frame.pairs()).sum();
+    if pairs > MOST_JSON_PAIRS {
+        return Ok(postcard::to_extend(trace, MAGIC.to_vec())?);
     }
+    Ok(serde_json::to_vec(trace)?)
+}
 
-    /// The trace of bytes in either encoding, checked.
-    ///
-    /// # Errors
-    /// Returns a [`FileError`] if the bytes are no trace, or its numbers contradict each other.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, FileError> {
-        let trace: Self = match bytes.strip_prefix(&MAGIC) {
-            Some(binary) => postcard::from_bytes(binary)?,
-            None => serde_json::from_slice(bytes)?,
-        };
-        trace.check()?;
-        Ok(trace)
-    }
+/// The trace of bytes in either encoding, checked.
+///
+/// # Errors
+/// Returns a [`FileError`] if the bytes are no trace, or its numbers contradict each other.
+pub fn from_bytes(bytes: &[u8]) -> Result<Trace, FileError> {
+    let trace: Trace = match bytes.strip_prefix(&MAGIC) {
+        Some(binary) => postcard::from_bytes(binary)?,
+        None => serde_json::from_slice(bytes)?,
+    };
+    check::check(&trace)?;
+    Ok(trace)
 }
 
 #[cfg(test)]
@@ -75,35 +73,35 @@ mod tests {
     fn traces_survive_both_encodings() {
         for (pairs, is_binary) in [(MOST_JSON_PAIRS / 2, false), (MOST_JSON_PAIRS / 2 + 260, true)] {
             let trace = trace(pairs);
-            let bytes = trace.to_bytes().unwrap();
+            let bytes = to_bytes(&trace).unwrap();
             assert_eq!(bytes.starts_with(&MAGIC), is_binary, "{pairs}");
-            assert_eq!(Trace::from_bytes(&bytes).unwrap(), trace);
+            assert_eq!(from_bytes(&bytes).unwrap(), trace);
         }
     }
 
     #[test]
     fn the_binary_encoding_is_smaller() {
         let [json, binary] =
-            [MOST_JSON_PAIRS / 2, MOST_JSON_PAIRS / 2 + 260].map(|pairs| trace(pairs).to_bytes().unwrap());
+            [MOST_JSON_PAIRS / 2, MOST_JSON_PAIRS / 2 + 260].map(|pairs| to_bytes(&trace(pairs)).unwrap());
         // An id below 16384 has at most two bytes, and five and a comma in JSON.
         assert!(2 * binary.len() < json.len(), "{} {}", binary.len(), json.len());
     }
 
     #[test]
     fn cut_and_changed_bytes_are_refused_or_read() {
-        let bytes = trace(MOST_JSON_PAIRS).to_bytes().unwrap();
+        let bytes = to_bytes(&trace(MOST_JSON_PAIRS)).unwrap();
         for length in [0, 3, 8, 9, 100, bytes.len() / 2, bytes.len() - 1] {
-            assert!(Trace::from_bytes(&bytes[..length]).is_err(), "{length}");
+            assert!(from_bytes(&bytes[..length]).is_err(), "{length}");
         }
         // A changed byte may give another trace, but no panic and no large allocation.
         for at in (8..bytes.len()).step_by(bytes.len() / 40) {
             let mut changed = bytes.clone();
             changed[at] ^= 0xff;
-            let _read = Trace::from_bytes(&changed);
+            let _read = from_bytes(&changed);
         }
         let mut old = trace(10);
         old.version = 3;
-        let error = Trace::from_bytes(&old.to_bytes().unwrap()).unwrap_err();
+        let error = from_bytes(&to_bytes(&old).unwrap()).unwrap_err();
         assert_eq!(error.to_string(), "version 3; only traces of version 4 can be read");
     }
 }

@@ -75,109 +75,99 @@ fn work_is_valid(work: &ShaderWork, field: &'static str) -> Result<(), Contradic
     holds(work.is_valid(), field, "a count is negative, too large or no number")
 }
 
-impl Trace {
-    /// Checks a trace read from a file.
-    ///
-    /// # Errors
-    /// Returns a [`TraceError`] that names the first problem.
-    pub fn check(&self) -> Result<(), TraceError> {
-        if self.version != TRACE_VERSION {
-            return Err(TraceError::Version(self.version));
-        }
-        for (number, frame) in self.frames.iter().enumerate() {
-            frame.check(number)?;
-        }
-        Ok(())
+/// Checks a trace read from a file.
+///
+/// # Errors
+/// Returns a [`TraceError`] that names the first problem.
+pub fn check(trace: &Trace) -> Result<(), TraceError> {
+    if trace.version != TRACE_VERSION {
+        return Err(TraceError::Version(trace.version));
     }
+    for (number, frame) in trace.frames.iter().enumerate() {
+        check_frame(frame, number)?;
+    }
+    Ok(())
 }
 
-impl FrameWork {
-    fn check(&self, frame: usize) -> Result<(), TraceError> {
-        let squares = |draw: &DrawWork| draw.boxed_pairs.max(draw.pairs());
-        let pairs = self.draws.iter().map(squares).fold(0, u64::saturating_add);
-        if pairs > MAX_PAIRS {
-            return Err(TraceError::TooLarge { frame, pairs });
-        }
-        self.fields().map_err(|contradiction| TraceError::Frame { frame, contradiction })?;
-        for (number, draw) in self.draws.iter().enumerate() {
-            draw.fields().map_err(|contradiction| TraceError::Draw { frame, draw: number, contradiction })?;
-            let mut places = HashSet::with_capacity(draw.tiles.len());
-            for tile in &draw.tiles {
-                let is_new = places.insert((tile.at, tile.layer));
-                let checked = holds(is_new, "at", "the draw has the tile twice in a layer");
-                let checked = checked.and_then(|()| tile.fields(self.size, draw.mode));
-                let at = tile.at;
-                checked.map_err(|contradiction| TraceError::Tile { frame, draw: number, at, contradiction })?;
-            }
-        }
-        Ok(())
+fn check_frame(frame: &FrameWork, index: usize) -> Result<(), TraceError> {
+    let squares = |draw: &DrawWork| draw.boxed_pairs.max(draw.pairs());
+    let pairs = frame.draws.iter().map(squares).fold(0, u64::saturating_add);
+    if pairs > MAX_PAIRS {
+        return Err(TraceError::TooLarge { frame: index, pairs });
     }
-
-    fn fields(&self) -> Result<(), Contradiction> {
-        let has_tiles = self.draws.iter().any(|draw| !draw.tiles.is_empty());
-        let is_empty = self.size.contains(&0);
-        holds(!(has_tiles && is_empty), "size", "the picture has no pixels, and draws have tiles")?;
-        holds(self.size.iter().all(|&side| side <= MAX_SIDE), "size", "a side has more than 16777216 pixels")?;
-        work_is_valid(&self.compute, "compute")
+    frame_fields(frame).map_err(|contradiction| TraceError::Frame { frame: index, contradiction })?;
+    for (number, draw) in frame.draws.iter().enumerate() {
+        draw_fields(draw).map_err(|contradiction| TraceError::Draw { frame: index, draw: number, contradiction })?;
+        let mut places = HashSet::with_capacity(draw.tiles.len());
+        for tile in &draw.tiles {
+            let is_new = places.insert((tile.at, tile.layer));
+            let checked = holds(is_new, "at", "the draw has the tile twice in a layer");
+            let checked = checked.and_then(|()| tile_fields(tile, frame.size, draw.mode));
+            let at = tile.at;
+            checked.map_err(|contradiction| TraceError::Tile { frame: index, draw: number, at, contradiction })?;
+        }
     }
+    Ok(())
 }
 
-impl DrawWork {
-    fn fields(&self) -> Result<(), Contradiction> {
-        work_is_valid(&self.preprocess, "preprocess")?;
-        work_is_valid(&self.sort, "sort")?;
-        work_is_valid(&self.shade, "shade")?;
-        let known = self.sized_pairs.windows(2).filter(|pair| pair.iter().all(|&count| count > 0));
-        // A tile of the next size has four of the size before.
-        let is_possible = |pair: &[u64]| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4);
-        let reason = "pairs must not grow with the side of a tile, nor shrink by more than four";
-        holds(known.into_iter().all(is_possible), "sized_pairs", reason)?;
-        if self.mode == Mode::Triangle {
-            // Clipping and programs make more primitives than the draw names.
-            return Ok(());
-        }
-        holds(self.drawn <= self.primitives, "drawn", "more Gaussians are drawn than the draw names")?;
-        holds(self.drawn == 0 || !self.tiles.is_empty(), "tiles", "Gaussians are drawn, and no tile has a list")?;
-        let is_large = self.boxed_pairs == 0 || self.boxed_pairs >= self.pairs();
-        holds(is_large, "boxed_pairs", "there are fewer than the pairs of the lists")
-    }
+fn frame_fields(frame: &FrameWork) -> Result<(), Contradiction> {
+    let has_tiles = frame.draws.iter().any(|draw| !draw.tiles.is_empty());
+    let is_empty = frame.size.contains(&0);
+    holds(!(has_tiles && is_empty), "size", "the picture has no pixels, and draws have tiles")?;
+    holds(frame.size.iter().all(|&side| side <= MAX_SIDE), "size", "a side has more than 16777216 pixels")?;
+    work_is_valid(&frame.compute, "compute")
 }
 
-impl TileWork {
-    /// Checks the fields of a tile in a picture of `size` pixels.
-    fn fields(&self, size: [u32; 2], mode: Mode) -> Result<(), Contradiction> {
-        let is_inside = self.at.iter().zip(size).all(|(&at, side)| at < side.div_ceil(TILE_SIDE));
-        holds(is_inside, "at", "the tile is outside of the picture")?;
-        let needed = self.runs.iter().map(|run| u64::from(run.primitives)).sum::<u64>();
-        holds(needed <= self.listed.into(), "runs.primitives", "the runs have more primitives than the list")?;
-        self.runs.iter().try_for_each(Run::fields)?;
-        if mode == Mode::Gaussian {
-            let shrink = |pair: &[Run]| pair[1].rows <= pair[0].rows && pair[1].blocks <= pair[0].blocks;
-            let reason = "finished rows or blocks become unfinished again";
-            holds(self.runs.windows(2).all(shrink), "runs.rows", reason)?;
-        }
-        holds(self.terminated <= TILE_PIXELS, "terminated", "more pixels are finished than a tile has")?;
-        let most = u64::from(self.listed) * u64::from(TILE_PIXELS);
-        holds(self.contributions <= most, "contributions", "more pixels are changed than the primitives have")?;
-        let is_whole = self.ids.is_empty() || self.ids.len() as u64 == u64::from(self.listed);
-        holds(is_whole, "ids", "there are not as many as the list has primitives")
+fn draw_fields(draw: &DrawWork) -> Result<(), Contradiction> {
+    work_is_valid(&draw.preprocess, "preprocess")?;
+    work_is_valid(&draw.sort, "sort")?;
+    work_is_valid(&draw.shade, "shade")?;
+    let known = draw.sized_pairs.windows(2).filter(|pair| pair.iter().all(|&count| count > 0));
+    // A tile of the next size has four of the size before.
+    let is_possible = |pair: &[u64]| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4);
+    let reason = "pairs must not grow with the side of a tile, nor shrink by more than four";
+    holds(known.into_iter().all(is_possible), "sized_pairs", reason)?;
+    if draw.mode == Mode::Triangle {
+        // Clipping and programs make more primitives than the draw names.
+        return Ok(());
     }
+    holds(draw.drawn <= draw.primitives, "drawn", "more Gaussians are drawn than the draw names")?;
+    holds(draw.drawn == 0 || !draw.tiles.is_empty(), "tiles", "Gaussians are drawn, and no tile has a list")?;
+    let is_large = draw.boxed_pairs == 0 || draw.boxed_pairs >= draw.pairs();
+    holds(is_large, "boxed_pairs", "there are fewer than the pairs of the lists")
 }
 
-impl Run {
-    fn fields(&self) -> Result<(), Contradiction> {
-        let groups = TILE_GROUPS as u8;
-        holds(self.rows <= groups, "runs.rows", "a tile has 16 rows")?;
-        holds(self.blocks <= groups, "runs.blocks", "a tile has 16 blocks")?;
-        let agree = (self.rows == 0) == (self.blocks == 0);
-        holds(agree, "runs.blocks", "a row is unfinished and no block, or a block and no row")?;
-        let reached = u64::from(self.reached) + u64::from(self.hidden_blocks);
-        let most = u64::from(self.primitives) * u64::from(TILE_GROUPS);
-        holds(reached <= most, "runs.reached", "more blocks are reached than the primitives have")?;
-        holds(self.hidden <= self.primitives, "runs.hidden", "more primitives are hidden than the run has")?;
-        let waits = self.waits.unwrap_or_default();
-        holds(waits.is_sorted(), "runs.waits", "a longer interval waits for less")
+/// Checks the fields of a tile in a picture of `size` pixels.
+fn tile_fields(tile: &TileWork, size: [u32; 2], mode: Mode) -> Result<(), Contradiction> {
+    let is_inside = tile.at.iter().zip(size).all(|(&at, side)| at < side.div_ceil(TILE_SIDE));
+    holds(is_inside, "at", "the tile is outside of the picture")?;
+    let needed = tile.runs.iter().map(|run| u64::from(run.primitives)).sum::<u64>();
+    holds(needed <= tile.listed.into(), "runs.primitives", "the runs have more primitives than the list")?;
+    tile.runs.iter().try_for_each(run_fields)?;
+    if mode == Mode::Gaussian {
+        let shrink = |pair: &[Run]| pair[1].rows <= pair[0].rows && pair[1].blocks <= pair[0].blocks;
+        let reason = "finished rows or blocks become unfinished again";
+        holds(tile.runs.windows(2).all(shrink), "runs.rows", reason)?;
     }
+    holds(tile.terminated <= TILE_PIXELS, "terminated", "more pixels are finished than a tile has")?;
+    let most = u64::from(tile.listed) * u64::from(TILE_PIXELS);
+    holds(tile.contributions <= most, "contributions", "more pixels are changed than the primitives have")?;
+    let is_whole = tile.ids.is_empty() || tile.ids.len() as u64 == u64::from(tile.listed);
+    holds(is_whole, "ids", "there are not as many as the list has primitives")
+}
+
+fn run_fields(run: &Run) -> Result<(), Contradiction> {
+    let groups = TILE_GROUPS as u8;
+    holds(run.rows <= groups, "runs.rows", "a tile has 16 rows")?;
+    holds(run.blocks <= groups, "runs.blocks", "a tile has 16 blocks")?;
+    let agree = (run.rows == 0) == (run.blocks == 0);
+    holds(agree, "runs.blocks", "a row is unfinished and no block, or a block and no row")?;
+    let reached = u64::from(run.reached) + u64::from(run.hidden_blocks);
+    let most = u64::from(run.primitives) * u64::from(TILE_GROUPS);
+    holds(reached <= most, "runs.reached", "more blocks are reached than the primitives have")?;
+    holds(run.hidden <= run.primitives, "runs.hidden", "more primitives are hidden than the run has")?;
+    let waits = run.waits.unwrap_or_default();
+    holds(waits.is_sorted(), "runs.waits", "a longer interval waits for less")
 }
 
 #[cfg(test)]
@@ -202,7 +192,7 @@ mod tests {
         let draw = DrawWork { primitives: 20, drawn: 10, tiles: vec![tile()], ..DrawWork::default() };
         let mut frame = FrameWork { size: [64, 48], draws: vec![draw], ..FrameWork::default() };
         change(&mut frame);
-        Trace { version: TRACE_VERSION, frames: vec![frame] }.check()
+        check(&Trace { version: TRACE_VERSION, frames: vec![frame] })
     }
 
     /// The message for a changed trace.
