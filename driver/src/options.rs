@@ -14,6 +14,7 @@ use simdevice::Config;
 use simdevice::runtime::SimdLevel;
 use simdevice::stats::optimizations::{Optimizations, UnknownOptimization};
 use simdevice::stats::recorder::{Recorder, Trace};
+use simdevice::timing::trace_file;
 use std::ffi::{CString, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -318,16 +319,16 @@ struct TraceReceivers {
 impl TraceReceivers {
     /// Gives the trace to the program's function and writes it to the file. A failure is reported.
     fn give(&self, trace: &Trace) {
-        let json = match serde_json::to_vec(trace) {
-            Ok(json) => json,
+        let bytes = match trace_file::to_bytes(trace) {
+            Ok(bytes) => bytes,
             Err(error) => return self.report(&error.to_string()),
         };
         if let Some(WorkTraceCallback { function, user_data }) = self.callback {
             // SAFETY: the program keeps the function callable until its devices are destroyed.
-            unsafe { function(user_data, json.len(), json.as_ptr().cast()) };
+            unsafe { function(user_data, bytes.len(), bytes.as_ptr().cast()) };
         }
         if let Some(file) = &self.file
-            && let Err(error) = std::fs::write(file, &json)
+            && let Err(error) = std::fs::write(file, &bytes)
         {
             self.report(&format!("{TRACE}={}: {error}", Path::display(file)));
         }

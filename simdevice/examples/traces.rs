@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (config, recorder) = scenes::recording();
         scenes::draw(kind, &config, [&[], &[]]);
         let path = folder.join(format!("{name}.json"));
-        std::fs::write(&path, serde_json::to_vec(&recorder.trace())?)?;
+        std::fs::write(&path, timing::trace_file::to_bytes(&recorder.trace())?)?;
         println!("wrote {}", path.display());
     }
     Ok(())

@@ -22,8 +22,8 @@ const MACHINES: [(&str, &[&str]); 6] = [
 /// # Panics
 /// If there is none, or it is invalid.
 pub fn recorded(trace: &WorkTrace) -> Trace {
-    let json = trace.take().expect("the device gave its trace");
-    serde_json::from_slice(&json).expect("a trace")
+    let bytes = trace.take().expect("the device gave its trace");
+    simdevice::timing::trace_file::from_bytes(&bytes).expect("a trace")
 }
 
 /// The differences between the fast model and the stepped model.

@@ -15,7 +15,7 @@ use crate::vk::DriverOptionsGAURAST;
 /// # // SAFETY: never run.
 /// let instance = unsafe { entry.create_instance(&create_info, None)? };
 /// // A device draws, and is destroyed.
-/// let json = trace.take().expect("the device's work");
+/// let bytes = trace.take().expect("the device's work");
 /// # Ok(())
 /// # }
 /// ```
@@ -23,8 +23,8 @@ use crate::vk::DriverOptionsGAURAST;
 pub struct WorkTrace(Mutex<Option<Vec<u8>>>);
 
 impl WorkTrace {
-    /// Takes the trace of the device that was destroyed last, as JSON in UTF-8; `None` if none was destroyed since the
-    /// last call.
+    /// Takes the trace of the device that was destroyed last, as JSON in UTF-8, or binary if it is large; `None`
+    /// if none was destroyed since the last call.
     pub fn take(&self) -> Option<Vec<u8>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
@@ -41,6 +41,7 @@ impl<'a> DriverOptionsGAURAST<'a> {
 /// Gives a trace to the [`WorkTrace`] that `user_data` points at.
 unsafe extern "system" fn receive(user_data: *mut c_void, size: usize, data: *const c_void) {
     // SAFETY: the driver passes valid data, and the user data that `work_trace` sets.
-    let (receiver, json) = unsafe { (&*user_data.cast::<WorkTrace>(), core::slice::from_raw_parts(data.cast(), size)) };
-    *receiver.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(json.to_vec());
+    let (receiver, bytes) =
+        unsafe { (&*user_data.cast::<WorkTrace>(), core::slice::from_raw_parts(data.cast(), size)) };
+    *receiver.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes.to_vec());
 }

@@ -19,6 +19,7 @@ mod renderers;
 mod report;
 mod sheet;
 mod simulate;
+mod simulate_machines;
 mod simulate_plot;
 mod simulate_report;
 mod sources;

@@ -40,7 +40,7 @@ pub enum Error {
     #[error("{0}")]
     Limit(String),
     #[error("the device's trace of its work: {0}")]
-    Trace(serde_json::Error),
+    Trace(timing::trace_file::FileError),
     #[error("the pictures are written, but not the report: {0}")]
     Report(std::io::Error),
 }
@@ -67,8 +67,7 @@ pub fn work(arguments: &RenderArguments) -> Result<Trace, Error> {
 
 /// The work that the device has left; none if it has drawn nothing.
 fn parse(trace: &WorkTrace) -> Result<Trace, Error> {
-    let json = trace.take().unwrap_or_default();
-    serde_json::from_slice(&json).map_err(Error::Trace)
+    timing::trace_file::from_bytes(&trace.take().unwrap_or_default()).map_err(Error::Trace)
 }
 
 /// Draws a scene and writes the pictures. `trace` receives the device's work.

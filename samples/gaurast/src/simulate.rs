@@ -3,9 +3,8 @@
 //! The work is that of a real run: of the scene, which this program draws, or of any Vulkan program that ran with
 //! `GAURAST_TRACE` set.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
 use gaurast_picture::Size;
@@ -15,13 +14,15 @@ use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::fast::{self, TileSpan};
 use timing::raster::RasterReport;
 use timing::schedule::{self, Engine, ModuleSpan, Span};
-use timing::simulate::{self, Shared, Simulation};
-use timing::work::{Trace, TraceError};
+use timing::simulate::{self, Simulation};
+use timing::trace_file::{self, FileError};
+use timing::work::Trace;
 use timing_studies::what_if::{WhatIf, what_ifs};
-use timing_studies::{area, paper, rtl, stepped};
+use timing_studies::{paper, rtl, stepped};
 
 use crate::args::RenderArguments;
 use crate::render;
+use crate::simulate_machines::{Document, Machine, MachineResult, SweepError, simulate_all, sweep};
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 
@@ -32,10 +33,8 @@ pub enum Error {
     Config(#[from] ConfigError),
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    #[error("{}: not a trace of work: {source}", path.display())]
-    Trace { path: PathBuf, source: serde_json::Error },
     #[error("{}: {source}", path.display())]
-    Work { path: PathBuf, source: TraceError },
+    Trace { path: PathBuf, source: FileError },
     #[error("{0}: there is no frame in the trace")]
     Empty(String),
     #[error("{0}: the last frame has no work, so there is nothing to simulate")]
@@ -44,10 +43,8 @@ pub enum Error {
     TooLong(u64),
     #[error("drawing the scene: {0}")]
     Draw(#[from] render::Error),
-    #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
-    Sweep(String),
-    #[error("--sweep: {0} machines, and at most {MAX_GRID}")]
-    Grid(usize),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -68,7 +65,7 @@ pub enum Format {
 
 #[derive(Args)]
 pub struct SimulateArguments {
-    /// The scene file, or a trace of work (.json); a generated garden if there is none
+    /// The scene file, or a trace of work (.json, or a binary one of any name); a generated garden if there is none
     pub scene: Option<PathBuf>,
 
     /// The hardware: paper-15x16, paper-pipeline, paper-300, single-module, fp16, orin-nx-10w, orin-nx-maxn or m2-pro
@@ -83,8 +80,8 @@ pub struct SimulateArguments {
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub settings: Vec<String>,
 
-    /// Simulate one machine after the other, as in modules=1..32 or saturation=none,tile,block; if given more than
-    /// once, every combination
+    /// Simulate one machine after the other, as in modules=1..32 or saturation=none,tile,block: every number from the
+    /// first to the last; if given more than once, every combination
     #[arg(long, value_name = "NAME=FIRST..LAST")]
     pub sweep: Vec<String>,
 
@@ -97,11 +94,11 @@ pub struct SimulateArguments {
     pub pareto: Option<PathBuf>,
 
     /// Plot the stages under the rooflines of shader cores and rasterizer
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", conflicts_with_all = ["sweep", "what_if", "every_frame"])]
     pub roofline: Option<PathBuf>,
 
     /// Draw the frame's tiles, coloured by their cycles
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", conflicts_with = "sweep")]
     pub tiles: Option<PathBuf>,
 
     /// Simulate every frame of the trace, not only the last one
@@ -116,8 +113,8 @@ pub struct SimulateArguments {
     #[arg(long, conflicts_with = "sweep")]
     pub what_if: bool,
 
-    /// Write a timeline for chrome://tracing and Perfetto
-    #[arg(long, value_name = "FILE.json")]
+    /// Write a timeline of one machine for chrome://tracing and Perfetto
+    #[arg(long, value_name = "FILE.json", conflicts_with = "sweep")]
     pub trace: Option<PathBuf>,
 
     /// The number of frames of the timeline
@@ -162,35 +159,26 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         return rtl::write(folder).map_err(|source| Error::File { path: folder.clone(), source });
     }
     // Errors of the command line are reported before a large scene is drawn.
-    let config = config(arguments)?;
-    let machines = if arguments.sweep.is_empty() {
-        vec![(machine_name(arguments), config.clone())]
-    } else {
-        let named = |settings: Vec<String>| Ok((settings.join(" "), config.with(&settings)?));
-        let grid = grid(&arguments.sweep)?;
-        grid.into_iter().map(named).collect::<Result<Vec<_>, Error>>()?
-    };
+    let machine = machine(arguments)?;
+    let config = &machine.config;
+    let machines = if arguments.sweep.is_empty() { vec![machine.clone()] } else { sweep(&arguments.sweep, config)? };
     let trace = work(arguments)?;
     let name = || arguments.scene.as_ref().map_or("the garden".to_owned(), |path| path.display().to_string());
     let frame = trace.frames.last().ok_or_else(|| Error::Empty(name()))?;
     if frame.pairs() == 0 && frame.shader().iter().all(|work| work.operations() == 0.0) {
         return Err(Error::NoWork(name()));
     }
-    if arguments.what_if {
-        let variants = what_ifs(frame, &config);
-        return print(&what_if_text(arguments.format, &variants)?);
-    }
     if arguments.stepped {
-        return print(&report::compared(&models(&trace, &config)?));
+        return print(&report::compared(&models(&trace, config)?));
     }
-    let results = if arguments.every_frame {
-        let named = |(number, frame)| (format!("frame {number}"), simulate::simulate(frame, &config));
-        trace.frames.iter().enumerate().map(named).collect()
+    let results = if arguments.what_if {
+        variants(&trace, config)
+    } else if arguments.every_frame {
+        every_frame(&trace, &machine)
     } else {
-        simulate_all(frame, &machines)
+        simulate_all(&trace, &machines)
     };
     if let Some(path) = &arguments.trace {
-        let (_, config) = &machines[0];
         write_timeline(path, &trace, config, arguments.frames)?;
     }
     if let Some(path) = &arguments.plot {
@@ -198,59 +186,50 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         replace(path, plot::svg(&swept.join(", "), &results).as_bytes())?;
     }
     if let Some(path) = &arguments.pareto {
-        replace(path, plot::pareto(&machines, &results).as_bytes())?;
+        replace(path, plot::pareto(&results).as_bytes())?;
     }
-    if let (Some(path), Some((_, result))) = (&arguments.roofline, results.first()) {
-        replace(path, plot::roofline(frame, result, &machines[0].1).as_bytes())?;
+    if let (Some(path), Some(result)) = (&arguments.roofline, results.first()) {
+        replace(path, plot::roofline(frame, &result.simulation, config).as_bytes())?;
     }
     if let Some(path) = &arguments.tiles {
-        let spans = tile_spans(frame, &machines[0].1);
-        replace(path, plot::tiles(frame, &spans, &machines[0].1).as_bytes())?;
+        replace(path, plot::tiles(frame, &tile_spans(frame, config), config).as_bytes())?;
     }
+    let has_one_machine = arguments.sweep.is_empty() && !arguments.what_if && !arguments.every_frame;
     print(&match (arguments.format, results.as_slice()) {
-        (Format::Table, [(_, one)]) if !arguments.every_frame => {
-            let spans = tile_spans(frame, &machines[0].1);
-            report::one(frame, one, &config, &spans)
+        (Format::Table, [one]) if has_one_machine => {
+            report::one(frame, &one.simulation, config, &tile_spans(frame, config))
         }
         (Format::Table, many) => report::many(many),
-        (Format::Json, many) => serde_json::to_string_pretty(many)? + "\n",
-        (Format::Csv, many) => report::csv(many, &areas(&machines, many.len())),
+        (Format::Json, many) => serde_json::to_string_pretty(&Document::of(&trace, many))? + "\n",
+        (Format::Csv, many) => report::csv(many),
     })
+}
+
+/// The last frame on the hardware with each of the device's skips.
+fn variants(trace: &Trace, config: &Config) -> Vec<MachineResult> {
+    let last = trace.frames.len().saturating_sub(1);
+    let simulated = |variant: WhatIf| MachineResult {
+        frame: last,
+        machine: Machine { name: variant.name.to_owned(), config: variant.config },
+        simulation: variant.simulation,
+    };
+    let variants = trace.frames.last().map(|frame| what_ifs(frame, config)).unwrap_or_default();
+    variants.into_iter().map(simulated).collect()
+}
+
+/// Every frame of the trace on one machine.
+fn every_frame(trace: &Trace, machine: &Machine) -> Vec<MachineResult> {
+    let simulated = |(number, frame)| MachineResult {
+        frame: number,
+        machine: Machine { name: format!("frame {number}"), ..machine.clone() },
+        simulation: simulate::simulate(frame, &machine.config),
+    };
+    trace.frames.iter().enumerate().map(simulated).collect()
 }
 
 /// The tiles of a frame in the modules, for the frame alone.
 fn tile_spans(frame: &FrameWork, config: &Config) -> Vec<TileSpan> {
     fast::rasterize_tiles(&simulate::of_rasterizer(frame, config), config, 0.0).1
-}
-
-/// The area that Gaussians add on each of `count` machines, or on the same one.
-fn areas(machines: &[(String, Config)], count: usize) -> Vec<f64> {
-    let of = |(_, config): &(String, Config)| area::area(config).added;
-    machines.iter().map(of).cycle().take(count).collect()
-}
-
-/// Simulates the frame on every machine. Each of the host's cores takes the next machine when it is free.
-fn simulate_all(frame: &FrameWork, machines: &[(String, Config)]) -> Vec<(String, Simulation)> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let shared = Shared::new(frame);
-    let next = AtomicUsize::new(0);
-    let take = || {
-        let index = next.fetch_add(1, Ordering::Relaxed);
-        let (name, config) = machines.get(index)?;
-        Some((index, (name.clone(), shared.simulate(config))))
-    };
-    let mut results: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..cores.min(machines.len()))
-            .map(|_| scope.spawn(|| std::iter::from_fn(take).collect::<Vec<_>>()))
-            .collect();
-        let results = threads.into_iter().flat_map(|thread| match thread.join() {
-            Ok(results) => results,
-            Err(panic) => std::panic::resume_unwind(panic),
-        });
-        results.collect()
-    });
-    results.sort_unstable_by_key(|(index, _)| *index);
-    results.into_iter().map(|(_, result)| result).collect()
 }
 
 /// The greatest number of pairs that are stepped clock by clock, which takes some minutes.
@@ -282,84 +261,32 @@ fn models(trace: &Trace, config: &Config) -> Result<Vec<report::Compared>, Error
     Ok(compared)
 }
 
-fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {
-    let named: Vec<_> = variants.iter().map(|variant| (variant.name.to_owned(), variant.simulation.clone())).collect();
-    Ok(match format {
-        Format::Table => report::many(&named),
-        Format::Json => serde_json::to_string_pretty(variants)? + "\n",
-        Format::Csv => report::csv(&named, &[]),
-    })
-}
-
 fn print(text: &str) -> Result<(), Error> {
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(text.as_bytes())?;
     Ok(stdout.flush()?)
 }
 
-fn machine_name(arguments: &SimulateArguments) -> String {
-    match &arguments.config {
-        Some(path) => path.display().to_string(),
-        None => arguments.preset.clone(),
-    }
-}
-
-fn config(arguments: &SimulateArguments) -> Result<Config, Error> {
+/// The machine of the command line.
+fn machine(arguments: &SimulateArguments) -> Result<Machine, Error> {
     let settings = &arguments.settings;
     Ok(match &arguments.config {
-        Some(path) => Config::parse(&read(path)?, settings)?,
-        None => Config::preset(&arguments.preset, settings)?,
+        Some(path) => {
+            let text = String::from_utf8_lossy(&read(path)?).into_owned();
+            Machine { name: path.display().to_string(), config: Config::parse(&text, settings)? }
+        }
+        None => Machine { name: arguments.preset.clone(), config: Config::preset(&arguments.preset, settings)? },
     })
 }
 
-fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::File { path: path.to_owned(), source })
-}
-
-/// The greatest number of machines of a range.
-const MAX_MACHINES: u32 = 64;
-
-/// The greatest number of machines of all combinations.
-const MAX_GRID: usize = 10_000;
-
-/// Every combination of the values of sweeps; the last one changes fastest.
-fn grid(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
-    let mut grid = vec![Vec::new()];
-    for sweep in sweeps {
-        let values = sweep_values(sweep)?;
-        let count = grid.len() * values.len();
-        if count > MAX_GRID {
-            return Err(Error::Grid(count));
-        }
-        let with = |settings: &Vec<String>| {
-            let settings = settings.clone();
-            values.iter().map(move |value| [settings.as_slice(), std::slice::from_ref(value)].concat())
-        };
-        grid = grid.iter().flat_map(with).collect();
-    }
-    Ok(grid)
-}
-
-/// The settings of a sweep.
-fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
-    let wrong = || Error::Sweep(sweep.to_owned());
-    let (name, values) = sweep.split_once('=').ok_or_else(wrong)?;
-    let Some((first, last)) = values.split_once("..") else {
-        return Ok(values.split(',').map(|value| format!("{name}={value}")).collect());
-    };
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
-    let (first, last) = (number(first)?, number(last)?);
-    if first > last {
-        return Err(wrong());
-    }
-    let step = ((last - first) / MAX_MACHINES + 1) as usize;
-    Ok((first..=last).step_by(step).map(|value| format!("{name}={value}")).collect())
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })
 }
 
 /// The work of the scene, from drawing it or from a file.
 fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     match &arguments.scene {
-        Some(path) if path.extension().is_some_and(|extension| extension == "json") => load(path),
+        Some(path) if is_trace(path) => load(path),
         _ => {
             let folder = tempfile::tempdir()?;
             draw(arguments, folder.path())
@@ -367,11 +294,18 @@ fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     }
 }
 
+/// True if a file is a trace, by its name or by its first bytes.
+fn is_trace(path: &Path) -> bool {
+    let is_binary = || {
+        let mut first = [0; trace_file::MAGIC.len()];
+        let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut first));
+        read.is_ok() && first == trace_file::MAGIC
+    };
+    path.extension().is_some_and(|extension| extension == "json") || is_binary()
+}
+
 fn load(path: &Path) -> Result<Trace, Error> {
-    let trace: Trace =
-        serde_json::from_str(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })?;
-    trace.check().map_err(|source| Error::Work { path: path.to_owned(), source })?;
-    Ok(trace)
+    trace_file::from_bytes(&read(path)?).map_err(|source| Error::Trace { path: path.to_owned(), source })
 }
 
 /// Draws the scene, and returns the work. The picture goes to `folder`.
@@ -428,51 +362,4 @@ fn module_spans(trace: &Trace, frames: &[Simulation], spans: &[Span], config: &C
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     gaurast_picture::write_atomically(path, bytes).map_err(|source| Error::File { path: path.to_owned(), source })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sweeps() {
-        let values = |text: &str| sweep_values(text).unwrap_or_default();
-        assert_eq!(values("modules=2..4"), ["modules=2", "modules=3", "modules=4"]);
-        assert_eq!(values("saturation=none,tile"), ["saturation=none", "saturation=tile"]);
-        assert!(values("batch=1..1000").len() <= 64);
-        for bad in ["modules", "modules=4..2", "modules=a..b"] {
-            assert!(sweep_values(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn grids_have_every_combination() {
-        let of = |sweeps: &[&str]| {
-            let sweeps: Vec<_> = sweeps.iter().map(ToString::to_string).collect();
-            grid(&sweeps)
-        };
-        let all = of(&["modules=2..3", "batch=16,32,64"]).unwrap_or_default();
-        assert_eq!(all.len(), 6);
-        assert_eq!(all[1], ["modules=2", "batch=32"]);
-        assert_eq!(all[5], ["modules=3", "batch=64"]);
-        let many = ["modules=1..64", "batch=1..64", "pes_per_module=1..64"];
-        assert!(matches!(of(&many), Err(Error::Grid(262_144))));
-    }
-
-    #[test]
-    fn a_sweep_has_the_results_of_one_machine_after_the_other() {
-        let frame = simulate::even_frame([64, 64], 1000, 0.3);
-        let machines: Vec<_> = (1..8)
-            .map(|modules| {
-                let setting = format!("modules={modules}");
-                let config = Config::preset(DEFAULT_PRESET, std::slice::from_ref(&setting));
-                (setting, config.expect("a preset"))
-            })
-            .collect();
-        let all = simulate_all(&frame, &machines);
-        assert_eq!(all.len(), machines.len());
-        for ((name, result), (machine, config)) in all.iter().zip(&machines) {
-            assert_eq!((name, result), (machine, &simulate::simulate(&frame, config)));
-        }
-    }
 }

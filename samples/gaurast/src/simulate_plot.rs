@@ -3,15 +3,17 @@
 
 use std::fmt::Write as _;
 
+use timing::area;
 use timing::config::Config;
 use timing::fast::TileSpan;
 use timing::pe::Operations;
 
 use timing::simulate::Simulation;
 use timing::work::FrameWork;
-use timing_studies::area;
 use timing_studies::chart::{self, Chart, Corner, Curve};
 use timing_studies::scatter::{self, Axis, Line, Plot, Point};
+
+use crate::simulate_machines::MachineResult;
 
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 380];
@@ -30,24 +32,24 @@ const ENERGY: [Number; 3] = [
 ];
 
 /// An SVG of the machines' results. `swept` names the parameter that differs, and each machine is named by its value.
-pub fn svg(swept: &str, results: &[(String, Simulation)]) -> String {
+pub fn svg(swept: &str, results: &[MachineResult]) -> String {
     chart::svg(&[
         panel([swept, "speed-up over the shader cores"], &SPEED, results),
         panel([swept, "mJ a frame"], &ENERGY, results),
     ])
 }
 
-fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) -> Chart {
+fn panel(axes: [&str; 2], numbers: &[Number], results: &[MachineResult]) -> Chart {
     let value = |name: &str| name.split_once('=').map_or(name, |(_, value)| value).to_owned();
     let curve = |(&(label, of), color): (&Number, &'static str)| Curve {
         label,
         color,
-        values: results.iter().map(|(_, result)| of(result)).collect(),
+        values: results.iter().map(|result| of(&result.simulation)).collect(),
     };
     Chart {
         size: PANEL,
         axes: axes.map(str::to_owned),
-        steps: results.iter().map(|(name, _)| value(name)).collect(),
+        steps: results.iter().map(|result| value(&result.machine.name)).collect(),
         curves: numbers.iter().zip(COLORS).map(curve).collect(),
         marks: Vec::new(),
         legend_corner: Corner::UpperLeft,
@@ -55,16 +57,13 @@ fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) 
 }
 
 /// A plot of machines by area and raster time. Those on the Pareto front are named and joined by a line.
-pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -> String {
-    let places: Vec<_> = machines
-        .iter()
-        .zip(results)
-        .map(|((_, config), (_, result))| [area::area(config).added, result.stages.raster])
-        .collect();
+pub fn pareto(results: &[MachineResult]) -> String {
+    let place = |result: &MachineResult| [area::area(&result.machine.config).added, result.simulation.stages.raster];
+    let places: Vec<_> = results.iter().map(place).collect();
     let front = scatter::pareto(&places);
-    let point = |(index, (name, result)): (usize, &(String, Simulation))| Point {
+    let point = |(index, result): (usize, &MachineResult)| Point {
         at: places[index],
-        name: format!("{name}: {:.2} mJ", result.energy.total()),
+        name: format!("{}: {:.2} mJ", result.machine.name, result.simulation.energy.total()),
         labelled: front.contains(&index) && front.len() <= 12,
         color: if front.contains(&index) { COLORS[1] } else { "#bbb" },
     };
@@ -190,19 +189,15 @@ pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use timing::config::Config;
-    use timing::simulate::{even_frame, simulate};
+    use crate::simulate_machines::simulate_all;
+    use crate::simulate_machines::tests::{machines, trace};
+    use timing::simulate::even_frame;
 
     #[test]
     fn every_machine_is_a_step_of_every_curve() {
         let frame = even_frame([64, 64], 1000, 0.3);
-        let results: Vec<_> = ["saturation=none", "saturation=tile", "saturation=row"]
-            .map(|setting| {
-                let config = Config::preset("paper-15x16", &[setting.to_owned()]);
-                let result = simulate(&frame, &config.expect("a preset"));
-                (setting.to_owned(), result)
-            })
-            .into();
+        let machines = machines(&["saturation=none", "saturation=tile", "saturation=row"]);
+        let results = simulate_all(&trace(frame), &machines);
         let svg = svg("saturation", &results);
         assert_eq!(svg.matches("<circle").count(), 3 * (SPEED.len() + ENERGY.len()));
         for word in ["none", "tile", "row", "modules", "whole frame"] {
@@ -214,16 +209,10 @@ mod tests {
     fn other_plots_show_every_machine_stage_and_tile() {
         let mut frame = even_frame([320, 200], 20_000, 0.3);
         frame.draws[0].sort = timing::work::ShaderWork { integer: 1e6, bytes: 1e6, ..Default::default() };
-        let machines: Vec<_> = ["modules=2", "modules=4", "modules=8"]
-            .map(|setting| {
-                let config = Config::preset("paper-15x16", &[setting.to_owned()]);
-                (setting.to_owned(), config.expect("a preset"))
-            })
-            .into();
-        let of = |(name, config): &(String, Config)| (name.clone(), simulate(&frame, config));
-        let results: Vec<_> = machines.iter().map(of).collect();
-        assert_eq!(pareto(&machines, &results).matches("<circle").count(), 3);
-        let (config, result) = (&machines[0].1, &results[0].1);
+        let machines = machines(&["modules=2", "modules=4", "modules=8"]);
+        let results = simulate_all(&trace(frame.clone()), &machines);
+        assert_eq!(pareto(&results).matches("<circle").count(), 3);
+        let (config, result) = (&machines[0].config, &results[0].simulation);
         let roofs = roofline(&frame, result, config);
         assert!(roofs.contains(">stage 2</text>") && roofs.contains(">stage 3</text>"));
         assert_eq!(roofs.matches("<polyline").count(), 2);

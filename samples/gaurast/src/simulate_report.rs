@@ -3,12 +3,17 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
 use timing::Config;
+use timing::area;
+use timing::dram::{Dram, Timings};
+use timing::energy::PAPER_MODULE_W;
 use timing::fast::TileSpan;
 use timing::raster::RasterReport;
 use timing::simulate::Simulation;
 use timing::work::{FrameWork, TileWork};
 use timing_studies::paper::Section;
-use timing_studies::{area, rivals, simt};
+use timing_studies::{rivals, simt};
+
+use crate::simulate_machines::MachineResult;
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -79,6 +84,10 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         let note = format!("compute {:.3}, memory {:.3} ms", roofline.compute_ms, roofline.memory_ms);
         row("time", name, ms(roofline.milliseconds()), note);
     }
+    if result.lists.bytes > 0.0 {
+        let note = format!("{:.1} MB; a unit writes records into lists", result.lists.bytes * 1e-6);
+        row("time", "list writer", ms(stages.lists), note);
+    }
     row("time", "stage 3, raster", ms(stages.raster), format!("{:.0} cycles", result.raster.cycles));
     row(
         "time",
@@ -99,7 +108,15 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         share(result.raster.bytes_wasted, result.raster.bytes_in) + " in vain",
     );
     row("memory", "pixels", gb_s(result.raster.bytes_out), none());
-    row("memory", "shader cores meanwhile", format!("{:.1} GB/s", result.contention_gb_s), none());
+    let streams = config.memory.bandwidth_gb_s * config.memory.efficiency;
+    let note = format!("of {:.1} GB/s that they ask for; streams get {streams:.1} GB/s", result.contention_gb_s);
+    row("memory", "shader cores meanwhile", format!("{:.1} GB/s", result.meanwhile_gb_s), note);
+    let raster = &config.rasterizer;
+    let batch = u64::from(raster.batch * raster.primitive_bytes());
+    let by_banks = Dram::lists_gb_s(Timings::LPDDR5, raster.modules.max(1), batch);
+    let note = format!("of {:.1} GB/s; lists of all modules, {batch} bytes at a time", Timings::LPDDR5.peak_gb_s());
+    row("memory", "LPDDR5 by banks and rows", format!("{by_banks:.1} GB/s"), note);
+    row("memory", "not counted", none(), "copies, clears, loads and stores of attachments, depth".to_owned());
     if let Some(longest) = longest(spans) {
         let cycles = longest.end - longest.begin;
         let part = cycles / result.raster_alone.cycles.max(1.0);
@@ -111,7 +128,6 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
             row("tiles", "warning", format!("tile {x},{y}"), note);
         }
     }
-    row("memory", "not counted", none(), "copies, clears, loads and stores of attachments, depth".to_owned());
     row("frames", "collaborative", format!("{:.1} FPS", result.fps_collaborative), none());
     row("frames", "serial", format!("{:.1} FPS", result.fps_serial), none());
     row(
@@ -133,12 +149,14 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
     let gains = &result.gains;
     for (name, factor, note) in [
         ("raster speed-up", result.raster_speedup, "product of:"),
-        ("hardware", gains.hardware, "on the same lists, without stalls"),
+        ("hardware", gains.hardware, "on the same lists, without stalls; calibrated: the paper's raster times"),
         ("lists", gains.lists, "the rasterizer's instead of the baseline's"),
         ("stalls", gains.stalls, "PEs busy while they are theirs"),
     ] {
         row("raster", name, format!("{factor:.2}x"), note.to_owned());
     }
+    let note = "less than 3-sigma squares, on shader cores; no part of the product if both sides have the same";
+    row("raster", "exact lists", format!("{:.2}x", result.exact_lists), note.to_owned());
     for (name, millijoules) in result.energy.by_component() {
         row("energy", name, format!("{millijoules:.2} mJ"), share(millijoules, result.energy.total()));
     }
@@ -148,7 +166,16 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
         format!("{:.1} mJ", result.baseline_mj),
         format!("{:.1}x", result.baseline_mj / result.energy.total()),
     );
+    let power = &result.power;
+    let budget = config.soc.power_w;
+    let verdict = if power.exceeds_budget(config) { "warning: above" } else { "within" };
+    row("power", "mean of the frame", format!("{:.1} W", power.frame_w), format!("{verdict} the budget of {budget} W"));
+    let paper = f64::from(config.rasterizer.modules) * PAPER_MODULE_W;
+    let note = format!("no budget: it lasts {}; {PAPER_MODULE_W} W a module would be {paper:.1} W", ms(stages.raster));
+    row("power", "raster stage", format!("{:.1} W", power.raster_w), note);
     let area = area::area(config);
+    let note = format!("{:.0} % buffers; {:.3} mm2 a module", area.buffers / area.module * 100.0, area.module);
+    row("area", "modules", format!("{:.3} mm2", area.module * f64::from(config.rasterizer.modules)), note);
     row(
         "area",
         "added by Gaussians",
@@ -170,7 +197,9 @@ fn longest(spans: &[TileSpan]) -> Option<&TileSpan> {
 }
 
 /// The main numbers of a result, each with its name and its number of digits.
-fn summary(result: &Simulation) -> [(&'static str, f64, usize); 14] {
+fn summary(result: &MachineResult) -> [(&'static str, f64, usize); 17] {
+    let area = area::area(&result.machine.config);
+    let result = &result.simulation;
     [
         ("cycles", result.raster.cycles, 0),
         ("raster ms", result.stages.raster, 3),
@@ -186,23 +215,31 @@ fn summary(result: &Simulation) -> [(&'static str, f64, usize); 14] {
         ("modules mJ", result.energy.modules(), 2),
         ("memory mJ", result.energy.memory, 2),
         ("total mJ", result.energy.total(), 2),
+        ("frame W", result.power.frame_w, 2),
+        ("raster W", result.power.raster_w, 2),
+        ("added mm2", area.added, 3),
     ]
 }
 
-/// A row for each machine.
-pub fn many(results: &[(String, Simulation)]) -> String {
+/// A row for each machine, and a warning if the power of some exceeds their budgets.
+pub fn many(results: &[MachineResult]) -> String {
     let mut table = new_table();
-    for (name, result) in results {
+    for result in results {
         let summary = summary(result);
         if table.header().is_none() {
             let names = summary.iter().map(|(name, ..)| *name);
             table.set_header(std::iter::once("machine").chain(names));
         }
         let values = summary.iter().map(|(_, value, decimals)| format!("{value:.decimals$}"));
-        table.add_row(std::iter::once(name.clone()).chain(values));
+        table.add_row(std::iter::once(result.machine.name.clone()).chain(values));
     }
-    right(&mut table, 1..15);
-    format!("{table}\n")
+    right(&mut table, 1..18);
+    let over = results.iter().filter(|result| result.simulation.power.exceeds_budget(&result.machine.config)).count();
+    let warning = match over {
+        0 => String::new(),
+        _ => format!("warning: of {over} of {} rows the frame's mean power is above soc.power_w\n", results.len()),
+    };
+    format!("{table}\n{warning}")
 }
 
 /// The cycles of a frame by the fast model and by the stepped one.
@@ -257,18 +294,17 @@ fn field(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
-/// A CSV line for each machine, with its area in mm2 if there is one for each.
-pub fn csv(results: &[(String, Simulation)], areas: &[f64]) -> String {
+/// A CSV line for each machine.
+pub fn csv(results: &[MachineResult]) -> String {
     let mut out = String::new();
-    for (index, (name, result)) in results.iter().enumerate() {
-        let mut summary = summary(result).to_vec();
-        summary.extend(areas.get(index).map(|&area| ("added mm2", area, 3)));
+    for (index, result) in results.iter().enumerate() {
+        let summary = summary(result);
         if index == 0 {
             let names: Vec<_> = summary.iter().map(|(name, ..)| *name).collect();
             out += &format!("machine,{}\n", names.join(","));
         }
         let values: Vec<_> = summary.iter().map(|(_, value, _)| value.to_string()).collect();
-        out += &format!("{},{}\n", field(name), values.join(","));
+        out += &format!("{},{}\n", field(&result.machine.name), values.join(","));
     }
     out
 }
@@ -305,6 +341,8 @@ pub fn paper_csv(sections: &[Section]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate_machines::simulate_all;
+    use crate::simulate_machines::tests::{machines, trace};
     use timing::simulate::{even_frame, simulate};
 
     #[test]
@@ -314,14 +352,15 @@ mod tests {
         let result = simulate(&frame, &config);
         let (_, spans) = timing::fast::rasterize_tiles(&frame, &config, 0.0);
         let text = one(&frame, &result, &config, &spans);
-        assert!(!text.contains("warning"), "{text}");
+        assert!(!text.contains("takes most of the stage"), "{text}");
         let alone = [TileSpan { end: result.raster_alone.cycles, ..spans[0] }];
         assert!(one(&frame, &result, &config, &alone).contains("takes most of the stage"));
         let result_gains = result.gains;
         for part in ["320 x 200", "50000", "stage 3, raster", "mode switch", "FPS", "mJ", "mm2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        let results = [("a,b".to_owned(), result.clone()), ("c".to_owned(), result)];
+        let mut results = simulate_all(&trace(frame), &machines(&["modules=15", "modules=16"]));
+        results[0].machine.name = "a,b".to_owned();
         // Compares whole rows.
         let cell = |row: &str, column: usize| -> String {
             let line = text.lines().find(|line| line.split('┆').nth(1).is_some_and(|name| name.trim() == row));
@@ -332,11 +371,14 @@ mod tests {
         let gains = result_gains.hardware * result_gains.stalls;
         assert_eq!(cell("raster speed-up", 2), format!("{gains:.2}x"));
         assert_eq!(cell("dependency", 3), "0.0 % of a frame alone");
-        let lines = csv(&results, &[1.0, 2.5]);
+        let lines = csv(&results);
         assert_eq!(lines.lines().count(), 3);
-        assert!(lines.contains("\"a,b\",") && lines.contains(",2.5\n"));
-        assert!(!csv(&results, &[]).contains("mm2"));
+        assert!(lines.contains("\"a,b\",") && lines.contains(",added mm2\n"));
         assert!(many(&results).contains("raster speed-up"));
+        // The shader cores do nothing in this frame, and the modules draw more than the chip may.
+        assert!(many(&results).contains("of 2 of 2 rows"), "{}", many(&results));
+        assert!(cell("mean of the frame", 3).starts_with("warning: above the budget of 10 W"));
+        assert!(cell("raster stage", 3).ends_with("1.7 W a module would be 25.5 W"));
         let sections = timing_studies::paper::report();
         assert!(paper(&sections).contains("GSCore"));
         let rows: usize = sections.iter().map(|section| section.rows.len()).sum();

@@ -73,6 +73,8 @@ pub struct BinnedDraw {
     pub(crate) origins: Option<Origins>,
     /// The record of its tiles' work, if one is kept.
     pub(crate) record: Option<Arc<DrawRecord>>,
+    /// True if the record has the ids of lists: those of a program's trace, and not those of queries.
+    pub(crate) keeps_ids: bool,
 }
 
 impl SortedSet {
@@ -143,6 +145,7 @@ impl BinnedDraw {
             layer: set.layer,
             sorted,
             optimizations: runtime.config().optimizations,
+            keeps_ids: record.is_some() && runtime.config().recorder.is_some(),
             record,
         }
     }

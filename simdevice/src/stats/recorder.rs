@@ -58,11 +58,15 @@ struct Frame {
 impl Frame {
     fn work(&self) -> Option<FrameWork> {
         let some = !self.draws.is_empty() || self.before.count > 0;
-        some.then(|| FrameWork {
-            size: self.size,
-            compute: self.before.work,
-            dispatches: self.before.count,
-            draws: self.draws.iter().map(|draw| draw.finished()).collect(),
+        some.then(|| {
+            let mut frame = FrameWork {
+                size: self.size,
+                compute: self.before.work,
+                dispatches: self.before.count,
+                draws: self.draws.iter().map(|draw| draw.finished()).collect(),
+            };
+            frame.place();
+            frame
         })
     }
 }
@@ -130,9 +134,16 @@ impl Recorder {
         frames.dispatched.remove(&owner);
     }
 
-    /// Begins an owner's render pass over `area`.
+    /// Begins an owner's render pass over `area`. The ids of the owner's frames before it are forgotten, since a large
+    /// frame has many.
     pub(crate) fn begin_frame(&self, owner: Owner, area: Rect) {
-        self.lock().begin(owner, [area.width, area.height]);
+        // A render area lies inside its attachments, so that it begins at zero or later.
+        let side = |from: i32, length: u32| u32::try_from(from).unwrap_or(0).saturating_add(length);
+        let mut frames = self.lock();
+        for frame in frames.kept.iter().filter(|frame| frame.owner == owner) {
+            frame.draws.iter().for_each(|draw| draw.forget_ids());
+        }
+        frames.begin(owner, [side(area.x, area.width), side(area.y, area.height)]);
     }
 
     /// Adds a draw to the last render pass of its owner.
@@ -247,6 +258,11 @@ impl DrawRecord {
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
+    /// Forgets the ids of the lists.
+    fn forget_ids(&self) {
+        self.update(|work| work.tiles.iter_mut().for_each(|tile| tile.ids = Vec::new()));
+    }
+
     /// Adds the work of a tile.
     pub(crate) fn add(&self, tile: TileWork) {
         self.update(|work| work.tiles.push(tile));
@@ -263,19 +279,37 @@ impl DrawRecord {
         let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let shading = self.1.lock().unwrap_or_else(PoisonError::into_inner);
         work.shade = work.shade.plus(&shader_work(&shading));
-        work.tiles.sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
+        work.tiles.sort_by_key(|tile| [tile.at[1], tile.at[0]]);
+        for index in 1..work.tiles.len() {
+            let before = &work.tiles[index - 1];
+            if before.at == work.tiles[index].at {
+                work.tiles[index].layer = before.layer + 1;
+            }
+        }
+        if work.mode == Mode::Gaussian {
+            if work.tiles.is_empty() {
+                work.drawn = 0;
+            }
+            // A Gaussian reaches beyond its square where it is most opaque.
+            work.boxed_pairs = work.boxed_pairs.max(work.pairs());
+        }
         work
     }
 }
 
-/// Appends a run to a tile's runs, or adds it to the last run if no row or block finished in between.
+/// Appends a run to a tile's runs, or adds it to the last run if no row or block finished in between. Where all rows
+/// are finished, primitives are not needed, and are in no run.
 pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
+    if run.rows == 0 {
+        return;
+    }
     match runs.last_mut() {
         Some(last) if (last.rows, last.blocks) == (run.rows, run.blocks) => {
             last.primitives += run.primitives;
             last.reached += run.reached;
             last.hidden += run.hidden;
             last.hidden_blocks += run.hidden_blocks;
+            last.waits = last.waits.zip(run.waits).map(|(a, b)| std::array::from_fn(|k| a[k].saturating_add(b[k])));
         }
         _ => runs.push(run),
     }
@@ -284,6 +318,7 @@ pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use timing::work::INTERVALS;
 
     const BOUNDS: Rect = Rect { x: 0, y: 0, width: 160, height: 80 };
 
@@ -305,14 +340,14 @@ mod tests {
         recorder.begin_frame(0, BOUNDS);
         let draw = DrawRecord::new(DrawWork::default());
         recorder.add_draw(0, &draw);
-        for at in [[1, 1], [0, 1], [3, 0]] {
+        for at in [[1, 1], [0, 1], [3, 0], [1, 1]] {
             draw.add(TileWork { at, ..TileWork::default() });
         }
         drop(recorder);
         let trace = receive.recv().unwrap();
         assert_eq!((trace.version, trace.frames.len()), (TRACE_VERSION, 1));
-        let order: Vec<_> = trace.frames[0].draws[0].tiles.iter().map(|tile| tile.at).collect();
-        assert_eq!(order, [[3, 0], [0, 1], [1, 1]]);
+        let order: Vec<_> = trace.frames[0].draws[0].tiles.iter().map(|tile| (tile.at, tile.layer)).collect();
+        assert_eq!(order, [([3, 0], 0), ([0, 1], 0), ([1, 1], 0), ([1, 1], 1)]);
     }
 
     #[gaurast_runner::test]
@@ -338,13 +373,15 @@ mod tests {
 
     #[gaurast_runner::test]
     fn runs_grow_until_something_finishes() {
-        let run = |rows, blocks| Run { primitives: 32, rows, blocks, reached: 5, hidden: 2, hidden_blocks: 1 };
+        let waits = Some([1; INTERVALS]);
+        let run = |rows, blocks| Run { primitives: 32, rows, blocks, reached: 5, hidden: 2, hidden_blocks: 1, waits };
         let mut runs = Vec::new();
-        for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8)] {
+        for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8), run(0, 8)] {
             push_run(&mut runs, next);
         }
         assert_eq!(runs.len(), 3);
         assert_eq!((runs[0].primitives, runs[0].reached), (64, 10));
         assert_eq!((runs[0].hidden, runs[0].hidden_blocks), (4, 2));
+        assert_eq!(runs[0].waits, Some([2; INTERVALS]));
     }
 }

@@ -1,7 +1,7 @@
 //! The configuration of the hardware, read from a typed TOML file, and the presets. `presets/paper-15x16.toml` gives
 //! the source of each number; a preset may inherit from another.
 
-use crate::work::{Mode, Saturation, TILE_SIDES};
+use crate::work::{INTERVALS, Mode, Saturation, Segment, TILE_SIDES};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use toml::{Table, Value};
@@ -12,6 +12,8 @@ use toml::{Table, Value};
 pub struct Config {
     /// The rasterizer modules.
     pub rasterizer: Rasterizer,
+    /// The unit that writes records into lists.
+    pub list_writer: ListWriter,
     /// Main memory, shared by all units.
     pub memory: Memory,
     /// The shader cores.
@@ -38,6 +40,28 @@ pub enum Lists {
     Squares,
 }
 
+/// The place from which the rasterizer reads a primitive's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Records {
+    /// A list has indices, as the sort leaves them, and the rasterizer reads the records that they name.
+    Gathered,
+    /// A unit writes the records into the lists, one after the other, as the module in SystemVerilog reads them.
+    Listed,
+}
+
+/// The unit that writes records into lists, for [`Records::Listed`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListWriter {
+    /// Cycles of the rasterizer's clock for a pair.
+    pub cycles_per_pair: f64,
+    /// Its area in mm2 of the rasterizer's technology.
+    pub area_mm2: f64,
+    /// The energy of a byte that passes through it, in pJ of the table's technology.
+    pub pj_per_byte: f64,
+}
+
 /// The rasterizer modules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +80,8 @@ pub struct Rasterizer {
     pub gaussian_latency: u32,
     /// Cycles from operands to weights and depth.
     pub triangle_latency: u32,
+    /// The same with numbers of at most two bytes.
+    pub half_triangle_latency: u32,
     /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel can't begin closer to each
     /// other.
     pub carried_latency: u32,
@@ -78,11 +104,14 @@ pub struct Rasterizer {
     pub batch: u32,
     /// The kind of the tile lists.
     pub lists: Lists,
+    /// The place from which primitives' numbers are read.
+    pub records: Records,
     /// Numbers that are read for a primitive.
     pub numbers_in: u32,
     /// Numbers that are written for a pixel.
     pub numbers_out: u32,
-    /// Bytes of a number.
+    /// Bytes of a number. Units of at most two bytes have the latencies, energies and areas whose names begin with
+    /// `half`.
     pub number_bytes: u32,
     /// Bytes of an entry of a tile's list.
     pub index_bytes: u32,
@@ -119,6 +148,7 @@ impl Rasterizer {
     /// Cycles from operands to results.
     pub fn latency(&self, mode: Mode) -> u32 {
         match mode {
+            Mode::Triangle if self.is_half() => self.half_triangle_latency,
             Mode::Triangle => self.triangle_latency,
             Mode::Gaussian => self.gaussian_latency,
         }
@@ -146,14 +176,57 @@ impl Rasterizer {
         (most as f64 * self.neighbour_sharing).round() as u64
     }
 
+    /// Cycles in which the PEs wait for transmittances in a segment whose waits are known: those of the interval that
+    /// [`Self::carried_latency`] is, in evaluations of a group.
+    pub fn known_waiting_cycles(&self, mode: Mode, segment: &Segment) -> Option<u64> {
+        let waits = segment.waits.filter(|_| mode == Mode::Gaussian)?;
+        let cycles = self.busy_cycles(mode, 1);
+        let interval = usize::try_from(u64::from(self.carried_latency).div_ceil(cycles)).ok()?;
+        let evaluations = match interval.checked_sub(2) {
+            None => 0,
+            Some(index) if index < INTERVALS => u64::from(waits[index]),
+            Some(index) => {
+                // Beyond the longest interval of the trace, each further evaluation costs what the last one did.
+                let [before, longest] = [waits[INTERVALS - 2], waits[INTERVALS - 1]].map(u64::from);
+                let further = (index - INTERVALS + 1) as u64;
+                longest + further * longest.saturating_sub(before)
+            }
+        };
+        Some(evaluations * cycles)
+    }
+
     /// Cycles of the controller for a primitive that is evaluated at no pixel.
     pub fn looking_cycles(groups: u64) -> u64 {
         u64::from(groups == 0)
     }
 
+    /// True if the units are those of 16-bit numbers.
+    pub fn is_half(&self) -> bool {
+        self.number_bytes <= 2
+    }
+
+    /// Bytes of a module's two halves for primitives.
+    pub fn primitive_buffer_bytes(&self) -> f64 {
+        2.0 * f64::from(self.batch) * f64::from(self.primitive_bytes())
+    }
+
+    /// Bytes of a module's two halves for pixels: a pixel has its numbers and its transmittance.
+    pub fn pixel_buffer_bytes(&self) -> f64 {
+        let pixels = f64::from(self.tile_side).powi(2);
+        2.0 * pixels * f64::from(self.number_bytes) * f64::from(self.numbers_out + 1)
+    }
+
     /// Bytes read for a primitive of a tile's list.
     pub fn primitive_bytes(&self) -> u32 {
         self.numbers_in * self.number_bytes + self.index_bytes
+    }
+
+    /// Bytes that the list writer moves for a pair: it reads an index and its record, and writes the entry.
+    pub fn written_bytes(&self) -> u32 {
+        match self.records {
+            Records::Gathered => 0,
+            Records::Listed => 2 * self.primitive_bytes(),
+        }
     }
 
     /// Bytes written for a tile.
@@ -232,22 +305,28 @@ pub struct ScheduleConfig {
     pub frames_in_flight: u32,
 }
 
-/// Energy: picojoules of the reference technology, unless a field says otherwise.
+/// Energy: picojoules of the reference technology, unless a field says otherwise. The voltage is the same at every
+/// clock.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the operation or byte is in the name")]
 pub struct EnergyConfig {
-    /// The power of a module in W at the calibration frames' mean activity; 0 if unknown.
-    pub module_power_w: f64,
-    /// The static share of that power.
-    pub static_share: f64,
-    /// Rasterizer pJ per pJ of this table; 0 to calibrate it.
+    /// Rasterizer pJ per pJ of this table, for operations and buffers.
     pub scale: f64,
+    /// Leakage of a module in W per mm2 of its units and buffers, in the rasterizer's technology.
+    pub leakage_w_per_mm2: f64,
     pub add_pj: f64,
     pub mul_pj: f64,
     pub div_pj: f64,
     pub exp_pj: f64,
-    pub buffer_pj_per_byte: f64,
+    pub half_add_pj: f64,
+    pub half_mul_pj: f64,
+    pub half_div_pj: f64,
+    pub half_exp_pj: f64,
+    /// A bit read from a buffer of 8 kB or written to it. A buffer of another size takes the square root of the ratio
+    /// of the sizes.
+    pub sram_pj_per_bit: f64,
+    /// Main memory, in pJ of its own technology.
     pub dram_pj_per_byte: f64,
     /// The share of the calibration frames' evaluations that are blended.
     pub blended_share: f64,
@@ -267,6 +346,8 @@ pub struct AreaConfig {
     pub exp_um2: f64,
     pub half_add_um2: f64,
     pub half_mul_um2: f64,
+    /// The area of a bit of a buffer, with its share of decoders and amplifiers.
+    pub sram_um2_per_bit: f64,
     /// Area added for Gaussians over the area of the triangle units.
     pub enhanced_ratio: f64,
 }
@@ -375,6 +456,7 @@ const RANGES: &[(&str, &str, Range)] = {
         ("rasterizer", "triangle_interval", From(1.0, 1000.0)),
         ("rasterizer", "gaussian_latency", From(0.0, 10_000.0)),
         ("rasterizer", "triangle_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "half_triangle_latency", From(0.0, 10_000.0)),
         ("rasterizer", "carried_latency", From(0.0, 10_000.0)),
         ("rasterizer", "neighbour_sharing", From(0.0, 1.0)),
         ("rasterizer", "tile_side", OneOf(&TILE_SIDES)),
@@ -386,6 +468,9 @@ const RANGES: &[(&str, &str, Range)] = {
         ("rasterizer", "port_bytes_per_cycle", From(0.01, 65_536.0)),
         ("rasterizer", "tile_overhead", From(0.0, 100_000.0)),
         ("rasterizer", "mode_switch", From(0.0, 100_000.0)),
+        ("list_writer", "cycles_per_pair", From(0.0, 1e6)),
+        ("list_writer", "area_mm2", From(0.0, 1e5)),
+        ("list_writer", "pj_per_byte", From(0.0, 1e6)),
         ("memory", "bandwidth_gb_s", From(0.01, 1e5)),
         ("memory", "efficiency", SHARE),
         ("memory", "latency_ns", From(0.0, 1e6)),
@@ -404,14 +489,17 @@ const RANGES: &[(&str, &str, Range)] = {
         ("soc", "area_mm2", Above(0.0, 100_000.0)),
         ("soc", "node_scaling", From(0.001, 1000.0)),
         ("schedule", "frames_in_flight", From(1.0, 64.0)),
-        ("energy", "module_power_w", From(0.0, 1000.0)),
-        ("energy", "static_share", From(0.0, 0.99)),
         ("energy", "scale", From(0.0, 1000.0)),
+        ("energy", "leakage_w_per_mm2", From(0.0, 1000.0)),
         ("energy", "add_pj", Above(0.0, 1e6)),
         ("energy", "mul_pj", Above(0.0, 1e6)),
         ("energy", "div_pj", From(0.0, 1e6)),
         ("energy", "exp_pj", From(0.0, 1e6)),
-        ("energy", "buffer_pj_per_byte", From(0.0, 1e6)),
+        ("energy", "half_add_pj", Above(0.0, 1e6)),
+        ("energy", "half_mul_pj", Above(0.0, 1e6)),
+        ("energy", "half_div_pj", From(0.0, 1e6)),
+        ("energy", "half_exp_pj", From(0.0, 1e6)),
+        ("energy", "sram_pj_per_bit", From(0.0, 1e6)),
         ("energy", "dram_pj_per_byte", From(0.0, 1e6)),
         ("energy", "blended_share", From(0.0, 1.0)),
         ("area", "technology_nm", From(1.0, 1000.0)),
@@ -422,6 +510,7 @@ const RANGES: &[(&str, &str, Range)] = {
         ("area", "exp_um2", From(0.0, 1e9)),
         ("area", "half_add_um2", Above(0.0, 1e9)),
         ("area", "half_mul_um2", Above(0.0, 1e9)),
+        ("area", "sram_um2_per_bit", From(0.0, 1e6)),
         ("area", "enhanced_ratio", From(0.0, 10.0)),
     ]
 };
@@ -737,6 +826,23 @@ mod tests {
         assert_eq!(gaussian(&wide, 16), 13, "256 pixels on 20 PEs");
         let unfolded = Rasterizer { opacity_folded: false, ..raster };
         assert_eq!(gaussian(&unfolded, 16), 32, "11 multiplications on 10 units");
+    }
+
+    #[test]
+    fn waits_of_the_trace_are_those_of_the_latency() {
+        let segment = Segment { primitives: 9, groups: 9, open: 16, waits: Some([1, 2, 4, 7, 11, 16, 22, 29]) };
+        let with = |setting: &str| {
+            let config = Config::preset("paper-15x16", &[setting.to_owned()]).unwrap();
+            config.rasterizer.known_waiting_cycles(Mode::Gaussian, &segment)
+        };
+        for (latency, cycles) in [(0, 0), (1, 0), (2, 1), (7, 16), (9, 29), (11, 43)] {
+            assert_eq!(with(&format!("carried_latency={latency}")), Some(cycles), "{latency}");
+        }
+        // A group takes two cycles, so that seven cycles are four evaluations.
+        assert_eq!(with("pes_per_module=8"), Some(8));
+        let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
+        assert_eq!(raster.known_waiting_cycles(Mode::Triangle, &segment), None);
+        assert_eq!(raster.known_waiting_cycles(Mode::Gaussian, &Segment { waits: None, ..segment }), None);
     }
 
     #[test]

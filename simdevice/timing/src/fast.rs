@@ -488,7 +488,7 @@ impl Module {
     }
 }
 
-/// Cycles of the primitives `from..to` of a segment. The segment's groups are spread evenly.
+/// Cycles of the primitives `from..to` of a segment. The segment's groups and its known waits are spread evenly.
 fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Rasterizer) -> [f64; 3] {
     let n = u64::from(segment.primitives);
     let low = segment.groups / n;
@@ -500,6 +500,10 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
         busy += (raster.busy_cycles(mode, groups) * count) as f64;
         dependency += (raster.waiting_cycles(mode, groups, segment.open) * count) as f64;
         controller += (Rasterizer::looking_cycles(groups) * count) as f64;
+    }
+    if let Some(waiting) = raster.known_waiting_cycles(mode, segment) {
+        let before = |k: u32| u64::from(k) * waiting / n;
+        dependency = (before(to) - before(from)) as f64;
     }
     [busy, dependency, controller]
 }
@@ -538,7 +542,9 @@ fn part_batches(part: &Part, raster: &Rasterizer, begin: f64, report: &mut Raste
             report.modules.controller += controller;
             busy + dependency + controller
         };
-        let even = segment.groups.is_multiple_of(u64::from(segment.primitives));
+        let waiting = raster.known_waiting_cycles(part.mode, segment).unwrap_or(0);
+        let primitives = u64::from(segment.primitives);
+        let even = segment.groups.is_multiple_of(primitives) && waiting.is_multiple_of(primitives);
         let mut at = 0;
         while at < segment.primitives {
             let left = segment.primitives - at;

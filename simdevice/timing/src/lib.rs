@@ -5,7 +5,10 @@
 //! (the paper's numbers, sweeps, a cycle-stepped model) are the crate `timing-studies`.
 #![forbid(unsafe_code)]
 
+pub mod area;
+pub mod check;
 pub mod config;
+pub mod dram;
 pub mod energy;
 pub mod fast;
 pub mod pe;
@@ -15,6 +18,7 @@ pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;
 pub mod stages;
+pub mod trace_file;
 pub mod work;
 
 pub use config::{Config, ConfigError};

@@ -159,6 +159,7 @@ fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) ->
         primitives: needed,
         groups: if per_pixel { reached } else { u64::from(needed) * groups },
         open: groups,
+        waits: None,
     };
     Part { mode, segments: vec![segment; usize::from(needed > 0)], needed, left_over: all - needed }
 }
@@ -239,6 +240,7 @@ mod tests {
                 reached: 40,
                 hidden: 4,
                 hidden_blocks: 24,
+                waits: None,
             }],
             ..TileWork::default()
         };

@@ -1,5 +1,5 @@
-//! The schedule of frames on two engines: the shader cores run dispatches, stages 1 and 2 and fragment programs, and
-//! the rasterizer runs stage 3. Collaborative scheduling lets the next frame's stages 1 and 2 run while a frame is
+//! The schedule of frames on three engines: the shader cores run dispatches, stages 1 and 2 and fragment programs, the
+//! list writer writes records into lists if the machine has one, and the rasterizer runs stage 3. Collaborative scheduling lets the next frame's stages 1 and 2 run while a frame is
 //! rasterized; without it a frame ends before the next one begins. Without a rasterizer all stages run on the shader
 //! cores. A stage begins when the one before it has ended for the whole frame. So fragments are not shaded while their
 //! frame is still rasterized, which costs latency but, if frames overlap, no throughput.
@@ -15,6 +15,8 @@ pub struct Stages {
     pub preprocess: f64,
     /// Stage 2.
     pub sort: f64,
+    /// Writing records into lists; 0 without a list writer.
+    pub lists: f64,
     /// Stage 3.
     pub raster: f64,
     /// Fragment programs of triangles.
@@ -24,7 +26,7 @@ pub struct Stages {
 impl Stages {
     /// The sum of all stages.
     pub fn total(&self) -> f64 {
-        self.compute + self.preprocess + self.sort + self.raster + self.shade
+        self.compute + self.preprocess + self.sort + self.lists + self.raster + self.shade
     }
 }
 
@@ -36,6 +38,13 @@ pub enum Engine {
     ShaderCores,
     /// The rasterizer.
     Rasterizer,
+    /// The unit that writes records into lists.
+    ListWriter,
+}
+
+impl Engine {
+    /// All engines.
+    pub const ALL: [Self; 3] = [Self::ShaderCores, Self::Rasterizer, Self::ListWriter];
 }
 
 impl Engine {
@@ -44,6 +53,7 @@ impl Engine {
         match self {
             Self::ShaderCores => "shader cores",
             Self::Rasterizer => "rasterizer",
+            Self::ListWriter => "list writer",
         }
     }
 }
@@ -87,7 +97,7 @@ struct Progress {
 /// The timeline of frames. A free engine takes the stage that can begin first, of the oldest frame if several can.
 pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
     let in_flight = if policy.collaborative { policy.frames_in_flight.max(1) } else { 1 };
-    let mut free = [0.0f64; 2];
+    let mut free = [0.0f64; Engine::ALL.len()];
     let mut spans = Vec::new();
     let mut waiting = frames.iter().enumerate();
     let mut begun: Vec<Progress> = Vec::new();
@@ -128,17 +138,19 @@ impl Progress {
             (Engine::ShaderCores, "compute", stages.compute),
             (Engine::ShaderCores, "preprocess", stages.preprocess),
             (Engine::ShaderCores, "sort", stages.sort),
+            (Engine::ListWriter, "lists", stages.lists),
             (raster, "raster", stages.raster),
             (Engine::ShaderCores, "shade", stages.shade),
         ];
         // Only stages that every frame has are shown if they take no time.
-        let shown = |&(_, stage, length): &(Engine, &str, f64)| length > 0.0 || !matches!(stage, "compute" | "shade");
+        let is_of_every_frame = |stage: &str| !matches!(stage, "compute" | "lists" | "shade");
+        let shown = |&(_, stage, length): &(Engine, &str, f64)| length > 0.0 || is_of_every_frame(stage);
         Self { frame, stages: all.into_iter().filter(shown).collect(), next: 0, ready }
     }
 
     /// The time at which the next stage can begin, in ms; negative infinity after the last stage, so that the frame is
     /// removed first.
-    fn start(&self, free: &[f64; 2]) -> f64 {
+    fn start(&self, free: &[f64; Engine::ALL.len()]) -> f64 {
         match self.stages.get(self.next) {
             Some(&(engine, ..)) => self.ready.max(free[engine as usize]),
             None => f64::NEG_INFINITY,
@@ -218,6 +230,7 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_
     let track = |engine: Engine| match engine {
         Engine::ShaderCores => 1,
         Engine::Rasterizer => 2,
+        Engine::ListWriter => 3,
     };
     let named = |kind: &str, tid, name: String| Event {
         name: kind.to_owned(),
@@ -230,7 +243,8 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_
         args: Arguments::Name(name),
     };
     let mut trace_events = vec![named("process_name", 0, "GauRast".to_owned())];
-    for engine in [Engine::ShaderCores, Engine::Rasterizer] {
+    let works = |engine: &Engine| *engine != Engine::ListWriter || spans.iter().any(|span| span.engine == *engine);
+    for engine in Engine::ALL.into_iter().filter(works) {
         trace_events.push(named("thread_name", track(engine), engine.name().to_owned()));
     }
     trace_events.extend(spans.iter().map(|span| Event {
@@ -265,7 +279,7 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], modules: &[ModuleSpan], other_
 mod tests {
     use super::*;
 
-    const STAGES: Stages = Stages { compute: 0.0, preprocess: 20.0, sort: 10.0, raster: 12.0, shade: 0.0 };
+    const STAGES: Stages = Stages { compute: 0.0, preprocess: 20.0, sort: 10.0, lists: 0.0, raster: 12.0, shade: 0.0 };
     const POLICY: Policy = Policy { collaborative: true, frames_in_flight: 2, has_rasterizer: true };
 
     #[test]
@@ -281,6 +295,11 @@ mod tests {
         let shaded = Stages { shade: 5.0, ..STAGES };
         assert!((fps(shaded, POLICY) - 1e3 / 35.0).abs() < 1e-9);
         assert!((fps(shaded, serial) - 1e3 / 47.0).abs() < 1e-9);
+        // A list writer of 15 ms hides behind the shader cores' 30, and one of 40 does not.
+        assert!((fps(Stages { lists: 15.0, ..STAGES }, POLICY) - 1e3 / 30.0).abs() < 1e-9);
+        assert!(
+            (fps(Stages { lists: 40.0, ..STAGES }, Policy { frames_in_flight: 3, ..POLICY }) - 1e3 / 40.0).abs() < 1e-9
+        );
         let none = Policy { has_rasterizer: false, ..POLICY };
         assert!((fps(STAGES, none) - 1e3 / 42.0).abs() < 1e-9);
     }
@@ -291,6 +310,7 @@ mod tests {
             .map(|k| Stages {
                 preprocess: f64::from(k * 7 % 5),
                 sort: 1.0,
+                lists: 0.0,
                 raster: f64::from(k * 3 % 4),
                 shade: f64::from(k * 5 % 3),
                 compute: f64::from(k % 2),

@@ -1,7 +1,7 @@
 //! The simulation of one frame on one configuration: all models of this crate combined.
 
-use crate::config::{Config, Lists, Rasterizer};
-use crate::energy::{self, Changed, Energy};
+use crate::config::{Config, Lists, Rasterizer, Records};
+use crate::energy::{self, Changed, Energy, Power};
 use crate::fast;
 use crate::plan::{self, Division, Task};
 use crate::raster::RasterReport;
@@ -24,6 +24,8 @@ pub struct Simulation {
     pub blended: f64,
     /// The share of triangles' evaluations that covered a pixel and passed the early tests.
     pub covered: f64,
+    /// The work of the list writer.
+    pub lists: ListWriting,
     /// Time of dispatches.
     pub compute: Roofline,
     /// Time of stage 1.
@@ -36,8 +38,10 @@ pub struct Simulation {
     pub stages: Stages,
     /// Milliseconds of the stages if frames don't overlap.
     pub stages_alone: Stages,
-    /// GB/s that the shader cores use while the rasterizer runs.
+    /// GB/s that the shader cores and the list writer ask for while the rasterizer runs, which the arbiter counts with.
     pub contention_gb_s: f64,
+    /// GB/s that they get while the rasterizer runs: what they ask for, as far as the rasterizer leaves it.
+    pub meanwhile_gb_s: f64,
     /// Frames per second with the overlap that the configuration allows.
     pub fps: f64,
     /// Frames per second if frames overlap.
@@ -52,10 +56,15 @@ pub struct Simulation {
     pub raster_speedup: f64,
     /// The factors of `raster_speedup`.
     pub gains: Gains,
+    /// The gain of exact lists over those of 3-sigma squares, both on shader cores. It is no part of `raster_speedup`,
+    /// unless the rasterizer and the baseline have lists of different kinds.
+    pub exact_lists: f64,
     /// The speed-up of frames per second over the baseline.
     pub speedup: f64,
     /// Millijoules of a frame.
     pub energy: Energy,
+    /// Mean powers of the frame and of its raster stage.
+    pub power: Power,
     /// Millijoules of a frame without a rasterizer for Gaussians.
     pub baseline_mj: f64,
 }
@@ -216,8 +225,33 @@ fn milliseconds(before: &[Roofline; 4]) -> f64 {
     before.iter().map(Roofline::milliseconds).sum()
 }
 
+/// The work of the list writer for a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ListWriting {
+    /// Bytes that it moves.
+    pub bytes: f64,
+    /// Its milliseconds: those of its cycles, or of its bytes if main memory is slower.
+    pub ms: f64,
+}
+
+impl ListWriting {
+    /// The work for all pairs of a frame's lists, whether a tile needs them or not.
+    fn of(frame: &FrameWork, config: &Config) -> Self {
+        let raster = &config.rasterizer;
+        if raster.modules == 0 || raster.records == Records::Gathered {
+            return Self::default();
+        }
+        let pairs = frame.pairs() as f64;
+        let bytes = pairs * f64::from(raster.written_bytes());
+        let cycles_ms = pairs * config.list_writer.cycles_per_pair / raster.clock_ghz * 1e-6;
+        let memory_ms = bytes / (config.memory.bandwidth_gb_s * config.memory.efficiency * 1e6);
+        Self { bytes, ms: cycles_ms.max(memory_ms) }
+    }
+}
+
 /// The times of the stages of a frame, for frames one at a time or for frames that overlap.
 struct Both {
+    lists: ListWriting,
     shader: [Roofline; 4],
     raster: RasterReport,
     raster_ms: f64,
@@ -227,7 +261,7 @@ struct Both {
 impl Both {
     fn stages(&self) -> Stages {
         let [compute, preprocess, sort, shade] = self.shader.map(|stage| stage.milliseconds());
-        Stages { compute, preprocess, sort, raster: self.raster_ms, shade }
+        Stages { compute, preprocess, sort, lists: self.lists.ms, raster: self.raster_ms, shade }
     }
 }
 
@@ -240,19 +274,21 @@ fn serial(listed: &Listed, config: &Config, baseline_raster_ms: f64) -> Both {
         raster = listed.rasterize(config, 0.0);
         raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
     }
-    Both { shader: on_shader_cores(&listed.frame, config, 0.0), raster, raster_ms, contention_gb_s: 0.0 }
+    let lists = ListWriting::of(&listed.frame, config);
+    Both { lists, shader: on_shader_cores(&listed.frame, config, 0.0), raster, raster_ms, contention_gb_s: 0.0 }
 }
 
 /// The times if a frame's work on shader cores overlaps stage 3 of another frame: both move bytes through one memory.
 fn collaborative(listed: &Listed, config: &Config, alone: &Both) -> Both {
     let frame = &listed.frame;
-    let moved = alone.raster.bytes_in + alone.raster.bytes_out;
+    let moved = alone.raster.bytes_in + alone.raster.bytes_out + alone.lists.bytes;
     let shader = on_shader_cores(frame, config, moved);
-    let bytes: f64 = frame.shader().iter().map(|stage| stage.bytes).sum();
+    let bytes = frame.shader().iter().map(|stage| stage.bytes).sum::<f64>() + alone.lists.bytes;
     let time = milliseconds(&shader);
     let contention_gb_s = if time > 0.0 { bytes / time * 1e-6 } else { 0.0 };
     let raster = listed.rasterize(config, contention_gb_s);
-    Both { shader, raster_ms: raster.milliseconds(config.rasterizer.clock_ghz), raster, contention_gb_s }
+    let raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
+    Both { lists: alone.lists, shader, raster_ms, raster, contention_gb_s }
 }
 
 /// Simulates a frame.
@@ -266,7 +302,12 @@ impl Shared<'_> {
         let of_baseline = self.listed(config.baseline.lists);
         let of_rasterizer = self.listed(lists_of_rasterizer(config));
         let triangles_ms = self.triangles_ms(config);
-        simulate_listed(of_baseline, of_rasterizer, triangles_ms, config)
+        let simulation = simulate_listed(of_baseline, of_rasterizer, triangles_ms, config);
+        let on_cores_ms =
+            |lists| shader_cores::stage_3_ms(self.listed(lists).baseline_evaluations(), config) + triangles_ms;
+        let exact_ms = on_cores_ms(Lists::Exact);
+        let exact_lists = if exact_ms > 0.0 { on_cores_ms(Lists::Squares) / exact_ms } else { 1.0 };
+        Simulation { exact_lists, ..simulation }
     }
 }
 
@@ -293,13 +334,18 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
         }
     }
     let changed = of_rasterizer.rasterizer_work(&config.rasterizer).changed;
+    let fps = if policy.collaborative { fps_collaborative } else { fps_serial };
+    let frame_ms = if fps > 0.0 { 1e3 / fps } else { 0.0 };
     let mut energy = Energy::default();
     if policy.has_rasterizer {
-        energy = energy::rasterizer(&chosen.raster, changed, config);
+        energy = energy::rasterizer(&chosen.raster, changed, frame_ms, config);
     }
+    energy.list_writer = energy::list_writer_mj(chosen.lists.bytes, config);
     energy.shader_cores = energy::shader_cores_mj(shader_ms, config);
-    let fps = if policy.collaborative { fps_collaborative } else { fps_serial };
     let stages = chosen.stages();
+    let moved = chosen.raster.bytes_in + chosen.raster.bytes_out;
+    let raster_gb_s = if stages.raster > 0.0 { moved / stages.raster * 1e-6 } else { 0.0 };
+    let left_gb_s = (config.memory.bandwidth_gb_s * config.memory.efficiency - raster_gb_s).max(0.0);
     let [compute, preprocess, sort, shade] = chosen.shader;
     let busy_ms =
         chosen.raster.modules.busy / f64::from(config.rasterizer.modules.max(1)) / config.rasterizer.clock_ghz * 1e-6;
@@ -318,12 +364,15 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
         gains,
         blended: changed.blended,
         covered: changed.covered,
+        lists: chosen.lists,
         compute,
         preprocess,
         sort,
         shade,
         stages,
         contention_gb_s: chosen.contention_gb_s,
+        meanwhile_gb_s: chosen.contention_gb_s.min(left_gb_s),
+        exact_lists: 1.0,
         fps,
         fps_collaborative,
         fps_serial,
@@ -331,6 +380,7 @@ fn simulate_listed(of_baseline: &Listed, of_rasterizer: &Listed, triangles_ms: f
         baseline_fps: if baseline_ms > 0.0 { 1e3 / baseline_ms } else { 0.0 },
         raster_speedup: if stages.raster > 0.0 { baseline_raster_ms / stages.raster } else { 1.0 },
         speedup: fps * baseline_ms * 1e-3,
+        power: Power::of(&energy, frame_ms, stages.raster, config),
         energy,
         baseline_mj: energy::shader_cores_mj(baseline_ms, config),
         raster: chosen.raster,
@@ -400,9 +450,15 @@ mod tests {
     fn the_speed_up_is_the_product_of_what_it_is_made_of() {
         let mut frame = frame();
         frame.draws[0].boxed_pairs = 3_000_000;
-        let with = |preset: &str| simulate(&frame, &Config::preset(preset, &[]).unwrap());
-        let (exact, squares) = (with("paper-15x16"), with("paper-pipeline"));
-        for result in [&exact, &squares] {
+        let with = |preset: &str, settings: &[&str]| {
+            let settings: Vec<_> = settings.iter().map(|&setting| setting.to_owned()).collect();
+            simulate(&frame, &Config::preset(preset, &settings).unwrap())
+        };
+        let alike = with("paper-15x16", &[]);
+        let exact = with("paper-15x16", &["baseline.lists=squares"]);
+        let squares = with("paper-pipeline", &[]);
+        for result in [&alike, &exact, &squares] {
+            assert!((result.exact_lists - 3.0).abs() < 0.01, "{}", result.exact_lists);
             let Gains { hardware, lists, stalls } = result.gains;
             let product = hardware * lists * stalls;
             assert!((product / result.raster_speedup - 1.0).abs() < 1e-9);
@@ -412,12 +468,12 @@ mod tests {
             assert!(stalls <= 1.0);
         }
         assert!((exact.gains.lists - 3.0).abs() < 0.01);
-        assert_eq!(squares.gains.lists, 1.0);
+        assert_eq!([alike.gains.lists, squares.gains.lists], [1.0; 2]);
         // Both baselines sort and evaluate the pairs of squares.
         assert!((exact.baseline_fps - squares.baseline_fps).abs() < 1e-9);
         assert!((squares.sort.memory_ms / exact.sort.memory_ms - 3.0).abs() < 0.6);
-        let baseline = with("orin-nx-10w");
-        assert!((baseline.fps - exact.baseline_fps).abs() < 1e-9);
+        let baseline = with("orin-nx-10w", &[]);
+        assert!((baseline.fps - alike.baseline_fps).abs() < 1e-9);
         assert_eq!(baseline.gains, Gains::NONE);
     }
 
@@ -471,6 +527,43 @@ mod tests {
         let paper = simulate(&frame(), &Config::preset("paper-15x16", &[]).unwrap());
         assert!((paper.baseline_fps - simulation.fps).abs() < 1e-9);
         assert!(paper.fps_collaborative > paper.fps_serial && paper.fps_serial > simulation.fps);
+    }
+
+    #[test]
+    fn a_list_writer_costs_time_bytes_area_and_energy() {
+        let frame = frame();
+        let with = |settings: &[&str]| {
+            let settings: Vec<_> = settings.iter().map(|&setting| setting.to_owned()).collect();
+            let config = Config::preset("paper-15x16", &settings).unwrap();
+            (simulate(&frame, &config), crate::area::area(&config))
+        };
+        let (gathered, area) = with(&[]);
+        assert_eq!((gathered.lists, gathered.stages.lists, area.list_writer), (ListWriting::default(), 0.0, 0.0));
+        assert_eq!(gathered.energy.list_writer, 0.0);
+        let (listed, area) = with(&["records=listed"]);
+        // A million pairs of 40 bytes in and as many out; five cycles each are longer than their bytes.
+        assert!((listed.lists.bytes - 8e7).abs() < 1.0);
+        assert!((listed.stages.lists - 5.0).abs() < 1e-9);
+        assert!(area.list_writer > 0.0 && listed.energy.list_writer > 80e6 * 32e-9);
+        assert!(listed.energy.total() > gathered.energy.total() && listed.fps_serial < gathered.fps_serial);
+        // Main memory is the limit of a faster unit.
+        let (fast, _) = with(&["records=listed", "list_writer.cycles_per_pair=0.5"]);
+        assert!((fast.stages.lists - 8e7 / (68.3e6 * 0.9)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn all_units_together_move_no_more_than_memory_does() {
+        let mut frame = frame();
+        // Short lists: primitives and pixels alone need more than there is, and so do stages 1 and 2.
+        frame.draws[0].tiles = even_frame([1280, 720], 40_000, 0.25).draws.remove(0).tiles;
+        for setting in ["modules=1", "modules=15", "modules=60", "memory.efficiency=0.5"] {
+            let config = Config::preset("paper-15x16", &[setting.to_owned()]).unwrap();
+            let result = simulate(&frame, &config);
+            let raster = (result.raster.bytes_in + result.raster.bytes_out) / result.stages.raster * 1e-6;
+            let whole = config.memory.bandwidth_gb_s * config.memory.efficiency;
+            assert!(result.meanwhile_gb_s > 0.0 && result.meanwhile_gb_s <= result.contention_gb_s, "{setting}");
+            assert!(raster + result.meanwhile_gb_s <= whole * (1.0 + 1e-9), "{setting}: {raster} of {whole}");
+        }
     }
 
     #[test]

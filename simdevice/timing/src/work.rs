@@ -10,7 +10,7 @@ pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
 /// Groups of 16 pixels (rows, or 4x4 blocks) of such a tile.
 pub const TILE_GROUPS: u32 = 16;
 /// The version of [`Trace`]'s layout.
-pub const TRACE_VERSION: u32 = 3;
+pub const TRACE_VERSION: u32 = 4;
 /// The sides in pixels of the tiles that [`DrawWork::sized_pairs`] counts.
 pub const TILE_SIDES: [u32; 4] = [8, 16, 32, 64];
 
@@ -23,86 +23,6 @@ pub struct Trace {
     /// Frames, oldest first: render passes that drew something, with the dispatches before them. Dispatches after the
     /// last pass are a frame without draws.
     pub frames: Vec<FrameWork>,
-}
-
-/// The most pairs of a tile and a primitive, and the most tiles of a draw, in a frame of a trace: 19 times as many as
-/// the paper's largest scene has.
-pub const MAX_PAIRS: u64 = 1 << 28;
-
-/// The most tiles of a picture across and down.
-const MAX_TILES_ACROSS: u32 = 1 << 20;
-
-/// The reason that a trace can't be one of a device.
-#[derive(Debug, PartialEq, thiserror::Error)]
-pub enum TraceError {
-    /// The layout has another version.
-    #[error("a trace of version {0}, not {TRACE_VERSION}")]
-    Version(u32),
-    /// The frame has more pairs than can be simulated in reasonable time.
-    #[error("frame {frame} has {pairs} pairs of a tile and a primitive; it must be at most {MAX_PAIRS}")]
-    TooLarge {
-        /// The frame, from 0.
-        frame: usize,
-        /// Its pairs.
-        pairs: u64,
-    },
-    /// A tile's numbers contradict each other.
-    #[error("frame {frame}, tile {at:?}: {what}")]
-    Tile {
-        /// The frame, from 0.
-        frame: usize,
-        /// Column and row of the tile.
-        at: [u32; 2],
-        /// The contradiction.
-        what: &'static str,
-    },
-    /// The frame's shader work has a count that is negative or not a number.
-    #[error("frame {0}: work of shader cores is negative or no number")]
-    ShaderWork(usize),
-    /// The frame has a draw whose boxes touch numbers of tiles that no boxes touch.
-    #[error("frame {0}: sized_pairs must not grow with the side of a tile, nor shrink by more than four")]
-    SizedPairs(usize),
-}
-
-impl Trace {
-    /// Checks a trace read from a file.
-    ///
-    /// # Errors
-    /// Returns a [`TraceError`] that names the first problem.
-    pub fn check(&self) -> Result<(), TraceError> {
-        if self.version != TRACE_VERSION {
-            return Err(TraceError::Version(self.version));
-        }
-        for (number, frame) in self.frames.iter().enumerate() {
-            frame.check(number)?;
-        }
-        Ok(())
-    }
-}
-
-impl FrameWork {
-    fn check(&self, frame: usize) -> Result<(), TraceError> {
-        let squares = |draw: &DrawWork| draw.boxed_pairs.max(draw.pairs());
-        let pairs = self.draws.iter().map(squares).fold(0, u64::saturating_add);
-        if pairs > MAX_PAIRS {
-            return Err(TraceError::TooLarge { frame, pairs });
-        }
-        let draws = self.draws.iter();
-        let works = draws.flat_map(|draw| [draw.preprocess, draw.sort, draw.shade]);
-        if !works.chain([self.compute]).all(|work| work.is_valid()) {
-            return Err(TraceError::ShaderWork(frame));
-        }
-        if !self.draws.iter().all(DrawWork::has_possible_boxes) {
-            return Err(TraceError::SizedPairs(frame));
-        }
-        for tile in self.draws.iter().flat_map(|draw| &draw.tiles) {
-            if let Some(what) = tile.contradiction() {
-                let at = tile.at;
-                return Err(TraceError::Tile { frame, at, what });
-            }
-        }
-        Ok(())
-    }
 }
 
 /// The work of one frame.
@@ -143,7 +63,7 @@ pub struct DrawWork {
     /// Primitives that reached at least one tile.
     pub drawn: u64,
     /// Pairs of a tile and a Gaussian if each Gaussian is listed in all tiles that the square around its 3-sigma circle
-    /// touches, as in the original 3DGS code; 0 if unknown.
+    /// touches, as in the original 3DGS code; at least the pairs of the lists; 0 if unknown.
     pub boxed_pairs: u64,
     /// Pairs of a tile and a primitive whose bounding box touches it, for tiles of each of [`TILE_SIDES`]; 0 if
     /// unknown. Only their ratios are used, because lists are made by exact tests.
@@ -156,8 +76,27 @@ pub struct DrawWork {
     /// The work after rasterization: fragment programs.
     #[serde(default)]
     pub shade: ShaderWork,
+    /// The places of the draw's records and lists in the memory of the simulated machine.
+    #[serde(default)]
+    pub places: Places,
     /// Tiles whose list is not empty, in the order in which they are dispatched.
     pub tiles: Vec<TileWork>,
+}
+
+/// Bytes of a primitive's record: nine numbers of 32 bits (GauRast, Table II).
+pub const RECORD_BYTES: u64 = 36;
+/// Bytes of an entry of a list.
+pub const ENTRY_BYTES: u64 = 4;
+
+/// Addresses in the memory of the simulated machine, in bytes. [`FrameWork::place`] sets them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Places {
+    /// The record of id 0. Stage 1 writes it, and the rasterizer reads it; that of id `n` is `n` [`RECORD_BYTES`] on.
+    pub records: u64,
+    /// The first entry of the first tile's list. The lists follow each other in the order of the tiles, without gaps,
+    /// and an entry has [`ENTRY_BYTES`].
+    pub lists: u64,
 }
 
 /// The work of shader cores: operations, counted by single lanes, and bytes.
@@ -184,7 +123,7 @@ pub struct ShaderWork {
 
 impl ShaderWork {
     /// Reports whether every count is a number and not negative.
-    fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         let counts =
             [self.float, self.integer, self.special, self.wide, self.memory, self.image, self.other, self.bytes];
         counts.iter().all(|count| (0.0..1e18).contains(count))
@@ -249,6 +188,14 @@ pub struct TileWork {
     /// Quads that were covered but failed early tests in every pixel. Quads of hidden primitives are not counted.
     #[serde(default)]
     pub killed: u32,
+    /// The number of the tile among those of its place in the draw: layers, views, and parts of the draw that are
+    /// rendered one after the other.
+    #[serde(default)]
+    pub layer: u32,
+    /// The ids of the list's primitives, in its order: numbers of their records. Empty if unknown. Draws of Gaussians
+    /// have them in the last frame that was recorded.
+    #[serde(default)]
+    pub ids: Vec<u32>,
 }
 
 /// Consecutive primitives of a tile's list, between two changes of the number of unfinished pixels.
@@ -271,6 +218,58 @@ pub struct Run {
     /// triangles, only those that the whole tile hides are counted; for Gaussians, all.
     #[serde(default)]
     pub hidden_blocks: u32,
+    /// Statistics of the intervals between evaluations in a block, from [`BlockIntervals`]; none if unknown, and of
+    /// triangles.
+    #[serde(default)]
+    pub waits: Option<[u32; INTERVALS]>,
+}
+
+/// The intervals that [`Run::waits`] is of: 2 to 9 evaluations.
+pub const INTERVALS: usize = 8;
+
+/// The cycles that a module waits for pixels' transmittances, if it evaluates a block in a cycle, in the order of the
+/// list and of the blocks' numbers, and evaluates no block again before an interval has passed.
+#[derive(Clone, Debug)]
+pub struct BlockIntervals {
+    machines: [Intervals; INTERVALS],
+}
+
+/// The cycles of one interval.
+#[derive(Clone, Copy, Debug, Default)]
+struct Intervals {
+    now: u64,
+    /// The cycle from which each block may be evaluated again.
+    free: [u64; TILE_GROUPS as usize],
+    waited: u32,
+}
+
+impl Default for BlockIntervals {
+    fn default() -> Self {
+        Self { machines: [Intervals::default(); INTERVALS] }
+    }
+}
+
+impl BlockIntervals {
+    /// Evaluates a primitive in blocks, a bit each.
+    pub fn evaluate(&mut self, blocks: u16) {
+        for (index, machine) in self.machines.iter_mut().enumerate() {
+            let interval = index as u64 + 2;
+            let mut left = blocks;
+            while left != 0 {
+                let free = &mut machine.free[left.trailing_zeros() as usize];
+                left &= left - 1;
+                let begin = machine.now.max(*free);
+                machine.waited = machine.waited.saturating_add((begin - machine.now) as u32);
+                *free = begin + interval;
+                machine.now = begin + 1;
+            }
+        }
+    }
+
+    /// The cycles waited since the last call, for each interval.
+    pub fn take(&mut self) -> [u32; INTERVALS] {
+        std::array::from_fn(|index| std::mem::take(&mut self.machines[index].waited))
+    }
 }
 
 impl Run {
@@ -344,32 +343,6 @@ impl TileWork {
         }
     }
 
-    /// The contradiction between the tile's numbers, if there is one.
-    fn contradiction(&self) -> Option<&'static str> {
-        let sum = |of: fn(&Run) -> u32| self.runs.iter().map(|run| u64::from(of(run))).sum::<u64>();
-        let groups = |run: &Run| u64::from(run.primitives) * u64::from(TILE_GROUPS);
-        if sum(|run| run.primitives) > u64::from(self.listed) {
-            return Some("its runs have more primitives than its list");
-        }
-        if self.runs.iter().any(|run| run.rows > 16 || run.blocks > 16) {
-            return Some("a run has more than 16 rows or blocks");
-        }
-        let reached = |run: &Run| u64::from(run.reached) + u64::from(run.hidden_blocks);
-        if self.runs.iter().any(|run| reached(run) > groups(run)) {
-            return Some("a run reaches more blocks than its primitives have");
-        }
-        if self.runs.iter().any(|run| run.hidden > run.primitives) {
-            return Some("a run hides more primitives than it has");
-        }
-        if self.contributions > u64::from(self.listed) * u64::from(TILE_PIXELS) {
-            return Some("more pixels are changed than its primitives have");
-        }
-        if self.at.iter().any(|&at| at >= MAX_TILES_ACROSS) {
-            return Some("it is in no picture");
-        }
-        None
-    }
-
     /// Primitives before the end of the last run: those that an unfinished pixel needs, or would need without depth
     /// tests.
     pub fn needed(&self) -> u32 {
@@ -400,10 +373,15 @@ impl TileWork {
                 primitives: run.primitives,
                 groups: run.groups(saturation, hierarchical_depth),
                 open: run.open(saturation),
+                waits: if saturation == Saturation::Reached { run.waits } else { None },
             }
         });
-        let rest =
-            Segment { primitives: rest, groups: u64::from(rest) * u64::from(TILE_GROUPS), open: TILE_GROUPS.into() };
+        let rest = Segment {
+            primitives: rest,
+            groups: u64::from(rest) * u64::from(TILE_GROUPS),
+            open: TILE_GROUPS.into(),
+            waits: None,
+        };
         runs.chain([rest]).filter(|segment| segment.primitives > 0)
     }
 
@@ -424,17 +402,11 @@ pub struct Segment {
     pub groups: u64,
     /// Groups of 16 pixels in which each of them may be evaluated.
     pub open: u64,
+    /// The waits of the run, if its primitives are evaluated in the blocks that they reach.
+    pub waits: Option<[u32; INTERVALS]>,
 }
 
 impl DrawWork {
-    /// True if boxes can touch so many tiles of each size: a tile of the next size has four of the size before. Numbers
-    /// of 0 are unknown.
-    fn has_possible_boxes(&self) -> bool {
-        let pairs = self.sized_pairs.windows(2);
-        let known = pairs.filter(|pair| pair.iter().all(|&count| count > 0));
-        known.into_iter().all(|pair| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4))
-    }
-
     /// Pairs of a tile and a primitive in the lists.
     pub fn pairs(&self) -> u64 {
         self.tiles.iter().map(|tile| u64::from(tile.listed)).sum()
@@ -479,8 +451,10 @@ impl FrameWork {
             draw.sort = draw.sort.times(factor);
             draw.boxed_pairs = 0;
             for tile in &mut draw.tiles {
+                tile.ids = Vec::new();
                 for run in &mut tile.runs {
                     run.primitives = longer(run.primitives);
+                    run.waits = run.waits.map(|waits| waits.map(longer));
                     run.hidden = longer(run.hidden).min(run.primitives);
                 }
                 tile.hidden_rest = longer(tile.hidden_rest);
@@ -488,6 +462,20 @@ impl FrameWork {
             }
         }
         frame
+    }
+
+    /// Gives the draws places in memory: from address 0 on, each draw's records, then its lists, each aligned to 64
+    /// bytes.
+    pub fn place(&mut self) {
+        let aligned = |address: u64| address.next_multiple_of(64);
+        let mut address = 0;
+        for draw in &mut self.draws {
+            let last = draw.tiles.iter().flat_map(|tile| &tile.ids).max();
+            let records = last.map_or(draw.drawn, |&last| u64::from(last) + 1);
+            draw.places.records = address;
+            draw.places.lists = aligned(address + records * RECORD_BYTES);
+            address = aligned(draw.places.lists + draw.pairs() * ENTRY_BYTES);
+        }
     }
 
     /// The frame with only the draws of one mode, and without dispatches.
@@ -523,7 +511,7 @@ mod tests {
     fn what_was_not_needed_is_a_segment_without_saturation() {
         let segments: Vec<_> = tile().segments(Saturation::None, false).collect();
         assert_eq!(segments.len(), 3);
-        assert_eq!(segments[2], Segment { primitives: 3, groups: 48, open: 16 });
+        assert_eq!(segments[2], Segment { primitives: 3, groups: 48, open: 16, waits: None });
         assert_eq!(tile().segments(Saturation::Row, false).count(), 2);
     }
 
@@ -548,69 +536,33 @@ mod tests {
     }
 
     #[test]
-    fn what_no_device_does_is_refused() {
-        let check = |change: fn(&mut TileWork)| {
-            let mut tile = tile();
-            change(&mut tile);
-            let draw = DrawWork { tiles: vec![tile], ..DrawWork::default() };
-            let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
-            let (version, frames) = (TRACE_VERSION, vec![frame]);
-            Trace { version, frames }.check()
+    fn blocks_wait_for_their_last_evaluation() {
+        let waits = |masks: &[u16]| {
+            let mut intervals = BlockIntervals::default();
+            masks.iter().for_each(|&mask| intervals.evaluate(mask));
+            intervals.take()
         };
-        assert_eq!(check(|_| ()), Ok(()));
-        let pairs = 4_000_000_000;
-        assert_eq!(check(|tile| tile.listed = 4_000_000_000), Err(TraceError::TooLarge { frame: 0, pairs }));
-        for wrong in [
-            (|tile| tile.runs[0].primitives = 10) as fn(&mut TileWork),
-            |tile| tile.runs[0].rows = 17,
-            |tile| tile.runs[1].reached = 65,
-            |tile| tile.runs[1].hidden = 5,
-            |tile| tile.contributions = 10 * 256 + 1,
-            |tile| tile.contributions = u64::MAX,
-            |tile| tile.at = [0, u32::MAX],
-        ] {
-            assert!(matches!(check(wrong), Err(TraceError::Tile { .. })));
-        }
+        // The same block again waits for the rest of each interval.
+        assert_eq!(waits(&[1, 1]), [1, 2, 3, 4, 5, 6, 7, 8]);
+        // Of two blocks in turn, the second has waited with the first.
+        assert_eq!(waits(&[0b100, 0b1000, 0b100, 0b1000]), [0, 1, 2, 3, 4, 5, 6, 7]);
+        // 16 blocks hide all intervals.
+        assert_eq!(waits(&[u16::MAX, u16::MAX]), [0; INTERVALS]);
+        // A longer interval waits for more, in a list that has both.
+        assert!(waits(&[0b11, 0b110, 0b1, 0b1000, 0b11]).is_sorted());
     }
 
     #[test]
-    fn boxes_that_no_primitives_have_are_refused() {
-        let check = |sized_pairs| {
-            let draw = DrawWork { sized_pairs, ..DrawWork::default() };
-            let frame = FrameWork { draws: vec![draw], ..FrameWork::default() };
-            let (version, frames) = (TRACE_VERSION, vec![frame]);
-            Trace { version, frames }.check()
+    fn records_and_lists_have_places_of_their_own() {
+        let draw = |ids: &[u32]| DrawWork {
+            drawn: 3,
+            tiles: vec![TileWork { listed: 5, ids: ids.to_vec(), ..TileWork::default() }],
+            ..DrawWork::default()
         };
-        for right in [[0; 4], [400, 100, 25, 25], [0, 7, 0, 9]] {
-            assert_eq!(check(right), Ok(()), "{right:?}");
-        }
-        for wrong in [[401, 100, 25, 25], [u64::MAX, 1, 1, 1], [7, 8, 8, 8]] {
-            assert_eq!(check(wrong), Err(TraceError::SizedPairs(0)), "{wrong:?}");
-        }
-    }
-
-    #[test]
-    fn shader_work_that_is_no_number_is_refused() {
-        for wrong in [f64::NAN, f64::INFINITY, -1.0, 1e18] {
-            let work = ShaderWork { bytes: wrong, ..ShaderWork::default() };
-            let frame = FrameWork { compute: work, ..FrameWork::default() };
-            let (version, frames) = (TRACE_VERSION, vec![frame]);
-            let checked = Trace { version, frames }.check();
-            assert_eq!(checked, Err(TraceError::ShaderWork(0)), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn traces_survive_json() {
-        let trace = Trace {
-            version: TRACE_VERSION,
-            frames: vec![FrameWork {
-                size: [16, 16],
-                draws: vec![DrawWork { tiles: vec![tile()], ..DrawWork::default() }],
-                ..FrameWork::default()
-            }],
-        };
-        let text = serde_json::to_string(&trace).unwrap();
-        assert_eq!(serde_json::from_str::<Trace>(&text).unwrap(), trace);
+        let mut frame = FrameWork { draws: vec![draw(&[0, 2, 1, 9, 4]), draw(&[])], ..FrameWork::default() };
+        frame.place();
+        // Ten records of 36 bytes end at 360, and five entries of four bytes at 404.
+        assert_eq!(frame.draws[0].places, Places { records: 0, lists: 384 });
+        assert_eq!(frame.draws[1].places, Places { records: 448, lists: 576 });
     }
 }

@@ -6,6 +6,7 @@ use gaurast_runner::{Case, Need, Variant, data, is_long};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::timing::config::Config;
+use simdevice::timing::work::Mode;
 use std::path::{Path, PathBuf};
 use std::sync::{Once, OnceLock};
 use timing_studies::exponential::{Exponential, exp2};
@@ -195,8 +196,7 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
         // In the module, pixels in the pipeline finish later than in the model.
         assert!(busy[0] >= busy[1]);
         near(busy, 0.04);
-        // With masks, the model does not know which Gaussians share groups of pixels.
-        near(dependency, if setting.masked { 0.12 } else { 0.0 });
+        near(dependency, if setting.masked { 0.02 } else { 0.0 });
         near(memory, 0.12);
         near(controller, 0.01);
         near(modes, 0.04);
@@ -209,8 +209,8 @@ fn the_presets_have_the_latencies_of_the_module() {
     for (name, format) in [("paper-15x16", Format::SINGLE), ("fp16", Format::HALF)] {
         let raster = Config::preset(name, &[]).expect("a preset").rasterizer;
         let latencies = Latencies::of(format, Exponential::Table);
-        assert_eq!(raster.gaussian_latency, latencies.gaussian);
-        assert_eq!(raster.triangle_latency, latencies.triangle);
+        assert_eq!(raster.latency(Mode::Gaussian), latencies.gaussian);
+        assert_eq!(raster.latency(Mode::Triangle), latencies.triangle);
         assert_eq!(raster.carried_latency, latencies.carried);
         assert_eq!([raster.gaussian_interval, raster.triangle_interval], [1, 1]);
     }

@@ -1081,7 +1081,7 @@ vk_enum! {
 }
 
 /// The type of a function that receives the trace of a device's work: `dataSize` bytes of JSON
-/// in UTF-8.
+/// in UTF-8, or binary.
 #[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkWorkTraceCallbackGAURAST =
     Option<unsafe extern "system" fn(p_user_data: *mut c_void, data_size: usize, p_data: *const c_void)>;

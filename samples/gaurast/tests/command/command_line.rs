@@ -273,13 +273,16 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     };
     let json: serde_json::Value =
         serde_json::from_str(&simulate(&["--format", "json", "--trace", "t.json"])).expect("JSON");
-    let raster = &json[0][1]["raster"];
+    let result = &json["results"][0];
+    assert_eq!((&result["machine"], &result["config"]["rasterizer"]["modules"]), (&"paper-15x16".into(), &15.into()));
+    let raster = &result["simulation"]["raster"];
     let number = |value: &serde_json::Value| value.as_f64().expect("a number");
     // Every list holds at most three Gaussians, and there are 5 x 4 tiles.
     let pairs = number(&raster["pairs"]);
     assert!((3.0..=60.0).contains(&pairs), "{pairs}");
     assert_eq!(number(&raster["gaussian_evaluations"]), pairs * 256.0);
-    assert!(number(&json[0][1]["blended"]) > 0.0);
+    assert!(number(&result["simulation"]["blended"]) > 0.0);
+    assert!(number(&result["area"]["module"]) > 0.0 && number(&result["simt"]["compute_ms"]) > 0.0);
     let timeline = std::fs::read(folder.path().join("t.json")).expect("a timeline");
     let timeline: serde_json::Value = serde_json::from_slice(&timeline).expect("JSON");
     let events = timeline["traceEvents"].as_array().expect("events");
@@ -298,14 +301,16 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     let plot = std::fs::read_to_string(folder.path().join("s.svg")).expect("a plot");
     assert!(plot.contains("speed-up over the shader cores"));
     let grid = ["--sweep", "modules=1..4", "--sweep", "batch=16,32,64", "--format", "csv"];
-    let plots = ["--pareto", "p.svg", "--roofline", "r.svg", "--tiles", "f.svg"];
-    let grid = simulate(&[&grid[..], &plots].concat());
+    let grid = simulate(&[&grid[..], &["--pareto", "p.svg"]].concat());
+    assert!(simulate(&["--roofline", "r.svg", "--tiles", "f.svg"]).contains("mean of the frame"));
     assert_eq!(grid.lines().count(), 13, "{grid}");
     assert!(grid.contains("added mm2") && grid.contains("modules=4 batch=64,"));
     let svg = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a plot");
     assert_eq!(svg("p.svg").matches("<circle").count(), 12);
     assert!(svg("r.svg").contains(">stage 3</text>"));
     assert_eq!(svg("f.svg").matches(" cycles</title>").count(), spans(true) / 6);
+    let range = simulate(&["--sweep", "modules=1..100", "--format", "csv"]);
+    assert_eq!(range.lines().count(), 101, "every number of a range");
     let every = simulate(&["--every-frame", "--format", "csv"]);
     assert!(every.lines().nth(1).is_some_and(|line| line.starts_with("frame 0,")));
     let compared = simulate(&["--stepped"]);
@@ -355,9 +360,9 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
     ];
     let output = gaurast(&folder, &simulated);
     assert!(output.status.success());
-    let frames: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let frames = frames.as_array().expect("frames");
-    let sum = |of: &dyn Fn(&serde_json::Value) -> f64| frames.iter().map(|frame| of(&frame[1])).sum::<f64>();
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let frames = json["results"].as_array().expect("frames");
+    let sum = |of: &dyn Fn(&serde_json::Value) -> f64| frames.iter().map(|frame| of(&frame["simulation"])).sum::<f64>();
     let raster = |field: &'static str| sum(&|result| result["raster"][field].as_f64().expect("a number"));
     let cause = |field: &'static str| sum(&|result| result["raster"]["modules"][field].as_f64().expect("a number"));
     let energy = |field: &'static str| sum(&|result| result["energy"][field].as_f64().expect("a number")) * 1e6;
@@ -434,25 +439,33 @@ fn machines_and_traces_that_cannot_be_are_refused() {
     let traces = [
         ("", "not a trace of work"),
         ("[]", "not a trace of work"),
-        (r#"{"version":3,"frames":[]}"#, "there is no frame"),
-        (r#"{"version":4,"frames":[]}"#, "a trace of version 4, not 3"),
-        (r#"{"version":3,"frames":[{"size":[16,16],"draws":[]}]}"#, "the last frame has no work"),
+        ("gaurast\n\u{4}", "not a binary trace of work"),
+        (r#"{"version":4,"frames":[]}"#, "there is no frame"),
+        (r#"{"version":3,"frames":[]}"#, "version 3; only traces of version 4"),
+        (r#"{"version":4,"frames":[{"size":[16,16],"draws":[]}]}"#, "the last frame has no work"),
         (
-            r#"{"version":3,"frames":[{"size":[16,16],"draws":[],"compute":{"float":-1}}]}"#,
-            "frame 0: work of shader cores is negative",
+            r#"{"version":4,"frames":[{"size":[16,16],"draws":[],"compute":{"float":-1}}]}"#,
+            "frame 0, compute: a count is negative",
         ),
-        (r#"{"version":3,"frames":[{"size":[16,16],"draws":[],"compute":{"float":NaN}}]}"#, "not a trace of work"),
+        (r#"{"version":4,"frames":[{"size":[16,16],"draws":[],"compute":{"float":NaN}}]}"#, "not a trace of work"),
     ];
     let tiles = [
         (r#""at":[0,0],"listed":4294967295,"runs":[]"#, "frame 0 has 4294967295 pairs"),
         (r#""at":[0,0],"listed":4294967296,"runs":[]"#, "not a trace of work"),
-        (r#""at":[0,0],"listed":1,"runs":[{"primitives":2,"rows":1,"blocks":1,"reached":1}]"#, "frame 0, tile [0, 0]"),
-        (r#""at":[0,0],"listed":1,"runs":[{"primitives":1,"rows":17,"blocks":1,"reached":1}]"#, "frame 0, tile [0, 0]"),
-        (r#""at":[0,4294967295],"listed":1,"runs":[]"#, "frame 0, tile [0, 4294967295]"),
+        (
+            r#""at":[0,0],"listed":1,"runs":[{"primitives":2,"rows":1,"blocks":1,"reached":1}]"#,
+            "frame 0, draw 0, tile [0, 0], runs.primitives",
+        ),
+        (
+            r#""at":[0,0],"listed":1,"runs":[{"primitives":1,"rows":17,"blocks":1,"reached":1}]"#,
+            "frame 0, draw 0, tile [0, 0], runs.rows",
+        ),
+        (r#""at":[0,4294967295],"listed":1,"runs":[]"#, "frame 0, draw 0, tile [0, 4294967295], at"),
+        (r#""at":[0,0],"layer":1,"listed":1,"ids":[1,2],"runs":[]"#, "frame 0, draw 0, tile [0, 0], ids"),
     ];
     let of_tile = |tile: &str| {
         format!(
-            r#"{{"version":3,"frames":[{{"size":[16,16],"draws":[{{"mode":"gaussian","primitives":1,"drawn":1,
+            r#"{{"version":4,"frames":[{{"size":[16,16],"draws":[{{"mode":"gaussian","primitives":1,"drawn":1,
             "boxed_pairs":0,"preprocess":{{}},"sort":{{}},
             "tiles":[{{{tile},"contributions":0,"terminated":0}}]}}]}}]}}"#
         )
@@ -476,7 +489,7 @@ fn the_papers_numbers_are_printed() {
     let folder = folder();
     let output = gaurast(&folder, &["simulate", "--paper"]);
     let text = String::from_utf8_lossy(&output.stdout);
-    for part in ["bicycle", "GSCore", "predicted", "solved", "calibrated", "0.64 W"] {
+    for part in ["bicycle", "GSCore", "predicted", "solved", "calibrated", "fit", "contradiction", "0.64 W"] {
         assert!(text.contains(part), "{part}");
     }
 }

@@ -37,7 +37,7 @@ use crate::limits::{MAX_SAMPLES, TILE_SIZE};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::{Optimization, Optimizations};
 use crate::stats::recorder::{Run, TileWork};
-use devmem::dispatch;
+use devmem::{dispatch, host};
 use fearless_simd::Level;
 
 /// Primitives of a piece of a sorted walk. The fast kernel goes on where it was, so that pieces change no bit.
@@ -125,11 +125,19 @@ impl GaussianTile {
             ranges: &self.ranges,
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
+        let mut ids = draw.keeps_ids.then(Vec::new);
         let compositor = &mut self.compositor;
         let accumulator = &mut self.accumulators[accumulator];
         let counts = match draw.sorted.tiles.walk() {
-            None => compositor.composite_list::<M>(level, &inputs, accumulator, runs.as_mut()),
-            Some(walk) => compositor.composite_walk::<M>(level, &inputs, walk, accumulator, runs.as_mut()),
+            None => {
+                if let Some(ids) = &mut ids {
+                    host::extend(ids, list);
+                }
+                compositor.composite_list::<M>(level, &inputs, accumulator, runs.as_mut())
+            }
+            Some(walk) => {
+                compositor.composite_walk::<M>(level, &inputs, walk, accumulator, runs.as_mut(), ids.as_mut())
+            }
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -140,6 +148,7 @@ impl GaussianTile {
                 contributions: counts.contributions,
                 terminated: count(&accumulator.finished()).saturating_sub(outside),
                 hidden_rest: counts.hidden_rest,
+                ids: ids.unwrap_or_default(),
                 ..TileWork::default()
             });
         }
@@ -186,7 +195,7 @@ impl GaussianTile {
         let compositor = &mut self.compositor;
         match draw.sorted.tiles.walk() {
             None => compositor.composite_list::<FindReached>(level, &inputs, accumulator, None),
-            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None),
+            Some(walk) => compositor.composite_walk::<FindReached>(level, &inputs, walk, accumulator, None, None),
         };
         let finished = accumulator.finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
@@ -285,7 +294,8 @@ impl Compositor {
         }
     }
 
-    /// Composites what a tile finds in the sorted sequence, until nothing more can contribute.
+    /// Composites what a tile finds in the sorted sequence, until nothing more can contribute, and appends it to `ids`.
+    #[expect(clippy::too_many_arguments, reason = "the inputs and the record of one tile")]
     fn composite_walk<M: Mode>(
         &mut self,
         level: Level,
@@ -293,6 +303,7 @@ impl Compositor {
         walk: &SortedWalk,
         accumulator: &mut Accumulator,
         mut runs: Option<&mut Vec<Run>>,
+        mut ids: Option<&mut Vec<u32>>,
     ) -> TileCounts {
         let most = match inputs.kernel {
             Kernel::Fast => PIECE,
@@ -312,6 +323,9 @@ impl Compositor {
             walk.next(tile, &mut from, most, &mut piece);
             if piece.is_empty() {
                 break;
+            }
+            if let Some(ids) = &mut ids {
+                host::extend(ids, &piece);
             }
             let inputs = TileInputs { list: &piece, ..*inputs };
             counts.add(&self.composite_list::<M>(level, &inputs, accumulator, runs.as_deref_mut()));

@@ -4,7 +4,6 @@
 //! with: [`stepped`] cycle by cycle, [`pe`] and [`module`] bit by bit, and [`rtl`], the module in SystemVerilog.
 #![forbid(unsafe_code)]
 
-pub mod area;
 pub mod chart;
 pub mod exponential;
 pub mod module;

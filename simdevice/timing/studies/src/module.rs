@@ -4,7 +4,7 @@
 use crate::exponential::Exponential;
 use crate::number::Format;
 use crate::pe::{Gaussian, Pe, Pixel, Thresholds, Triangle};
-use timing::work::{Mode, Run, TILE_GROUPS, TILE_SIDE, TileWork};
+use timing::work::{BlockIntervals, INTERVALS, Mode, Run, TILE_GROUPS, TILE_SIDE, TileWork};
 
 const GROUPS: usize = TILE_GROUPS as usize;
 /// Pixels of a group, and PEs of a module.
@@ -126,6 +126,7 @@ impl Module {
         let mut pixels = vec![Pixel::new(self.format); GROUPS * LANES];
         let centres = self.centres();
         let mut work = TileWork { listed: list.primitives.len() as u32, ..TileWork::default() };
+        let mut intervals = BlockIntervals::default();
         for primitive in &list.primitives {
             let open = open_groups(&pixels);
             if open == 0 {
@@ -136,7 +137,10 @@ impl Module {
                 false => (u16::MAX, TILE_SIDE as u8),
             };
             let reached = primitive.groups() & open;
-            push(&mut work.runs, open, rows, reached);
+            intervals.evaluate(reached);
+            let (blocks, reached_count) = (open.count_ones() as u8, reached.count_ones());
+            let waits = Some(intervals.take());
+            push(&mut work.runs, Run { primitives: 1, rows, blocks, reached: reached_count, waits, ..Run::default() });
             let Primitive::Gaussian(_, gaussian) = primitive else {
                 continue;
             };
@@ -159,7 +163,8 @@ impl Module {
         let mut work = TileWork { listed: list.primitives.len() as u32, ..TileWork::default() };
         for primitive in &list.primitives {
             let groups = primitive.groups();
-            push(&mut work.runs, u16::MAX, TILE_SIDE as u8, groups);
+            let (side, reached) = (TILE_SIDE as u8, groups.count_ones());
+            push(&mut work.runs, Run { primitives: 1, rows: side, blocks: side, reached, ..Run::default() });
             let Primitive::Triangle(_, triangle) = primitive else {
                 continue;
             };
@@ -207,13 +212,16 @@ fn open_groups(pixels: &[Pixel]) -> u16 {
 }
 
 /// Appends a primitive to the runs; it extends the last run if that is equal to it.
-fn push(runs: &mut Vec<Run>, open: u16, rows: u8, reached: u16) {
-    let (blocks, reached) = (open.count_ones() as u8, reached.count_ones());
+fn push(runs: &mut Vec<Run>, primitive: Run) {
     match runs.last_mut() {
-        Some(run) if (run.rows, run.blocks) == (rows, blocks) && run.reached == reached * run.primitives => {
+        Some(run)
+            if (run.rows, run.blocks) == (primitive.rows, primitive.blocks)
+                && run.reached == primitive.reached * run.primitives
+                && [run.waits, primitive.waits].iter().flatten().all(|waits| waits[INTERVALS - 1] == 0) =>
+        {
             run.primitives += 1;
-            run.reached += reached;
+            run.reached += primitive.reached;
         }
-        _ => runs.push(Run { primitives: 1, rows, blocks, reached, ..Run::default() }),
+        _ => runs.push(primitive),
     }
 }

@@ -84,12 +84,15 @@ impl Cycles {
         })
     }
 
-    /// The error of the model's cycles if `sharing` of the Gaussians that need not wait for the one before do wait; 0.1
-    /// if they are 10 % too many.
+    /// The error of the model's cycles if the lists' waits are unknown, and `sharing` of the Gaussians that need not wait
+    /// for the one before do wait; 0.1 if they are 10 % too many.
     pub fn error(&self, sharing: f64) -> f64 {
         let mut config = self.config.clone();
         config.rasterizer.neighbour_sharing = sharing;
-        fast::rasterize(&self.frame, &config, 0.0).cycles / f64::from(self.rasterized.cycles) - 1.0
+        let mut frame = self.frame.clone();
+        let tiles = frame.draws.iter_mut().flat_map(|draw| &mut draw.tiles);
+        tiles.flat_map(|tile| &mut tile.runs).for_each(|run| run.waits = None);
+        fast::rasterize(&frame, &config, 0.0).cycles / f64::from(self.rasterized.cycles) - 1.0
     }
 
     /// Cycles of the module and of the model, by cause: all, evaluating a pixel for each PE, waiting for a

@@ -2,7 +2,7 @@
 //! simple, and the reference for the fast model.
 
 use std::collections::VecDeque;
-use timing::config::Config;
+use timing::config::{Config, Rasterizer};
 use timing::plan::{self, Division, Part, Rates, Task};
 use timing::raster::{ModuleCycles, RasterReport};
 use timing::work::{FrameWork, Mode};
@@ -62,6 +62,8 @@ struct Groups {
     evaluated: u64,
     /// The number of groups in which it may be evaluated.
     open: u64,
+    /// The cycles that it waits for transmittances, if they are known.
+    waiting: Option<u64>,
 }
 
 /// A transfer of a port. A port does its transfers in order.
@@ -239,10 +241,12 @@ impl Computation {
         let (raster, mode) = (&config.rasterizer, self.batch.mode);
         if groups.evaluated == 0 {
             self.controller += 1;
+            self.dependency = groups.waiting.unwrap_or(0);
             return;
         }
         self.busy = raster.busy_cycles(mode, groups.evaluated);
-        self.dependency = raster.waiting_cycles(mode, groups.evaluated, groups.open);
+        let estimate = || raster.waiting_cycles(mode, groups.evaluated, groups.open);
+        self.dependency = groups.waiting.unwrap_or_else(estimate);
     }
 
     fn spend(&mut self, config: &Config, spent: &mut ModuleCycles) {
@@ -280,7 +284,7 @@ fn batches(task: &Task, config: &Config, after_waste: &mut bool, report: &mut Ra
     let raster = &config.rasterizer;
     let mut out = VecDeque::new();
     for part in &task.parts {
-        let groups = groups_of_each(part);
+        let groups = groups_of_each(part, raster);
         let pixels = groups.iter().map(|groups| groups.evaluated).sum::<u64>() * 16;
         report.add_evaluations(part.mode, pixels as f64);
         report.pairs += f64::from(part.needed);
@@ -325,17 +329,18 @@ fn batches(task: &Task, config: &Config, after_waste: &mut bool, report: &mut Ra
     out
 }
 
-/// The groups of 16 pixels of each primitive: those of a segment are spread evenly.
-fn groups_of_each(part: &Part) -> Vec<Groups> {
+/// The groups of 16 pixels of each primitive: those of a segment are spread evenly, and so are known waits.
+fn groups_of_each(part: &Part, raster: &Rasterizer) -> Vec<Groups> {
     let mut out = Vec::with_capacity(part.needed as usize);
     for segment in &part.segments {
         let n = u64::from(segment.primitives);
-        out.extend(
-            (0..n).map(|k| Groups {
-                evaluated: (k + 1) * segment.groups / n - k * segment.groups / n,
-                open: segment.open,
-            }),
-        );
+        let of = |k: u64, all: u64| (k + 1) * all / n - k * all / n;
+        let waiting = raster.known_waiting_cycles(part.mode, segment);
+        out.extend((0..n).map(|k| Groups {
+            evaluated: of(k, segment.groups),
+            open: segment.open,
+            waiting: waiting.map(|waiting| of(k, waiting)),
+        }));
     }
     out
 }

@@ -13,6 +13,8 @@ use timing::work::{FrameWork, Mode, Saturation};
 pub struct WhatIf {
     /// The name of the variant.
     pub name: &'static str,
+    /// The configuration of the variant.
+    pub config: Config,
     /// The simulation of the variant.
     pub simulation: Simulation,
 }
@@ -39,7 +41,7 @@ impl Skipping {
         config.rasterizer.saturation = self.saturation;
         config.rasterizer.triangle_traversal = self.traversal;
         config.rasterizer.hierarchical_depth = self.hierarchical_depth;
-        WhatIf { name, simulation: simulate(frame, &config) }
+        WhatIf { name, simulation: simulate(frame, &config), config }
     }
 }
 

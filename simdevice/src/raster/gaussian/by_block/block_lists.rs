@@ -12,6 +12,7 @@ use crate::stats::recorder;
 use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, mask32x16, prelude::*};
+use timing::work::BlockIntervals;
 
 /// The Gaussians that may reach each block, in the order of the tile's list.
 pub(crate) type BlockLists = [Vec<u32>; BLOCKS];
@@ -34,6 +35,7 @@ pub(crate) fn divide<S: Simd>(
     }
     let middles = BlockMiddles::new(inputs.corner);
     let (mut hidden_alone, recorded) = (0, runs.is_some());
+    let mut intervals = recorded.then(BlockIntervals::default);
     for &primitive in inputs.list {
         let index = SplatIndex::new(primitive);
         let splat = index.of(inputs.splats);
@@ -67,6 +69,9 @@ pub(crate) fn divide<S: Simd>(
         }
         let mut reached = reached.to_bitmask();
         counts.items += u64::from(reached.count_ones());
+        if let Some(intervals) = &mut intervals {
+            intervals.evaluate(reached as u16);
+        }
         while reached != 0 {
             let list = &mut lists[reached.trailing_zeros() as usize % BLOCKS];
             host::push(list, primitive);
@@ -83,6 +88,7 @@ pub(crate) fn divide<S: Simd>(
                 reached: counts.items as u32,
                 hidden: counts.tiles_hidden as u32,
                 hidden_blocks: hidden_alone + counts.blocks_hidden as u32,
+                waits: intervals.as_mut().map(BlockIntervals::take),
             },
         );
     }

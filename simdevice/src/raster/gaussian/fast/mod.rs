@@ -23,7 +23,8 @@ use alphas::Alphas;
 use compositing::{composite_in_f64, evaluate};
 use fearless_simd::{Simd, mask32x16, prelude::*};
 use round::{OpenBlocks, Round};
-use staging::StagedRound;
+use staging::{Placed, StagedRound};
+use timing::work::{BlockIntervals, INTERVALS};
 
 /// The kernel's scratch besides the pixels.
 #[derive(Debug, Default)]
@@ -53,6 +54,7 @@ pub(crate) fn composite<S: Simd, M: Mode>(
     for (splat, &primitive) in ahead.iter_mut().zip(inputs.list) {
         *splat = inputs.prefetched(primitive);
     }
+    let mut intervals = runs.is_some().then(BlockIntervals::default);
     // The open blocks stay the same until a pixel is finished, unless blocks are left out for the transmittance that they have.
     let mut known = None;
     for (number, primitives) in inputs.list.chunks(ROUND).enumerate() {
@@ -82,7 +84,16 @@ pub(crate) fn composite<S: Simd, M: Mode>(
         let next = rest.get(ROUND..).unwrap_or_default();
         let before = counts;
         let round = Round { splats, primitives, next, open, is_recorded: runs.is_some() };
-        let outcome = composite_round::<_, M>(scratch, simd, inputs, accumulator, &round, &mut ahead, &mut counts);
+        let outcome = composite_round::<_, M>(
+            scratch,
+            simd,
+            inputs,
+            accumulator,
+            &round,
+            &mut ahead,
+            &mut intervals,
+            &mut counts,
+        );
         known = (!outcome.may_have_finished).then_some(bits);
         if let Some(runs) = &mut runs {
             let run = Run {
@@ -92,6 +103,7 @@ pub(crate) fn composite<S: Simd, M: Mode>(
                 reached: (counts.items - before.items) as u32,
                 hidden: (counts.tiles_hidden - before.tiles_hidden) as u32,
                 hidden_blocks: outcome.blocks_of_hidden + (counts.blocks_hidden - before.blocks_hidden) as u32,
+                waits: intervals.as_mut().map(BlockIntervals::take),
             };
             recorder::push_run(runs, run);
         }
@@ -132,6 +144,7 @@ struct RoundOutcome {
 }
 
 /// Composites a round, and brings the next one's splats `ahead`.
+#[expect(clippy::too_many_arguments, reason = "the inputs, the state and the record of one round")]
 #[inline(always)]
 fn composite_round<'a, S: Simd, M: Mode>(
     scratch: &mut FastScratch,
@@ -140,6 +153,7 @@ fn composite_round<'a, S: Simd, M: Mode>(
     accumulator: &mut Accumulator,
     round: &Round<'_>,
     ahead: &mut [&'a Splat; ROUND],
+    intervals: &mut Option<BlockIntervals>,
     counts: &mut TileCounts,
 ) -> RoundOutcome {
     let (open, blocks) = (round.open.bits, u64::from(round.open.count));
@@ -155,6 +169,9 @@ fn composite_round<'a, S: Simd, M: Mode>(
         counts.items += evaluated.items;
         counts.contributions += evaluated.contributions;
         outcome.may_have_finished |= evaluated.may_have_finished;
+        if let Some(intervals) = intervals {
+            record_intervals(intervals, &placed, from);
+        }
         let Some(&splat) = round.splats.get(placed.end) else {
             break;
         };
@@ -162,6 +179,9 @@ fn composite_round<'a, S: Simd, M: Mode>(
         let shown =
             if !M::DEPTH.tests() { open } else { open & inputs.ranges.blocks(simd, splat.look.depth).to_bitmask() };
         let exact = u64::from(shown.count_ones());
+        if let Some(intervals) = intervals {
+            intervals.evaluate(shown as u16);
+        }
         counts.open += blocks;
         counts.blocks_hidden += blocks - exact;
         counts.items += exact;
@@ -174,6 +194,16 @@ fn composite_round<'a, S: Simd, M: Mode>(
     outcome
 }
 
+/// Adds the blocks that a round's Gaussians from number `from` on reach, one Gaussian after the other.
+#[cold]
+fn record_intervals(intervals: &mut BlockIntervals, placed: &Placed, from: usize) {
+    for number in from..placed.end {
+        let words = placed.reaching.iter().enumerate();
+        let blocks = words.fold(0, |blocks, (block, word)| blocks | ((word >> number & 1) as u16) << block);
+        intervals.evaluate(blocks);
+    }
+}
+
 /// The record in a trace of the Gaussians at a list's end that depths hide in all of the tile.
 #[inline(always)]
 fn hidden_run<S: Simd>(simd: S, inputs: &TileInputs<'_>, rest: &[u32], open: OpenBlocks) -> Run {
@@ -182,6 +212,8 @@ fn hidden_run<S: Simd>(simd: S, inputs: &TileInputs<'_>, rest: &[u32], open: Ope
         rows: open.rows,
         blocks: open.count,
         hidden: rest.len() as u32,
+        // None of them is evaluated.
+        waits: Some([0; INTERVALS]),
         ..Run::default()
     };
     let open = mask32x16::from_bitmask(simd, open.bits);

@@ -2,25 +2,28 @@
 
 use super::numbers::SCENES;
 use super::table::{Label, Row, Section};
+use super::tornado;
+
+/// The number of ranges of assumptions that are shown, with that of all at once.
+const WIDEST: usize = 6;
 
 /// The title of the section.
 pub const TITLE: &str = "At a glance";
 
 /// The labels of the section's rows, in order, and the items of other sections that have them.
-const SHOWN: [(Label, &[&str]); 4] = [
+const SHOWN: [(Label, &[&str]); 6] = [
     (
         Label::Predicted,
         &[
-            "FPS without a raster stage, 1.0 listed a needed pair",
             "FPS, 1.0 listed a needed pair",
             "end-to-end speed-up, 1.0 listed a needed pair",
             "FPS, 1.5 listed a needed pair",
             "end-to-end speed-up, 1.5 listed a needed pair",
             "mean error: SIMT machine, each warp blends",
             "mean error: SIMT machine, no warp blends",
-            "mean error: line through the other scenes (null)",
         ],
     ),
+    (Label::Fit, &["mean error: line through the other scenes (null)"]),
     (
         Label::Calibrated,
         &[
@@ -35,6 +38,15 @@ const SHOWN: [(Label, &[&str]); 4] = [
     ),
     (Label::Solved, &["raster speed-up, 3DGS", "raster energy, 3DGS", "baseline FPS, 3DGS", "area ratio to GSCore"]),
     (
+        Label::Contradiction,
+        &[
+            "PEs",
+            "raster energy ratio",
+            "raster energy ratio, if 1.7 W is the whole machine's",
+            "power of the raster stage",
+        ],
+    ),
+    (
         Label::Input,
         &["modules of the scaled design", "PEs of a module", "clock", "typical power of a module", "SoC power"],
     ),
@@ -47,19 +59,25 @@ pub fn section(report: &[Section]) -> Section {
     let mut shown = Vec::new();
     for (label, items) in SHOWN {
         shown.extend(items.iter().filter_map(|item| found(item, label)));
+        if label == Label::Predicted {
+            let tornado = report.iter().filter(|section| section.title == tornado::TITLE);
+            shown.extend(tornado.flat_map(|section| &section.rows).take(WIDEST).cloned());
+        }
     }
     shown.push(raster_times());
     let of_paper = |label| {
         let counted = |row: &&Row| row.label == label && !row.paper.is_empty();
         rows().filter(counted).count()
     };
-    let [predicted, calibrated, solved, input] = SHOWN.map(|(label, _)| of_paper(label));
+    let [predicted, fit, calibrated, solved, contradiction, input] = SHOWN.map(|(label, _)| of_paper(label));
     Section {
         title: TITLE,
         text: format!(
-            "The main rows of the tables below: what the model predicts, from what, and how far off it is; then what it was \
-             calibrated for; then what follows from the paper's numbers alone; then what goes in. Below, {predicted} numbers \
-             of the paper are predicted, {calibrated} calibrated, {solved} solved and {input} go in."
+            "The main rows of the tables below: what the model predicts, from what, and how far off it is; the range of the \
+             frame rate over all that is assumed, and the assumptions that move it most; a fit; what the model was calibrated \
+             for; what follows from the paper's numbers alone; what contradicts itself in them; and what goes in. Below, \
+             {predicted} numbers of the paper are predicted, {fit} fitted, {calibrated} calibrated, {solved} solved, \
+             {contradiction} contradict others and {input} go in."
         ),
         rows: shown,
     }

@@ -1,7 +1,7 @@
 //! The baseline as a SIMT machine, the traffic of sorting, and other ways to draw Gaussians.
 
 use super::numbers::{SCENES, Scene};
-use super::predicted::frame;
+use super::predicted::{Unpublished, frame};
 use super::table::{Label, Row, Section};
 use crate::rivals::{self, PUBLISHED};
 use crate::simt;
@@ -20,7 +20,7 @@ pub fn sections() -> Result<[Section; 3], ConfigError> {
 
 /// A scene's frame in two variants: no warp blends, and each warp does.
 fn both(scene: &Scene, config: &Config) -> [FrameWork; 2] {
-    let all = frame(scene, 1.0, config);
+    let all = frame(scene, Unpublished::LEAST, config);
     let mut none = all.clone();
     for tile in none.draws.iter_mut().flat_map(|draw| &mut draw.tiles) {
         tile.runs.iter_mut().for_each(|run| run.reached = 0);
@@ -72,7 +72,8 @@ fn baseline(config: &Config) -> Section {
     ];
     for (name, error, from) in errors {
         let model = format!("{:.1} %", error * 100.0);
-        rows.push(Row::new(format!("mean error: {name}"), "", model, Label::Predicted).note(from));
+        let label = if name.ends_with("(null)") { Label::Fit } else { Label::Predicted };
+        rows.push(Row::new(format!("mean error: {name}"), "", model, label).note(from));
     }
     for (index, scene) in SCENES.iter().enumerate() {
         let [none, all] = results[index].map(|result| result.milliseconds());
@@ -124,7 +125,7 @@ fn sorting(config: &Config) -> Section {
     let mut rows = Vec::new();
     let mut shares = [0.0; 3];
     for scene in &SCENES {
-        let work = frame(scene, 1.0, config);
+        let work = frame(scene, Unpublished::LEAST, config);
         let [_, one, two, _] = work.shader();
         let time = |work| roofline(work, &config.shader, &config.memory).milliseconds();
         let (before, sort) = (time(&one), time(&two));
@@ -175,7 +176,7 @@ fn sorting(config: &Config) -> Section {
 fn others(config: &Config) -> Section {
     let mut rows = Vec::new();
     for scene in &SCENES {
-        let quads = rivals::quads(&frame(scene, 1.0, config), config);
+        let quads = rivals::quads(&frame(scene, Unpublished::LEAST, config), config);
         rows.push(
             Row::new(
                 format!("{}, blended quads from the implied pairs, at most", scene.name),

@@ -16,8 +16,14 @@ pub enum Label {
     Calibrated,
     /// It follows from the paper's numbers by arithmetic.
     Solved,
+    /// Numbers of the paper that don't fit together; the arithmetic is in the note.
+    Contradiction,
     /// The model computes it from other numbers.
     Predicted,
+    /// A regression over the paper's own numbers, in which no machine is simulated.
+    Fit,
+    /// No machine can pass it, so it predicts nothing.
+    Bound,
     /// A number of something similar to the paper's. It shows a possibility and proves nothing.
     Illustration,
     /// A test would need data that is not available.
@@ -33,7 +39,10 @@ impl Label {
             Self::Assumed => "assumed",
             Self::Calibrated => "calibrated",
             Self::Solved => "solved",
+            Self::Contradiction => "contradiction",
             Self::Predicted => "predicted",
+            Self::Fit => "fit",
+            Self::Bound => "bound",
             Self::Illustration => "illustration",
             Self::Untestable => "not testable",
         }

@@ -43,6 +43,10 @@ fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> Tile
             reached: reached.round() as u32,
             hidden,
             hidden_blocks: hidden * random.random_range(0..=u32::from(blocks)),
+            waits: (mode == Mode::Gaussian && random.random_bool(0.5)).then(|| {
+                let most = random.random_range(0..=primitives);
+                std::array::from_fn(|index| most * (index as u32 + 1))
+            }),
         });
         rows = random.random_range(1..=rows);
         blocks = random.random_range(1..=blocks);

@@ -1,7 +1,7 @@
-//! Area from the paper's component counts: the triangle units of a PE, and the units added for Gaussians.
+//! Area from the paper's component counts: the triangle units of a PE, the units added for Gaussians, and buffers.
 
+use crate::config::{AreaConfig, Config, Records};
 use serde::Serialize;
-use timing::config::{AreaConfig, Config};
 
 /// Areas in mm2 of the rasterizer's technology, unless a field says otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -12,6 +12,12 @@ pub struct Area {
     pub pe_added: f64,
     /// The exponential unit, which is part of `pe_added`.
     pub exponential: f64,
+    /// A module's PEs and buffers.
+    pub module: f64,
+    /// The list writer, if the machine has one.
+    pub list_writer: f64,
+    /// The module's buffers for primitives and pixels, which are part of `module`.
+    pub buffers: f64,
     /// The area added for Gaussians in all PEs.
     pub added: f64,
     /// The area added for Gaussians in all PEs, in mm2 of the chip's technology.
@@ -64,15 +70,24 @@ impl Units {
 /// The area of a configuration's components. Units have 16 bits if its numbers have at most two bytes.
 pub fn area(config: &Config) -> Area {
     let table = &config.area;
-    let units = if config.rasterizer.number_bytes <= 2 { Units::half(table) } else { Units::single(table) };
+    let units = if config.rasterizer.is_half() { Units::half(table) } else { Units::single(table) };
     // Areas shrink as the square of the feature size.
     let shrink = (table.technology_nm / table.reference_nm).powi(2) * 1e-6;
     let pes = f64::from(config.rasterizer.pes());
+    let buffer_bytes = config.rasterizer.primitive_buffer_bytes() + config.rasterizer.pixel_buffer_bytes();
+    let buffers = 8.0 * buffer_bytes * table.sram_um2_per_bit * shrink;
+    let module_pes = f64::from(config.rasterizer.pes_per_module);
     let in_soc = units.added() * shrink * pes / config.soc.node_scaling;
     Area {
         pe_triangle: units.there() * shrink,
         pe_added: units.added() * shrink,
         exponential: units.exp * shrink,
+        module: module_pes * (units.there() + units.added()) * shrink + buffers,
+        list_writer: match config.rasterizer.records {
+            Records::Gathered => 0.0,
+            Records::Listed => config.list_writer.area_mm2,
+        },
+        buffers,
         added: units.added() * shrink * pes,
         added_in_soc: in_soc,
         share_of_soc: in_soc / config.soc.area_mm2,
@@ -95,6 +110,22 @@ mod tests {
         assert!(given.ratio > 0.3);
         let twice = area(&config.with(&["modules=30".to_owned()]).unwrap());
         assert!((twice.added - 2.0 * solved.added).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_module_has_its_pes_and_buffers() {
+        let of = |settings: &[&str]| {
+            let settings: Vec<_> = settings.iter().map(|&setting| setting.to_owned()).collect();
+            area(&Config::preset("paper-15x16", &settings).unwrap())
+        };
+        let paper = of(&[]);
+        assert!((paper.module - paper.buffers - 16.0 * (paper.pe_triangle + paper.pe_added)).abs() < 1e-12);
+        // 64 primitives of 40 bytes, and 512 pixels of four numbers.
+        let bits = 8.0 * (64.0 * 40.0 + 512.0 * 16.0);
+        assert!((paper.buffers - bits * 0.6e-6 * (28.0_f64 / 45.0).powi(2)).abs() < 1e-12);
+        let larger = of(&["batch=64"]);
+        assert!((larger.module - larger.buffers - paper.module + paper.buffers).abs() < 1e-12);
+        assert!(larger.buffers > paper.buffers && of(&["number_bytes=2"]).module < 0.5 * paper.module);
     }
 
     #[test]
