@@ -15,13 +15,13 @@ use crate::errors::of_scene;
 #[pyclass(frozen, module = "gaurast._gaurast")]
 pub struct NativeScene(pub Arc<Scene>);
 
-/// A read-only array of rows of `columns` numbers in the memory of `scene`.
-fn view<'py>(scene: &Bound<'py, NativeScene>, values: &[f32], columns: usize) -> PyResult<Bound<'py, PyArray2<f32>>> {
+/// A read-only array of rows of `columns` numbers in the memory of the `bound` scene.
+fn view<'py>(bound: &Bound<'py, NativeScene>, values: &[f32], columns: usize) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let rows = values.len() / columns;
     let view =
         ArrayView2::from_shape((rows, columns), values).map_err(|error| PyValueError::new_err(error.to_string()))?;
     // SAFETY: the scene owns the values, nothing changes it, and the array keeps it alive.
-    let array = unsafe { PyArray2::borrow_from_array(&view, scene.clone().into_any()) };
+    let array = unsafe { PyArray2::borrow_from_array(&view, bound.clone().into_any()) };
     array.readwrite().make_nonwriteable();
     Ok(array)
 }
@@ -56,20 +56,20 @@ impl NativeScene {
 
     /// Centres, `[N, 3]`.
     #[getter]
-    fn positions<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view(this, bytemuck::cast_slice(this.get().0.positions()), 3)
+    fn positions<'py>(bound: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        view(bound, bytemuck::cast_slice(bound.get().0.positions()), 3)
     }
 
     /// Scales, rotations and opacities, `[N, 8]`.
     #[getter]
-    fn shapes<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view(this, bytemuck::cast_slice(this.get().0.shapes()), 8)
+    fn shapes<'py>(bound: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        view(bound, bytemuck::cast_slice(bound.get().0.shapes()), 8)
     }
 
     /// Harmonics, `[N * K, 3]`.
     #[getter]
-    fn harmonics<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        view(this, bytemuck::cast_slice(this.get().0.sh()), 3)
+    fn harmonics<'py>(bound: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        view(bound, bytemuck::cast_slice(bound.get().0.sh()), 3)
     }
 }
 

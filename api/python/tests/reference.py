@@ -111,13 +111,13 @@ def rasterize(means, quats, scales, opacities, colors, viewmat, K, width, height
         sigma = 0.5 * (inverse[0, 0] * dx * dx + inverse[1, 1] * dy * dy) + inverse[0, 1] * dx * dy
         alpha = np.minimum(ceiling, opacities[index] * np.exp(-sigma))
         # Rounding to binary32 decides which side of a threshold a pixel is on, and the order of two at one depth.
-        undecided |= inside & ~done & (np.abs(alpha / FLOOR - 1.0) < 2e-4 * (1.0 + sigma))
+        undecided |= inside & ~done & (np.abs(alpha / FLOOR - 1.0) < 2e-5 * (1.0 + sigma))
         if last is not None and abs(depths[index] / depths[last] - 1.0) < 2e-6:
             undecided |= inside & ~done & (alpha > FLOOR)
         last = index
         drawn = inside & ~done & (alpha >= FLOOR)
         after_it = transmittance * (1.0 - alpha)
-        undecided |= drawn & (np.abs(after_it / 1e-4 - 1.0) < 1e-2)
+        undecided |= drawn & (np.abs(after_it / 1e-4 - 1.0) < 1e-3)
         done |= drawn & (after_it <= 1e-4)
         drawn &= ~done
         weight = np.where(drawn, alpha * transmittance, 0.0)

@@ -22,4 +22,4 @@ cp -r "$here/python" "$work/package"
 cp "$build/lib_gaurast.so" "$work/package/gaurast/_gaurast.abi3.so"
 "$work/venv/bin/python" -c 'import sys, pathlib; sys.path.insert(0, sys.argv[1]); import backend
 backend.collect(pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]))' "$here" "$build" "$work/package/gaurast"
-PYTHONPATH=$work/package PYTHONDONTWRITEBYTECODE=1 "$work/venv/bin/python" -m pytest -p no:cacheprovider "$here/tests" -rs --durations=5
+GAURAST_BUILD=$build PYTHONPATH=$work/package PYTHONDONTWRITEBYTECODE=1 "$work/venv/bin/python" -m pytest -p no:cacheprovider "$here/tests" -rs --durations=5

@@ -2,16 +2,12 @@
 
 use std::mem::MaybeUninit;
 
-use ash::vk;
 use bytemuck::Pod;
 use gaurast_scene::{GaussianShape, MAX_SH_DEGREE, SH_C0};
 
-use crate::device_scene::DeviceScene;
 use crate::error::RenderError;
 use crate::pipeline::BINDINGS;
-use crate::renderer::Renderer;
-use crate::resource::{Buffer, Memory};
-use crate::settings::Settings;
+use crate::resource::Buffer;
 
 /// Gaussians as one array for each attribute, all of the same length.
 #[derive(Clone, Copy, Debug)]
@@ -56,14 +52,15 @@ pub enum Colors<'a> {
 
 impl Arrays<'_> {
     /// The stored degree and the RGB triples of each Gaussian.
-    fn harmonics(&self) -> (u32, usize) {
+    pub(crate) fn harmonics(&self) -> (u32, usize) {
         match self.colors {
             Colors::Harmonics { degree, stride, .. } => (degree, stride),
             Colors::Channels { .. } => (0, 1),
         }
     }
 
-    fn check(&self) {
+    /// Asserts that the arrays are of one length and have harmonics of their degree.
+    pub(crate) fn check(&self) {
         let count = self.positions.len();
         let colors = match self.colors {
             Colors::Harmonics { degree, stride, coefficients } => {
@@ -86,8 +83,22 @@ impl Arrays<'_> {
         })
     }
 
+    /// Writes the arrays to buffers that have room for them.
+    pub(crate) fn write_to(&self, buffers: &[Buffer; BINDINGS]) -> Result<(), RenderError> {
+        let [positions, shapes, harmonics] = buffers;
+        positions.write(bytemuck::cast_slice(self.positions))?;
+        write_each(shapes, self.positions.len(), self.shapes())?;
+        match self.colors {
+            Colors::Harmonics { coefficients, .. } => harmonics.write(bytemuck::cast_slice(coefficients))?,
+            Colors::Channels { stride, first, low, values } => {
+                write_each(harmonics, self.positions.len(), constant_harmonics(values, stride, first, low))?;
+            }
+        }
+        Ok(())
+    }
+
     /// Returns true if `buffers` have the bits of these arrays.
-    fn are_in(&self, [positions, shapes, harmonics]: &[Buffer; BINDINGS]) -> Result<bool, RenderError> {
+    pub(crate) fn are_in(&self, [positions, shapes, harmonics]: &[Buffer; BINDINGS]) -> Result<bool, RenderError> {
         let (count, (_, stride)) = (self.positions.len(), self.harmonics());
         let bits = |floats: &[f32; 3]| floats.map(f32::to_bits);
         Ok(positions.look(count * 12, |held: &[u8]| held == bytemuck::cast_slice::<_, u8>(self.positions))?
@@ -120,95 +131,4 @@ fn write_each<T: Pod>(buffer: &Buffer, count: usize, values: impl Iterator<Item 
             place.write(value);
         }
     })
-}
-
-impl Renderer {
-    /// Copies `arrays` to the device, to be drawn with `settings`. `used` is a scene that this function returned before, whose
-    /// memory and pipeline it uses again where they serve.
-    ///
-    /// Arrays are drawn from host memory the first time. Those that come again unchanged are copied to the device's own, for which
-    /// drivers keep what they compute.
-    ///
-    /// # Errors
-    /// If there are too many Gaussians for the device, or Vulkan fails.
-    ///
-    /// # Panics
-    /// If the arrays are not of one length, or have too few harmonics.
-    pub fn upload_arrays(
-        &mut self,
-        arrays: &Arrays<'_>,
-        settings: Settings,
-        used: Option<DeviceScene>,
-    ) -> Result<DeviceScene, RenderError> {
-        arrays.check();
-        let count = self.checked_count(arrays.positions.len())?;
-        let (stored_degree, sh_stride) = arrays.harmonics();
-        let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), sh_stride * size_of::<[f32; 3]>()];
-        let strides = strides.map(|stride| stride as u32);
-        let bytes = strides.map(|stride| u64::from(stride) * u64::from(count));
-        let mut scene = match used {
-            Some(mut used) => {
-                let is_same = (used.count, used.strides) == (count, strides) && arrays.are_in(&used.buffers)?;
-                if (used.strides, used.stored_degree, used.settings) != (strides, stored_degree, settings) {
-                    used.pipeline = self.pipeline(strides, stored_degree, settings, false)?;
-                }
-                let used = DeviceScene { count, strides, stored_degree, settings, ..used };
-                if is_same {
-                    return self.made_resident(used, bytes);
-                }
-                DeviceScene { resident: None, ..used }
-            }
-            None => DeviceScene {
-                mesh: None,
-                origin: [0.0; 3],
-                count,
-                strides,
-                stored_degree,
-                settings,
-                pipeline: self.pipeline(strides, stored_degree, settings, false)?,
-                buffers: [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?],
-                resident: None,
-            },
-        };
-        for (buffer, bytes) in scene.buffers.iter_mut().zip(bytes) {
-            if buffer.size() < bytes {
-                *buffer = self.vertices(bytes)?;
-            }
-        }
-        let [positions, shapes, harmonics] = &scene.buffers;
-        positions.write(bytemuck::cast_slice(arrays.positions))?;
-        write_each(shapes, arrays.positions.len(), arrays.shapes())?;
-        match arrays.colors {
-            Colors::Harmonics { coefficients, .. } => harmonics.write(bytemuck::cast_slice(coefficients))?,
-            Colors::Channels { stride, first, low, values } => {
-                write_each(harmonics, arrays.positions.len(), constant_harmonics(values, stride, first, low))?;
-            }
-        }
-        Ok(scene)
-    }
-
-    /// The scene with copies in the device's memory, of which the first `bytes` are drawn.
-    fn made_resident(&mut self, mut scene: DeviceScene, bytes: [u64; BINDINGS]) -> Result<DeviceScene, RenderError> {
-        if scene.resident.is_none() && scene.count > 0 {
-            let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
-            let copy = |bytes: u64| Buffer::new(self.device(), bytes, usage, Memory::Device);
-            let copies = [copy(bytes[0])?, copy(bytes[1])?, copy(bytes[2])?];
-            let region = |bytes: u64| vk::BufferCopy::default().size(bytes);
-            let [positions, shapes, harmonics] = &scene.buffers;
-            self.copy(&[
-                (positions, &copies[0], region(bytes[0])),
-                (shapes, &copies[1], region(bytes[1])),
-                (harmonics, &copies[2], region(bytes[2])),
-            ])?;
-            scene.resident = Some(copies);
-        }
-        Ok(scene)
-    }
-
-    /// A vertex buffer in host memory of `bytes`.
-    fn vertices(&self, bytes: u64) -> Result<Buffer, RenderError> {
-        let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC;
-        // Vulkan has no empty buffers.
-        Buffer::new(self.device(), bytes.max(4), usage, Memory::Host)
-    }
 }

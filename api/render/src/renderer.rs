@@ -8,6 +8,7 @@ use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
 use gaurast_scene::{Camera, GaussianShape, MAX_SH_DEGREE, Scene};
 
+use crate::arrays::Arrays;
 use crate::device::{Device, Purpose};
 use crate::device_scene::DeviceScene;
 use crate::draw::{DepthScale, Recorder};
@@ -156,19 +157,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// The device that draws.
-    pub(crate) fn device(&self) -> &Arc<Device> {
-        &self.device
-    }
-
     /// The number of Gaussians of a draw, if the device draws that many.
-    pub(crate) fn checked_count(&self, count: usize) -> Result<u32, RenderError> {
+    fn checked_count(&self, count: usize) -> Result<u32, RenderError> {
         let max = self.device.max_gaussians().min(u32::MAX.into());
         let too_many = RenderError::TooMany { count: count as u64, max };
         u32::try_from(count).ok().filter(|count| u64::from(*count) <= max).ok_or(too_many)
     }
 
-    pub(crate) fn pipeline(
+    fn pipeline(
         &self,
         strides: [u32; BINDINGS],
         stored_degree: u32,
@@ -199,7 +195,7 @@ impl Renderer {
     }
 
     /// Copies regions of buffers to others, from which the next submission's draws read vertices.
-    pub(crate) fn copy(&mut self, regions: &[(&Buffer, &Buffer, vk::BufferCopy)]) -> Result<(), RenderError> {
+    fn copy(&mut self, regions: &[(&Buffer, &Buffer, vk::BufferCopy)]) -> Result<(), RenderError> {
         self.commands.record(0, |device, commands| {
             for (from, to, region) in regions {
                 // SAFETY: the command buffer is recording, and the regions lie within both buffers, which live until the
@@ -223,6 +219,87 @@ impl Renderer {
             }
         })?;
         self.commands.submit_and_wait(&[0])
+    }
+
+    /// Copies `arrays` to the device, to be drawn with `settings`. `used` is a scene that this function returned before, whose
+    /// memory and pipeline it uses again where they serve.
+    ///
+    /// Arrays are drawn from host memory the first time. Those that come again unchanged are copied to the device's own, for which
+    /// drivers keep what they compute.
+    ///
+    /// # Errors
+    /// If there are too many Gaussians for the device, or Vulkan fails.
+    ///
+    /// # Panics
+    /// If the arrays are not of one length, or have too few harmonics.
+    pub fn upload_arrays(
+        &mut self,
+        arrays: &Arrays<'_>,
+        settings: Settings,
+        used: Option<DeviceScene>,
+    ) -> Result<DeviceScene, RenderError> {
+        arrays.check();
+        let count = self.checked_count(arrays.positions.len())?;
+        let (stored_degree, sh_stride) = arrays.harmonics();
+        let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), sh_stride * size_of::<[f32; 3]>()];
+        let strides = strides.map(|stride| stride as u32);
+        let bytes = strides.map(|stride| u64::from(stride) * u64::from(count));
+        let mut scene = match used {
+            Some(mut used) => {
+                let is_same = (used.count, used.strides) == (count, strides) && arrays.are_in(&used.buffers)?;
+                if (used.strides, used.stored_degree, used.settings) != (strides, stored_degree, settings) {
+                    used.pipeline = self.pipeline(strides, stored_degree, settings, false)?;
+                }
+                let used = DeviceScene { count, strides, stored_degree, settings, ..used };
+                if is_same {
+                    return self.made_resident(used, bytes);
+                }
+                DeviceScene { resident: None, ..used }
+            }
+            None => DeviceScene {
+                mesh: None,
+                origin: [0.0; 3],
+                count,
+                strides,
+                stored_degree,
+                settings,
+                pipeline: self.pipeline(strides, stored_degree, settings, false)?,
+                buffers: [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?],
+                resident: None,
+            },
+        };
+        for (buffer, bytes) in scene.buffers.iter_mut().zip(bytes) {
+            if buffer.size() < bytes {
+                *buffer = self.vertices(bytes)?;
+            }
+        }
+        arrays.write_to(&scene.buffers)?;
+        Ok(scene)
+    }
+
+    /// The scene with copies in the device's memory, of which the first `bytes` are drawn.
+    fn made_resident(&mut self, mut scene: DeviceScene, bytes: [u64; BINDINGS]) -> Result<DeviceScene, RenderError> {
+        if scene.resident.is_none() && scene.count > 0 {
+            let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
+            let copy = |bytes: u64| Buffer::new(&self.device, bytes, usage, Memory::Device);
+            let copies = [copy(bytes[0])?, copy(bytes[1])?, copy(bytes[2])?];
+            let region = |bytes: u64| vk::BufferCopy::default().size(bytes);
+            let [positions, shapes, harmonics] = &scene.buffers;
+            self.copy(&[
+                (positions, &copies[0], region(bytes[0])),
+                (shapes, &copies[1], region(bytes[1])),
+                (harmonics, &copies[2], region(bytes[2])),
+            ])?;
+            scene.resident = Some(copies);
+        }
+        Ok(scene)
+    }
+
+    /// A vertex buffer in host memory of `bytes`.
+    fn vertices(&self, bytes: u64) -> Result<Buffer, RenderError> {
+        let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC;
+        // Vulkan has no empty buffers.
+        Buffer::new(&self.device, bytes.max(4), usage, Memory::Host)
     }
 
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.

@@ -36,6 +36,8 @@ pub enum Command {
     Info(Box<InfoArguments>),
     /// Estimates the cost of a scene on the simulated hardware: time, energy, area
     Simulate(Box<SimulateArguments>),
+    /// Prints the variables with which Vulkan programs run on this installation's driver, for a shell's eval
+    Icd,
     /// Prints a script that completes this command's arguments in a shell
     Completions {
         /// The shell

@@ -9,6 +9,7 @@ mod compare;
 mod compare_drivers;
 mod drawing;
 mod heatmap;
+mod icd;
 mod info;
 mod limits;
 mod messages;
@@ -77,6 +78,11 @@ fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Info(arguments) => info::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         Command::Simulate(arguments) => simulate::run(&arguments).map_err(|error| failure(error.to_string(), false)),
+        Command::Icd => {
+            let lines = icd::lines().map_err(|error| failure(error.to_string(), false))?;
+            std::io::Write::write_all(&mut std::io::stdout(), lines.as_bytes())
+                .map_err(|error| failure(format!("output: {error}"), false))
+        }
         Command::Completions { shell } => {
             use clap::CommandFactory;
             let mut script = Vec::new();
