@@ -295,7 +295,6 @@ impl Compositor {
     }
 
     /// Composites what a tile finds in the sorted sequence, until nothing more can contribute, and appends it to `ids`.
-    #[expect(clippy::too_many_arguments, reason = "the inputs and the record of one tile")]
     fn composite_walk<M: Mode>(
         &mut self,
         level: Level,

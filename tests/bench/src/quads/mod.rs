@@ -132,7 +132,7 @@ impl QuadRenderer {
         let processor = start.and_then(|start| Some(processor_time()? - start));
         let picture = prepared.picture()?;
         let Steps { sum, counters, .. } = prepared.steps;
-        Ok(Frame { picture, time: sum, processor_time: processor, counters, depth: None })
+        Ok(Frame { picture, time: sum, processor_time: processor, counters, depth: None, gaussians: None })
     }
 
     /// Does the processor's part of [`QuadRenderer::render`]: the sorted quads are in the buffers afterwards.
