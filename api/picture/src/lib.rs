@@ -17,6 +17,8 @@ mod ssim;
 #[cfg(feature = "metrics")]
 #[allow(clippy::disallowed_methods, reason = "a metric: it judges pictures and is no part of one")]
 mod statistics;
+#[cfg(feature = "metrics")]
+mod tiles;
 
 pub use atomic::{folder, write_atomically};
 pub use color::Background;

@@ -14,12 +14,13 @@ pub struct Picture {
 impl Picture {
     /// This picture over an opaque background: C + T background, with alpha 1.
     #[must_use]
-    pub fn over(&self, background: [f32; 3]) -> Self {
-        let over = |&[r, g, b, alpha]: &[f32; 4]| {
+    pub fn over(mut self, background: [f32; 3]) -> Self {
+        for pixel in &mut self.pixels {
+            let [r, g, b, alpha] = *pixel;
             let transmittance = 1.0 - alpha;
             let channel = |colour: f32, behind: f32| colour + transmittance * behind;
-            [channel(r, background[0]), channel(g, background[1]), channel(b, background[2]), 1.0]
-        };
-        Self { pixels: self.pixels.iter().map(over).collect(), ..*self }
+            *pixel = [channel(r, background[0]), channel(g, background[1]), channel(b, background[2]), 1.0];
+        }
+        self
     }
 }

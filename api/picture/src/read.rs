@@ -40,15 +40,14 @@ fn sized(width: u64, height: u64) -> Result<(), String> {
     Ok(())
 }
 
-/// A picture from `channels` values a pixel, 1 to 4, each 0 to 1.
-fn picture(width: u32, height: u32, channels: usize, values: impl Iterator<Item = f32>) -> Picture {
-    let values: Vec<f32> = values.collect();
-    let pixel = |values: &[f32]| {
+/// A picture from `channels` values a pixel, 1 to 4. `scaled` makes 0 to 1 of a value.
+fn picture<T: Copy>(width: u32, height: u32, channels: usize, values: &[T], scaled: impl Fn(T) -> f32) -> Picture {
+    let pixel = |values: &[T]| {
         let [r, g, b, alpha] = match *values {
-            [grey] => [grey, grey, grey, 1.0],
-            [grey, alpha] => [grey, grey, grey, alpha],
-            [r, g, b] => [r, g, b, 1.0],
-            [r, g, b, alpha, ..] => [r, g, b, alpha],
+            [grey] => [scaled(grey), scaled(grey), scaled(grey), 1.0],
+            [grey, alpha] => [scaled(grey), scaled(grey), scaled(grey), scaled(alpha)],
+            [r, g, b] => [scaled(r), scaled(g), scaled(b), 1.0],
+            [r, g, b, alpha, ..] => [r, g, b, alpha].map(&scaled),
             [] => [0.0; 4],
         };
         [r * alpha, g * alpha, b * alpha, alpha]
@@ -56,8 +55,12 @@ fn picture(width: u32, height: u32, channels: usize, values: impl Iterator<Item 
     Picture { width, height, pixels: values.chunks_exact(channels).map(pixel).collect() }
 }
 
-fn of_bytes(bytes: &[u8]) -> impl Iterator<Item = f32> {
-    bytes.iter().map(|byte| f32::from(*byte) / 255.0)
+fn of_byte(byte: u8) -> f32 {
+    f32::from(byte) / 255.0
+}
+
+fn of_word(word: u16) -> f32 {
+    f32::from(word) / 65_535.0
 }
 
 fn png(file: BufReader<File>) -> Result<Picture, String> {
@@ -72,10 +75,9 @@ fn png(file: BufReader<File>) -> Result<Picture, String> {
     let bytes = &bytes[..info.buffer_size()];
     let channels = info.color_type.samples();
     Ok(if info.bit_depth == png::BitDepth::Sixteen {
-        let values = (bytes.chunks_exact(2)).map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / 65_535.0);
-        picture(width, height, channels, values)
+        picture(width, height, channels, bytes.as_chunks().0, |pair| of_word(u16::from_be_bytes(pair)))
     } else {
-        picture(width, height, channels, of_bytes(bytes))
+        picture(width, height, channels, bytes, of_byte)
     })
 }
 
@@ -93,7 +95,7 @@ fn jpeg(mut file: BufReader<File>) -> Result<Picture, String> {
     let decoded = decoder.decode().map_err(|error| error.to_string())?;
     let (width, height) = decoder.dimensions().ok_or("it has no size")?;
     sized(width as u64, height as u64)?;
-    Ok(picture(width as u32, height as u32, 3, of_bytes(&decoded)))
+    Ok(picture(width as u32, height as u32, 3, &decoded, of_byte))
 }
 
 fn ppm(mut file: BufReader<File>) -> Result<Picture, String> {
@@ -109,11 +111,8 @@ fn ppm(mut file: BufReader<File>) -> Result<Picture, String> {
     let channels = decoder.colorspace().ok_or("it has no channels")?.num_components();
     let (width, height) = (width as u32, height as u32);
     match decoder.decode().map_err(text)? {
-        DecodingResult::U8(values) => Ok(picture(width, height, channels, of_bytes(&values))),
-        DecodingResult::U16(values) => {
-            let values = values.iter().map(|value| f32::from(*value) / 65_535.0);
-            Ok(picture(width, height, channels, values))
-        }
+        DecodingResult::U8(values) => Ok(picture(width, height, channels, &values, of_byte)),
+        DecodingResult::U16(values) => Ok(picture(width, height, channels, &values, of_word)),
         _ => Err("its numbers are neither of 8 nor of 16 bits".to_owned()),
     }
 }
@@ -126,7 +125,7 @@ fn webp(file: BufReader<File>) -> Result<Picture, String> {
     let channels = if decoder.has_alpha() { 4 } else { 3 };
     let mut bytes = vec![0; size];
     decoder.read_image(&mut bytes).map_err(|error| error.to_string())?;
-    Ok(picture(width, height, channels, of_bytes(&bytes)))
+    Ok(picture(width, height, channels, &bytes, of_byte))
 }
 
 fn exr(file: BufReader<File>) -> Result<Picture, String> {

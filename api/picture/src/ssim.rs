@@ -4,7 +4,10 @@
 //! as the original 3DGS code computes it: a Gaussian window of 11x11 with a standard deviation of 1.5, zeros beyond the
 //! border, constants 0.01 and 0.03, the mean over pixels and channels.
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
+
+use crate::tiles::{Along, Filter, Form, Tile, tiles};
 
 /// Half the window's width.
 const RADIUS: usize = 5;
@@ -25,32 +28,55 @@ pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
         return 1.0;
     }
     let width = width as usize;
-    let sum: f64 = (0..3)
-        .into_par_iter()
-        .map(|channel| {
-            let plane =
-                |pixels: &[[f32; 4]]| -> Vec<f64> { pixels.iter().map(|pixel| pixel[channel].into()).collect() };
-            channel_sum(&plane(image), &plane(reference), width)
-        })
-        .sum();
-    sum / (3 * image.len()) as f64
+    let (height, filter) = (image.len() / width, Filter { form: Form::Even, weights: window()[RADIUS..].to_vec() });
+    let level = Level::new();
+    let sum_of =
+        |tile: Tile| dispatch!(level, simd => tile_sum(simd, image, reference, [width, height], tile, &filter));
+    // Summed in the order of the tiles, so that threads change nothing.
+    let sums: Vec<f64> = tiles(width, height).into_par_iter().map(sum_of).collect();
+    sums.into_iter().sum::<f64>() / (3 * image.len()) as f64
 }
 
-fn channel_sum(a: &[f64], b: &[f64], width: usize) -> f64 {
-    let window = window();
-    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
-    let smooth = |values: &[f64]| filtered(values, width, &window);
-    let (mean_a, mean_b) = (smooth(a), smooth(b));
-    let (square_a, square_b) = (smooth(&product(a, a)), smooth(&product(b, b)));
-    let both = smooth(&product(a, b));
-    (0..a.len())
-        .map(|i| {
-            let (x, y) = (mean_a[i], mean_b[i]);
-            let covariance = both[i] - x * y;
-            let variances = square_a[i] - x * x + square_b[i] - y * y;
-            (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
-        })
-        .sum()
+/// The sum of a tile's values of three channels.
+#[inline(always)]
+fn tile_sum<S: Simd>(
+    simd: S,
+    a: &[[f32; 4]],
+    b: &[[f32; 4]],
+    [width, height]: [usize; 2],
+    tile: Tile,
+    filter: &Filter<f64>,
+) -> f64 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let smooth = |plane: &[f64]| {
+                let along_rows = filter.correlate(plane, tile, RADIUS, Along::Rows);
+                filter.correlate(&along_rows, tile, RADIUS, Along::Columns)
+            };
+            let mut sum = 0.0;
+            for channel in 0..3 {
+                let plane = |image: &[[f32; 4]]| {
+                    tile.bordered(RADIUS, |x, y| {
+                        let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
+                        if inside { f64::from(image[y as usize * width + x as usize][channel]) } else { 0.0 }
+                    })
+                };
+                let (a, b) = (plane(a), plane(b));
+                let both: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a * b).collect();
+                let squares: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a * a + b * b).collect();
+                let (mean_a, mean_b) = (smooth(&a), smooth(&b));
+                let (both, squares) = (smooth(&both), smooth(&squares));
+                sum += tile.sum(|at| {
+                    let (x, y) = (mean_a[at], mean_b[at]);
+                    let covariance = both[at] - x * y;
+                    let variances = squares[at] - (x * x + y * y);
+                    (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
+                });
+            }
+            sum
+        },
+    )
 }
 
 fn window() -> [f64; 2 * RADIUS + 1] {
@@ -62,29 +88,64 @@ fn window() -> [f64; 2 * RADIUS + 1] {
     weights.map(|weight| weight / sum)
 }
 
-/// Correlates rows, then columns, with zeros beyond the border.
-fn filtered(values: &[f64], width: usize, window: &[f64]) -> Vec<f64> {
-    let height = values.len() / width;
-    let correlate = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
-        let taps = window.iter().enumerate();
-        taps.filter_map(|(i, weight)| {
-            let position = (at + i).checked_sub(RADIUS).filter(|p| *p < count)?;
-            Some(weight * value(position))
-        })
-        .sum::<f64>()
-    };
-    let rows: Vec<f64> = (0..values.len())
-        .map(|i| {
-            let row = &values[i / width * width..][..width];
-            correlate(i % width, width, &|x| row[x])
-        })
-        .collect();
-    (0..values.len()).map(|i| correlate(i / width, height, &|y| rows[y * width + i % width])).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Correlates rows, then columns, with zeros beyond the border.
+    fn filtered(values: &[f64], width: usize, window: &[f64]) -> Vec<f64> {
+        let height = values.len() / width;
+        let correlate = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
+            let taps = window.iter().enumerate();
+            taps.filter_map(|(i, weight)| {
+                let position = (at + i).checked_sub(RADIUS).filter(|p| *p < count)?;
+                Some(weight * value(position))
+            })
+            .sum::<f64>()
+        };
+        let rows: Vec<f64> = (0..values.len())
+            .map(|i| {
+                let row = &values[i / width * width..][..width];
+                correlate(i % width, width, &|x| row[x])
+            })
+            .collect();
+        (0..values.len()).map(|i| correlate(i / width, height, &|y| rows[y * width + i % width])).collect()
+    }
+
+    /// The sum of a channel's values, one pixel after the other.
+    fn channel_sum(a: &[f64], b: &[f64], width: usize) -> f64 {
+        let window = window();
+        let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+        let smooth = |values: &[f64]| filtered(values, width, &window);
+        let (mean_a, mean_b) = (smooth(a), smooth(b));
+        let (square_a, square_b) = (smooth(&product(a, a)), smooth(&product(b, b)));
+        let both = smooth(&product(a, b));
+        (0..a.len())
+            .map(|i| {
+                let (x, y) = (mean_a[i], mean_b[i]);
+                let covariance = both[i] - x * y;
+                let variances = square_a[i] - x * x + square_b[i] - y * y;
+                (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
+            })
+            .sum()
+    }
+
+    #[test]
+    fn values_are_those_of_the_naive_form() {
+        // More than a tile wide and high.
+        let (width, height) = (300, 150);
+        let image = |seed: usize| -> Vec<[f32; 4]> {
+            let pixel = |i: usize| [i * seed % 97, i * 7 % 89, (i / width) * seed % 83, 96].map(|c| c as f32 / 96.0);
+            (0..width * height).map(pixel).collect()
+        };
+        let (a, b) = (image(31), image(37));
+        let plane =
+            |image: &[[f32; 4]], channel: usize| -> Vec<f64> { image.iter().map(|p| p[channel].into()).collect() };
+        let sums = (0..3).map(|channel| channel_sum(&plane(&a, channel), &plane(&b, channel), width));
+        let expected = sums.sum::<f64>() / (3 * width * height) as f64;
+        let found = ssim(&a, &b, width as u32);
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
 
     fn grey(value: impl Fn(usize) -> f32, count: usize) -> Vec<[f32; 4]> {
         (0..count).map(|i| [value(i), value(i), value(i), 1.0]).collect()

@@ -1,5 +1,7 @@
 //! Statistics of the differences between two pictures.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::fmt;
 
 use crate::flip;
@@ -22,22 +24,26 @@ impl Statistics {
     /// Compares two images with `width` pixels in a row.
     pub fn new(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> Self {
         assert_eq!(image.len(), reference.len(), "the sizes differ");
-        let differences = || {
-            image
-                .iter()
-                .zip(reference)
-                .map(|(a, b)| std::array::from_fn::<f64, 4, _>(|c| (f64::from(a[c]) - f64::from(b[c])).abs()))
-        };
-        let mut worst: Vec<f64> = differences().map(|d| d.into_iter().fold(0.0, f64::max)).collect();
-        worst.sort_by(f64::total_cmp);
-        let squares: f64 = differences().flat_map(|d| [d[0], d[1], d[2]]).map(|d| d * d).sum();
-        let mean_square = squares / (3 * image.len()) as f64;
-        let errors = flip::flip(&opaque(reference), &opaque(image), width, flip::DEFAULT_PIXELS_PER_DEGREE);
+        let count = image.len();
+        // The value that a share of 0.999 does not exceed is the least of these.
+        let rank = (0.999 * count as f64).ceil() as usize;
+        let mut largest = Largest::new(count - rank.saturating_sub(1).min(count));
+        let (mut max, mut squares) = (0.0_f64, 0.0);
+        for (a, b) in image.iter().zip(reference) {
+            let differences: [f64; 4] = std::array::from_fn(|c| (f64::from(a[c]) - f64::from(b[c])).abs());
+            let worst = differences.into_iter().fold(0.0, f64::max);
+            max = max.max(worst);
+            largest.add(worst);
+            for difference in &differences[..3] {
+                squares += difference * difference;
+            }
+        }
+        let mean_square = squares / (3 * count) as f64;
         Self {
-            max: worst.last().copied().unwrap_or(0.0),
-            p999: percentile(&worst, 0.999),
+            max,
+            p999: largest.least(),
             psnr: -10.0 * mean_square.log10(),
-            flip: errors.iter().sum::<f64>() / errors.len() as f64,
+            flip: flip::mean(reference, image, width, flip::DEFAULT_PIXELS_PER_DEGREE),
         }
     }
 }
@@ -48,14 +54,34 @@ impl fmt::Display for Statistics {
     }
 }
 
-/// The value that a `share` of the ascending `values` does not exceed; 0 if there are none.
-fn percentile(values: &[f64], share: f64) -> f64 {
-    let rank = (share * values.len() as f64).ceil() as usize;
-    values.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+/// The largest of the numbers that are added, none of which is negative.
+struct Largest {
+    count: usize,
+    /// Their bits, which are in the order of the numbers, the least first.
+    bits: BinaryHeap<Reverse<u64>>,
 }
 
-fn opaque(image: &[[f32; 4]]) -> Vec<[f32; 3]> {
-    image.iter().map(|&[r, g, b, _]| [r, g, b]).collect()
+impl Largest {
+    /// Of none yet, with so many to keep.
+    fn new(count: usize) -> Self {
+        Self { count, bits: BinaryHeap::new() }
+    }
+
+    fn add(&mut self, value: f64) {
+        let bits = value.to_bits();
+        if self.bits.len() < self.count {
+            self.bits.push(Reverse(bits));
+        } else if let Some(mut least) = self.bits.peek_mut()
+            && bits > least.0
+        {
+            *least = Reverse(bits);
+        }
+    }
+
+    /// The least of them; 0 if there are none.
+    fn least(&self) -> f64 {
+        self.bits.peek().map_or(0.0, |least| f64::from_bits(least.0))
+    }
 }
 
 #[cfg(test)]

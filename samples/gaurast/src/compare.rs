@@ -170,17 +170,17 @@ pub fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Resul
 }
 
 fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> {
-    let shown = |picture: &Picture| {
-        let behind = arguments.background.map_or([0.0; 3], Background::color);
-        let over = picture.over(behind);
-        // As a screen displays it.
-        over.pixels
-            .iter()
-            .map(|pixel| pixel.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }))
-            .collect::<Vec<_>>()
+    let behind = arguments.background.map_or([0.0; 3], Background::color);
+    // As a screen displays it. Large pictures are changed where they are.
+    let shown = |picture: Picture| {
+        let mut pixels = picture.over(behind).pixels;
+        for channel in pixels.as_flattened_mut() {
+            *channel = if channel.is_nan() { 0.0 } else { channel.clamp(0.0, 1.0) };
+        }
+        pixels
     };
-    let (a, b) = (shown(&pair.a), shown(&pair.b));
-    let width = pair.a.width;
+    let [width, height] = [pair.a.width, pair.a.height];
+    let (a, b) = (shown(pair.a), shown(pair.b));
     let statistics = Statistics::new(&a, &b, width);
     if let Some(path) = &pair.difference {
         if path.is_file() && !arguments.force {
@@ -191,7 +191,7 @@ fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> 
             let channel = |c: usize| (a[c] - b[c]).abs() * scale;
             [channel(0), channel(1), channel(2), 1.0]
         };
-        let picture = Picture { pixels: a.iter().zip(&b).map(difference).collect(), ..pair.a };
+        let picture = Picture { width, height, pixels: a.iter().zip(&b).map(difference).collect() };
         gaurast_picture::write(path, &picture, None)?;
     }
     Ok(Compared { name: pair.name, statistics, ssim: ssim(&a, &b, width) })

@@ -124,7 +124,7 @@ fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, projec
     let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
     projected.reaches.extend(reaches);
     if view.geometry == GaussianGeometry::Surfel {
-        let surfels = lanes.iter().map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).surfel);
+        let surfels = lanes.iter().map(|one| surfel_of(view, one.at, scratch));
         projected.surfels.extend(surfels);
     }
     if view.order == GaussianOrder::PerPixel {

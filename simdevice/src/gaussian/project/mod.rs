@@ -2,7 +2,6 @@
 
 mod color;
 mod covariance;
-mod ellipse;
 pub(crate) mod group;
 mod keys;
 pub(crate) mod panorama;

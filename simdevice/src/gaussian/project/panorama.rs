@@ -7,8 +7,8 @@
 //!
 //! [`Splat::exceeds_period`]: crate::gaussian::splats::splat::Splat::exceeds_period
 
-use super::ellipse::Ellipse;
 use super::scratch::PanoramaCopy;
+use crate::gaussian::splats::ellipse::Ellipse;
 use crate::gaussian::splats::footprint::TileFootprint;
 use crate::gaussian::splats::group::ProjectedGroup;
 use crate::gaussian::view::visible::Visible;

@@ -1,8 +1,8 @@
 //! Gaussians in the picture: the output of projection.
 
-use super::ellipse::Ellipse;
 use crate::gaussian::lanes::{Bits, GroupF64, NO_GROUP_F64, log2};
 use crate::gaussian::splats::binary16::binary16_headroom;
+use crate::gaussian::splats::ellipse::Ellipse;
 use crate::gaussian::splats::splat::{Splat, SplatLook};
 use crate::gaussian::view::constants::ViewConstants;
 use crate::state::gaussian::GaussianPrecision;

@@ -1,17 +1,11 @@
-//! The projection of discs to surfels, and the tiles that these reach.
+//! The projection of discs to surfels.
 
-use super::ellipse::Ellipse;
 use super::scratch::Scratch;
 use super::screen::LN_2;
 use crate::gaussian::linear_algebra::{axes, cross, dot};
-use crate::gaussian::splats::footprint::{TileFootprint, TileSpan};
 use crate::gaussian::splats::surfel::Surfel;
 use crate::gaussian::view::constants::ViewConstants;
-use crate::gaussian::view::visible::Visible;
 use crate::state::gaussian::CameraModel;
-
-/// The least determinant, relative to its terms, that is not taken for zero.
-const LEAST_DETERMINANT: f64 = 1e-9;
 
 /// A disc in camera space, and the camera.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +19,7 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
-    /// The surfel of a disc, without bounds.
+    /// The surfel of a disc, which is not placed in the picture yet.
     pub(crate) fn surfel(&self) -> Surfel {
         let [a, b] = self.axes;
         let [fx, fy] = self.focal;
@@ -51,104 +45,13 @@ impl Disc {
             across: [u, v].map(|c| c.map(|c| c / largest)),
             scale,
             limit: if is_parallel { f64::INFINITY } else { depth * scale[0] / self.near },
-            bounds: [0.0; 4],
+            ..Surfel::default()
         }
     }
-}
-
-/// The ellipse in the picture of the disc out to a squared distance of `extent`. If the disc's plane meets the
-/// eye's plane there, the ellipse is infinite.
-fn ellipse(surfel: &Surfel, mean: [f64; 2], extent: f64) -> Ellipse {
-    let [[ux, uy], [vx, vy]] = surfel.across;
-    let [w, wx, wy] = surfel.scale;
-    // (u.d)^2 + (v.d)^2 <= extent (w + w'.d)^2 is d^T P d - 2 extent w w'.d <= extent w^2.
-    let xx = [ux * ux + vx * vx, extent * wx * wx];
-    let yy = [uy * uy + vy * vy, extent * wy * wy];
-    let xy = ux * uy + vx * vy - extent * wx * wy;
-    let (p, q) = (xx[0] - xx[1], yy[0] - yy[1]);
-    let determinant = p * q - xy * xy;
-    let total = (xx[0] + xx[1]) * (yy[0] + yy[1]);
-    if !(p > 0.0 && determinant > LEAST_DETERMINANT * total) {
-        return Ellipse { mean, half: [f64::INFINITY; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
-    }
-    let force = [extent * w * wx, extent * w * wy];
-    let shift = [(q * force[0] - xy * force[1]) / determinant, (p * force[1] - xy * force[0]) / determinant];
-    let level = extent * w * w + shift[0] * force[0] + shift[1] * force[1];
-    // The covariance: level P^-1.
-    let (a, b, c) = (level * q / determinant, -level * xy / determinant, level * p / determinant);
-    Ellipse {
-        mean: [mean[0] + shift[0], mean[1] + shift[1]],
-        half: [a.sqrt(), c.sqrt()],
-        slope: b / c,
-        narrowing: level * level / determinant / (c * c),
-        peak: b / a.sqrt(),
-    }
-}
-
-/// Sets the bounds of the disc and the filter's circle, both out to a squared distance of `extent` about `mean`,
-/// and returns their tiles, if there are any. Spans that do not fit inline go to `others`.
-fn reach(
-    surfel: &mut Surfel,
-    mean: [f64; 2],
-    extent: f64,
-    low_pass: f64,
-    visible: &Visible,
-    others: &mut Vec<TileSpan>,
-) -> Option<TileFootprint> {
-    // NaN reaches no tile.
-    if !(extent >= 0.0 && mean[0].is_finite() && mean[1].is_finite()) {
-        return None;
-    }
-    let radius = (extent * low_pass).sqrt();
-    let circle = Ellipse { mean, half: [radius; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
-    let disc = (surfel.scale[0] > 0.0).then(|| ellipse(surfel, mean, extent));
-    let shapes = [disc, (low_pass > 0.0).then_some(circle)];
-    surfel.bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
-    // Both shapes contain the mean, so that their union in a row of tiles is taken as one span.
-    let mut rows: Vec<(u32, TileSpan)> = Vec::new();
-    for shape in shapes.into_iter().flatten() {
-        for axis in 0..2 {
-            let (middle, half) = (shape.mean[axis], shape.half[axis]);
-            surfel.bounds[2 * axis] = surfel.bounds[2 * axis].min(middle - half);
-            surfel.bounds[2 * axis + 1] = surfel.bounds[2 * axis + 1].max(middle + half);
-        }
-        let mut spans = Vec::new();
-        let reach = shape.reach(visible, &mut spans, Some(&mut 0));
-        for (row, span) in reach.iter().flat_map(|reach| reach.spans(&spans)) {
-            if span.first == span.end {
-                continue;
-            }
-            match rows.iter_mut().find(|(other, _)| *other == row) {
-                Some((_, other)) => {
-                    other.first = other.first.min(span.first);
-                    other.end = other.end.max(span.end);
-                }
-                None => rows.push((row, span)),
-            }
-        }
-    }
-    let first = rows.iter().map(|(row, _)| *row).min()?;
-    let last = rows.iter().map(|(row, _)| *row).max()?;
-    let mut reach = TileFootprint::new(first as u16, (last - first + 1) as u16, others);
-    for (row, span) in rows {
-        reach.set(others, (row - first) as u16, span);
-    }
-    Some(reach)
-}
-
-/// A surfel, and the tiles that it reaches, if there are any.
-pub(crate) struct ProjectedSurfel {
-    pub(crate) surfel: Surfel,
-    pub(crate) footprint: Option<TileFootprint>,
 }
 
 /// The surfel of a kept Gaussian.
-pub(crate) fn surfel_of(
-    view: &ViewConstants,
-    at: usize,
-    scratch: &Scratch,
-    spans: &mut Vec<TileSpan>,
-) -> ProjectedSurfel {
+pub(crate) fn surfel_of(view: &ViewConstants, at: usize, scratch: &Scratch) -> Surfel {
     let [w, x, y, z] = &*scratch.rotation;
     let axes = axes([w[at], x[at], y[at], z[at]]);
     let r = &view.rotation;
@@ -164,20 +67,19 @@ pub(crate) fn surfel_of(
         axes: [placed(0), placed(1)],
         centre: [x[at], y[at], z[at]],
     };
-    let mut surfel = disc.surfel();
     let screen = &*scratch.screen;
     // The same margin as for volumes, in [`shape`](super::screen::shape).
     let log2_range = screen.log2_opacity[at] - view.log2_floor;
     let extent = (log2_range + log2_range.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
     let mean = [screen.mean[0][at], screen.mean[1][at]];
-    let footprint = reach(&mut surfel, mean, extent, view.low_pass, &view.visible, spans);
-    ProjectedSurfel { surfel, footprint }
+    disc.surfel().placed(mean, extent, view.low_pass)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gaussian::splats::surfel::UNIT;
+    use crate::gaussian::view::visible::Visible;
     use crate::runtime::SimdLevel;
     use crate::token_of;
     use devmem::dispatch;
@@ -223,9 +125,9 @@ mod tests {
                     _ => FOCAL,
                 };
                 let placed = Disc { model, focal, near: 0.2, axes, centre: t };
-                let mut surfel = placed.surfel();
+                let surfel = placed.surfel().placed(mean, extent, LOW_PASS);
                 let mut others = Vec::new();
-                let footprint = reach(&mut surfel, mean, extent, LOW_PASS, &VISIBLE, &mut others);
+                let footprint = surfel.reach(&VISIBLE, &mut others);
                 let mut listed = std::collections::BTreeSet::new();
                 for (row, span) in footprint.iter().flat_map(|footprint| footprint.spans(&others)) {
                     listed.extend((span.first..span.end).map(|column| (u32::from(column), row)));
@@ -262,6 +164,36 @@ mod tests {
                 }
             }
         });
+    }
+
+    /// The tiles that a surfel is listed in, and their blocks, of which a bit is set.
+    fn listed(surfel: &Surfel) -> (usize, u32) {
+        let mut others = Vec::new();
+        let footprint = surfel.reach(&VISIBLE, &mut others);
+        let spans = footprint.iter().flat_map(|footprint| footprint.spans(&others));
+        let tiles: Vec<_> =
+            spans.flat_map(|(row, span)| (span.first..span.end).map(move |at| [at.into(), row])).collect();
+        let blocks = tiles.iter().map(|tile: &[u32; 2]| surfel.blocks(tile.map(|at| 16 * at)).count_ones()).sum();
+        (tiles.len(), blocks)
+    }
+
+    #[gaurast_runner::test]
+    fn needles_and_discs_at_the_eye_s_plane_are_bounded() {
+        let disc = |axes, centre: [f64; 3]| {
+            let placed = Disc { model: CameraModel::Pinhole, focal: FOCAL, near: 0.2, axes, centre };
+            let mean = [0, 1].map(|axis| FOCAL[axis] * centre[axis] / centre[2] + CENTER[axis]);
+            placed.surfel().placed(mean, 11.0, LOW_PASS)
+        };
+        // Needles across the picture, of any thinness, reach the tiles of a line: 160 pixels are 10 tiles.
+        for thin in [1e-3, 1e-8, 1e-20, 0.0] {
+            let (tiles, blocks) = listed(&disc([[0.6, 0.0, 0.1], [0.0, thin, 0.0]], [0.0, 0.03, 2.0]));
+            assert!(tiles <= 10 && blocks <= 80, "{thin}: {tiles} tiles, {blocks} blocks");
+        }
+        // A disc whose plane is seen at an angle, through the eye's plane and on one side of the picture.
+        let open = disc([[0.0, 0.0, 1.0], [0.0, 0.1, 0.0]], [1.2, 0.0, 2.0]);
+        assert!(matches!(open.outline, crate::gaussian::splats::surfel::Outline::Open));
+        let (tiles, blocks) = listed(&open);
+        assert!((1..=30).contains(&tiles) && blocks <= 16 * 30, "{tiles} tiles, {blocks} blocks");
     }
 
     #[gaurast_runner::test(each = simd_levels())]

@@ -60,7 +60,7 @@ struct Range<S: Simd> {
 
 impl<S: Simd> Range<S> {
     /// The integers of `first..=last` whose pixel centres are between `low` and `high`, in the same steps as in
-    /// [`footprint`](super::footprint).
+    /// [`ellipse`](crate::gaussian::splats::ellipse).
     #[inline(always)]
     fn new(low: S::f32s, high: S::f32s, [first, last]: [S::f32s; 2]) -> Self {
         let low = float::ceil(low - 0.5).max(first);
@@ -112,7 +112,7 @@ impl<S: Simd> Shapes<S> {
     }
 }
 
-/// Ellipses whose tiles are searched row by row; see [`Ellipse`](super::footprint::Ellipse). They are larger than the
+/// Ellipses whose tiles are searched row by row; see [`Ellipse`](crate::gaussian::splats::ellipse::Ellipse). They are larger than the
 /// exact ones by more than all rounding errors.
 struct Ellipses<S: Simd> {
     mean: [S::f32s; 2],
@@ -175,7 +175,7 @@ impl<S: Simd> Ellipses<S> {
     }
 
     /// The columns that each ellipse reaches in a row of tiles. The steps are those of
-    /// [`Ellipse::reach`](super::footprint::Ellipse::reach).
+    /// [`Ellipse::reach`](crate::gaussian::splats::ellipse::Ellipse::reach).
     #[inline(always)]
     fn row(&self, simd: S, row: S::f32s) -> RowColumns<S> {
         let number = |value: f32| S::f32s::splat(simd, value);
@@ -304,7 +304,7 @@ fn find_drawn<S: Simd>(view: &ViewConstants, simd: S, scratch: &Scratch, counter
 }
 
 /// The footprints of the lanes of `drawn` that reach at most [`HELD_ROWS`] rows of tiles. The steps are those of
-/// [`Ellipse::reach`](super::footprint::Ellipse::reach). Adds the number of tiles of bounding boxes that ellipses do
+/// [`Ellipse::reach`](crate::gaussian::splats::ellipse::Ellipse::reach). Adds the number of tiles of bounding boxes that ellipses do
 /// not reach to `beside`.
 #[inline(always)]
 fn reach_in_lanes<S: Simd>(
@@ -386,7 +386,7 @@ fn reach_in_lanes<S: Simd>(
 const NUMBERS: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 /// The footprint of a lane that [`reach_in_lanes`] found to be tall, if it reaches tiles: several rows at once, in the
-/// steps of [`Ellipse::reach`](super::footprint::Ellipse::reach).
+/// steps of [`Ellipse::reach`](crate::gaussian::splats::ellipse::Ellipse::reach).
 #[inline(always)]
 fn reach_by_rows<S: Simd>(
     view: &ViewConstants,
@@ -433,7 +433,7 @@ fn reach_of_one(
     beside: &mut u64,
 ) -> Option<TileFootprint> {
     if view.geometry == GaussianGeometry::Surfel {
-        return surfel_of(view, at, scratch, &mut projected.spans).footprint;
+        return surfel_of(view, at, scratch).reach(&view.visible, &mut projected.spans);
     }
     let ellipse = scratch.screen.ellipse(at);
     // The square root of a negative extent is NaN.

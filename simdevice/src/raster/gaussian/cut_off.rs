@@ -5,6 +5,7 @@ use crate::gaussian::BinnedDraw;
 use crate::gaussian::splats::splat::Splat;
 use crate::gaussian::view::cut_off::TileCutOff;
 use crate::state::gaussian::GaussianCutOff;
+use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// The cut-off of a draw.
 #[derive(Clone, Copy, Debug)]
@@ -27,32 +28,43 @@ impl CutOff {
     }
 
     /// The lanes of a block, in the tile at `corner`, whose pixels' centres lie within the cut-off of a Gaussian, a bit each.
-    pub(crate) fn lanes(&self, splat: &Splat, corner: [u32; 2], block: usize) -> u32 {
+    #[inline(always)]
+    pub(crate) fn lanes<S: Simd>(&self, simd: S, splat: &Splat, corner: [u32; 2], block: usize) -> u64 {
         let middle = [f64::from(corner[0]) + BLOCK_X[block], f64::from(corner[1]) + BLOCK_Y[block]];
-        let bits = |is_within: &dyn Fn([f64; 2]) -> bool| {
-            (0..BLOCK_PIXELS).fold(0, |bits, lane| {
-                let centre = [middle[0] + LANE_X_64[lane], middle[1] + LANE_Y_64[lane]];
-                bits | u32::from(is_within(centre)) << lane
-            })
-        };
         match self {
             Self::Ellipse(most) => {
-                let [a, b, c] = splat.factor;
-                bits(&|centre| {
-                    let [dx, dy] = [0, 1].map(|axis| centre[axis] - splat.mean[axis]);
-                    let (u, v) = (a * dx, b * dx + c * dy);
-                    u * u + v * v <= *most
-                })
+                let low = half_within(simd, splat, middle, *most, 0);
+                low | half_within(simd, splat, middle, *most, 8) << 8
             }
             Self::Tiles(cut_off) => {
                 let tiles = cut_off.tiles(splat.mean, splat.factor);
-                bits(&|centre| {
-                    [0, 1].into_iter().all(|axis| {
+                (0..BLOCK_PIXELS).fold(0, |bits, lane| {
+                    let centre = [middle[0] + LANE_X_64[lane], middle[1] + LANE_Y_64[lane]];
+                    let is_within = [0, 1].into_iter().all(|axis| {
                         let [first, end] = tiles[axis];
                         (first..end).contains(&cut_off.tile_of(axis, centre[axis]))
-                    })
+                    });
+                    bits | u64::from(is_within) << lane
                 })
             }
         }
     }
+
+    /// The negated logarithm of the alpha floor beyond which a Gaussian of an opacity is cut off everywhere, if there is one.
+    pub(crate) fn neg_log2_floor(&self, log2_opacity: f32) -> f32 {
+        match self {
+            Self::Ellipse(most) => (most - f64::from(log2_opacity)) as f32,
+            Self::Tiles(_) => f32::INFINITY,
+        }
+    }
+}
+
+/// A bit for each of eight of a block's lanes, from number `first` on, with at most so much of `u^2 + v^2`. `middle` is the block's.
+#[inline(always)]
+fn half_within<S: Simd>(simd: S, splat: &Splat, middle: [f64; 2], most: f64, first: usize) -> u64 {
+    let [a, b, c] = splat.factor;
+    let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0] - splat.mean[0];
+    let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1] - splat.mean[1];
+    let (u, v) = (dx * a, dx * b + dy * c);
+    (u * u + v * v).simd_le(most).to_bitmask()
 }

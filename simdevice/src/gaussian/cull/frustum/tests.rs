@@ -10,7 +10,7 @@ use crate::gaussian::read::attributes::GroupVertices;
 use crate::gaussian::read::group::{GroupAttributes, Sequence};
 use crate::gaussian::read::harmonics::{CoefficientReader, Harmonics};
 use crate::gaussian::splats::group::ProjectedGroup;
-use crate::gaussian::splats::surfel::Surfel;
+use crate::gaussian::splats::surfel::{Outline, Surfel};
 use crate::gaussian::view::visible::Visible;
 use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, ModelAttributes};
 use crate::runtime::SimdLevel;
@@ -73,9 +73,6 @@ fn around_edges(rng: &mut ChaCha8Rng, is_surfel: bool) -> Attributes {
     }
     attributes
 }
-
-/// The corner of a tile that lies outside of every picture.
-const FAR_OFF: [u32; 2] = [1 << 24; 2];
 
 /// The bounds of a cluster of one lane.
 fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
@@ -148,9 +145,9 @@ fn what_is_outside_is_drawn_nowhere() {
                 beside += outside.beside.count();
                 let mut is_drawn = [false; GROUP];
                 for (at, &[_, lane]) in projected.keys.iter().enumerate() {
-                    // Discs that reach the eye's plane are listed in all tiles, wherever they are.
-                    let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
-                    is_drawn[lane as usize] = !projected.surfels.get(at).is_some_and(everywhere);
+                    // The tiles of discs that reach the eye's plane are found less exactly.
+                    let is_open = |surfel: &Surfel| matches!(surfel.outline, Outline::Open);
+                    is_drawn[lane as usize] = !projected.surfels.get(at).is_some_and(is_open);
                 }
                 let all = Bits::first(GROUP);
                 for (of, what) in [(outside.near, "near"), (outside.far, "far"), (outside.beside, "beside")] {

@@ -50,7 +50,11 @@ pub(crate) fn divide<S: Simd>(
         }
         let neg_log2_floor = match inputs.kernel {
             Kernel::Half => half_neg_log2_floor(splat, inputs.thresholds.neg_log2_floor),
-            _ => inputs.thresholds.neg_log2_floor,
+            kernel => {
+                let cut_off =
+                    kernel.cut_off().map_or(f32::INFINITY, |cut_off| cut_off.neg_log2_floor(splat.log2_opacity));
+                inputs.thresholds.neg_log2_floor.min(cut_off)
+            }
         };
         let mut reached = match inputs.kernel.surfel(index) {
             _ if !bounded => all,

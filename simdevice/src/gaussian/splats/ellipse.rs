@@ -1,7 +1,7 @@
-//! The ellipse outside of which a Gaussian stays below the alpha floor, and the tiles that it reaches: by exact tests against
-//! rectangles of pixel centres.
+//! The ellipse outside of which a Gaussian stays below the alpha floor, and the tiles and blocks that it reaches: by exact tests
+//! against rectangles of pixel centres.
 
-use crate::gaussian::splats::footprint::{TileFootprint, TileSpan};
+use super::footprint::{TileFootprint, TileSpan};
 use crate::gaussian::view::visible::Visible;
 use crate::limits::TILE_SIZE;
 
@@ -117,6 +117,45 @@ impl Ellipse {
         let all = u64::from(rows) * u64::from(boxed.end - boxed.first);
         *beside += all.saturating_sub(reached);
         (reached > 0).then_some(reach)
+    }
+
+    /// The rows of tiles that may have visible pixel centres of the ellipse: the first one, and one past the last.
+    pub(crate) fn rows(&self, visible: &Visible) -> Option<[u16; 2]> {
+        let [first, last] = visible.pixels(1);
+        let [top, bottom] = centres(self.mean[1] - self.half[1], self.mean[1] + self.half[1], first, last)?;
+        Some([tile_of(top), tile_of(bottom) + 1])
+    }
+
+    /// The tiles of one of its [rows](Ellipse::rows) whose visible pixel centres the ellipse may contain.
+    pub(crate) fn span(&self, visible: &Visible, row: u16) -> Option<TileSpan> {
+        let ([x, y], half_y) = (self.mean, self.half[1]);
+        let ([first_x, last_x], [first_y, last_y]) = (visible.pixels(0), visible.pixels(1));
+        let row_top = f64::from(row) * f64::from(TILE_SIZE);
+        let (first_y, last_y) = (larger(first_y, row_top), smaller(last_y, row_top + f64::from(TILE_SIZE) - 1.0));
+        let [top, bottom] = centres(y - half_y, y + half_y, first_y, last_y)?;
+        let [low, high] = self.sides(top + 0.5 - y, bottom + 0.5 - y);
+        let [left, right] = centres(x + low, x + high, first_x, last_x)?;
+        Some(TileSpan { first: tile_of(left), end: tile_of(right) + 1 })
+    }
+
+    /// The blocks of 4x4 pixels, in the tile at `corner`, whose pixel centres the ellipse may contain: a bit for each, row by row.
+    pub(crate) fn blocks(&self, corner: [u32; 2]) -> u64 {
+        let [left, top] = [0, 1].map(|axis| f64::from(corner[axis]) - self.mean[axis]);
+        let mut blocks = 0;
+        for row in 0..4 {
+            let first = top + f64::from(4 * row) + 0.5;
+            let (above, below) = (larger(first, -self.half[1]), smaller(first + 3.0, self.half[1]));
+            if above > below {
+                continue;
+            }
+            let [low, high] = self.sides(above, below);
+            for column in 0..4 {
+                let first = left + f64::from(4 * column) + 0.5;
+                let is_reached = low <= first + 3.0 && high >= first;
+                blocks |= u64::from(is_reached) << (4 * row + column);
+            }
+        }
+        blocks
     }
 
     /// The leftmost and rightmost extent between two heights, all relative to the centre.
