@@ -1,4 +1,4 @@
-# The command and the driver in a small image: docker build -t gaurast . && docker run --rm -v "$PWD:/work" gaurast scene.ply
+# The command and the driver in a small image: docker build -t gaurast . && docker run --rm -v "$PWD:/data" gaurast scene.ply
 #
 # Programs of images that begin with this one run on the driver: the Vulkan loader finds it without a variable.
 FROM debian:bookworm-slim AS build
@@ -12,5 +12,5 @@ RUN cargo build --locked --profile dist && DESTDIR=/installed PREFIX=/usr driver
 FROM debian:bookworm-slim
 RUN apt-get update && apt-get install --yes --no-install-recommends libvulkan1 && rm -rf /var/lib/apt/lists/*
 COPY --from=build /installed /
-WORKDIR /work
+WORKDIR /data
 ENTRYPOINT ["gaurast"]
