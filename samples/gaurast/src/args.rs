@@ -271,8 +271,8 @@ pub struct OutputArguments {
     /// The file, folder or video for the pictures; may be given more than once [default: the scene's name with .png]
     ///
     /// PNG and WebP (lossless) and JPEG have 8 bits, with colours as they are trained; EXR has 32-bit floats. Several
-    /// views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4 or .webm, made
-    /// by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
+    /// views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4, .webm or .gif,
+    /// made by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
 

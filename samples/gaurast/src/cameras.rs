@@ -371,10 +371,15 @@ fn choose(text: &str, path: &std::path::Path, views: &[camera_files::View]) -> R
         named.map(|(index, _)| index).collect()
     };
     let file = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
-    let tests: [&dyn Fn(&str) -> bool; 4] =
-        [&|name| name == text, &|name| file(name) == text, &|name| stem(std::path::Path::new(name)) == text, &|name| {
-            name.contains(text)
-        }];
+    let stem_of = |name: &str| stem(std::path::Path::new(name));
+    let tests: [&dyn Fn(&str) -> bool; 5] = [
+        &|name| name == text,
+        &|name| file(name) == text,
+        &|name| stem_of(name) == text,
+        // Camera files of 3DGS name photographs without extension.
+        &|name| file(name) == stem_of(text),
+        &|name| name.contains(text),
+    ];
     let found = tests.into_iter().map(of_name).find(|found| !found.is_empty());
     match found.as_deref() {
         Some([one]) => Ok(vec![*one]),
@@ -422,6 +427,8 @@ mod tests {
         assert_eq!(chosen("a.png"), [0]);
         assert_eq!(chosen("00003"), [1]);
         assert_eq!(chosen("8680"), [3], "no index");
+        assert_eq!(chosen("DSC8679.JPG"), [2]);
+        assert_eq!(chosen("images/DSC8680.png"), [3]);
         for (bad, reason) in [
             ("5", "there are 5 views"),
             ("2..9", "there are 5 views"),

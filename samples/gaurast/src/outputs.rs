@@ -11,12 +11,19 @@ use crate::args::OutputArguments;
 use crate::cameras::View;
 use crate::sources::stem;
 
-/// File extensions of videos, and ffmpeg's arguments for them.
-const VIDEOS: [(&str, &[&str]); 4] = [
-    ("mp4", &["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"]),
-    ("mov", &["-c:v", "libx264", "-crf", "18"]),
-    ("mkv", &["-c:v", "libx264", "-crf", "18"]),
-    ("webm", &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"]),
+/// Filters of videos whose chroma has half the resolution, so that sides must be even.
+const EVEN: [&str; 4] = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"];
+
+/// Filters of GIF files: a palette of all frames.
+const PALETTE: [&str; 2] = ["-filter_complex", "split[a][b];[a]palettegen[p];[b][p]paletteuse"];
+
+/// File extensions of videos, and ffmpeg's arguments for them: its filters, and those of the encoder.
+const VIDEOS: [(&str, &[&str], &[&str]); 5] = [
+    ("mp4", &EVEN, &["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"]),
+    ("mov", &EVEN, &["-c:v", "libx264", "-crf", "18"]),
+    ("mkv", &EVEN, &["-c:v", "libx264", "-crf", "18"]),
+    ("webm", &EVEN, &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"]),
+    ("gif", &PALETTE, &["-loop", "0"]),
 ];
 
 /// A failure to write pictures. Displayed as one sentence.
@@ -117,10 +124,11 @@ impl Place {
     }
 }
 
-fn video_options(path: &Path) -> Option<&'static [&'static str]> {
+/// ffmpeg's arguments for a video: its filters, and then those of the encoder.
+fn video_options(path: &Path) -> Option<[&'static [&'static str]; 2]> {
     let extension = path.extension()?.to_string_lossy().to_lowercase();
-    let video = VIDEOS.iter().find(|(name, _)| *name == extension);
-    video.map(|(_, options)| *options)
+    let video = VIDEOS.iter().find(|(name, ..)| *name == extension);
+    video.map(|(_, filters, options)| [*filters, *options])
 }
 
 /// The destinations of all pictures, checked before anything is drawn.
@@ -397,10 +405,9 @@ impl Video {
         let mut child = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             .args(["-s", &format!("{width}x{height}"), "-r", &fps.to_string()])
-            // Chroma has half the resolution, so the sides must be even.
-            .args(["-i", "pipe:0", "-an", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
-            .args(options)
-            .args(["-pix_fmt", "yuv420p", "-y"])
+            .args(["-i", "pipe:0", "-an"])
+            .args(options.concat())
+            .arg("-y")
             .arg(&temporary)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())

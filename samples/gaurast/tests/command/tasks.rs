@@ -384,6 +384,12 @@ fn a_video_goes_through_ffmpeg() {
     let told = std::fs::read_to_string(folder.path().join("told")).expect("told");
     assert!(told.contains("-s 16x8 -r 12") && told.contains("libx264"), "{told}");
     assert_eq!(files(&folder), ["a.mp4", "told", "two.ply"]);
+    // An animated picture has a palette, and its sides may be odd.
+    let output = run(&["two.ply", "--orbit", "2", "--size", "15x7", "-o", "b.gif"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told = std::fs::read_to_string(folder.path().join("told")).expect("told");
+    assert!(told.contains("-s 15x7") && told.contains("palettegen") && !told.contains("yuv420p"), "{told}");
+    std::fs::remove_file(folder.path().join("b.gif")).expect("removed");
     // A fake encoder that fails: its last line is reported, and no file is left.
     std::fs::write(&program, "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 1\n").expect("written");
     let output = run(&[&video[..], &["--force"]].concat());
