@@ -208,7 +208,7 @@ mod tests {
         assert!(enabled.features.performance_counter_query_pools);
         assert_eq!(*heard.0.lock().unwrap(), ["VUID-VkDeviceCreateInfo-pNext-pNext"]);
         for text in ["one", "one", "other"] {
-            enabled.require(false, || Error::usage("VUID-rule", text)).unwrap();
+            enabled.require(false, || Error::usage("VUID-VkDeviceCreateInfo-pNext-pNext", text)).unwrap();
         }
         enabled.require(true, || unreachable!()).unwrap();
         assert_eq!(heard.0.lock().unwrap().len(), 3);

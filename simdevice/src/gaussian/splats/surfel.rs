@@ -138,12 +138,18 @@ impl Surfel {
         if !(self.extent >= 0.0 && self.mean[0].is_finite() && self.mean[1].is_finite()) {
             return None;
         }
-        let tiles = |axis: usize| visible.pixels(axis).map(|pixel| (pixel / f64::from(TILE_SIZE)) as u16);
+        let tiles = |axis: usize| {
+            let [first, last] = visible.pixels(axis);
+            // The conversion ends at the greatest number.
+            let number = |tiles: f64| tiles as u16;
+            let tile = f64::from(TILE_SIZE);
+            (first <= last).then(|| [number(first / tile), number(last / tile + 1.0)])
+        };
         let circle = self.circle();
         let disc = match &self.outline {
             Outline::Empty => None,
             Outline::Ellipse(ellipse) => ellipse.rows(visible),
-            Outline::Open => Some(tiles(1)).map(|[first, last]| [first, last + 1]),
+            Outline::Open => tiles(1),
         };
         let rows = [disc, circle.and_then(|circle| circle.rows(visible))].into_iter().flatten();
         let [first, end] = rows.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?;
@@ -153,7 +159,7 @@ impl Surfel {
             let disc = match &self.outline {
                 Outline::Empty => None,
                 Outline::Ellipse(ellipse) => ellipse.span(visible, row),
-                Outline::Open => self.open_span(tiles(0), row),
+                Outline::Open => tiles(0).and_then(|columns| self.open_span(columns, row)),
             };
             let spans = [disc, circle.and_then(|circle| circle.span(visible, row))].into_iter().flatten();
             // Both shapes contain the mean, so that their union in a row of tiles is taken as one span.
@@ -165,13 +171,13 @@ impl Surfel {
         reaches_any.then_some(reach)
     }
 
-    /// The tiles of a row, among the first and the last column, in which rays may meet an open disc.
-    fn open_span(&self, [first, last]: [u16; 2], row: u16) -> Option<TileSpan> {
+    /// The tiles of a row in which rays may meet an open disc, among the columns from the first to one before the end.
+    fn open_span(&self, [first, end]: [u16; 2], row: u16) -> Option<TileSpan> {
         let tile = f64::from(TILE_SIZE);
         let middle = |tiles: u16| (f64::from(tiles) + 0.5) * tile;
         let is_met = |column: &u16| self.may_meet([middle(*column), middle(row)], 0.5 * (tile - 1.0));
-        let from = (first..=last).find(is_met)?;
-        let to = (from..=last).rev().find(is_met)?;
+        let from = (first..end).find(is_met)?;
+        let to = (from..end).rev().find(is_met)?;
         Some(TileSpan { first: from, end: to + 1 })
     }
 

@@ -43,13 +43,14 @@ use fearless_simd::Level;
 /// Primitives of a piece of a sorted walk. The fast kernel goes on where it was, so that pieces change no bit.
 const PIECE: usize = 1024;
 
-/// The accumulators of a tile: one for each sample, and one to find what is reached at all.
+/// The number of a tile's accumulators.
 const ACCUMULATORS: usize = MAX_SAMPLES as usize + 1;
 
 /// The part of tile buffer B that Gaussian mode uses.
 #[derive(Debug)]
 pub struct GaussianTile {
-    pub(crate) accumulators: [Accumulator; ACCUMULATORS],
+    /// One for each sample, and one to find what is reached at all.
+    pub(crate) accumulators: Vec<Accumulator>,
     pub(crate) ranges: DepthRanges,
     compositor: Compositor,
 }
@@ -67,11 +68,9 @@ struct Compositor {
 
 impl Default for GaussianTile {
     fn default() -> Self {
-        Self {
-            accumulators: [Accumulator::EMPTY; ACCUMULATORS],
-            ranges: DepthRanges::default(),
-            compositor: Compositor::default(),
-        }
+        let mut accumulators = Vec::new();
+        host::resize(&mut accumulators, ACCUMULATORS, Accumulator::EMPTY);
+        Self { accumulators, ranges: DepthRanges::default(), compositor: Compositor::default() }
     }
 }
 

@@ -99,6 +99,14 @@ struct SceneDraw {
     discards: bool,
     early_tests: bool,
     writes_depth: bool,
+    writes_stencil_reference: bool,
+}
+
+impl SceneDraw {
+    /// The stencil reference that the program writes for a primitive: the last bits of the value that kills it.
+    fn stencil_reference(&self, values: &[u32; 10]) -> Option<u8> {
+        (self.writes_stencil_reference && !self.early_tests).then_some(values[8] as u8)
+    }
 }
 
 const CLEAR: [u32; 4] = [0x3F40_0000, 0x3E80_0000, 0x3F00_0000, 0x3F19_999A];
@@ -183,6 +191,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
             discards: rng.random_bool(0.3),
             early_tests: rng.random_bool(0.3),
             writes_depth: rng.random_bool(0.25),
+            writes_stencil_reference: rng.random_bool(0.2),
         }
     });
     let draws = draws.collect();
@@ -282,6 +291,8 @@ fn fragment(
         }
     }
     let face = tests.stencil.filter(|_| has_stencil).map(|faces| faces[usize::from(!primitive.front)]);
+    let written = draw.stencil_reference(values);
+    let face = face.map(|face| StencilFace { reference: written.unwrap_or(face.reference), ..face });
     let stencil = picture.stencil[at];
     let stencil_passes =
         face.is_none_or(|face| face.compare.holds(face.reference & face.compare_mask, stencil & face.compare_mask));
@@ -399,6 +410,13 @@ fn render(scene: &Scene, config: &Config) -> Picture {
             if scene_draw.writes_depth {
                 inputs.swap(8, 9);
                 outputs.push(FragmentOutput::Depth);
+            }
+            if scene_draw.writes_stencil_reference {
+                // The output is a copy of the input that also kills, which must come twice.
+                let kill =
+                    FragmentInput::Varying { index: 8, interpolation: Interpolation::Flat, sampling: Sampling::Center };
+                inputs.insert(outputs.len(), kill);
+                outputs.push(FragmentOutput::StencilReference);
             }
             let mut stage = fragments(inputs, outputs, scene_draw.discards);
             stage.early_tests = scene_draw.early_tests;
