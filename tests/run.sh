@@ -83,6 +83,15 @@ step() { # step NAME COMMAND...
     printf '%6d  %s\n' $((SECONDS - start)) "$name" >>"$work/steps"
 }
 
+# absent WHAT: a missing program fails if it is required; otherwise what needs it is ignored.
+absent() {
+    if [ -n "${GAURAST_TEST_REQUIRE:-}" ]; then
+        echo "$1 is missing" >&2
+        return 1
+    fi
+    printf 'ignored\t%s is missing\n' "$1" >>"$GAURAST_TEST_REPORT"
+}
+
 # The profile is optimised, since the oracle compares whole images, and checks debug assertions and overflow.
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
@@ -97,11 +106,8 @@ step documentation env RUSTDOCFLAGS="-D warnings" cargo doc --profile checked --
 specification() {
     if command -v asciidoctor >/dev/null; then
         asciidoctor --failure-level WARN --destination-dir "$work/specification" api/spec/*.adoc
-    elif [ -n "${GAURAST_TEST_REQUIRE:-}" ]; then
-        echo "asciidoctor is missing" >&2
-        return 1
     else
-        printf 'ignored\tasciidoctor is missing\n' >>"$GAURAST_TEST_REPORT"
+        absent asciidoctor
     fi
 }
 step specification specification
@@ -117,13 +123,11 @@ step tests cargo test "${tests[@]}" --quiet --no-fail-fast
 # The Python package on the libraries that the tests built.
 python_tests() {
     if python3 -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
-        api/python/tests/run.sh "$GAURAST_TEST_LIBRARIES" | tee "$work/pytest"
+        # Within a condition, as steps are, a failure does not end a function by itself.
+        api/python/tests/run.sh "$GAURAST_TEST_LIBRARIES" | tee "$work/pytest" || return 1
         sed -n 's/^SKIPPED \[[0-9]*\] [^ ]* /ignored\t/p' "$work/pytest" >>"$GAURAST_TEST_REPORT"
-    elif [ -n "${GAURAST_TEST_REQUIRE:-}" ]; then
-        echo "Python 3.9 is missing" >&2
-        return 1
     else
-        printf 'ignored\tPython 3.9 is missing\n' >>"$GAURAST_TEST_REPORT"
+        absent "Python 3.9"
     fi
 }
 step python python_tests

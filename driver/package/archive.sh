@@ -6,14 +6,8 @@
 # The archive is an installed tree that runs where it is unpacked: `eval "$(gaurast-VERSION-x86_64-linux/bin/gaurast icd)"`.
 # The same files give the same archive.
 set -eu
-here=$(cd "$(dirname "$0")" && pwd)
-build=$1
-mkdir -p "$2"
-out=$(cd "$2" && pwd)
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/../../Cargo.toml" | head -n 1)
+. "$(dirname "$0")/arguments.sh"
 name=gaurast-$version-$(uname -m)-linux
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
 DESTDIR=$work PREFIX=/$name "$here/install.sh" "$build"
 tar --sort=name --owner=0 --group=0 --numeric-owner --mtime="@${SOURCE_DATE_EPOCH:-0}" -C "$work" -cf - "$name" |
     xz -9e --threads=1 >"$out/$name.tar.xz"

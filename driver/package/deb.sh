@@ -3,14 +3,8 @@
 #
 #   deb.sh BUILD OUT
 set -eu
-here=$(cd "$(dirname "$0")" && pwd)
-build=$1
-mkdir -p "$2"
-out=$(cd "$2" && pwd)
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/../../Cargo.toml" | head -n 1)
+. "$(dirname "$0")/arguments.sh"
 architecture=$(dpkg --print-architecture)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
 DESTDIR=$work PREFIX=/usr LIBDIR=/usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH 2>/dev/null || echo "$(uname -m)-linux-gnu") \
     "$here/install.sh" "$build"
 find "$work/usr/share/man" -name '*.1' -exec gzip -9n {} +

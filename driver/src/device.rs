@@ -141,7 +141,7 @@ impl Device {
 
     /// The version and extensions under which commands are looked up through this device.
     pub(crate) fn enabled_extensions(&self) -> EnabledExtensions<'_> {
-        EnabledExtensions { device_extensions: self.enabled.extensions(), ..self.instance.enabled() }
+        EnabledExtensions { device_extensions: self.enabled.extensions(), ..self.instance.enabled_extensions() }
     }
 
     /// Executes the work of its queues and joins their threads.

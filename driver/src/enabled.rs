@@ -12,7 +12,7 @@ use std::collections::HashSet;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What an application enabled on a device, and the answer to uses of what it did not.
+/// The features and extensions that an application enabled on a device, and the answer to uses of others.
 pub(crate) struct Enabled {
     features: Features,
     extensions: Vec<&'static CStr>,

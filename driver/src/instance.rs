@@ -131,7 +131,7 @@ impl Instance {
     }
 
     /// The version and extensions that decide which commands are found through this instance.
-    pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
+    pub(crate) fn enabled_extensions(&self) -> EnabledExtensions<'_> {
         EnabledExtensions {
             api_version: self.api_version,
             instance_extensions: &self.extensions,

@@ -45,6 +45,6 @@ pub unsafe fn get_physical_device_proc_addr(instance: vk::Instance, name: *const
         // SAFETY: the caller's promise.
         let (instance, name) = unsafe { (handle::get(instance)?, valid::string(name)) };
         let name = name.ok_or(Error::NullPointer { what: "name" })?;
-        Ok(dispatch::physical_device_command(name, &instance.enabled()))
+        Ok(dispatch::physical_device_command(name, &instance.enabled_extensions()))
     })
 }

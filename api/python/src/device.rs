@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use gaurast_render::{Arrays, Colors, DeviceOptions, DeviceScene, Frame, RenderError, Renderer, Settings};
 use gaurast_scene::{Camera, Scene};
 use numpy::ndarray::Array3;
-use numpy::{IntoPyArray, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{Element, IntoPyArray, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -82,25 +82,21 @@ type FrameArrays<'py> =
     (Bound<'py, PyArray3<f32>>, Option<Bound<'py, PyArray3<f32>>>, Option<Bound<'py, PyArray3<u32>>>);
 
 fn to_arrays(py: Python<'_>, frame: Frame) -> PyResult<FrameArrays<'_>> {
-    let [height, width] = [frame.picture.height as usize, frame.picture.width as usize];
-    let wrong = |error: numpy::ndarray::ShapeError| PyValueError::new_err(error.to_string());
-    let pixels = frame.picture.pixels.into_flattened();
-    let colors = Array3::from_shape_vec((height, width, 4), pixels).map_err(wrong)?.into_pyarray(py);
-    let depths = match frame.depth {
-        Some(depths) => {
-            let depths = depths.into_flattened();
-            Some(Array3::from_shape_vec((height, width, 2), depths).map_err(wrong)?.into_pyarray(py))
-        }
-        None => None,
-    };
-    let gaussians = match frame.gaussians {
-        Some(gaussians) => {
-            let gaussians = gaussians.into_flattened();
-            Some(Array3::from_shape_vec((height, width, 2), gaussians).map_err(wrong)?.into_pyarray(py))
-        }
-        None => None,
-    };
+    let size = [frame.picture.height as usize, frame.picture.width as usize];
+    let colors = to_array(py, size, frame.picture.pixels)?;
+    let depths = frame.depth.map(|depths| to_array(py, size, depths)).transpose()?;
+    let gaussians = frame.gaussians.map(|gaussians| to_array(py, size, gaussians)).transpose()?;
     Ok((colors, depths, gaussians))
+}
+
+/// An array `[H, W, N]` of pixels of `N` numbers each.
+fn to_array<T: Element, const N: usize>(
+    py: Python<'_>,
+    [height, width]: [usize; 2],
+    pixels: Vec<[T; N]>,
+) -> PyResult<Bound<'_, PyArray3<T>>> {
+    let array = Array3::from_shape_vec((height, width, N), pixels.into_flattened());
+    Ok(array.map_err(|error| PyValueError::new_err(error.to_string()))?.into_pyarray(py))
 }
 
 #[pymethods]

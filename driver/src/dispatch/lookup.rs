@@ -148,7 +148,7 @@ pub(super) fn get_instance_proc_addr(
 ) -> Result<vk::PFN_vkVoidFunction, Error> {
     Ok(match instance {
         None => commands.global_command(name),
-        Some(instance) => commands.instance_command(name, &instance.enabled()),
+        Some(instance) => commands.instance_command(name, &instance.enabled_extensions()),
     })
 }
 

@@ -9,8 +9,11 @@ use gaurast_scene::{Antialiasing, SortOrder};
 pub enum OtherRenderer {
     /// 3DGS's own (diff-gaussian-rasterization): tiles of a square of 3 standard deviations, from 0.2 on
     Inria,
-    /// gsplat's: tiles of a rectangle of 3.33 standard deviations, alphas of up to 0.999, from 0.01 on
+    /// gsplat's, from 1.6 on: tiles of a rectangle of 3.33 standard deviations, from 0.01 on
     Gsplat,
+    /// gsplat's up to 1.5: the same with alphas of up to 0.999
+    #[value(name = "gsplat-1.5")]
+    Gsplat15,
     /// As KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
     Gltf,
 }
@@ -19,7 +22,7 @@ impl OtherRenderer {
     /// The order in which it composites.
     pub fn order(self) -> SortOrder {
         match self {
-            Self::Inria | Self::Gsplat => SortOrder::Depth,
+            Self::Inria | Self::Gsplat | Self::Gsplat15 => SortOrder::Depth,
             Self::Gltf => SortOrder::Distance,
         }
     }
@@ -28,7 +31,7 @@ impl OtherRenderer {
     pub fn near(self) -> Option<f64> {
         match self {
             Self::Inria => Some(0.2),
-            Self::Gsplat => Some(0.01),
+            Self::Gsplat | Self::Gsplat15 => Some(0.01),
             Self::Gltf => None,
         }
     }
@@ -38,15 +41,15 @@ impl OtherRenderer {
     pub fn settings(self, settings: Settings) -> Settings {
         let (cut_off, cut_off_deviations) = match self {
             Self::Inria => (CutOff::TileSquare, 3.0),
-            Self::Gsplat => (CutOff::TileRectangle, 3.33),
+            Self::Gsplat | Self::Gsplat15 => (CutOff::TileRectangle, 3.33),
             Self::Gltf => (CutOff::Ellipse, 3.0),
         };
         let is_compensated = settings.antialiasing == Antialiasing::Compensated;
         Settings {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: match self {
-                Self::Gsplat => 0.999,
-                Self::Inria | Self::Gltf => 0.99,
+                Self::Gsplat15 => 0.999,
+                Self::Inria | Self::Gsplat | Self::Gltf => 0.99,
             },
             transmittance_floor: 1e-4,
             cut_off,

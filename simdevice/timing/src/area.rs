@@ -1,6 +1,7 @@
 //! Area from the paper's component counts: the triangle units of a PE, the units added for Gaussians, and buffers.
 
 use crate::config::{AreaConfig, Config, Records};
+use crate::pe::{Operations, PerUnit};
 use serde::Serialize;
 
 /// Areas in mm2 of the rasterizer's technology, unless a field says otherwise.
@@ -30,69 +31,54 @@ pub struct Area {
     pub added_half: f64,
 }
 
-/// Areas of single units in um2 of the reference technology.
-#[derive(Clone, Copy)]
-struct Units {
-    add: f64,
-    mul: f64,
-    div: f64,
-    exp: f64,
+/// The units that Gaussians add to a PE for triangles; GauRast, Table II.
+const ADDED: Operations = Operations { add: 2, mul: 1, div: 0, exp: 1 };
+
+/// Areas of single 32-bit units in um2 of the reference technology. If the exponential's area is not given, it is solved from the
+/// paper's ratio.
+fn single_units(table: &AreaConfig) -> PerUnit {
+    let units = PerUnit { add: table.add_um2, mul: table.mul_um2, div: table.div_um2, exp: table.exp_um2 };
+    if units.exp != 0.0 {
+        return units;
+    }
+    let exp = table.enhanced_ratio * units.sum(Operations::TRIANGLE) - units.sum(ADDED);
+    PerUnit { exp: exp.max(0.0), ..units }
 }
 
-impl Units {
-    /// The areas of 32-bit units. If the exponential's area is not given, it is solved from the paper's ratio.
-    fn single(table: &AreaConfig) -> Self {
-        let mut units = Self { add: table.add_um2, mul: table.mul_um2, div: table.div_um2, exp: table.exp_um2 };
-        if units.exp == 0.0 {
-            units.exp = (table.enhanced_ratio * units.there() - units.added()).max(0.0);
-        }
-        units
-    }
-
-    /// The areas of 16-bit units. Divider and exponential shrink as multipliers do.
-    fn half(table: &AreaConfig) -> Self {
-        let single = Self::single(table);
-        let shrink = table.half_mul_um2 / table.mul_um2;
-        Self { add: table.half_add_um2, mul: table.half_mul_um2, div: single.div * shrink, exp: single.exp * shrink }
-    }
-
-    /// The area of a PE for triangles.
-    fn there(&self) -> f64 {
-        9.0 * self.add + 9.0 * self.mul + self.div
-    }
-
-    /// The area that Gaussians add to a PE.
-    fn added(&self) -> f64 {
-        2.0 * self.add + self.mul + self.exp
-    }
+/// The same of 16-bit units. Divider and exponential shrink as multipliers do.
+fn half_units(table: &AreaConfig) -> PerUnit {
+    let single = single_units(table);
+    let shrink = table.half_mul_um2 / table.mul_um2;
+    PerUnit { add: table.half_add_um2, mul: table.half_mul_um2, div: single.div * shrink, exp: single.exp * shrink }
 }
 
 /// The area of a configuration's components. Units have 16 bits if its numbers have at most two bytes.
 pub fn area(config: &Config) -> Area {
     let table = &config.area;
-    let units = if config.rasterizer.is_half() { Units::half(table) } else { Units::single(table) };
+    let units = if config.rasterizer.is_half() { half_units(table) } else { single_units(table) };
+    let (triangle, added) = (units.sum(Operations::TRIANGLE), units.sum(ADDED));
     // Areas shrink as the square of the feature size.
     let shrink = (table.technology_nm / table.reference_nm).powi(2) * 1e-6;
     let pes = f64::from(config.rasterizer.pes());
     let buffer_bytes = config.rasterizer.primitive_buffer_bytes() + config.rasterizer.pixel_buffer_bytes();
     let buffers = 8.0 * buffer_bytes * table.sram_um2_per_bit * shrink;
     let module_pes = f64::from(config.rasterizer.pes_per_module);
-    let in_soc = units.added() * shrink * pes / config.soc.node_scaling;
+    let in_soc = added * shrink * pes / config.soc.node_scaling;
     Area {
-        pe_triangle: units.there() * shrink,
-        pe_added: units.added() * shrink,
+        pe_triangle: triangle * shrink,
+        pe_added: added * shrink,
         exponential: units.exp * shrink,
-        module: module_pes * (units.there() + units.added()) * shrink + buffers,
+        module: module_pes * (triangle + added) * shrink + buffers,
         list_writer: match config.rasterizer.records {
             Records::Gathered => 0.0,
             Records::Listed => config.list_writer.area_mm2,
         },
         buffers,
-        added: units.added() * shrink * pes,
+        added: added * shrink * pes,
         added_in_soc: in_soc,
         share_of_soc: in_soc / config.soc.area_mm2,
-        ratio: units.added() / units.there(),
-        added_half: Units::half(table).added() * shrink * pes,
+        ratio: added / triangle,
+        added_half: half_units(table).sum(ADDED) * shrink * pes,
     }
 }
 

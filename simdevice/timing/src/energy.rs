@@ -6,7 +6,7 @@
 
 use crate::area;
 use crate::config::{Config, EnergyConfig, Rasterizer};
-use crate::pe::Operations;
+use crate::pe::{Operations, PerUnit};
 use crate::raster::RasterReport;
 use crate::work::Mode;
 use serde::Serialize;
@@ -52,37 +52,18 @@ impl Energy {
     }
 }
 
-/// Picojoules of one use of each unit, in the table's technology.
-#[derive(Clone, Copy)]
-struct Units {
-    add: f64,
-    mul: f64,
-    div: f64,
-    exp: f64,
-}
-
-impl Units {
-    /// The units for numbers of the configuration's width.
-    fn of(config: &Config) -> Self {
-        let table: &EnergyConfig = &config.energy;
-        if config.rasterizer.is_half() {
-            return Self {
-                add: table.half_add_pj,
-                mul: table.half_mul_pj,
-                div: table.half_div_pj,
-                exp: table.half_exp_pj,
-            };
-        }
-        Self { add: table.add_pj, mul: table.mul_pj, div: table.div_pj, exp: table.exp_pj }
+/// Picojoules of one use of each unit, in the table's technology, for numbers of the configuration's width.
+fn units_of(config: &Config) -> PerUnit {
+    let table: &EnergyConfig = &config.energy;
+    if config.rasterizer.is_half() {
+        return PerUnit {
+            add: table.half_add_pj,
+            mul: table.half_mul_pj,
+            div: table.half_div_pj,
+            exp: table.half_exp_pj,
+        };
     }
-
-    /// The energy of operations, in pJ.
-    fn spend(&self, count: Operations) -> f64 {
-        count.add as f64 * self.add
-            + count.mul as f64 * self.mul
-            + count.div as f64 * self.div
-            + count.exp as f64 * self.exp
-    }
+    PerUnit { add: table.add_pj, mul: table.mul_pj, div: table.div_pj, exp: table.exp_pj }
 }
 
 /// Bytes of the buffer that [`EnergyConfig::sram_pj_per_bit`] is of.
@@ -109,19 +90,19 @@ fn pixel_pj_per_byte(config: &Config) -> f64 {
 /// The energy of one evaluation, in pJ of the table's technology: arithmetic, then buffers. `blended` is the share of
 /// evaluations whose Gaussian is blended; for the others the units for blending are gated.
 pub fn evaluation_pj(mode: Mode, blended: f64, config: &Config) -> [f64; 2] {
-    let (units, raster) = (Units::of(config), &config.rasterizer);
+    let (units, raster) = (units_of(config), &config.rasterizer);
     let number = f64::from(raster.number_bytes);
     let (arithmetic, bytes) = match mode {
         Mode::Triangle => {
             let out = f64::from(raster.numbers_out) * number;
             // Depth is read and compared at each pixel; pixels that pass are written.
-            (units.spend(Operations::TRIANGLE), number + out * blended)
+            (units.sum(Operations::TRIANGLE), number + out * blended)
         }
         Mode::Gaussian => {
-            let gated = units.spend(Operations::BLEND) * (1.0 - blended);
+            let gated = units.sum(Operations::BLEND) * (1.0 - blended);
             // Transmittance is read at each pixel. Where the Gaussian is blended, colour is read and both are written.
             let bytes = number + blended * number * (2.0 * f64::from(raster.numbers_out) + 1.0);
-            (units.spend(Operations::GAUSSIAN) - gated, bytes)
+            (units.sum(Operations::GAUSSIAN) - gated, bytes)
         }
     };
     [arithmetic, bytes * pixel_pj_per_byte(config)]

@@ -16,6 +16,29 @@ pub struct Operations {
     pub exp: u64,
 }
 
+/// A number for a use of each unit, such as an area or an energy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PerUnit {
+    /// Of an adder.
+    pub(crate) add: f64,
+    /// Of a multiplier.
+    pub(crate) mul: f64,
+    /// Of a divider.
+    pub(crate) div: f64,
+    /// Of an exponential unit.
+    pub(crate) exp: f64,
+}
+
+impl PerUnit {
+    /// The sum over uses of units.
+    pub(crate) fn sum(&self, uses: Operations) -> f64 {
+        uses.add as f64 * self.add
+            + uses.mul as f64 * self.mul
+            + uses.div as f64 * self.div
+            + uses.exp as f64 * self.exp
+    }
+}
+
 impl Operations {
     /// The operations of a PE for one pixel and triangle; GauRast, Table II.
     pub const TRIANGLE: Self = Self { add: 9, mul: 9, div: 1, exp: 0 };

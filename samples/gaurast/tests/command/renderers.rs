@@ -367,13 +367,16 @@ fn gsplat_s_pictures_are_drawn() {
     let folder = folder();
     let rules = Rules {
         near: 0.01,
-        ceiling: 0.999,
+        ceiling: 0.99,
         compensated: false,
         ratio_floor: 0.0,
         by_distance: false,
         is_within: within_rectangle,
     };
     let open = check(&folder, &["--as", "gsplat"], &rules);
+    assert!(open <= FEW, "{open}");
+    let older = Rules { ceiling: 0.999, ..rules };
+    let open = check(&folder, &["--as", "gsplat-1.5"], &older);
     assert!(open <= FEW, "{open}");
     let compensated = Rules { compensated: true, ..rules };
     let arguments = ["--as", "gsplat", "--antialiasing", "compensated"];
@@ -401,7 +404,7 @@ fn renderers_differ_and_pictures_are_compared_with_them() {
     let folder = folder();
     let plain = drawn(&folder, &["--near", "0.2"]);
     let mut pictures = vec![plain];
-    for renderer in ["inria", "gsplat", "gltf"] {
+    for renderer in ["inria", "gsplat", "gsplat-1.5", "gltf"] {
         pictures.push(drawn(&folder, &["--as", renderer]));
     }
     for (index, picture) in pictures.iter().enumerate() {

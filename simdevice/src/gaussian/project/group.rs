@@ -132,8 +132,7 @@ fn append(view: &ViewConstants, lanes: &[ColoredLane], scratch: &Scratch, projec
         projected.ray_depths.extend(depths);
     }
     if view.is_tracked {
-        let identities =
-            lanes.iter().map(|one| Identity { z: scratch.depth[one.at] as f32, sequence: sequences[one.at] });
+        let identities = lanes.iter().map(|one| Identity::new(scratch.depth[one.at], sequences[one.at]));
         projected.identities.extend(identities);
     }
 }

@@ -302,8 +302,7 @@ impl Shading {
             projected.splats.push(splat);
             projected.reaches.push(scratch.reaches.get(at));
             if constants.is_tracked {
-                let z = w[at] as f32;
-                projected.identities.push(Identity { z, sequence });
+                projected.identities.push(Identity::new(w[at], sequence));
             }
         }
         let drawn = projected.splats.len() as u64;

@@ -64,6 +64,13 @@ fn tile_of(pixel: f64) -> u16 {
     (middle + (3u64 << 51) as f64).to_bits() as u16
 }
 
+/// The tiles of a row that contain the pixels from the first to the last. Limits on the framebuffer's size make their numbers fit into
+/// 16 bits.
+#[inline(always)]
+fn tiles_of([first, last]: [f64; 2]) -> TileSpan {
+    TileSpan { first: tile_of(first), end: tile_of(last) + 1 }
+}
+
 impl Ellipse {
     /// The tiles whose visible pixel centres the ellipse may contain, or `None` if there are none. Spans that do not
     /// fit inline go to `others`.
@@ -86,12 +93,10 @@ impl Ellipse {
         let (Some([left, right]), Some([top, bottom])) = (columns, rows) else {
             return None;
         };
-        // Limits on the framebuffer's size make tile numbers fit into 16 bits.
-        let span = |[left, right]: [f64; 2]| TileSpan { first: tile_of(left), end: tile_of(right) + 1 };
         let row = tile_of(top);
         let rows = tile_of(bottom) - row + 1;
         let clipped = left == first_x || right == last_x || top == first_y || bottom == last_y;
-        let boxed = span([left, right]);
+        let boxed = tiles_of([left, right]);
         let one = boxed.end - boxed.first == 1 && rows == 1 && !clipped;
         let mut reach = TileFootprint::new(row, rows, others);
         let Some(beside) = beside.filter(|_| !one) else {
@@ -104,12 +109,9 @@ impl Ellipse {
         let mut reached = 0;
         let mut row_top = f64::from(row) * tile;
         for number in 0..rows {
-            let above = larger(top, row_top) + 0.5 - y;
-            let below = smaller(bottom, row_top + (tile - 1.0)) + 0.5 - y;
+            let in_row = [larger(top, row_top), smaller(bottom, row_top + (tile - 1.0))];
             row_top += tile;
-            let [low, high] = self.sides(above, below);
-            if let Some(columns) = centres(x + low, x + high, first_x, last_x) {
-                let span = span(columns);
+            if let Some(span) = self.span_between(in_row, [first_x, last_x]) {
                 reached += u64::from(span.end - span.first);
                 reach.set(others, number, span);
             }
@@ -128,14 +130,21 @@ impl Ellipse {
 
     /// The tiles of one of its [rows](Ellipse::rows) whose visible pixel centres the ellipse may contain.
     pub(crate) fn span(&self, visible: &Visible, row: u16) -> Option<TileSpan> {
-        let ([x, y], half_y) = (self.mean, self.half[1]);
-        let ([first_x, last_x], [first_y, last_y]) = (visible.pixels(0), visible.pixels(1));
-        let row_top = f64::from(row) * f64::from(TILE_SIZE);
-        let (first_y, last_y) = (larger(first_y, row_top), smaller(last_y, row_top + f64::from(TILE_SIZE) - 1.0));
-        let [top, bottom] = centres(y - half_y, y + half_y, first_y, last_y)?;
+        let (y, half_y) = (self.mean[1], self.half[1]);
+        let [first, last] = visible.pixels(1);
+        let top = f64::from(row) * f64::from(TILE_SIZE);
+        let (first, last) = (larger(first, top), smaller(last, top + f64::from(TILE_SIZE) - 1.0));
+        let in_row = centres(y - half_y, y + half_y, first, last)?;
+        self.span_between(in_row, visible.pixels(0))
+    }
+
+    /// The tiles whose pixel centres the ellipse may contain between two rows of pixels of one row of tiles, among the `visible`
+    /// columns of pixels from the first to the last.
+    #[inline(always)]
+    fn span_between(&self, [top, bottom]: [f64; 2], visible: [f64; 2]) -> Option<TileSpan> {
+        let ([x, y], [first, last]) = (self.mean, visible);
         let [low, high] = self.sides(top + 0.5 - y, bottom + 0.5 - y);
-        let [left, right] = centres(x + low, x + high, first_x, last_x)?;
-        Some(TileSpan { first: tile_of(left), end: tile_of(right) + 1 })
+        centres(x + low, x + high, first, last).map(tiles_of)
     }
 
     /// The blocks of 4x4 pixels, in the tile at `corner`, whose pixel centres the ellipse may contain: a bit for each, row by row.

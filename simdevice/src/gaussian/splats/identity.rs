@@ -7,10 +7,18 @@ use devmem::host;
 /// A Gaussian that is drawn, among those of its set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Identity {
-    /// The depth variable, rounded to binary32.
+    /// The depth variable, rounded to binary32; finite.
     pub(crate) z: f32,
     /// Its number in the set.
     pub(crate) sequence: u32,
+}
+
+impl Identity {
+    /// The identity of a Gaussian with a depth variable and a number in the set. Sums add products of depth variables and weights
+    /// that may be zero, so that none is infinite.
+    pub(crate) fn new(z: f64, sequence: u32) -> Self {
+        Self { z: (z as f32).clamp(f32::MIN, f32::MAX), sequence }
+    }
 }
 
 /// The draws of a set, by which the number of a Gaussian becomes a vertex and an instance.
@@ -80,6 +88,12 @@ mod tests {
     use super::*;
     use devmem::Allocation;
     use devmem::BufferRange;
+
+    #[gaurast_runner::test]
+    fn depth_variables_are_finite() {
+        let z = [1e300, -1e300, f64::INFINITY, 0.1].map(|z| Identity::new(z, 0).z);
+        assert_eq!(z, [f32::MAX, f32::MIN, f32::MAX, 0.1]);
+    }
 
     #[gaurast_runner::test]
     fn numbers_become_vertices_and_instances_of_their_draws() {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::gaussian::splats::identity::Identity;
 
-/// What a pixel shows of Gaussians, as the twin finds it.
+/// The Gaussians that a pixel shows, as the twin finds them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct NaiveTracked {
     nearest: Option<Identity>,
