@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import threading
 
 import numpy as np
@@ -172,6 +173,20 @@ def test_tensors_that_are_refused_say_what_to_do(arrays):
         call(scene, OnGpu())
     with pytest.raises(NotImplementedError, match=r"colors.detach\(\)"):
         call(scene, Trained())
+
+
+def test_results_are_jaxs_where_arguments_are(arrays):
+    if importlib.util.find_spec("jax") is None:
+        pytest.skip("jax is missing")
+    import jax
+
+    scene = arrays(7, 100)
+    picture, alpha, _ = call(scene, scene.colors)
+    for name in ("means", "quats", "scales", "opacities", "colors", "viewmat", "K"):
+        setattr(scene, name, jax.numpy.asarray(getattr(scene, name)))
+    found, alphas, _ = call(scene, scene.colors)
+    assert isinstance(found, jax.Array) and isinstance(alphas, jax.Array)
+    assert np.array_equal(found, picture) and np.array_equal(alphas, alpha)
 
 
 def test_a_scenes_own_arrays_are_drawn_as_copies_are():
