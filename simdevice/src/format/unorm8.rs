@@ -4,6 +4,7 @@ use crate::simd::bits_of;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, mask32x16, u32x8, u32x16};
 use isa::float;
+use isa::float::FusedMultiply;
 
 /// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest. The sum of the two
 /// products rounds as the quotient does.
@@ -47,7 +48,7 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     const NO_FRACTION: f32 = 8_388_608.0;
     if float::has_instructions(simd) {
         // This rounds once, to the nearest integer. 127.5 is the only tie.
-        let scaled = value.mul_add_precise(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
+        let scaled = value.fused_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
         return bits_of(scaled);
     }
     // 255 v = 256 v - v. The first term is exact, so that its nearest integer is the result or one more.

@@ -2,6 +2,7 @@
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 use isa::float;
+use isa::float::FusedMultiply;
 
 /// The number of coefficients of degrees 0 to 4.
 pub(crate) const MAX_COEFFICIENTS: usize = 25;
@@ -171,7 +172,7 @@ impl Bases {
     #[inline(always)]
     fn term<S: Simd>(&self, simd: S, at: usize, coefficients: &[f32], k: usize, sum: f32x4<S>) -> f32x4<S> {
         let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-        coefficient.mul_add_precise(f32x4::splat(simd, self.0[k][at]), sum)
+        coefficient.fused_add(f32x4::splat(simd, self.0[k][at]), sum)
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, prelude::*};
+use isa::float::FusedMultiply;
 
 /// A polynomial with few terms for powers of two.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +33,7 @@ impl<const TERMS: usize> Powers<TERMS> {
         let f = (shifter - shifted) - x;
         let mut p = constant(self.coefficients[0]);
         for &coefficient in &self.coefficients[1..] {
-            p = p.mul_add_precise(f, constant(coefficient));
+            p = p.fused_add(f, constant(coefficient));
         }
         let exponent = bits_of(shifted) << 23;
         floats_of(bits_of(p) + exponent)
@@ -65,7 +66,7 @@ pub(crate) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let power = floats_of(word + (parts << (23 - EIGHTHS.ilog2())));
     let mut growth = constant(GROWTH[0]);
     for coefficient in &GROWTH[1..] {
-        growth = growth.mul_add_precise(f, constant(*coefficient));
+        growth = growth.fused_add(f, constant(*coefficient));
     }
-    (power * f).mul_add_precise(growth, power)
+    (power * f).fused_add(growth, power)
 }

@@ -3,6 +3,7 @@
 //! 32-bit operations that SIMD vectors have are written with vectors of 16 lanes; the rest lane by lane, which the Rust
 //! compiler vectorises where it can. A step holds a pointer to its kernel, so that decoding it is one indirect call.
 
+use crate::kernels::float::FusedMultiply;
 use std::cmp::Ordering;
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
@@ -119,9 +120,9 @@ pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
         Op::FAdd => float!(|a, b| a + b),
         Op::FSub => float!(|a, b| a - b),
         Op::FMul => float!(|a, b| a * b),
-        Op::FFma => float!(|a, b, c| a.mul_add_precise(b, c)),
-        Op::FMulSub => float!(|a, b, c| a.mul_sub_precise(b, c)),
-        Op::FNegMulAdd => float!(|a, b, c| (-a).mul_add_precise(b, c)),
+        Op::FFma => float!(|a, b, c| a.fused_add(b, c)),
+        Op::FMulSub => float!(|a, b, c| a.fused_sub(b, c)),
+        Op::FNegMulAdd => float!(|a, b, c| (-a).fused_add(b, c)),
         Op::FDiv => float!(|a, b| a / b),
         Op::FNeg => float!(|a| -a),
         Op::FAbs => float!(|a| a.abs()),

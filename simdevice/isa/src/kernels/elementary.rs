@@ -5,6 +5,7 @@
 //! place. The Vulkan specification allows 3 + 2|x| ULP (exp), 3 ULP (log), 2^-11 absolute (sin, cos) and 4096 ULP
 //! (inverse trigonometric functions).
 
+use crate::kernels::float::FusedMultiply;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI, SQRT_2};
 
@@ -98,7 +99,7 @@ fn splat<S: Simd>(like: F<S>, value: f32) -> F<S> {
 fn polynomial<S: Simd, const N: usize>(x: F<S>, coefficients: [f32; N]) -> F<S> {
     let mut sum = splat(x, coefficients[0]);
     for coefficient in &coefficients[1..] {
-        sum = sum.mul_add_precise(x, splat(x, *coefficient));
+        sum = sum.fused_add(x, splat(x, *coefficient));
     }
     sum
 }
@@ -130,10 +131,10 @@ const GREATEST_EXPONENT: f32 = 88.722_83;
 fn exp_biased<S: Simd>(x: F<S>, bias: i32) -> F<S> {
     let clamped = x.max(splat(x, -104.0)).min(splat(x, 90.0));
     let n = round_ties_even(clamped * LOG2_E);
-    let r = n.mul_add_precise(splat(x, -0.693_359_4), clamped);
-    let r = n.mul_add_precise(splat(x, 2.121_944_4e-4), r);
+    let r = n.fused_add(splat(x, -0.693_359_4), clamped);
+    let r = n.fused_add(splat(x, 2.121_944_4e-4), r);
     let p = polynomial(r, [1.987_569_1e-4, 1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5e-1]);
-    let y = (r * r).mul_add_precise(p, r) + 1.0;
+    let y = (r * r).fused_add(p, r) + 1.0;
     let y = scale(y, I::truncate_from(n) + bias);
     x.is_nan().select(x, y)
 }
@@ -188,7 +189,7 @@ fn logarithm<S: Simd>(x: F<S>) -> Logarithm<S> {
             3.333_333e-1,
         ],
     );
-    let p = z.mul_add_precise(splat(x, -0.5), p * f * z);
+    let p = z.fused_add(splat(x, -0.5), p * f * z);
     Logarithm { exponent, fraction: f, polynomial: p }
 }
 
@@ -204,8 +205,8 @@ fn logarithm_or_special<S: Simd>(x: F<S>, y: F<S>) -> F<S> {
 #[inline(always)]
 fn log<S: Simd>(x: F<S>) -> F<S> {
     let Logarithm { exponent, fraction, polynomial } = logarithm(x);
-    let low = exponent.mul_add_precise(splat(x, -2.121_944_4e-4), polynomial);
-    let y = exponent.mul_add_precise(splat(x, 0.693_359_4), fraction + low);
+    let low = exponent.fused_add(splat(x, -2.121_944_4e-4), polynomial);
+    let y = exponent.fused_add(splat(x, 0.693_359_4), fraction + low);
     logarithm_or_special(x, y)
 }
 
@@ -229,9 +230,9 @@ fn pow<S: Simd>(x: F<S>, y: F<S>) -> F<S> {
 #[inline(always)]
 fn reduce<S: Simd>(x: F<S>) -> (F<S>, I<S>) {
     let n = round_ties_even(x * FRAC_2_PI);
-    let r = n.mul_add_precise(splat(x, -1.570_312_5), x);
-    let r = n.mul_add_precise(splat(x, -4.837_513e-4), r);
-    let r = n.mul_add_precise(splat(x, -7.549_79e-8), r);
+    let r = n.fused_add(splat(x, -1.570_312_5), x);
+    let r = n.fused_add(splat(x, -4.837_513e-4), r);
+    let r = n.fused_add(splat(x, -7.549_79e-8), r);
     (r, I::truncate_from(n))
 }
 
@@ -251,13 +252,13 @@ fn or_exact<S: Simd>(x: F<S>, y: F<S>, exact: fn(f64) -> f64) -> F<S> {
 
 #[inline(always)]
 fn sine_polynomial<S: Simd>(r: F<S>, z: F<S>) -> F<S> {
-    (polynomial(z, [-1.951_529_6e-4, 8.332_161e-3, -1.666_665_5e-1]) * z).mul_add_precise(r, r)
+    (polynomial(z, [-1.951_529_6e-4, 8.332_161e-3, -1.666_665_5e-1]) * z).fused_add(r, r)
 }
 
 #[inline(always)]
 fn cosine_polynomial<S: Simd>(z: F<S>) -> F<S> {
     let p = polynomial(z, [2.443_315_7e-5, -1.388_731_6e-3, 4.166_664_6e-2]);
-    (p * z).mul_add_precise(z, z * -0.5) + 1.0
+    (p * z).fused_add(z, z * -0.5) + 1.0
 }
 
 /// The sine of `x` plus `quarters` quarter turns.
@@ -288,7 +289,7 @@ fn tan<S: Simd>(x: F<S>) -> F<S> {
     let (r, n) = reduce(x);
     let z = r * r;
     let p = polynomial(z, [9.385_402e-3, 3.119_922_4e-3, 2.443_013_5e-2, 5.341_128e-2, 1.333_88e-1, 3.333_315_7e-1]);
-    let y = (p * z).mul_add_precise(r, r);
+    let y = (p * z).fused_add(r, r);
     let odd: M<S> = (n & 1).simd_eq(I::splat(x.simd, 1));
     let y = or_exact(x, odd.select(splat(x, -1.0) / y, y), libm::tan);
     x.simd_eq(splat(x, 0.0)).select(x, y)
@@ -298,7 +299,7 @@ fn tan<S: Simd>(x: F<S>) -> F<S> {
 #[inline(always)]
 fn asin_polynomial<S: Simd>(x: F<S>, z: F<S>) -> F<S> {
     let p = polynomial(z, [4.216_32e-2, 2.418_131_2e-2, 4.547_002_6e-2, 7.495_3e-2, 1.666_675_2e-1]);
-    (p * z).mul_add_precise(x, x)
+    (p * z).fused_add(x, x)
 }
 
 #[inline(always)]
@@ -340,7 +341,7 @@ fn atan_positive<S: Simd>(t: F<S>) -> F<S> {
     let x = numerator / denominator;
     let z = x * x;
     let p = polynomial(z, [8.053_744_5e-2, -1.387_768_6e-1, 1.997_771e-1, -3.333_295e-1]);
-    base + (p * z).mul_add_precise(x, x)
+    base + (p * z).fused_add(x, x)
 }
 
 #[inline(always)]
@@ -375,7 +376,7 @@ fn half_of_exp<S: Simd>(x: F<S>) -> F<S> {
 fn sinh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
-    let near = (polynomial(z, [2.037_219_1e-4, 8.330_284e-3, 1.666_671_6e-1]) * z).mul_add_precise(a, a);
+    let near = (polynomial(z, [2.037_219_1e-4, 8.330_284e-3, 1.666_671_6e-1]) * z).fused_add(a, a);
     let half = half_of_exp(a);
     let far = half - splat(x, 0.25) / half;
     with_sign(a.simd_lt(splat(x, 1.0)).select(near, far), x)
@@ -392,7 +393,7 @@ fn tanh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
     let p = polynomial(z, [-5.704_988_7e-3, 2.063_909e-2, -5.373_971_6e-2, 1.333_144_2e-1, -3.333_328e-1]);
-    let near = (p * z).mul_add_precise(a, a);
+    let near = (p * z).fused_add(a, a);
     let far = splat(x, 1.0) - splat(x, 2.0) / (exp(a + a) + 1.0);
     with_sign(a.simd_lt(splat(x, 0.625)).select(near, far), x)
 }
@@ -402,7 +403,7 @@ fn asinh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
     let p = polynomial(z, [2.012_200_3e-2, -4.269_934e-2, 7.484_759e-2, -1.666_628_8e-1]);
-    let near = (p * z).mul_add_precise(a, a);
+    let near = (p * z).fused_add(a, a);
     let huge = a.simd_gt(splat(x, 1500.0));
     let sum = huge.select(a, a + (z + 1.0).sqrt());
     let far = log(sum) + huge.select(splat(x, LN_2), splat(x, 0.0));
@@ -426,7 +427,7 @@ fn atanh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
     let p = polynomial(z, [1.817_400_8e-1, 8.243_703e-2, 1.466_914_3e-1, 1.997_821_6e-1, 3.333_373e-1]);
-    let near = (p * z).mul_add_precise(a, a);
+    let near = (p * z).fused_add(a, a);
     let one = splat(x, 1.0);
     let far = log((one + a) / (one - a)) * 0.5;
     with_sign(a.simd_lt(splat(x, 0.5)).select(near, far), x)

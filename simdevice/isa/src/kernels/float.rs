@@ -5,7 +5,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "instructions where the level has them")]
 
-use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, f32x4, f32x16, i32x4, i32x16, prelude::*};
 
 /// A vector of binary32 numbers.
 pub trait Floats<S: Simd>: SimdFloat<S, Element = f32> {}
@@ -125,6 +125,57 @@ rounding64! {
 #[inline(always)]
 pub fn fract64<S: Simd>(simd: S, a: f64) -> f64 {
     a - floor64(simd, a)
+}
+
+/// Products of floats that are added to or subtracted from, and rounded once.
+pub trait FusedMultiply<S: Simd>: Floats<S> {
+    /// `self * b + c`, rounded once.
+    #[inline(always)]
+    fn fused_add(self, b: Self, c: Self) -> Self {
+        let simd = self.token();
+        if has_instructions(simd) {
+            return self.mul_add_precise(b, c);
+        }
+        let mut lanes = self;
+        fuse(simd, lanes.as_mut_slice(), b.as_slice(), c.as_slice());
+        lanes
+    }
+
+    /// `self * b - c`, rounded once.
+    #[inline(always)]
+    fn fused_sub(self, b: Self, c: Self) -> Self {
+        self.fused_add(b, -c)
+    }
+}
+
+impl<S: Simd, F: Floats<S>> FusedMultiply<S> for F {}
+
+/// Makes `a * b + c` of each lane of `a`, rounded once without an instruction for it. It takes many instructions, which are
+/// here once, and not in each kernel.
+#[inline(never)]
+fn fuse<S: Simd>(simd: S, a: &mut [f32], b: &[f32], c: &[f32]) {
+    for ((a, b), c) in a.chunks_exact_mut(4).zip(b.chunks_exact(4)).zip(c.chunks_exact(4)) {
+        fuse4(f32x4::from_slice(simd, a), f32x4::from_slice(simd, b), f32x4::from_slice(simd, c)).store_slice(a);
+    }
+}
+
+/// `a * b + c` by way of binary64, in which the product is exact and a sum of zero too. Rounding the sum a second time gives
+/// another result only if the sum is in the middle of two floats, or has fewer bits because it is denormal: then
+/// `mul_add_precise` rounds to odd first.
+#[inline(always)]
+fn fuse4<S: Simd>(a: f32x4<S>, b: f32x4<S>, c: f32x4<S>) -> f32x4<S> {
+    /// The bits of a binary64 number's lower half that are not in a float, and their value in the middle of two floats.
+    const REST: i32 = 0x1fff_ffff;
+    const MIDDLE: i32 = 0x1000_0000;
+    /// The upper half of 2^-126, the smallest number that is not denormal, and one more.
+    const NORMAL: i32 = 0x3810_0001;
+    let ((a_low, a_high), (b_low, b_high), (c_low, c_high)) = (a.widen(), b.widen(), c.widen());
+    let (low, high) = (a_low * b_low + c_low, a_high * b_high + c_high);
+    let (low_bits, high_bits) = (low.bitcast::<i32x4<S>>(), high.bitcast::<i32x4<S>>());
+    let is_middle = (low_bits.unzip_low(high_bits) & REST).simd_eq(MIDDLE);
+    let magnitude = low_bits.unzip_high(high_bits) & i32::MAX;
+    let is_denormal = magnitude.simd_gt(0) & magnitude.simd_lt(NORMAL);
+    if (is_middle | is_denormal).any_true() { a.mul_add_precise(b, c) } else { low.narrow(high) }
 }
 
 /// `a * b + c`, rounded once.

@@ -9,6 +9,7 @@ use crate::gaussian::read::clusters::Bounds;
 use crate::gaussian::view::constants::ViewConstants;
 use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
+use isa::float::FusedMultiply;
 
 #[cfg(test)]
 mod tests;
@@ -185,7 +186,7 @@ impl Frustum {
             let size = x.abs() + y.abs() + z.abs() + far_off;
             let (x, y, z) = (x - rest[0], y - rest[1], z - rest[2]);
             let ([nx, ny, nz], error) = depth;
-            let t = x.mul_add_precise(nx, y.mul_add_precise(ny, z * nz));
+            let t = x.fused_add(nx, y.fused_add(ny, z * nz));
             let slack = size * error;
             outside.near.set(at, (t + slack).simd_le(near));
             outside.far.set(at, (t - slack).simd_ge(far));
@@ -193,8 +194,8 @@ impl Frustum {
             let scale = load(sx).max(load(sy)).max(load(sz));
             let mut beside = S::mask32s::splat(simd, false);
             for &([nx, ny, nz], per_scale, offset, error) in planes {
-                let slack = size.mul_add_precise(error, scale.mul_add_precise(per_scale, offset));
-                let value = x.mul_add_precise(nx, y.mul_add_precise(ny, z.mul_add_precise(nz, slack)));
+                let slack = size.fused_add(error, scale.fused_add(per_scale, offset));
+                let value = x.fused_add(nx, y.fused_add(ny, z.fused_add(nz, slack)));
                 beside |= value.simd_lt(0.0);
             }
             outside.beside.set(at, beside);

@@ -6,6 +6,7 @@ use crate::gaussian::read::group::GroupAttributes;
 use crate::gaussian::read::harmonics::Harmonics;
 use crate::gaussian::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS};
 use fearless_simd::{Simd, f32x16, prelude::*};
+use isa::float::FusedMultiply;
 
 /// The vectors from the eye to the means of the kept Gaussians, in the axes of the Gaussians' own space.
 pub(crate) fn toward<'a>(group: &GroupAttributes<'_>, scratch: &'a Scratch) -> &'a [GroupF64; 3] {
@@ -24,7 +25,7 @@ const SQUARES: [f32; 2] = [1e-20, 1e20];
 #[inline(always)]
 pub(crate) fn normalize<S: Simd>(simd: S, vectors: &mut [[f32; DIRECTIONS]; 3]) -> bool {
     let [x, y, z] = vectors.each_ref().map(|lanes| f32x16::from_slice(simd, lanes));
-    let square = z.mul_add_precise(z, y.mul_add_precise(y, x * x));
+    let square = z.fused_add(z, y.fused_add(y, x * x));
     let [least, greatest] = SQUARES;
     if !square.max(least).min(greatest).simd_eq(square).all_true() {
         return false;

@@ -21,6 +21,7 @@ use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
 use isa::float;
+use isa::float::FusedMultiply;
 
 #[cfg(test)]
 mod tests;
@@ -165,7 +166,7 @@ impl<S: Simd> Ellipses<S> {
             narrowing: shapes.determinant * per_c * per_c,
             peak: b * per_a * half_x,
             square: rise * rise,
-            margin: slope.abs().mul_add_precise(margin, margin),
+            margin: slope.abs().fused_add(margin, margin),
             across: Range::new(x - wide, x + wide, columns),
             along: Range::new(y - tall, y + tall, rows),
             columns,
@@ -188,7 +189,7 @@ impl<S: Simd> Ellipses<S> {
         let to_left = (zero - self.peak).max(above).min(below);
         let to_right = self.peak.max(above).min(below);
         let width = |height: S::f32s| {
-            let square = height.mul_add_precise(zero - height, self.square);
+            let square = height.fused_add(zero - height, self.square);
             (self.narrowing * square.max(zero)).sqrt() + self.margin
         };
         let low = x + (self.slope * to_left - width(to_left));

@@ -11,6 +11,7 @@ use crate::format::depth::DepthEncoding;
 use crate::gaussian::splats::identity::Identity;
 use crate::gaussian::splats::splat::SplatLook;
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+use isa::float::FusedMultiply;
 
 /// The sums of a block's pixels.
 ///
@@ -58,15 +59,15 @@ impl<S: Simd> Pixels<S> {
     #[inline(always)]
     pub(super) fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
         let t = self.transmittance;
-        Passed { weight: t * alpha, rest: t.mul_add_precise(-alpha, t) }
+        Passed { weight: t * alpha, rest: t.fused_add(-alpha, t) }
     }
 
     /// Adds so much of a colour.
     #[inline(always)]
     pub(super) fn add(&mut self, simd: S, weight: f32x16<S>, [red, green, blue]: [f32; 3]) {
-        self.red = weight.mul_add_precise(f32x16::splat(simd, red), self.red);
-        self.green = weight.mul_add_precise(f32x16::splat(simd, green), self.green);
-        self.blue = weight.mul_add_precise(f32x16::splat(simd, blue), self.blue);
+        self.red = weight.fused_add(f32x16::splat(simd, red), self.red);
+        self.green = weight.fused_add(f32x16::splat(simd, green), self.green);
+        self.blue = weight.fused_add(f32x16::splat(simd, blue), self.blue);
     }
 }
 
@@ -205,10 +206,10 @@ impl<S: Simd> Shown<S> {
             return;
         }
         let depth = f32x16::splat(simd, self.depth_unit.decode(look.depth));
-        self.depth_sum = weight.mul_add_precise(depth, self.depth_sum);
+        self.depth_sum = weight.fused_add(depth, self.depth_sum);
         self.weight_sum += weight;
         if self.mode.tracks() {
-            self.z_sum = weight.mul_add_precise(f32x16::splat(simd, identity.z), self.z_sum);
+            self.z_sum = weight.fused_add(f32x16::splat(simd, identity.z), self.z_sum);
         }
     }
 }

@@ -5,6 +5,7 @@ use super::inputs::TileInputs;
 use crate::gaussian::splats::splat::Splat;
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f64x4, mask32x16, prelude::*};
+use isa::float::FusedMultiply;
 
 /// A bound of rounding's effect on exponents, relative to them.
 pub(crate) const RANGE_FACTOR: f32 = 1.0 + 1e-5;
@@ -29,11 +30,12 @@ pub(crate) fn reached_blocks<S: Simd>(
     let v = upper.combine(lower);
     let [a, b, c] = [a as f32, b as f32, c as f32];
     let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
-    let log2_range = log2_opacity.mul_add_precise(RANGE_FACTOR, neg_log2_floor * RANGE_FACTOR + 1e-3);
+    let factor = f32x8::splat(simd, RANGE_FACTOR);
+    let log2_range = log2_opacity.fused_add(factor, f32x8::splat(simd, neg_log2_floor * RANGE_FACTOR + 1e-3));
     let least_u = (u.abs() - HALF * a.abs()).max(0.0);
     let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
     let least_u = least_u * least_u;
-    let least = least_v.mul_add_precise(least_v, least_u.combine(least_u));
+    let least = least_v.fused_add(least_v, least_u.combine(least_u));
     least.simd_le(log2_range.combine(log2_range))
 }
 

@@ -11,6 +11,7 @@ use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::{bits_of, both, spread, three};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::Vector;
+use isa::float::FusedMultiply;
 use isa::machine::{LaneMask, Machine};
 
 /// The number of lanes of the largest batch.
@@ -616,7 +617,7 @@ impl Batch {
 /// A varying at these barycentrics, given its value at corner 0 and its differences to the values at corners 1 and 2.
 #[inline(always)]
 pub fn varying<S: Simd>([a, da, db]: [f32x16<S>; 3], [b1, b2]: [f32x16<S>; 2]) -> f32x16<S> {
-    db.mul_add_precise(b2, da.mul_add_precise(b1, a))
+    db.fused_add(b2, da.fused_add(b1, a))
 }
 
 /// Perspective-correct barycentrics, from the linear ones, 1 / w at the same place, and 1 / w at corners 1 and 2.

@@ -12,6 +12,7 @@ use crate::raster::gaussian::grid::BLOCK_PIXELS;
 use crate::raster::gaussian::inputs::TileInputs;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
+use isa::float::FusedMultiply;
 
 /// Compositing in the order of the list, by sums in binary64.
 pub(crate) struct WideSums(Sums);
@@ -172,7 +173,7 @@ fn accumulate<S: Simd>(
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
         let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);
-        weight.mul_add_precise(depth, sum).store_slice(&mut depths[block]);
+        weight.fused_add(depth, sum).store_slice(&mut depths[block]);
         let sum = f32x16::from_slice(simd, &weights[block]) + weight;
         sum.store_slice(&mut weights[block]);
     }

@@ -12,6 +12,7 @@ use crate::raster::gaussian::pixels::ShownGaussian;
 use crate::raster::gaussian::reached_blocks::{RANGE_FACTOR, hidden_blocks};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, i32x16, mask32x16, prelude::*, u32x16};
+use isa::float::FusedMultiply;
 
 /// The Gaussians of a round that may reach each block: a bit for each.
 pub(crate) type Reaching = [u32; BLOCKS];
@@ -209,12 +210,12 @@ impl StagedRound {
             for (column, u) in u.iter().enumerate() {
                 let u = across + u[number];
                 let to = &mut from_u[2 * number + column];
-                u.mul_sub_precise(u, log2_opacity).store_slice(to);
+                u.fused_sub(u, log2_opacity).store_slice(to);
             }
         }
         let v_of_column = columns * b;
         let rows = f32x16::simd_from(simd, LANE_Y);
-        let along = rows.mul_add_precise(f32x16::splat(simd, c), v_of_column.combine(v_of_column));
+        let along = rows.fused_add(f32x16::splat(simd, c), v_of_column.combine(v_of_column));
         along.store_slice(&mut self.along[number]);
     }
 
@@ -242,7 +243,7 @@ impl StagedRound {
         let (a, b, c) = (wide(&factor[0]), wide(&factor[1]), wide(&factor[2]));
         let log2_opacity = S::f32s::from_slice(simd, &log2_opacity[lanes.clone()]);
         // The base-2 logarithm of the ratio of opacity and floor, with a margin for rounding.
-        let log2_range = log2_opacity.mul_add_precise(
+        let log2_range = log2_opacity.fused_add(
             S::f32s::splat(simd, RANGE_FACTOR),
             S::f32s::splat(simd, thresholds.neg_log2_floor * RANGE_FACTOR + 1e-3),
         );
@@ -272,7 +273,7 @@ impl StagedRound {
                 v.store_slice(&mut self.v[block][lanes.clone()]);
                 // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
                 let least_v = (v.abs() - around_v).max(zero);
-                let least = least_v.mul_add_precise(least_v, least_u[column]);
+                let least = least_v.fused_add(least_v, least_u[column]);
                 let may_reach = least.simd_le(log2_range).to_bitmask();
                 set_bits(&mut reaching[block], first, S::f32s::LEN, may_reach);
             }
@@ -304,7 +305,7 @@ impl StagedRound {
     ) -> f32x16<S> {
         let from_u = f32x8::from_slice(simd, &column[2 * number]);
         let v = f32x16::from_slice(simd, &self.along[number]) + self.v[block][number];
-        v.mul_add_precise(v, from_u.combine(from_u))
+        v.fused_add(v, from_u.combine(from_u))
     }
 }
 
