@@ -1,5 +1,5 @@
 //! `VK_LAYER_GAURAST_validation`, through the loader, over this driver: a table of mistakes, each of which it names by one
-//! message and no other; right uses, of which it says nothing; and samples.
+//! message and no other; right uses, of which it says nothing; and samples. `VK_LAYER_GAURAST_emulation`, over lavapipe.
 //!
 //! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or breaks it in
 //! the one way that it is about, which the driver survives.
@@ -10,6 +10,7 @@ mod contents;
 mod devices;
 mod draws;
 mod dynamic_states;
+mod emulation;
 mod features;
 mod harmonics;
 mod locations;

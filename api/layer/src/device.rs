@@ -1,8 +1,8 @@
 //! Devices: the next layer's commands, what is known, and messages to the application.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
@@ -12,7 +12,7 @@ use crate::next::Next;
 use crate::objects::Objects;
 use crate::recording::Recording;
 use crate::report::Faults;
-use gaurast_layer_interface as interface;
+use gaurast_layer_interface::Live;
 
 /// The greatest number of times that one message is given on a device.
 const REPEATS: u32 = 32;
@@ -46,8 +46,8 @@ pub(crate) struct Device {
     messages: Mutex<HashMap<&'static str, u32>>,
 }
 
-/// The devices that live, by the loader's key.
-static DEVICES: RwLock<BTreeMap<usize, Arc<Device>>> = RwLock::new(BTreeMap::new());
+/// The devices that live.
+static DEVICES: Live<Device> = Live::new();
 
 impl Device {
     /// Makes what the layer knows of a device.
@@ -75,9 +75,7 @@ impl Device {
     /// Remembers a device.
     pub(crate) fn register(self) {
         // SAFETY: the next layer has just made it.
-        let key = unsafe { interface::key(self.handle) };
-        let mut devices = DEVICES.write().unwrap_or_else(PoisonError::into_inner);
-        devices.insert(key, Arc::new(self));
+        unsafe { DEVICES.insert(self.handle, self) };
     }
 
     /// The device of a handle of its own, of a queue or of a command buffer.
@@ -86,9 +84,7 @@ impl Device {
     /// The handle is valid.
     pub(crate) unsafe fn of<H: vk::Handle>(handle: H) -> Option<Arc<Self>> {
         // SAFETY: the caller's promise.
-        let key = unsafe { interface::key(handle) };
-        let devices = DEVICES.read().unwrap_or_else(PoisonError::into_inner);
-        devices.get(&key).cloned()
+        unsafe { DEVICES.of(handle) }
     }
 
     /// Forgets a device, and gives it a last time.
@@ -97,9 +93,7 @@ impl Device {
     /// The handle is valid.
     pub(crate) unsafe fn forget(handle: vk::Device) -> Option<Arc<Self>> {
         // SAFETY: the caller's promise.
-        let key = unsafe { interface::key(handle) };
-        let mut devices = DEVICES.write().unwrap_or_else(PoisonError::into_inner);
-        devices.remove(&key)
+        unsafe { DEVICES.remove(handle) }
     }
 
     /// Locks the state that changes.

@@ -1,13 +1,12 @@
 //! Instances, and the functions of the next layer that belong to them.
 
-use std::collections::BTreeMap;
 use std::ffi::CStr;
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
 
 use ash::vk;
 
 use crate::report::Messengers;
-use gaurast_layer_interface::{self as interface, GetInstanceProcAddr, InstanceLink};
+use gaurast_layer_interface::{GetInstanceProcAddr, InstanceLink, Live, command};
 
 /// The next layer's commands. They are looked up as the instance is created, since the loader's end of the chain gives
 /// the first layer's functions later.
@@ -27,33 +26,22 @@ impl NextOfInstance {
     /// # Safety
     /// The instance was created by the link's layer a moment ago.
     unsafe fn load(handle: vk::Instance, link: &InstanceLink) -> Self {
+        let get = link.get_instance_proc_addr;
         // SAFETY: each name is that of a command of this type.
         unsafe {
             Self {
-                destroy: find(handle, link, c"vkDestroyInstance"),
-                create_messenger: find(handle, link, c"vkCreateDebugUtilsMessengerEXT"),
-                destroy_messenger: find(handle, link, c"vkDestroyDebugUtilsMessengerEXT"),
-                features: find(handle, link, c"vkGetPhysicalDeviceFeatures2")
-                    .or_else(|| find(handle, link, c"vkGetPhysicalDeviceFeatures2KHR")),
-                properties: find(handle, link, c"vkGetPhysicalDeviceProperties2")
-                    .or_else(|| find(handle, link, c"vkGetPhysicalDeviceProperties2KHR")),
-                memory_properties: find(handle, link, c"vkGetPhysicalDeviceMemoryProperties"),
-                format_properties: find(handle, link, c"vkGetPhysicalDeviceFormatProperties"),
+                destroy: command(get, handle, c"vkDestroyInstance"),
+                create_messenger: command(get, handle, c"vkCreateDebugUtilsMessengerEXT"),
+                destroy_messenger: command(get, handle, c"vkDestroyDebugUtilsMessengerEXT"),
+                features: command(get, handle, c"vkGetPhysicalDeviceFeatures2")
+                    .or_else(|| command(get, handle, c"vkGetPhysicalDeviceFeatures2KHR")),
+                properties: command(get, handle, c"vkGetPhysicalDeviceProperties2")
+                    .or_else(|| command(get, handle, c"vkGetPhysicalDeviceProperties2KHR")),
+                memory_properties: command(get, handle, c"vkGetPhysicalDeviceMemoryProperties"),
+                format_properties: command(get, handle, c"vkGetPhysicalDeviceFormatProperties"),
             }
         }
     }
-}
-
-/// A command of the next layer.
-///
-/// # Safety
-/// The instance is valid, and `F` is the type of the command's function.
-unsafe fn find<F: Copy>(handle: vk::Instance, link: &InstanceLink, name: &CStr) -> Option<F> {
-    // SAFETY: the instance lives, and the name is a string.
-    let found = unsafe { (link.get_instance_proc_addr)(handle, name.as_ptr()) }?;
-    const { assert!(size_of::<F>() == size_of::<usize>()) };
-    // SAFETY: function pointers have one size, and the caller knows the type.
-    Some(unsafe { std::mem::transmute_copy(&found) })
 }
 
 /// An instance.
@@ -65,8 +53,8 @@ pub(crate) struct Instance {
     pub(crate) messengers: Messengers,
 }
 
-/// The instances that live, by the loader's key.
-static INSTANCES: RwLock<BTreeMap<usize, Arc<Instance>>> = RwLock::new(BTreeMap::new());
+/// The instances that live.
+static INSTANCES: Live<Instance> = Live::new();
 
 impl Instance {
     /// Remembers an instance.
@@ -83,9 +71,7 @@ impl Instance {
             messengers: Messengers::default(),
         };
         // SAFETY: the next layer has just made it.
-        let key = unsafe { interface::key(handle) };
-        let mut instances = INSTANCES.write().unwrap_or_else(PoisonError::into_inner);
-        instances.insert(key, Arc::new(instance));
+        unsafe { INSTANCES.insert(handle, instance) };
     }
 
     /// The instance of a handle of its own or of a physical device.
@@ -94,9 +80,7 @@ impl Instance {
     /// The handle is valid.
     pub(crate) unsafe fn of<H: vk::Handle>(handle: H) -> Option<Arc<Self>> {
         // SAFETY: the caller's promise.
-        let key = unsafe { interface::key(handle) };
-        let instances = INSTANCES.read().unwrap_or_else(PoisonError::into_inner);
-        instances.get(&key).cloned()
+        unsafe { INSTANCES.of(handle) }
     }
 
     /// Forgets an instance, and gives it a last time.
@@ -105,9 +89,7 @@ impl Instance {
     /// The handle is valid.
     pub(crate) unsafe fn forget(handle: vk::Instance) -> Option<Arc<Self>> {
         // SAFETY: the caller's promise.
-        let key = unsafe { interface::key(handle) };
-        let mut instances = INSTANCES.write().unwrap_or_else(PoisonError::into_inner);
-        instances.remove(&key)
+        unsafe { INSTANCES.remove(handle) }
     }
 
     /// A command of the next layer by name, for the application.

@@ -54,6 +54,38 @@ fn mutants_manifest(folder: &Path) {
     std::fs::write(folder.join("gaurast_mutants.json"), text).expect("the manifest is written");
 }
 
+/// Builds the layer that gives devices the extension, and writes its manifest to `folder`, as [`manifest`] does for the driver.
+fn emulation_manifest(folder: &Path) {
+    let name = "libVkLayer_gaurast_emulation.so";
+    let library = gaurast_runner::built_library("gaurast-emulation-layer", name);
+    let library = library.to_str().expect("a path of Unicode");
+    let template = include_str!("../../../api/emulation/layer/gaurast_emulation.json");
+    let text = template.replace(&format!("../../../target/release/{name}"), library);
+    assert!(text.contains(library), "the template names the library");
+    std::fs::write(folder.join("gaurast_emulation.json"), text).expect("the manifest is written");
+}
+
+/// Runs `inside` in a process of its own, where the loader has the layer that gives devices the extension over all drivers of the
+/// system, with further variables in the environment. The test needs lavapipe.
+///
+/// # Panics
+/// If it fails there.
+pub fn with_emulation(case: &Case, variables: &[(&str, &str)], inside: impl FnOnce()) {
+    if case.is_alone() {
+        return inside();
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    emulation_manifest(folder.path());
+    case.run_alone(|command| {
+        command
+            .env("VK_ADD_LAYER_PATH", folder.path())
+            .env("VK_INSTANCE_LAYERS", "VK_LAYER_GAURAST_emulation")
+            .env_remove("VK_DRIVER_FILES")
+            .env_remove("VK_ICD_FILENAMES")
+            .envs(variables.iter().copied());
+    });
+}
+
 /// As [`through_the_loader`], where the loader also finds the layer that makes drivers wrong.
 ///
 /// # Panics

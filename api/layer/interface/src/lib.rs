@@ -1,9 +1,13 @@
 //! The interface between Vulkan's loader and layers: the structures of `vk_layer.h`, which the registry does not have, and what
 //! a layer does with them and with chains of structures.
 
+mod live;
+
 use std::ffi::{CStr, c_char, c_void};
 
 use ash::vk;
+
+pub use live::{Live, key};
 
 /// The version of the interface that layers speak.
 const VERSION: u32 = 2;
@@ -59,6 +63,8 @@ pub unsafe fn negotiate(structure: *mut NegotiateLayerInterface, functions: Laye
 
 /// `VK_LAYER_LINK_INFO`: the structure holds the next layer's functions.
 const LINK: i32 = 0;
+/// `VK_LOADER_DATA_CALLBACK`: the structure holds a function of the loader.
+const LOADER_DATA: i32 = 1;
 
 /// `VkLayerInstanceCreateInfo` or `VkLayerDeviceCreateInfo`, of which `L` is the link.
 #[repr(C)]
@@ -137,6 +143,49 @@ pub unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
     None
 }
 
+/// `PFN_vkSetDeviceLoaderData`: makes a queue or command buffer that a layer has got for itself one that the loader knows.
+pub type SetDeviceLoaderData = unsafe extern "system" fn(device: vk::Device, object: *mut c_void) -> vk::Result;
+
+/// `VkLayerDeviceCreateInfo` with a function in the place of the link.
+#[repr(C)]
+struct DataInfo {
+    s_type: vk::StructureType,
+    p_next: *const c_void,
+    function: i32,
+    set_loader_data: Option<SetDeviceLoaderData>,
+}
+
+/// The loader's function for a layer's own queues and command buffers, if the chain of `VkDeviceCreateInfo` has it.
+///
+/// # Safety
+/// `first` is the chain of a creation info that the loader has passed.
+pub unsafe fn set_loader_data(first: *const c_void) -> Option<SetDeviceLoaderData> {
+    // SAFETY: the caller's promise.
+    let mut structures = unsafe { chain(first) };
+    structures.find_map(|structure| {
+        let info = std::ptr::from_ref(structure).cast::<DataInfo>();
+        // SAFETY: a structure of this type is one of the loader's, of which this function has this member.
+        unsafe {
+            let is_loader_data =
+                structure.s_type == vk::StructureType::LOADER_DEVICE_CREATE_INFO && (*info).function == LOADER_DATA;
+            if is_loader_data { (*info).set_loader_data } else { None }
+        }
+    })
+}
+
+/// A command of the next layer by name, as the function that it is.
+///
+/// # Safety
+/// The instance is null or valid, and `F` is the type of the command's function.
+pub unsafe fn command<F: Copy>(get: GetInstanceProcAddr, instance: vk::Instance, name: &CStr) -> Option<F> {
+    const { assert!(size_of::<F>() == size_of::<usize>()) };
+    // SAFETY: the caller's promise; function pointers have one size.
+    unsafe {
+        let found = get(instance, name.as_ptr())?;
+        Some(std::mem::transmute_copy(&found))
+    }
+}
+
 /// The structures of a chain, in order.
 ///
 /// # Safety
@@ -204,18 +253,4 @@ pub unsafe fn string<'a>(text: *const c_char) -> &'a CStr {
     }
     // SAFETY: the caller's promise, and not null.
     unsafe { CStr::from_ptr(text) }
-}
-
-/// The loader's key of a dispatchable handle's chain: the address that its object begins with. Handles of one
-/// instance, and those of one device, have one key.
-///
-/// # Safety
-/// The handle is valid, and the loader has seen it.
-pub unsafe fn key<H: vk::Handle>(handle: H) -> usize {
-    let object = handle.as_raw() as *const usize;
-    if object.is_null() {
-        return 0;
-    }
-    // SAFETY: every dispatchable object begins with the loader's word.
-    unsafe { object.read() }
 }

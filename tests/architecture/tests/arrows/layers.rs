@@ -12,6 +12,8 @@ const RUNNER: &str = "tests/runner";
 const LAYERS: &[(&str, &[&str])] = &[
     ("api/layer/interface", &[]),
     ("api/layer", &["api/gaurast", "api/layer/interface"]),
+    ("api/emulation/layer", &["api/emulation", "api/layer/interface"]),
+    ("api/emulation", &["api/gaurast", "api/layer/interface"]),
     ("api", &["api"]),
     ("simdevice/devmem", &[]),
     ("simdevice/isa", &["simdevice/devmem"]),

@@ -1,0 +1,92 @@
+// Numbers as sums of two binary32: x is the sum, rounded, and y is the rest. Sums and products are Knuth's and Dekker's, of operations
+// that round to nearest. Every operation is `precise`: a compiler that contracts or reorders one makes the rest wrong.
+
+vec2 two_sum(float a, float b) {
+    precise float s = a + b;
+    precise float t = s - a;
+    precise float e = (a - (s - t)) + (b - t);
+    return vec2(s, e);
+}
+
+// The same, for |a| >= |b|.
+vec2 quick_two_sum(float a, float b) {
+    precise float s = a + b;
+    precise float e = b - (s - a);
+    return vec2(s, e);
+}
+
+// Halves of 12 bits each. There is no fma: it need not be fused.
+vec2 split(float a) {
+    precise float t = 4097.0 * a;
+    precise float high = t - (t - a);
+    precise float low = a - high;
+    return vec2(high, low);
+}
+
+vec2 two_product(float a, float b) {
+    precise float p = a * b;
+    vec2 x = split(a), y = split(b);
+    precise float e = ((x.x * y.x - p) + x.x * y.y + x.y * y.x) + x.y * y.y;
+    return vec2(p, e);
+}
+
+vec2 add(vec2 a, vec2 b) {
+    vec2 s = two_sum(a.x, b.x), t = two_sum(a.y, b.y);
+    precise float y = s.y + t.x;
+    s = quick_two_sum(s.x, y);
+    precise float z = s.y + t.y;
+    return quick_two_sum(s.x, z);
+}
+
+vec2 sub(vec2 a, vec2 b) {
+    return add(a, -b);
+}
+
+vec2 mul(vec2 a, vec2 b) {
+    vec2 p = two_product(a.x, b.x);
+    precise float e = p.y + (a.x * b.y + a.y * b.x);
+    return quick_two_sum(p.x, e);
+}
+
+vec2 mul(vec2 a, float b) {
+    vec2 p = two_product(a.x, b);
+    precise float e = p.y + a.y * b;
+    return quick_two_sum(p.x, e);
+}
+
+vec2 div(vec2 a, vec2 b) {
+    precise float q = a.x / b.x;
+    vec2 r = sub(a, mul(b, q));
+    precise float q2 = r.x / b.x;
+    r = sub(r, mul(b, q2));
+    precise float q3 = r.x / b.x;
+    return add(quick_two_sum(q, q2), vec2(q3, 0.0));
+}
+
+// The square root; 0 of what is not positive.
+vec2 root(vec2 a) {
+    if (!(a.x > 0.0)) {
+        return vec2(0.0);
+    }
+    float x = inversesqrt(a.x);
+    precise float y = a.x * x;
+    vec2 r = sub(a, two_product(y, y));
+    precise float c = 0.5 * r.x * x;
+    vec2 s = quick_two_sum(y, c);
+    r = sub(a, mul(s, s));
+    precise float d = 0.5 * r.x * x;
+    return add(s, vec2(d, 0.0));
+}
+
+vec2 pair(float a) {
+    return vec2(a, 0.0);
+}
+
+vec2 dot3(vec2 a0, vec2 a1, vec2 a2, vec2 b0, vec2 b1, vec2 b2) {
+    return add(add(mul(a0, b0), mul(a1, b1)), mul(a2, b2));
+}
+
+// a b - c d.
+vec2 cross2(vec2 a, vec2 b, vec2 c, vec2 d) {
+    return sub(mul(a, b), mul(c, d));
+}

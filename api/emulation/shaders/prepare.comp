@@ -1,0 +1,126 @@
+#version 460
+// Counts the set's Gaussians, which indirect draws know only now, and derives what all of them need of the view's camera.
+#extension GL_GOOGLE_include_directive : require
+#include "head.glsl"
+#include "set.glsl"
+#include "attributes.glsl"
+#include "pair.glsl"
+layout(local_size_x = 256) in;
+shared uint before[256];
+
+// The number of Gaussians of a draw, at most 2^24 - 1.
+uint resolve(uint index) {
+    Draw d = push.set.draws.at[index];
+    if (d.parameters != uvec2(0u)) {
+        uvec2 at = d.parameters;
+        d.count = word_at(at);
+        d.instances = word_at(advanced(at, 4u));
+        d.first = word_at(advanced(at, 8u));
+        uint next = word_at(advanced(at, 12u));
+        if (d.is_indexed != 0u) {
+            d.vertex_offset = int(next);
+            d.first_instance = word_at(advanced(at, 16u));
+        } else {
+            d.first_instance = next;
+        }
+        if (d.draw_count != uvec2(0u) && d.indirect_index >= word_at(d.draw_count)) {
+            d.count = 0u;
+        }
+        push.set.draws.at[index].count = d.count;
+        push.set.draws.at[index].instances = d.instances;
+        push.set.draws.at[index].first = d.first;
+        push.set.draws.at[index].vertex_offset = d.vertex_offset;
+        push.set.draws.at[index].first_instance = d.first_instance;
+    }
+    uint high, low;
+    umulExtended(d.count, d.instances, high, low);
+    return high != 0u ? 0xffffffu : min(low, 0xffffffu);
+}
+
+// A binary64 number as the sum of three binary32.
+vec3 in_three(uvec2 bits) {
+    int exponent = int(bits.y >> 20 & 0x7ffu);
+    if (exponent == 0) {
+        return vec3(0.0);
+    }
+    // 53 bits: 24, 24 and 5.
+    uint top = 0x100000u | bits.y & 0xfffffu;
+    uint high = top << 3 | bits.x >> 29, middle = bits.x >> 5 & 0xffffffu, low = bits.x & 31u;
+    int e = exponent - 1075;
+    vec3 value = vec3(ldexp(float(high), e + 29), ldexp(float(middle), e + 5), ldexp(float(low), e));
+    return bits.y >> 31 != 0u ? -value : value;
+}
+
+bool is_finite(float x) {
+    return !isnan(x) && !isinf(x);
+}
+
+bool is_valid(Camera camera) {
+    bool valid = camera.model == 0 || camera.model == 1;
+    for (int i = 0; i < 3; i++) {
+        valid = valid && (camera.eye[i].y >> 20 & 0x7ffu) != 0x7ffu;
+        for (int j = 0; j < 3; j++) {
+            valid = valid && is_finite(camera.rotation[i][j]);
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        valid = valid && is_finite(camera.principal_point[i]) && is_finite(camera.depth_coefficients[i]);
+        valid = valid && is_finite(camera.focal_length[i]) && camera.focal_length[i] > 0.0;
+    }
+    valid = valid && is_finite(camera.near_plane) && camera.far_plane > camera.near_plane;
+    return valid && (camera.model == 1 || camera.near_plane > 0.0);
+}
+
+void derive() {
+    Camera camera = push.set.cameras.at[min(push.view, push.set.camera_count - 1u)];
+    for (int i = 0; i < 3; i++) {
+        push.set.derived.of.eye[i] = in_three(camera.eye[i]);
+    }
+    // The slopes' limits: to the viewport's edges and 0.15 of its size beyond.
+    for (int i = 0; i < 2; i++) {
+        float size = push.set.viewport[2 + i];
+        vec2 focal = pair(camera.focal_length[i]), center = pair(camera.principal_point[i]);
+        vec2 beyond = div(mul(vec2(0.15, -5.9604645e-9), size), focal);
+        push.set.derived.of.limits[2 * i] = add(div(sub(pair(size), center), focal), beyond);
+        push.set.derived.of.limits[2 * i + 1] = add(div(center, focal), beyond);
+    }
+}
+
+void main() {
+    uint l = gl_LocalInvocationID.x;
+    uint all = 0u;
+    for (uint first = 0u; first < push.set.draw_count; first += 256u) {
+        uint index = first + l;
+        uint own = index < push.set.draw_count ? resolve(index) : 0u;
+        before[l] = own;
+        barrier();
+        for (uint d = 1u; d < 256u; d <<= 1) {
+            uint other = l >= d ? before[l - d] : 0u;
+            barrier();
+            before[l] = min(before[l] + other, 0x7fffffffu);
+            barrier();
+        }
+        if (index < push.set.draw_count) {
+            push.set.draws.at[index].base = min(all + before[l] - own, 0x7fffffffu);
+        }
+        all = min(all + before[255], 0x7fffffffu);
+        barrier();
+    }
+    if (l != 0u) {
+        return;
+    }
+    bool valid = push.set.camera_count > 0u;
+    for (uint i = 0u; i < push.set.camera_count; i++) {
+        valid = valid && is_valid(push.set.cameras.at[i]);
+    }
+    uint n = valid ? min(all, push.set.reserve) : 0u;
+    derive();
+    Words counters = push.set.counters;
+    counters.at[GAUSSIANS] = n;
+    counters.at[SEEN] = 0u;
+    counters.at[PAIRS] = 0u;
+    counters.at[STORED] = 0u;
+    set_groups(counters, BY_GAUSSIAN, blocks(n, 256u));
+    set_groups(counters, SORT_GAUSSIANS, blocks(n, BLOCK));
+    set_groups(counters, SCAN_GAUSSIANS, blocks(256u * blocks(n, BLOCK), BLOCK));
+}

@@ -1,0 +1,135 @@
+// A sorted set of Gaussians, as src/set.rs writes it. Every array is reached by its address.
+
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Couples { uvec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { vec4 at[]; };
+
+// The Gaussian as it is seen: lengths in pixels, the mean from the origin of the framebuffer.
+struct Record {
+    vec2 mean_x, mean_y;             // pairs
+    vec2 f0, f1, f2;                 // pairs: alpha is opacity 2^-((f0 dx)^2 + (f1 dx + f2 dy)^2)
+    float opacity, red, green, blue;
+    uint tiles_x, tiles_y;           // first | last << 16
+    float slope, curve, half_height, reach, half_width; // the ellipse by rows: see tiles.glsl
+    uint cut_x, cut_y;               // tiles of the cut-off, from the viewport's corner: first | end << 16
+    float unused;
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Records { Record at[]; };
+
+// VkGaussianCameraDataGAURAST; the eye is binary64.
+struct Camera {
+    uvec2 eye[3];
+    int model, reserved;
+    vec4 rotation[3];
+    vec2 focal_length, principal_point, depth_coefficients;
+    float near_plane, far_plane;
+    vec4 unused;
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Cameras { Camera at[]; };
+
+// What is derived from the view's camera: the eye as sums of three binary32, and the limits of the slopes as pairs.
+struct Derived {
+    vec3 eye[3];
+    vec2 limits[4];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer DerivedCamera { Derived of; };
+
+struct Draw {
+    uvec2 indices;               // their address
+    uint index_bytes;            // 0 without an index buffer
+    uint index_count;            // indices beyond read as 0
+    uint first, count;
+    int vertex_offset;
+    uint first_instance, instances;
+    uint base;                   // Gaussians of the draws before
+    uint indirect_index;         // position among the draws of the command
+    uint is_indexed;
+    uvec2 parameters;            // address of VkDraw(Indexed)IndirectCommand, or 0
+    uvec2 draw_count;            // address of the number of draws, or 0
+    uvec2 harmonics;             // address of the buffer of harmonics
+    uint harmonics_bytes, harmonics_format, harmonics_stride, harmonics_coefficient_stride;
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Draws { Draw at[]; };
+
+// A vertex buffer. Elements that do not lie within its bytes read as zeros.
+struct Source {
+    uvec2 address;
+    uint bytes, stride;
+    uint divisor;                // 0xffffffff: by vertex
+    uint unused;
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Sources { Source at[]; };
+
+struct Attribute {
+    uint source, offset, format; // see attributes.glsl
+};
+// Places in the list of attributes.
+const uint POSITION = 0u, SCALE = 1u, ROTATION = 2u, OPACITY = 3u, MATRIX = 4u, FACTOR = 7u, HARMONICS = 8u;
+
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Set {
+    Words counters;
+    Words keys, values, pair_keys, pair_values, histogram, sums, counts;
+    Couples ranges;
+    Records records;
+    Pixels image;
+    Words feedback;
+    Draws draws;
+    Sources sources;
+    Cameras cameras;
+    DerivedCamera derived;
+    ivec2 area_origin;           // pixels that the set may reach
+    uvec2 area_size;
+    vec4 viewport;               // x, y, width, height; not negative
+    uvec2 tiles;
+    uint reserve, pair_capacity;
+    uint draw_count, source_count, camera_count, degree;
+    uint order, compensated, cut_off, flags;
+    float low_pass, alpha_floor, alpha_ceiling, transmittance_floor;
+    float compensation_floor, cut_off_deviations;
+    uint unused0, unused1;
+    Attribute attributes[33];
+};
+
+layout(push_constant) uniform Push {
+    Set set;
+    uint view;
+    uint sort;                   // 0: Gaussians by depth, 1: pairs by tile
+    uint shift;                  // of the digit
+    uint is_first;               // the first digit of depths: what is not seen is dropped
+    uint side;                   // the half of the arrays that is read
+    uint plane;                  // the view's first pixel
+} push;
+
+// Flags of a set.
+const uint HAS_MATRIX = 1u, HAS_FACTOR = 2u, HARMONICS_IN_BUFFER = 4u;
+// Orders.
+const uint VIEW_DEPTH = 0u, RADIAL_DISTANCE = 1u, PRIMITIVE = 2u;
+// Cut-offs.
+const uint NO_CUT_OFF = 0u, ELLIPSE = 1u, TILE_SQUARE = 2u, TILE_RECTANGLE = 3u;
+
+// Places in the counters: the numbers of Gaussians, of those that are seen, of pairs, and of pairs that fit the arrays.
+const uint GAUSSIANS = 0u, SEEN = 1u, PAIRS = 2u, STORED = 3u;
+// Workgroups of indirect dispatches, three words each.
+const uint BY_GAUSSIAN = 4u, SORT_GAUSSIANS = 7u, SCAN_GAUSSIANS = 10u, BY_SEEN = 13u, SORT_SEEN = 16u, SCAN_SEEN = 19u,
+           SCAN_COUNTS = 22u, BY_PAIR = 25u, SORT_PAIRS = 28u, SCAN_PAIRS = 31u;
+
+const uint NOT_SEEN = 0xffffffffu;
+const uint TILE = 16u;
+// Keys of a workgroup in sorts and scans.
+const uint BLOCK = 2048u;
+
+uint blocks(uint count, uint size) {
+    return count / size + uint(count % size != 0u);
+}
+
+// The workgroup's number in a dispatch whose groups are spread over two dimensions.
+uint group() {
+    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+}
+
+void set_groups(Words counters, uint place, uint groups) {
+    const uint wide = 32768u;
+    counters.at[place] = min(groups, wide);
+    counters.at[place + 1u] = blocks(groups, wide);
+    counters.at[place + 2u] = 1u;
+}

@@ -1,0 +1,208 @@
+//! Vulkan's dynamic states, which are set again where a set's fragments were drawn with a pipeline of other states.
+
+use ash::vk;
+use gaurast_layer_interface::slice;
+
+use crate::hooks::site::record;
+use crate::next::Next;
+use crate::recording::Recording;
+
+/// Hooks of commands whose parameters are plain values: name, the functions' version, state, parameters.
+macro_rules! values {
+    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+);)*) => {$(
+        pub(super) unsafe extern "system" fn $name(commands: vk::CommandBuffer, $($parameter: $type),+) {
+            // SAFETY: see the crate.
+            unsafe {
+                record(
+                    commands,
+                    |site, recording| {
+                        (site.next.$functions().$name)(commands, $($parameter),+);
+                        repeat(recording, vk::DynamicState::$state, move |next, commands| {
+                            (next.$functions().$name)(commands, $($parameter),+);
+                        });
+                    },
+                    |next| (next.$functions().$name)(commands, $($parameter),+),
+                );
+            }
+        }
+    )*};
+}
+
+values! {
+    cmd_set_line_width, fp_v1_0, LINE_WIDTH, (width: f32);
+    cmd_set_depth_bias, fp_v1_0, DEPTH_BIAS, (constant: f32, clamp: f32, slope: f32);
+    cmd_set_depth_bounds, fp_v1_0, DEPTH_BOUNDS, (least: f32, most: f32);
+    cmd_set_cull_mode, fp_v1_3, CULL_MODE, (mode: vk::CullModeFlags);
+    cmd_set_front_face, fp_v1_3, FRONT_FACE, (face: vk::FrontFace);
+    cmd_set_primitive_topology, fp_v1_3, PRIMITIVE_TOPOLOGY, (topology: vk::PrimitiveTopology);
+    cmd_set_depth_test_enable, fp_v1_3, DEPTH_TEST_ENABLE, (enable: vk::Bool32);
+    cmd_set_depth_write_enable, fp_v1_3, DEPTH_WRITE_ENABLE, (enable: vk::Bool32);
+    cmd_set_depth_compare_op, fp_v1_3, DEPTH_COMPARE_OP, (op: vk::CompareOp);
+    cmd_set_depth_bounds_test_enable, fp_v1_3, DEPTH_BOUNDS_TEST_ENABLE, (enable: vk::Bool32);
+    cmd_set_stencil_test_enable, fp_v1_3, STENCIL_TEST_ENABLE, (enable: vk::Bool32);
+    cmd_set_rasterizer_discard_enable, fp_v1_3, RASTERIZER_DISCARD_ENABLE, (enable: vk::Bool32);
+    cmd_set_depth_bias_enable, fp_v1_3, DEPTH_BIAS_ENABLE, (enable: vk::Bool32);
+    cmd_set_primitive_restart_enable, fp_v1_3, PRIMITIVE_RESTART_ENABLE, (enable: vk::Bool32);
+}
+
+/// Remembers a command that sets dynamic state; the last of each state counts.
+fn repeat(
+    recording: &mut Recording,
+    state: vk::DynamicState,
+    command: impl Fn(&Next, vk::CommandBuffer) + Send + 'static,
+) {
+    recording.states.insert(state.as_raw(), Box::new(command));
+}
+
+/// Stencil states are of one face or of both: each face has its own.
+macro_rules! faces {
+    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+);)*) => {$(
+        pub(super) unsafe extern "system" fn $name(
+            commands: vk::CommandBuffer,
+            faces: vk::StencilFaceFlags,
+            $($parameter: $type),+
+        ) {
+            // SAFETY: see the crate.
+            unsafe {
+                record(
+                    commands,
+                    |site, recording| {
+                        (site.next.$functions().$name)(commands, faces, $($parameter),+);
+                        for (face, place) in [(vk::StencilFaceFlags::FRONT, 0), (vk::StencilFaceFlags::BACK, 1)] {
+                            if faces.contains(face) {
+                                let key = -2 * vk::DynamicState::$state.as_raw() - place;
+                                recording.states.insert(key, Box::new(move |next, commands| {
+                                    (next.$functions().$name)(commands, face, $($parameter),+);
+                                }));
+                            }
+                        }
+                    },
+                    |next| (next.$functions().$name)(commands, faces, $($parameter),+),
+                );
+            }
+        }
+    )*};
+}
+
+faces! {
+    cmd_set_stencil_compare_mask, fp_v1_0, STENCIL_COMPARE_MASK, (mask: u32);
+    cmd_set_stencil_write_mask, fp_v1_0, STENCIL_WRITE_MASK, (mask: u32);
+    cmd_set_stencil_reference, fp_v1_0, STENCIL_REFERENCE, (reference: u32);
+    cmd_set_stencil_op, fp_v1_3, STENCIL_OP,
+        (fail: vk::StencilOp, pass: vk::StencilOp, depth_fail: vk::StencilOp, compare: vk::CompareOp);
+}
+
+pub(super) unsafe extern "system" fn cmd_set_blend_constants(commands: vk::CommandBuffer, constants: *const [f32; 4]) {
+    // SAFETY: see the crate.
+    unsafe {
+        let constants = *constants;
+        record(
+            commands,
+            |site, recording| {
+                site.next.cmd_set_blend_constants(commands, &constants);
+                repeat(recording, vk::DynamicState::BLEND_CONSTANTS, move |next, commands| {
+                    next.cmd_set_blend_constants(commands, &constants);
+                });
+            },
+            |next| next.cmd_set_blend_constants(commands, &constants),
+        );
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_set_viewport(
+    commands: vk::CommandBuffer,
+    first: u32,
+    count: u32,
+    viewports: *const vk::Viewport,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let viewports = slice(viewports, count);
+        record(
+            commands,
+            |site, recording| {
+                site.next.cmd_set_viewport(commands, first, viewports);
+                if first == 0 {
+                    let kept = viewports.to_vec();
+                    recording.viewport = kept.first().copied();
+                    repeat(recording, vk::DynamicState::VIEWPORT, move |next, commands| {
+                        next.cmd_set_viewport(commands, first, &kept);
+                    });
+                }
+            },
+            |next| next.cmd_set_viewport(commands, first, viewports),
+        );
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_set_viewport_with_count(
+    commands: vk::CommandBuffer,
+    count: u32,
+    viewports: *const vk::Viewport,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let viewports = slice(viewports, count);
+        record(
+            commands,
+            |site, recording| {
+                site.next.cmd_set_viewport_with_count(commands, viewports);
+                let kept = viewports.to_vec();
+                recording.viewport = kept.first().copied();
+                repeat(recording, vk::DynamicState::VIEWPORT_WITH_COUNT, move |next, commands| {
+                    next.cmd_set_viewport_with_count(commands, &kept);
+                });
+            },
+            |next| next.cmd_set_viewport_with_count(commands, viewports),
+        );
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_set_scissor(
+    commands: vk::CommandBuffer,
+    first: u32,
+    count: u32,
+    scissors: *const vk::Rect2D,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let scissors = slice(scissors, count);
+        record(
+            commands,
+            |site, recording| {
+                site.next.cmd_set_scissor(commands, first, scissors);
+                if first == 0 {
+                    let kept = scissors.to_vec();
+                    recording.scissor = kept.first().copied();
+                    repeat(recording, vk::DynamicState::SCISSOR, move |next, commands| {
+                        next.cmd_set_scissor(commands, first, &kept);
+                    });
+                }
+            },
+            |next| next.cmd_set_scissor(commands, first, scissors),
+        );
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_set_scissor_with_count(
+    commands: vk::CommandBuffer,
+    count: u32,
+    scissors: *const vk::Rect2D,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let scissors = slice(scissors, count);
+        record(
+            commands,
+            |site, recording| {
+                site.next.cmd_set_scissor_with_count(commands, scissors);
+                let kept = scissors.to_vec();
+                recording.scissor = kept.first().copied();
+                repeat(recording, vk::DynamicState::SCISSOR_WITH_COUNT, move |next, commands| {
+                    next.cmd_set_scissor_with_count(commands, &kept);
+                });
+            },
+            |next| next.cmd_set_scissor_with_count(commands, scissors),
+        );
+    }
+}

@@ -1,0 +1,49 @@
+//! `VK_GAURAST_gaussian_primitive_topology` on Vulkan devices that lack it.
+//!
+//! Compute kernels project, sort and accumulate the Gaussians of a set, and a fragment shader hands the result to the
+//! application's blending. Numbers that decide a picture are pairs of binary32, so that pictures keep the precision of the
+//! extension's text without 64-bit floating point. `docs/gpu.md` says what runs and on which devices it was seen.
+//!
+//! There are two doors. [`entry`] puts the extension over an [`ash::Entry`] within a process. `layer_functions` are those of a
+//! layer, which `api/emulation/layer` makes a library for the Vulkan loader of. Where a driver has the extension itself, both
+//! step aside, unless the environment's `GAURAST_EMULATION_FORCE` is 1.
+//!
+//! | module | has |
+//! |---|---|
+//! | `proc_addr`, `entry` | the lookup of commands by name; the two doors |
+//! | `hooks` | the commands that are intercepted |
+//! | `instance`, `device` | what lives, by the loader's key |
+//! | `support` | the features and properties that devices get |
+//! | `formats`, `pipeline`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
+//! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
+//! | `set`, `work` | a sorted set that is recorded, and its dispatches |
+//! | `kernels`, `scratch` | the kernels, and the memory that they work in |
+//! | `self_test`, `pair` | the test of a device's arithmetic |
+//!
+//! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid usage, so
+//! that what pointers name is there, and what is changed keeps it where it is passed on.
+
+mod below;
+mod device;
+mod emulation;
+mod entry;
+mod formats;
+mod hooks;
+mod instance;
+mod kernels;
+mod next;
+mod pair;
+mod pass;
+mod pipeline;
+mod proc_addr;
+mod recording;
+mod render_pass;
+mod report;
+mod scratch;
+mod self_test;
+mod set;
+mod support;
+mod work;
+
+pub use entry::entry;
+pub use proc_addr::layer_functions;

@@ -1,0 +1,410 @@
+//! Pipelines of Gaussians: what the kernels need of one, and the graphics pipeline that shows what they have made.
+
+use std::sync::Arc;
+
+use ash::vk;
+use gaurast::vk as gvk;
+use gaurast::vk::{
+    GaussianCameraSourceGAURAST as CameraSource, GaussianGeometryGAURAST as Geometry,
+    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
+};
+use gaurast_layer_interface::{find, slice};
+
+use crate::formats;
+use crate::kernels::{self, CAMERA, Kernels};
+use crate::next::Next;
+use crate::report::tell;
+
+/// A location that is not used.
+const UNUSED: u32 = !0;
+
+/// An attribute, as `shaders/set.glsl` has it.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Attribute {
+    source: u32,
+    offset: u32,
+    format: u32,
+}
+
+/// A vertex buffer that attributes are read from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Source {
+    pub(crate) binding: u32,
+    pub(crate) stride: u32,
+    /// By instance; `None` by vertex.
+    pub(crate) divisor: Option<u32>,
+}
+
+/// The uniform buffer of cameras.
+pub(crate) struct CameraBuffer {
+    pub(crate) set: u32,
+    pub(crate) count: u32,
+    pub(crate) pipeline: vk::Pipeline,
+    pub(crate) layout: vk::PipelineLayout,
+}
+
+/// A pipeline of Gaussians.
+pub(crate) struct Pipeline {
+    next: Arc<Next>,
+    /// The graphics pipeline, which is also the application's handle.
+    pub(crate) raw: vk::Pipeline,
+    pub(crate) state: State<'static>,
+    pub(crate) cut_off: u32,
+    pub(crate) cut_off_deviations: f32,
+    pub(crate) compensation_floor: f32,
+    pub(crate) has_matrix: bool,
+    pub(crate) has_factor: bool,
+    pub(crate) attributes: [Attribute; 33],
+    pub(crate) sources: Vec<Source>,
+    pub(crate) dynamic: Vec<vk::DynamicState>,
+    /// Static ones.
+    pub(crate) viewport: Option<vk::Viewport>,
+    pub(crate) scissor: Option<vk::Rect2D>,
+    pub(crate) view_mask: u32,
+    pub(crate) camera_buffer: Option<CameraBuffer>,
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        if let Some(camera) = &self.camera_buffer {
+            // SAFETY: no command buffer that uses it is executed any more.
+            unsafe {
+                self.next.destroy_pipeline(camera.pipeline, None);
+                self.next.destroy_pipeline_layout(camera.layout, None);
+            }
+        }
+    }
+}
+
+/// Where a pipeline is created: what it needs beside its creation info.
+pub(crate) struct Site<'a> {
+    pub(crate) next: &'a Arc<Next>,
+    pub(crate) kernels: &'a Kernels,
+    /// The view mask of the subpass, in a render pass object.
+    pub(crate) view_mask: Option<u32>,
+    /// Layouts of the descriptor sets.
+    pub(crate) set_layouts: &'a [vk::DescriptorSetLayout],
+    pub(crate) cache: vk::PipelineCache,
+}
+
+/// The state of Gaussians, if a pipeline draws them.
+///
+/// # Safety
+/// The creation info is valid.
+pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a>) -> Option<&'a State<'a>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let assembly = info.p_input_assembly_state.as_ref();
+        let is_gaussian =
+            assembly.is_some_and(|assembly| assembly.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
+        if is_gaussian { find::<State<'_>>(info.p_next) } else { None }
+    }
+}
+
+/// A reason to refuse a pipeline.
+fn refusal(state: &State<'_>, has_fragment_stage: bool, tests_depth: bool) -> Option<&'static str> {
+    let refusals = [
+        (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
+        (has_fragment_stage, "resolveFragmentShader"),
+        (state.order == Order::PER_PIXEL, "perPixelOrder"),
+        (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
+        (state.linearization == Linearization::UNSCENTED, "unscentedProjection"),
+        (state.geometry == Geometry::GAUSSIAN_2D, "gaussian2D"),
+        (tests_depth, "gaussianDepthStencil"),
+        (state.flags.intersects(Flags::LOG_SCALE | Flags::LOGIT_OPACITY), "attributeActivation"),
+    ];
+    refusals.iter().find(|(is_used, _)| *is_used).map(|(_, feature)| *feature)
+}
+
+/// Dynamic states that act on the fragment that is shown; the others have no effect on Gaussians.
+const SHOWN: [vk::DynamicState; 8] = [
+    vk::DynamicState::BLEND_CONSTANTS,
+    vk::DynamicState::LOGIC_OP_EXT,
+    vk::DynamicState::LOGIC_OP_ENABLE_EXT,
+    vk::DynamicState::COLOR_WRITE_ENABLE_EXT,
+    vk::DynamicState::COLOR_BLEND_ENABLE_EXT,
+    vk::DynamicState::COLOR_BLEND_EQUATION_EXT,
+    vk::DynamicState::COLOR_WRITE_MASK_EXT,
+    vk::DynamicState::SAMPLE_MASK_EXT,
+];
+
+/// The attributes of a pipeline and the buffers that they are read from, or the sentence that refuses them.
+struct Attributes {
+    list: [Attribute; 33],
+    sources: Vec<Source>,
+}
+
+impl Attributes {
+    /// # Safety
+    /// The creation info is valid.
+    unsafe fn read(info: &vk::GraphicsPipelineCreateInfo<'_>, state: &State<'_>) -> Result<Self, String> {
+        // SAFETY: the caller's promise.
+        let (bindings, attributes, divisors) = unsafe {
+            let Some(input) = info.p_vertex_input_state.as_ref() else {
+                return Err("a pipeline of Gaussians has no vertex input state".to_owned());
+            };
+            let divisors = find::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(input.p_next);
+            (
+                slice(input.p_vertex_binding_descriptions, input.vertex_binding_description_count),
+                slice(input.p_vertex_attribute_descriptions, input.vertex_attribute_description_count),
+                divisors
+                    .map(|divisors| slice(divisors.p_vertex_binding_divisors, divisors.vertex_binding_divisor_count))
+                    .unwrap_or_default(),
+            )
+        };
+        let mut own = Self { list: [Attribute::default(); 33], sources: Vec::new() };
+        let at = &state.attribute_locations;
+        let harmonics = if state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
+            0
+        } else {
+            (state.spherical_harmonics_degree + 1).pow(2).min(25)
+        };
+        let matrix = (0..3).map(|row| (4 + row, at.first_model_matrix.saturating_add(row)));
+        let matrix = matrix.filter(|_| at.first_model_matrix != UNUSED);
+        let factor = Some((7, at.model_opacity)).filter(|_| at.model_opacity != UNUSED);
+        let places = [(0, at.position), (1, at.scale), (2, at.rotation), (3, at.opacity)];
+        let harmonics = (0..harmonics).map(|k| (8 + k as usize, at.first_spherical_harmonics.saturating_add(k)));
+        let used =
+            places.into_iter().chain(matrix.map(|(place, at)| (place as usize, at))).chain(factor).chain(harmonics);
+        for (place, location) in used {
+            let attribute = attributes.iter().find(|attribute| attribute.location == location);
+            let attribute =
+                attribute.ok_or_else(|| format!("no attribute has location {location}, which Gaussians use"))?;
+            let format = formats::code(attribute.format)
+                .ok_or_else(|| format!("attributes of format {:?} are not read", attribute.format))?;
+            let binding = bindings.iter().find(|binding| binding.binding == attribute.binding);
+            let binding = binding.ok_or_else(|| format!("there is no vertex binding {}", attribute.binding))?;
+            let divisor = divisors.iter().find(|divisor| divisor.binding == binding.binding);
+            let by_instance = binding.input_rate == vk::VertexInputRate::INSTANCE;
+            let source = Source {
+                binding: binding.binding,
+                stride: binding.stride,
+                divisor: by_instance.then(|| divisor.map_or(1, |divisor| divisor.divisor)),
+            };
+            let known = own.sources.iter().position(|other| *other == source);
+            let source = known.unwrap_or_else(|| {
+                own.sources.push(source);
+                own.sources.len() - 1
+            });
+            own.list[place] = Attribute { source: source as u32, offset: attribute.offset, format };
+        }
+        Ok(own)
+    }
+}
+
+/// Creates a pipeline of Gaussians. What is refused is told.
+///
+/// # Safety
+/// The creation info is valid.
+pub(crate) unsafe fn create(
+    site: &Site<'_>,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    state: &State<'_>,
+    allocator: Option<&vk::AllocationCallbacks<'_>>,
+) -> Result<Pipeline, vk::Result> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let stages = slice(info.p_stages, info.stage_count);
+        let has_fragment_stage = stages.iter().any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
+        let depth = info.p_depth_stencil_state.as_ref();
+        let tests_depth = depth.is_some_and(|depth| {
+            depth.depth_test_enable != 0 || depth.depth_bounds_test_enable != 0 || depth.stencil_test_enable != 0
+        });
+        if let Some(feature) = refusal(state, has_fragment_stage, tests_depth) {
+            tell(&format!("a pipeline needs {feature}, which is not emulated"));
+            return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+        }
+        let attributes = match Attributes::read(info, state) {
+            Ok(attributes) => attributes,
+            Err(reason) => {
+                tell(&reason);
+                return Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED);
+            }
+        };
+        let dynamic = info.p_dynamic_state.as_ref();
+        let dynamic = dynamic.map(|dynamic| slice(dynamic.p_dynamic_states, dynamic.dynamic_state_count));
+        let dynamic = dynamic.unwrap_or_default().to_vec();
+        let is_dynamic =
+            |one: vk::DynamicState, other: vk::DynamicState| dynamic.contains(&one) || dynamic.contains(&other);
+        let viewports = info.p_viewport_state.as_ref();
+        let viewport = viewports.and_then(|state| state.p_viewports.as_ref()).copied();
+        let scissor = viewports.and_then(|state| state.p_scissors.as_ref()).copied();
+        let (viewport_is_dynamic, scissor_is_dynamic) = (
+            is_dynamic(vk::DynamicState::VIEWPORT, vk::DynamicState::VIEWPORT_WITH_COUNT),
+            is_dynamic(vk::DynamicState::SCISSOR, vk::DynamicState::SCISSOR_WITH_COUNT),
+        );
+        let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
+        let view_mask = site.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
+        let footprint = find::<Footprint<'_>>(info.p_next);
+        let raw = graphics(site, info, &dynamic, view_mask, allocator)?;
+        let mut own = Pipeline {
+            next: Arc::clone(site.next),
+            raw,
+            state: State { p_next: std::ptr::null(), _marker: std::marker::PhantomData, ..*state },
+            cut_off: footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned()),
+            cut_off_deviations: footprint.map_or(0.0, |footprint| footprint.cut_off_deviations),
+            compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
+            has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
+            has_factor: state.attribute_locations.model_opacity != UNUSED,
+            attributes: attributes.list,
+            sources: attributes.sources,
+            viewport: viewport.filter(|_| !viewport_is_dynamic),
+            scissor: scissor.filter(|_| !scissor_is_dynamic),
+            dynamic,
+            view_mask,
+            camera_buffer: None,
+        };
+        if state.camera_source == CameraSource::UNIFORM_BUFFER {
+            match camera_buffer(site, state) {
+                Ok(camera) => own.camera_buffer = Some(camera),
+                Err(error) => {
+                    site.next.destroy_pipeline(raw, allocator);
+                    return Err(error);
+                }
+            }
+        }
+        Ok(own)
+    }
+}
+
+/// The graphics pipeline: a triangle over the set's area, whose fragments fetch what the kernels have made.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn graphics(
+    site: &Site<'_>,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    dynamic: &[vk::DynamicState],
+    view_mask: u32,
+    allocator: Option<&vk::AllocationCallbacks<'_>>,
+) -> Result<vk::Pipeline, vk::Result> {
+    let (vertex, fetch) = if view_mask == 0 {
+        (site.kernels.vertex, site.kernels.fetch)
+    } else {
+        (site.kernels.vertex_views, site.kernels.fetch_views)
+    };
+    let stage = |stage: vk::ShaderStageFlags, module: vk::ShaderModule| {
+        vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
+    };
+    let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), stage(vk::ShaderStageFlags::FRAGMENT, fetch)];
+    let input = vk::PipelineVertexInputStateCreateInfo::default();
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+    let viewports = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default();
+    let mut states: Vec<vk::DynamicState> = dynamic.iter().copied().filter(|state| SHOWN.contains(state)).collect();
+    states.extend([vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
+    let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
+    // SAFETY: the caller's promise.
+    unsafe {
+        let blend = info.p_color_blend_state.as_ref();
+        let mut attachments =
+            blend.map(|blend| slice(blend.p_attachments, blend.attachment_count)).unwrap_or_default().to_vec();
+        // There is a colour at location 0 alone.
+        for attachment in attachments.iter_mut().skip(1) {
+            attachment.color_write_mask = vk::ColorComponentFlags::empty();
+        }
+        let mut blend = blend.copied().unwrap_or_default();
+        if !blend.p_attachments.is_null() {
+            blend.p_attachments = attachments.as_ptr();
+        }
+        let mut multisample = info.p_multisample_state.as_ref().copied().unwrap_or_default();
+        multisample.sample_shading_enable = vk::FALSE;
+        let mut rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next).copied().unwrap_or_default();
+        rendering.p_next = std::ptr::null();
+        let mut own = vk::GraphicsPipelineCreateInfo::default()
+            .flags(info.flags & !vk::PipelineCreateFlags::DERIVATIVE)
+            .stages(&stages)
+            .vertex_input_state(&input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewports)
+            .rasterization_state(&raster)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .multisample_state(&multisample)
+            .dynamic_state(&states)
+            .layout(site.kernels.fetch_layout)
+            .render_pass(info.render_pass)
+            .subpass(info.subpass);
+        if info.render_pass == vk::RenderPass::null() {
+            own = own.push_next(&mut rendering);
+        }
+        match site.next.create_graphics_pipelines(site.cache, &[own], allocator) {
+            Ok(created) => created.first().copied().ok_or(vk::Result::ERROR_UNKNOWN),
+            Err((_, error)) => Err(error),
+        }
+    }
+}
+
+/// The kernel that copies the cameras of a uniform buffer, with its descriptor where the application has it.
+///
+/// # Safety
+/// The layouts live.
+unsafe fn camera_buffer(site: &Site<'_>, state: &State<'_>) -> Result<CameraBuffer, vk::Result> {
+    const OP_DECORATE: u32 = 71;
+    const BINDING: u32 = 33;
+    const DESCRIPTOR_SET: u32 = 34;
+    let mut words = kernels::words(CAMERA);
+    let mut at = 5;
+    while at < words.len() {
+        let (length, opcode) = (words[at] >> 16, words[at] & 0xFFFF);
+        if opcode == OP_DECORATE && length == 4 {
+            match words[at + 2] {
+                BINDING => words[at + 3] = state.camera_binding,
+                DESCRIPTOR_SET => words[at + 3] = state.camera_set,
+                _ => {}
+            }
+        }
+        at += (length as usize).max(1);
+    }
+    let info = vk::ShaderModuleCreateInfo::default().code(&words);
+    let sets = site.set_layouts.get(..=state.camera_set as usize).unwrap_or(site.set_layouts);
+    // SAFETY: the caller's promise.
+    unsafe {
+        let layout = kernels::layout(site.next, sets, vk::ShaderStageFlags::COMPUTE)?;
+        let module = site.next.create_shader_module(&info, None)?;
+        let pipeline = kernels::compute(site.next, module, layout, Some(8 * state.camera_count.max(1)));
+        site.next.destroy_shader_module(module, None);
+        Ok(CameraBuffer { set: state.camera_set, count: state.camera_count.max(1), pipeline: pipeline?, layout })
+    }
+}
+
+impl Pipeline {
+    /// Reports whether a state of the extension is set by a command.
+    pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
+        self.dynamic.contains(&state)
+    }
+
+    /// The greatest view index and one.
+    pub(crate) fn planes(&self) -> u32 {
+        (u32::BITS - self.view_mask.leading_zeros()).max(1)
+    }
+
+    /// The views that are drawn.
+    pub(crate) fn views(&self) -> impl Iterator<Item = u32> + use<> {
+        let mask = self.view_mask.max(1);
+        (0..u32::BITS).filter(move |view| mask >> view & 1 != 0)
+    }
+
+    /// Reports whether harmonics come from a buffer of their own.
+    pub(crate) fn has_harmonics_buffer(&self) -> bool {
+        self.state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER)
+    }
+}
+
+/// The names of the extension's dynamic states.
+pub(crate) use gvk::{
+    DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST as ALPHA_CEILING,
+    DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST as ALPHA_FLOOR,
+    DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST as ANTIALIASING,
+    DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST as CONTRIBUTION_BUDGET,
+    DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST as EXPONENTIAL_ERROR,
+    DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST as LOW_PASS_VARIANCE,
+    DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST as ORDER,
+    DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST as SPHERICAL_HARMONICS_DEGREE,
+    DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST as TRANSMITTANCE_FLOOR,
+};

@@ -1,0 +1,479 @@
+//! What is known of a command buffer that is being recorded, and the recording of its sets.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ash::vk;
+use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
+
+use crate::emulation::Emulation;
+use crate::formats;
+use crate::next::Next;
+use crate::pass::Pass;
+use crate::pipeline::Pipeline;
+use crate::report::tell;
+use crate::scratch::{Memory, Places};
+use crate::set::{DynamicValues, Set, SetState};
+use crate::support::MAX_GAUSSIANS;
+use crate::work::{Camera, Cameras, Draw, DrawSource, Work, barrier};
+
+/// The graphics pipeline that is bound.
+#[derive(Clone, Default)]
+pub(crate) enum Bound {
+    #[default]
+    Nothing,
+    Other(vk::Pipeline),
+    Gaussians(Arc<Pipeline>),
+}
+
+/// A vertex buffer.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct VertexBuffer {
+    pub(crate) address: u64,
+    pub(crate) size: u64,
+    /// Where it is dynamic.
+    pub(crate) stride: Option<u32>,
+}
+
+/// The index buffer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct IndexBuffer {
+    pub(crate) address: u64,
+    pub(crate) size: u64,
+    pub(crate) bytes: u32,
+}
+
+/// The buffer of spherical harmonics.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HarmonicsBuffer {
+    pub(crate) address: u64,
+    pub(crate) size: u64,
+    pub(crate) format: vk::Format,
+    pub(crate) stride: u32,
+    pub(crate) coefficient_stride: u64,
+}
+
+/// A descriptor set that is bound.
+#[derive(Clone, Debug)]
+pub(crate) struct BoundSet {
+    pub(crate) layout: vk::PipelineLayout,
+    pub(crate) set: vk::DescriptorSet,
+    pub(crate) offsets: Vec<u32>,
+}
+
+/// Push constants as a command has set them.
+#[derive(Clone, Debug)]
+pub(crate) struct PushConstants {
+    pub(crate) layout: vk::PipelineLayout,
+    pub(crate) stages: vk::ShaderStageFlags,
+    pub(crate) offset: u32,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// A query that the application has begun within a pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Query {
+    pub(crate) pool: vk::QueryPool,
+    pub(crate) index: u32,
+    pub(crate) flags: vk::QueryControlFlags,
+    /// It has begun on the device: something has been drawn since.
+    pub(crate) is_active: bool,
+}
+
+/// Conditional rendering that has begun within a pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Condition {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) flags: vk::ConditionalRenderingFlagsEXT,
+}
+
+/// A command that sets dynamic state, for repeating it.
+pub(crate) type Repeat = Box<dyn Fn(&Next, vk::CommandBuffer) + Send>;
+
+/// A draw as a command gives it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Call {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) vertex_offset: i32,
+    pub(crate) first_instance: u32,
+    pub(crate) instances: u32,
+    pub(crate) is_indexed: bool,
+    /// The address of the parameters, or 0.
+    pub(crate) parameters: u64,
+    /// The address of the number of draws, or 0.
+    pub(crate) draw_count: u64,
+    pub(crate) indirect_index: u32,
+}
+
+/// A command buffer.
+pub(crate) struct Recording {
+    pub(crate) commands: vk::CommandBuffer,
+    pub(crate) family: u32,
+    pub(crate) pass: Option<Pass>,
+    pub(crate) graphics: Bound,
+    pub(crate) compute: vk::Pipeline,
+    pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
+    pub(crate) index_buffer: Option<IndexBuffer>,
+    pub(crate) harmonics: Option<HarmonicsBuffer>,
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) values: DynamicValues,
+    pub(crate) viewport: Option<vk::Viewport>,
+    pub(crate) scissor: Option<vk::Rect2D>,
+    /// Vulkan's dynamic states, by their values as `VkDynamicState`.
+    pub(crate) states: BTreeMap<i32, Repeat>,
+    pub(crate) constants: Vec<PushConstants>,
+    /// By bind point and number.
+    pub(crate) descriptors: BTreeMap<(i32, u32), BoundSet>,
+    pub(crate) is_in_set: bool,
+    set: Option<Set>,
+    pub(crate) queries: Vec<Query>,
+    pub(crate) condition: Option<Condition>,
+    /// The sets of a secondary command buffer, which are computed where it is executed.
+    works: Vec<Work>,
+    /// Memory that recorded commands use.
+    scratch: Option<Arc<Memory>>,
+    kept: Vec<Arc<Memory>>,
+    pub(crate) failure: Option<vk::Result>,
+}
+
+impl Recording {
+    pub(crate) fn new(commands: vk::CommandBuffer, family: u32) -> Self {
+        Self {
+            commands,
+            family,
+            pass: None,
+            graphics: Bound::Nothing,
+            compute: vk::Pipeline::null(),
+            vertex_buffers: BTreeMap::new(),
+            index_buffer: None,
+            harmonics: None,
+            cameras: Vec::new(),
+            values: DynamicValues::default(),
+            viewport: None,
+            scissor: None,
+            states: BTreeMap::new(),
+            constants: Vec::new(),
+            descriptors: BTreeMap::new(),
+            is_in_set: false,
+            set: None,
+            queries: Vec::new(),
+            condition: None,
+            works: Vec::new(),
+            scratch: None,
+            kept: Vec::new(),
+            failure: None,
+        }
+    }
+
+    /// Forgets all that was recorded.
+    pub(crate) fn reset(&mut self) {
+        *self = Self::new(self.commands, self.family);
+    }
+
+    /// Remembers push constants; those of the same place are replaced.
+    pub(crate) fn push_constants(&mut self, pushed: PushConstants) {
+        self.constants.retain(|other| {
+            (other.layout, other.stages, other.offset, other.bytes.len())
+                != (pushed.layout, pushed.stages, pushed.offset, pushed.bytes.len())
+        });
+        self.constants.push(pushed);
+    }
+
+    /// Makes the queries begin that the application has begun.
+    ///
+    /// # Safety
+    /// The command buffer is being recorded, here and below.
+    pub(crate) unsafe fn activate_queries(&mut self, next: &Next) {
+        for query in self.queries.iter_mut().filter(|query| !query.is_active) {
+            query.is_active = true;
+            // SAFETY: the application has begun it.
+            unsafe { next.cmd_begin_query(self.commands, query.pool, query.index, query.flags) };
+        }
+    }
+
+    /// The state of a draw of Gaussians; `None` where the text says that it draws nothing.
+    fn state(&self, pipeline: &Arc<Pipeline>) -> Option<SetState> {
+        let cameras = if pipeline.state.camera_source == CameraSource::UNIFORM_BUFFER {
+            let number = pipeline.camera_buffer.as_ref()?.set;
+            let bound = self.descriptors.get(&(vk::PipelineBindPoint::GRAPHICS.as_raw(), number))?;
+            Cameras::Buffer(bound.set, bound.offsets.clone())
+        } else {
+            let is_enough = self.cameras.len() == 1 || self.cameras.len() >= pipeline.planes() as usize;
+            if self.cameras.is_empty() || !is_enough {
+                return None;
+            }
+            Cameras::Command(self.cameras.clone())
+        };
+        if pipeline.has_harmonics_buffer() {
+            self.harmonics?;
+        }
+        Some(SetState {
+            values: self.values.of(pipeline)?,
+            pipeline: Arc::clone(pipeline),
+            cameras,
+            viewport: pipeline.viewport.or(self.viewport)?,
+            scissor: pipeline.scissor.or(self.scissor)?,
+        })
+    }
+
+    /// The vertex buffers of a draw.
+    fn sources(&self, pipeline: &Pipeline) -> Vec<DrawSource> {
+        let stride_is_dynamic = pipeline.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE);
+        let source = |source: &crate::pipeline::Source| {
+            let buffer = self.vertex_buffers.get(&source.binding).copied().unwrap_or_default();
+            let stride = if stride_is_dynamic { buffer.stride.unwrap_or(source.stride) } else { source.stride };
+            DrawSource {
+                address: buffer.address,
+                bytes: u32::try_from(buffer.size).unwrap_or(u32::MAX),
+                stride,
+                divisor: source.divisor.unwrap_or(u32::MAX),
+                unused: 0,
+            }
+        };
+        pipeline.sources.iter().map(source).collect()
+    }
+
+    /// The most Gaussians of a draw. That of an indirect one is not known here: it is taken from the sizes of what it reads.
+    fn most(&self, call: &Call, pipeline: &Pipeline, sources: &[DrawSource]) -> u64 {
+        if call.parameters == 0 {
+            return (u64::from(call.count) * u64::from(call.instances)).min(u64::from(MAX_GAUSSIANS));
+        }
+        let elements = |by_instance: bool| {
+            let all = sources.iter().zip(&pipeline.sources);
+            let own = all.filter(|(_, source)| match source.divisor {
+                None => !by_instance,
+                Some(divisor) => by_instance && divisor != 0,
+            });
+            own.map(|(source, of)| u64::from(source.bytes / source.stride.max(1)) * u64::from(of.divisor.unwrap_or(1)))
+                .max()
+        };
+        let indices = self.index_buffer.filter(|_| call.is_indexed);
+        let vertices = indices.map(|buffer| buffer.size / u64::from(buffer.bytes)).or_else(|| elements(false));
+        let guess = vertices.unwrap_or(1) * elements(true).unwrap_or(1);
+        guess.clamp(1 << 18, u64::from(MAX_GAUSSIANS))
+    }
+
+    /// Records a draw of Gaussians.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    pub(crate) unsafe fn draw(&mut self, emulation: &Emulation, pipeline: &Arc<Pipeline>, call: Call) {
+        let Some(state) = self.state(pipeline) else {
+            return;
+        };
+        if self.set.as_ref().is_some_and(|set| !set.state.is_shared_with(&state)) {
+            return;
+        }
+        let index = if call.is_indexed { self.index_buffer } else { None };
+        if call.is_indexed && index.is_none() {
+            return;
+        }
+        let harmonics = self.harmonics.filter(|_| pipeline.has_harmonics_buffer());
+        let sources = self.sources(pipeline);
+        let gaussians = self.most(&call, pipeline, &sources);
+        let draw = Draw {
+            indices: index.map_or(0, |index| index.address),
+            index_bytes: index.map_or(0, |index| index.bytes),
+            index_count: index
+                .map_or(0, |index| u32::try_from(index.size / u64::from(index.bytes)).unwrap_or(u32::MAX)),
+            first: call.first,
+            count: call.count,
+            vertex_offset: call.vertex_offset,
+            first_instance: call.first_instance,
+            instances: call.instances,
+            base: 0,
+            indirect_index: call.indirect_index,
+            is_indexed: u32::from(call.is_indexed),
+            parameters: call.parameters,
+            draw_count: call.draw_count,
+            harmonics: harmonics.map_or(0, |buffer| buffer.address),
+            harmonics_bytes: harmonics.map_or(0, |buffer| u32::try_from(buffer.size).unwrap_or(u32::MAX)),
+            harmonics_format: harmonics.and_then(|buffer| formats::code(buffer.format)).unwrap_or(0),
+            harmonics_stride: harmonics.map_or(0, |buffer| buffer.stride),
+            harmonics_coefficient_stride: harmonics
+                .map_or(0, |buffer| u32::try_from(buffer.coefficient_stride).unwrap_or(u32::MAX)),
+        };
+        self.set.get_or_insert_with(|| Set::new(state)).push(draw, &sources, gaussians);
+        if !self.is_in_set {
+            // SAFETY: the caller's promise.
+            unsafe { self.end_set(emulation) };
+        }
+    }
+
+    /// Records what makes and shows the set.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    pub(crate) unsafe fn end_set(&mut self, emulation: &Emulation) {
+        let (Some(set), Some(pass)) = (self.set.take(), &self.pass) else {
+            return;
+        };
+        let Some(work) = set.into_work(pass.area()) else {
+            return;
+        };
+        // SAFETY: the caller's promise.
+        let recorded = unsafe {
+            if matches!(pass, Pass::Inherited) { self.defer(emulation, work) } else { self.compute(emulation, work) }
+        };
+        if let Err(error) = recorded {
+            self.failure = Some(error);
+        }
+    }
+
+    /// Shows a set of a secondary command buffer, which the primary one computes before.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn defer(&mut self, emulation: &Emulation, mut work: Work) -> Result<(), vk::Result> {
+        let pixels = Arc::new(Memory::new(&emulation.next, work.pixel_bytes(), false)?);
+        let address = pixels.address;
+        self.kept.push(Arc::clone(&pixels));
+        work.pixels = Some(pixels);
+        // SAFETY: the caller's promise.
+        unsafe { self.show(emulation, &work, address)? };
+        self.works.push(work);
+        Ok(())
+    }
+
+    /// Breaks the pass, computes a set, and shows it.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn compute(&mut self, emulation: &Emulation, work: Work) -> Result<(), vk::Result> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let address = self.between(emulation, std::slice::from_ref(&work))?;
+            self.show(emulation, &work, address)
+        }
+    }
+
+    /// Breaks the pass for the dispatches of sets. Returns the address of the last one's pixels.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn between(&mut self, emulation: &Emulation, works: &[Work]) -> Result<u64, vk::Result> {
+        let (next, kernels) = (&emulation.next, emulation.kernels()?);
+        if self.queries.iter().any(|query| query.is_active) {
+            tell("a query that has counted other draws within its render pass cannot count Gaussians too");
+            return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+        }
+        let Some(pass) = self.pass.take() else {
+            return Ok(0);
+        };
+        let most_pairs = u64::from(kernels.feedback.word(0));
+        let mut address = 0;
+        // SAFETY: the caller's promise.
+        unsafe {
+            if let (Some(end), Some(_)) = (next.end_conditional_rendering, self.condition) {
+                end(self.commands);
+            }
+            pass.interrupt(next, self.commands);
+            let mut failure = None;
+            for work in works {
+                let extent = work.extent(most_pairs);
+                let places = Places::of(&extent);
+                match emulation.scratch(self.family, &mut self.scratch, places.end) {
+                    Ok(scratch) => {
+                        work.record(next, kernels, self.commands, &scratch, &extent);
+                        address = work.pixels_at(&scratch, &places);
+                        if !self.kept.iter().any(|kept| Arc::ptr_eq(kept, &scratch)) {
+                            self.kept.push(scratch);
+                        }
+                    }
+                    Err(error) => failure = Some(error),
+                }
+            }
+            barrier(next, self.commands);
+            pass.resume(next, self.commands);
+            if let (Some(begin), Some(condition)) = (next.begin_conditional_rendering, self.condition) {
+                let info = vk::ConditionalRenderingBeginInfoEXT::default()
+                    .buffer(condition.buffer)
+                    .offset(condition.offset)
+                    .flags(condition.flags);
+                begin(self.commands, &raw const info);
+            }
+            self.pass = Some(pass);
+            self.restore_compute(next);
+            failure.map_or(Ok(address), Err)
+        }
+    }
+
+    /// Restores what dispatches have changed.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn restore_compute(&self, next: &Next) {
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        // SAFETY: the caller's promise: the application has bound these.
+        unsafe {
+            if self.compute != vk::Pipeline::null() {
+                next.cmd_bind_pipeline(self.commands, compute, self.compute);
+            }
+            let own = self.descriptors.iter().filter(|((point, _), _)| *point == compute.as_raw());
+            for ((_, number), bound) in own {
+                let sets = [bound.set];
+                next.cmd_bind_descriptor_sets(self.commands, compute, bound.layout, *number, &sets, &bound.offsets);
+            }
+        }
+    }
+
+    /// Draws what a set has made, and restores what that has changed.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn show(&mut self, emulation: &Emulation, work: &Work, pixels: u64) -> Result<(), vk::Result> {
+        let (next, kernels, commands) = (&emulation.next, emulation.kernels()?, self.commands);
+        let ([x, y], [width, height]) = (work.area.origin, work.area.size);
+        let area = vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } };
+        let viewport = vk::Viewport {
+            x: x as f32,
+            y: y as f32,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let pushed = [pixels as u32, (pixels >> 32) as u32, x.cast_unsigned(), y.cast_unsigned(), width, height, 0, 0];
+        let (graphics, fragment) = (vk::PipelineBindPoint::GRAPHICS, vk::ShaderStageFlags::FRAGMENT);
+        // SAFETY: the caller's promise: the application has recorded what is repeated.
+        unsafe {
+            self.activate_queries(next);
+            next.cmd_bind_pipeline(commands, graphics, work.pipeline.raw);
+            next.cmd_set_viewport(commands, 0, &[viewport]);
+            next.cmd_set_scissor(commands, 0, &[area]);
+            next.cmd_push_constants(commands, kernels.fetch_layout, fragment, 0, bytemuck::cast_slice(&pushed));
+            next.cmd_draw(commands, 3, 1, 0, 0);
+            for repeat in self.states.values() {
+                repeat(next, commands);
+            }
+            if let Bound::Other(pipeline) = self.graphics {
+                next.cmd_bind_pipeline(commands, graphics, pipeline);
+            }
+            for pushed in &self.constants {
+                next.cmd_push_constants(commands, pushed.layout, pushed.stages, pushed.offset, &pushed.bytes);
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes the sets of secondary command buffers that are about to be executed.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    pub(crate) unsafe fn before_secondaries(&mut self, emulation: &Emulation, works: &[Work]) {
+        if works.is_empty() {
+            return;
+        }
+        // SAFETY: the caller's promise.
+        if let Err(error) = unsafe { self.between(emulation, works) } {
+            self.failure = Some(error);
+        }
+    }
+
+    /// The sets that a secondary command buffer shows.
+    pub(crate) fn works(&self) -> &[Work] {
+        &self.works
+    }
+}
