@@ -12,6 +12,7 @@ mod heatmap;
 mod icd;
 mod info;
 mod limits;
+mod measures;
 mod messages;
 mod outputs;
 mod progress;
