@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use gaurast_picture::Background;
+use gaurast_scene::Camera;
 use gaurast_scene::camera_files::{self, CameraFileOptions};
 use serde::Deserialize;
 
 use super::arguments::{EvalArguments, Values};
 use super::cfg_args::CfgArgs;
 use super::error::Error;
+use super::gsplat_world::Worlds;
 use super::photographs::{Photographs, SizeRule};
 use super::split::{Split, stem};
 use crate::cameras::{DEFAULT_SIZE, View};
@@ -55,6 +57,8 @@ pub struct Dataset {
     pub values: Values,
     /// True if only the right halves are compared, as 3DGS does if the left ones train exposures.
     pub right_half: bool,
+    /// gsplat's worlds, of which the model's is one, if it was trained in a world of its own.
+    pub worlds: Option<Worlds>,
     /// The choices that were made, each with its subject.
     pub choices: BTreeMap<&'static str, String>,
     /// Facts that a reader should know, a sentence each.
@@ -94,14 +98,17 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     if let Some(path) = &dataparser {
         notes.push(format!("the cameras are taken to the model by {}", path.display()));
     }
-    if found.trainer == Some(Trainer::Gsplat) && found.cfg_yml.get("normalize_world_space").is_none_or(|v| v == "true")
-    {
-        return Err(Error::NormalizedWorld { path: found.model.join("cfg.yml") });
-    }
     let options = CameraFileOptions { size: DEFAULT_SIZE, dataparser, undistorted: arguments.undistorted };
     let file = camera_files::read(&cameras_path, &options)?;
     notes.extend(file.ignored);
     choices.insert("cameras", cameras_path.display().to_string());
+    let worlds = if found.is_normalized() {
+        let cameras: Vec<Camera> = file.views.iter().map(|view| view.camera.clone()).collect();
+        let worlds = Worlds::new(&cameras, &camera_files::colmap_points(&cameras_path)?);
+        Some(worlds.ok_or_else(|| Error::NoPoints { path: cameras_path.clone() })?)
+    } else {
+        None
+    };
 
     let folder = found.photographs(arguments, &cameras_path)?;
     let io = |path: &Path| {
@@ -201,7 +208,7 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     choices.insert("values", values.describe().to_owned());
     let background = found.background(arguments, source);
     choices.insert("background", background.map(|channel| channel.to_string()).join(", "));
-    Ok(Dataset { views, background, values, right_half: found.has_exposures(), choices, notes })
+    Ok(Dataset { views, background, values, right_half: found.has_exposures(), worlds, choices, notes })
 }
 
 /// The most that the shapes of a photograph and of its camera's picture may differ: photographs of a quarter of the size are
@@ -338,6 +345,12 @@ impl Found {
             }
             _ => Split::Every(8),
         }
+    }
+
+    /// Returns true if gsplat has moved the cameras to a world of its own.
+    fn is_normalized(&self) -> bool {
+        let is_told = |value: &String| value == "true";
+        self.trainer == Some(Trainer::Gsplat) && self.cfg_yml.get("normalize_world_space").is_none_or(is_told)
     }
 
     fn size_rule(&self, arguments: &EvalArguments) -> SizeRule {

@@ -53,12 +53,8 @@ pub enum Error {
         path.display(), size[0], size[1], of_camera[0], of_camera[1]
     )]
     Shape { path: PathBuf, size: [u32; 2], of_camera: [u32; 2] },
-    #[error(
-        "{}: gsplat has moved the cameras to coordinates of its own, which are not computed again: train with \
-         --no-normalize-world-space",
-        path.display()
-    )]
-    NormalizedWorld { path: PathBuf },
+    #[error("{}: COLMAP has no points here, by which gsplat places the cameras", path.display())]
+    NoPoints { path: PathBuf },
     #[error("{}: it is there already: --force measures again, --resume keeps it", path.display())]
     There { path: PathBuf },
     #[error("{}: it was measured with other choices: --force measures again", path.display())]

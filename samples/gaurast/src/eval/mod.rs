@@ -4,6 +4,7 @@ mod arguments;
 mod cfg_args;
 mod dataset;
 mod error;
+mod gsplat_world;
 mod photographs;
 mod report;
 mod split;
@@ -25,6 +26,7 @@ pub use arguments::EvalArguments;
 use arguments::Values;
 use dataset::{Dataset, Exposure, Measured};
 pub use error::Error;
+use gsplat_world::Chosen;
 use report::{Outcome, Report, Results};
 
 /// Draws the views, measures them, and prints the results.
@@ -34,6 +36,18 @@ pub fn run(arguments: &EvalArguments) -> Result<(), Error> {
     let source = Source::of(&SceneArguments { scenes: vec![arguments.model.clone()], ..SceneArguments::default() })?;
     let mut dataset = dataset::find(arguments, &source)?;
     let (scene, _) = source.load(progress)?;
+    if let Some(worlds) = &dataset.worlds {
+        let Chosen { world, share, next } = worlds.choose(scene.positions());
+        for measured in &mut dataset.views {
+            measured.view.camera = world.camera(&measured.view.camera);
+        }
+        let choice = format!(
+            "gsplat's, in the orientation in which {:.1} % of COLMAP's points lie near Gaussians, of four; the next has {:.1} %",
+            100.0 * share,
+            100.0 * next
+        );
+        dataset.choices.insert("world", choice);
+    }
     dataset.notes.extend(drawing::notes(&arguments.modes, &scene));
     let drawn = match arguments.modes.renderer.and_then(|renderer| renderer.to_possible_value()) {
         Some(renderer) => format!("--as {}", renderer.get_name()),

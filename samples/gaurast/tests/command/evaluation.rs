@@ -68,6 +68,12 @@ impl Noise {
 
 /// A PLY file of 150 round Gaussians before the cameras.
 fn scene() -> String {
+    placed_scene(|place| place, 1.0).0
+}
+
+/// The scene with its Gaussians elsewhere and scaled, and the places where they were.
+fn placed_scene(place: impl Fn([f64; 3]) -> [f64; 3], scaled: f64) -> (String, Vec<[f64; 3]>) {
+    let mut places = Vec::new();
     let mut text = "ply\nformat ascii 1.0\nelement vertex 150\n".to_owned();
     let properties = "x y z scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 opacity f_dc_0 f_dc_1 f_dc_2";
     for property in properties.split(' ') {
@@ -79,9 +85,11 @@ fn scene() -> String {
     for _ in 0..150 {
         let [x, y, z] = [4.0 * part() - 2.0, 3.0 * part() - 1.5, part()];
         let [scale, r, g, b] = [-2.5 + part(), 3.0 * part() - 1.5, 3.0 * part() - 1.5, 3.0 * part() - 1.5];
+        places.push([x, y, z]);
+        let ([x, y, z], scale) = (place([x, y, z]), scale + scaled.ln());
         writeln!(text, "{x} {y} {z} {scale} {scale} {scale} 1 0 0 0 2 {r} {g} {b}").expect("memory");
     }
-    text
+    (text, places)
 }
 
 /// The position of a camera, which looks along +z.
@@ -309,6 +317,47 @@ fn a_folder_of_nerfstudio_is_measured_as_nerfstudio_measures_it() {
     let names: Vec<&str> =
         json["views"].as_array().expect("views").iter().filter_map(|view| view["name"].as_str()).collect();
     assert_eq!(names, ["p02", "p05"]);
+}
+
+/// The map to gsplat's world that its formulas give in numpy for the scene's places and the cameras, row by row.
+const GSPLAT_WORLD: [[f64; 4]; 3] = [
+    [0.248_024_6, 0.017_916_57, 0.002_390_35, -0.003_629_02],
+    [-0.017_858_19, 0.247_975_13, -0.005_686_93, 0.023_589_68],
+    [-0.002_793_28, 0.005_500_23, 0.248_605_84, -0.125_755_99],
+];
+
+#[gaurast_runner::test]
+fn a_folder_of_gsplat_is_measured_in_its_own_world() {
+    let folder = inria();
+    let place =
+        |point: [f64; 3]| GSPLAT_WORLD.map(|[x, y, z, offset]| x * point[0] + y * point[1] + z * point[2] + offset);
+    let [x, y, z, _] = GSPLAT_WORLD[0];
+    let (model, places) = placed_scene(place, (x * x + y * y + z * z).sqrt());
+    write(&folder, "results/ply/point_cloud_29999.ply", &model);
+    write(&folder, "results/cfg.yml", "data_dir: data\ndata_factor: 1\ntest_every: 8\nnormalize_world_space: true\n");
+    let points = places.iter().enumerate().map(|(at, [x, y, z])| format!("{at} {x} {y} {z} 0 0 0 1\n"));
+    write(&folder, "data/sparse/0/points3D.txt", &points.collect::<String>());
+    let [width, height] = SIZE;
+    let camera = format!("1 PINHOLE {width} {height} 50 50 {} {}\n", width / 2, height / 2);
+    write(&folder, "data/sparse/0/cameras.txt", &camera);
+    let image = |at: usize| {
+        let [x, y, z] = position(at);
+        format!("{at} 1 0 0 0 {} {} {} 1 p{at:02}.png\n\n", -x, -y, -z)
+    };
+    write(&folder, "data/sparse/0/images.txt", &(0..COUNT).map(image).collect::<String>());
+    let json = evaluated(&folder, &["eval", "results", "--background", "white", "--values", "8-bit", "--json"]);
+    assert!(
+        json["choices"]["world"].as_str().is_some_and(|world| world.contains("100.0 % of COLMAP's points")),
+        "{json}"
+    );
+    for (view, name) in json["views"].as_array().expect("views").iter().zip(["p00", "p08", "p16"]) {
+        assert_eq!(view["name"], name);
+        let [clean, photograph] = [format!("clean/{name}.png"), format!("data/images/{name}.png")];
+        // Some bytes are rounded otherwise, since the places are.
+        close(&view["psnr"], psnr(&folder, &clean, &photograph, 0, |byte| byte), 0.05);
+    }
+    std::fs::remove_file(folder.path().join("data/sparse/0/points3D.txt")).expect("removed");
+    fails(&folder, &["eval", "results"], "points3D.txt");
 }
 
 #[gaurast_runner::test]
