@@ -10,6 +10,8 @@ mod files;
 pub mod flip;
 mod picture;
 mod read;
+#[cfg(feature = "metrics")]
+mod resize;
 mod size;
 #[cfg(feature = "metrics")]
 #[allow(clippy::disallowed_methods, reason = "a metric: it judges pictures and is no part of one")]
@@ -28,8 +30,10 @@ pub use files::{
 };
 pub use picture::Picture;
 pub use read::read;
+#[cfg(feature = "metrics")]
+pub use resize::resized;
 pub use size::Size;
 #[cfg(feature = "metrics")]
-pub use ssim::ssim;
+pub use ssim::Ssim;
 #[cfg(feature = "metrics")]
 pub use statistics::Statistics;

@@ -1,13 +1,15 @@
 //! SSIM: the structural similarity of two images.
 //!
 //! Wang, Bovik, Sheikh, Simoncelli, "Image Quality Assessment: From Error Visibility to Structural Similarity", 2004,
-//! as the original 3DGS code computes it: a Gaussian window of 11x11 with a standard deviation of 1.5, zeros beyond the
-//! border, constants 0.01 and 0.03, the mean over pixels and channels.
+//! with a Gaussian window of 11x11, a standard deviation of 1.5, constants 0.01 and 0.03, and the mean over pixels and
+//! channels. Programs differ in what they do at the border.
+
+use std::ops::Range;
 
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::tiles::{Along, Filter, Form, Tile, tiles};
+use crate::tiles::{Filter, Form, Tile, tiles};
 
 /// Half the window's width.
 const RADIUS: usize = 5;
@@ -18,63 +20,105 @@ const C1: f64 = 0.01 * 0.01;
 /// The square of the second constant times the range.
 const C2: f64 = 0.03 * 0.03;
 
-/// The mean SSIM of red, green and blue, at most 1, which is the value of equal images. Rows have `width` pixels.
-///
-/// # Panics
-/// Panics if the sizes differ.
-pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
-    assert_eq!(image.len(), reference.len(), "the sizes differ");
-    if image.is_empty() {
-        return 1.0;
-    }
-    let width = width as usize;
-    let (height, filter) = (image.len() / width, Filter { form: Form::Even, weights: window()[RADIUS..].to_vec() });
-    let level = Level::new();
-    let sum_of =
-        |tile: Tile| dispatch!(level, simd => tile_sum(simd, image, reference, [width, height], tile, &filter));
-    // Summed in the order of the tiles, so that threads change nothing.
-    let sums: Vec<f64> = tiles(width, height).into_par_iter().map(sum_of).collect();
-    sums.into_iter().sum::<f64>() / (3 * image.len()) as f64
+/// Mean SSIM of red, green and blue, each at most 1, which is the value of equal images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ssim {
+    /// Over all pixels, with zeros beyond the border, as `metrics.py` of the original 3DGS code computes it.
+    pub inria: f64,
+    /// Over the pixels whose window lies in the image, as torchmetrics (which gsplat uses) and pytorch-msssim (which
+    /// nerfstudio uses) compute it. None if there is no such pixel.
+    pub torchmetrics: Option<f64>,
 }
 
-/// The sum of a tile's values of three channels.
+impl Ssim {
+    /// Compares two images with `width` pixels in a row.
+    ///
+    /// # Panics
+    /// Panics if the sizes differ.
+    pub fn new(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> Self {
+        assert_eq!(image.len(), reference.len(), "the sizes differ");
+        if image.is_empty() {
+            return Self { inria: 1.0, torchmetrics: None };
+        }
+        let width = width as usize;
+        let (height, filter) = (image.len() / width, Filter { form: Form::Even, weights: window()[RADIUS..].to_vec() });
+        let level = Level::new();
+        let sums_of =
+            |tile: Tile| dispatch!(level, simd => tile_sums(simd, image, reference, [width, height], tile, &filter));
+        let sums: Vec<Sums> = tiles(width, height).into_par_iter().map(sums_of).collect();
+        // Summed in the order of the tiles, so that threads change nothing.
+        let all: f64 = sums.iter().map(|sums| sums.all).sum();
+        let inside: f64 = sums.iter().map(|sums| sums.inside).sum();
+        let count = width.saturating_sub(2 * RADIUS) * height.saturating_sub(2 * RADIUS);
+        Self { inria: all / (3 * image.len()) as f64, torchmetrics: (count > 0).then(|| inside / (3 * count) as f64) }
+    }
+}
+
+/// Sums of a tile's values of three channels.
+struct Sums {
+    all: f64,
+    /// Of the pixels whose window lies in the image.
+    inside: f64,
+}
+
+/// The part of a tile's rows or columns whose windows lie in an image of `side` rows or columns.
+fn inside(first: usize, count: usize, side: usize) -> Range<usize> {
+    let end = side.saturating_sub(RADIUS).saturating_sub(first).min(count);
+    RADIUS.saturating_sub(first).min(end)..end
+}
+
 #[inline(always)]
-fn tile_sum<S: Simd>(
+fn tile_sums<S: Simd>(
     simd: S,
     a: &[[f32; 4]],
     b: &[[f32; 4]],
     [width, height]: [usize; 2],
     tile: Tile,
     filter: &Filter<f64>,
-) -> f64 {
+) -> Sums {
     simd.vectorize(
         #[inline(always)]
         || {
-            let smooth = |plane: &[f64]| {
-                let along_rows = filter.correlate(plane, tile, RADIUS, Along::Rows);
-                filter.correlate(&along_rows, tile, RADIUS, Along::Columns)
-            };
-            let mut sum = 0.0;
+            let (rows, columns) = (inside(tile.top, tile.height, height), inside(tile.left, tile.width, width));
+            let mut sums = Sums { all: 0.0, inside: 0.0 };
             for channel in 0..3 {
-                let plane = |image: &[[f32; 4]]| {
-                    tile.bordered(RADIUS, |x, y| {
-                        let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
-                        if inside { f64::from(image[y as usize * width + x as usize][channel]) } else { 0.0 }
-                    })
-                };
-                let (a, b) = (plane(a), plane(b));
-                let both: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a * b).collect();
-                let squares: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a * a + b * b).collect();
-                let (mean_a, mean_b) = (smooth(&a), smooth(&b));
-                let (both, squares) = (smooth(&both), smooth(&squares));
-                sum += tile.sum(|at| {
+                let a = channel_of(a, [width, height], tile, channel);
+                let b = channel_of(b, [width, height], tile, channel);
+                let (mut both, mut squares) = (vec![0.0; a.len()], vec![0.0; a.len()]);
+                for at in 0..a.len() {
+                    both[at] = a[at] * b[at];
+                    squares[at] = a[at] * a[at] + b[at] * b[at];
+                }
+                let mean_a = filter.correlate_both(&a, tile, RADIUS);
+                let mean_b = filter.correlate_both(&b, tile, RADIUS);
+                let both = filter.correlate_both(&both, tile, RADIUS);
+                let squares = filter.correlate_both(&squares, tile, RADIUS);
+                // Computed before they are summed, since a sum in order is not vectorized.
+                let mut values = vec![0.0; both.len()];
+                for at in 0..values.len() {
                     let (x, y) = (mean_a[at], mean_b[at]);
                     let covariance = both[at] - x * y;
                     let variances = squares[at] - (x * x + y * y);
-                    (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
-                });
+                    values[at] =
+                        (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2));
+                }
+                sums.all += tile.sum(&values, 0..tile.height, 0..tile.width);
+                sums.inside += tile.sum(&values, rows.clone(), columns.clone());
             }
-            sum
+            sums
+        },
+    )
+}
+
+/// A channel of a tile and its border, with zeros beyond the image.
+#[inline(always)]
+fn channel_of(image: &[[f32; 4]], [width, height]: [usize; 2], tile: Tile, channel: usize) -> Vec<f64> {
+    tile.bordered(
+        RADIUS,
+        #[inline(always)]
+        |x, y| {
+            let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
+            if inside { f64::from(image[y as usize * width + x as usize][channel]) } else { 0.0 }
         },
     )
 }
@@ -112,8 +156,8 @@ mod tests {
         (0..values.len()).map(|i| correlate(i / width, height, &|y| rows[y * width + i % width])).collect()
     }
 
-    /// The sum of a channel's values, one pixel after the other.
-    fn channel_sum(a: &[f64], b: &[f64], width: usize) -> f64 {
+    /// A channel's values, one pixel after the other.
+    fn channel_values(a: &[f64], b: &[f64], width: usize) -> Vec<f64> {
         let window = window();
         let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
         let smooth = |values: &[f64]| filtered(values, width, &window);
@@ -127,7 +171,7 @@ mod tests {
                 let variances = square_a[i] - x * x + square_b[i] - y * y;
                 (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
             })
-            .sum()
+            .collect()
     }
 
     #[test]
@@ -141,24 +185,44 @@ mod tests {
         let (a, b) = (image(31), image(37));
         let plane =
             |image: &[[f32; 4]], channel: usize| -> Vec<f64> { image.iter().map(|p| p[channel].into()).collect() };
-        let sums = (0..3).map(|channel| channel_sum(&plane(&a, channel), &plane(&b, channel), width));
-        let expected = sums.sum::<f64>() / (3 * width * height) as f64;
-        let found = ssim(&a, &b, width as u32);
-        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        let values: Vec<Vec<f64>> =
+            (0..3).map(|channel| channel_values(&plane(&a, channel), &plane(&b, channel), width)).collect();
+        let expected = values.iter().flatten().sum::<f64>() / (3 * width * height) as f64;
+        let found = Ssim::new(&a, &b, width as u32);
+        assert!((found.inria - expected).abs() < 1e-12, "{found:?} {expected}");
+        let is_inside = |at: &usize| (5..width - 5).contains(&(at % width)) && (5..height - 5).contains(&(at / width));
+        let inside =
+            (0..width * height).filter(is_inside).map(|at| values.iter().map(|values| values[at]).sum::<f64>());
+        let expected = inside.sum::<f64>() / (3 * (width - 10) * (height - 10)) as f64;
+        let torchmetrics = found.torchmetrics.expect("windows fit");
+        assert!((torchmetrics - expected).abs() < 1e-12, "{found:?} {expected}");
+    }
+
+    #[test]
+    fn an_image_in_which_no_window_fits_has_one_value() {
+        let image = grey(|i| i as f32 / 120.0, 10 * 12);
+        assert_eq!(Ssim::new(&image, &image, 10), Ssim { inria: 1.0, torchmetrics: None });
+        assert_eq!(Ssim::new(&image, &image, 12).torchmetrics, None);
+        let image = grey(|i| i as f32 / 121.0, 11 * 11);
+        assert_eq!(Ssim::new(&image, &image, 11), Ssim { inria: 1.0, torchmetrics: Some(1.0) });
     }
 
     fn grey(value: impl Fn(usize) -> f32, count: usize) -> Vec<[f32; 4]> {
         (0..count).map(|i| [value(i), value(i), value(i), 1.0]).collect()
     }
 
+    fn inria(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
+        Ssim::new(image, reference, width).inria
+    }
+
     #[test]
     fn equal_images_are_alike_and_noise_is_not() {
         let ramp = grey(|i| (i % 32) as f32 / 31.0, 32 * 24);
-        assert!((ssim(&ramp, &ramp, 32) - 1.0).abs() < 1e-12);
+        assert!((inria(&ramp, &ramp, 32) - 1.0).abs() < 1e-12);
         let noise = grey(|i| (i * 7919 % 101) as f32 / 100.0, 32 * 24);
-        let alike = ssim(&ramp, &noise, 32);
+        let alike = inria(&ramp, &noise, 32);
         assert!(alike < 0.3, "{alike}");
-        assert!((alike - ssim(&noise, &ramp, 32)).abs() < 1e-12);
+        assert!((alike - inria(&noise, &ramp, 32)).abs() < 1e-12);
     }
 
     #[test]
@@ -171,6 +235,6 @@ mod tests {
         let variance = |p: f64, q: f64| weight * p * q - (weight * p) * (weight * q);
         let expected = (2.0 * x * y + C1) * (2.0 * variance(0.25, 0.75) + C2)
             / ((x * x + y * y + C1) * (variance(0.25, 0.25) + variance(0.75, 0.75) + C2));
-        assert!((ssim(&a, &b, 1) - expected).abs() < 1e-12);
+        assert!((inria(&a, &b, 1) - expected).abs() < 1e-12);
     }
 }

@@ -1,6 +1,9 @@
 //! Tiles of a picture, and the filters that metrics correlate them with. A tile and all that is computed of it fit into a cache.
+//!
+//! All of it is inlined into the callers' vectorized code. A function that is not, and a closure without the attribute, is
+//! compiled for the least processor.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Range, Sub};
 
 /// The width of tiles, a multiple of [`LANES`], and their height, in pixels.
 const SIZE: [usize; 2] = [256, 128];
@@ -39,6 +42,7 @@ impl Tile {
 
     /// The values of a picture in the tile and `border` pixels around its columns and rows. `value` receives the place of each,
     /// which may lie outside of the picture.
+    #[inline(always)]
     pub(crate) fn bordered<T>(self, border: usize, mut value: impl FnMut(isize, isize) -> T) -> Vec<T> {
         let (stride, rows) = (self.columns() + 2 * border, self.height + 2 * border);
         let mut values = Vec::with_capacity(stride * rows);
@@ -51,10 +55,16 @@ impl Tile {
         values
     }
 
-    /// The sum of a value over the tile's pixels. `value` receives the index of each in a plane of the tile's columns.
-    pub(crate) fn sum(self, mut value: impl FnMut(usize) -> f64) -> f64 {
-        let columns = self.columns();
-        (0..self.height).flat_map(|row| row * columns..row * columns + self.width).map(&mut value).sum()
+    /// The sum of a plane's values over some of the tile's rows and columns, row by row. The plane has the tile's columns.
+    #[inline(always)]
+    pub(crate) fn sum<T: Copy + Into<f64>>(self, plane: &[T], rows: Range<usize>, columns: Range<usize>) -> f64 {
+        let mut sum = 0.0;
+        for row in rows {
+            for value in &plane[row * self.columns()..][columns.clone()] {
+                sum += (*value).into();
+            }
+        }
+        sum
     }
 }
 
@@ -109,14 +119,17 @@ impl<T: Number> Filter<T> {
         output
     }
 
+    /// Correlates a plane with `border` values around the tile along rows, then along columns.
+    #[inline(always)]
+    pub(crate) fn correlate_both(&self, plane: &[T], tile: Tile, border: usize) -> Vec<T> {
+        let along_rows = self.correlate(plane, tile, border, Along::Rows);
+        self.correlate(&along_rows, tile, border, Along::Columns)
+    }
+
     /// Correlates a group of values, of which the first is at `middle`.
     #[inline(always)]
     fn correlate_group(&self, plane: &[T], middle: usize, step: usize) -> [T; LANES] {
-        let group = |at: usize| -> &[T; LANES] {
-            let (group, _) = plane[at..].split_first_chunk().expect("a plane has whole groups");
-            group
-        };
-        let centre = group(middle);
+        let centre = group(plane, middle);
         let mut sums = [T::default(); LANES];
         if self.form == Form::Even {
             for lane in 0..LANES {
@@ -124,7 +137,7 @@ impl<T: Number> Filter<T> {
             }
         }
         for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
-            let (before, after) = (group(middle - distance * step), group(middle + distance * step));
+            let (before, after) = (group(plane, middle - distance * step), group(plane, middle + distance * step));
             match self.form {
                 Form::Even => {
                     for lane in 0..LANES {
@@ -146,6 +159,12 @@ impl<T: Number> Filter<T> {
         }
         sums
     }
+}
+
+/// The values of a plane from `at` on.
+#[inline(always)]
+fn group<T>(plane: &[T], at: usize) -> &[T; LANES] {
+    plane[at..].first_chunk().expect("a plane has whole groups")
 }
 
 #[cfg(test)]
@@ -177,8 +196,7 @@ mod tests {
             }
             let filter = Filter { form, weights };
             let border = 4;
-            let rows = filter.correlate(&tile.bordered(border, value), tile, border, Along::Rows);
-            let both = filter.correlate(&rows, tile, border, Along::Columns);
+            let both = filter.correlate_both(&tile.bordered(border, value), tile, border);
             let weight = |at: isize| {
                 let weight = filter.weights.get(at.unsigned_abs()).copied().unwrap_or(0.0);
                 match (form, at.signum()) {

@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 use crate::args::{EXIT_CODES, RenderArguments};
 use crate::compare::CompareArguments;
 use crate::compare_drivers::CompareDriversArguments;
+use crate::eval::EvalArguments;
 use crate::info::InfoArguments;
 use crate::sheet::ViewsArguments;
 use crate::simulate::SimulateArguments;
@@ -32,6 +33,8 @@ pub enum Command {
     Compare(Box<CompareArguments>),
     /// Runs a program on this driver and on another one, and measures the differences of its pictures
     CompareDrivers(Box<CompareDriversArguments>),
+    /// Measures a trained model against its photographs
+    Eval(Box<EvalArguments>),
     /// Prints the contents of a scene
     Info(Box<InfoArguments>),
     /// Estimates the cost of a scene on the simulated hardware: time, energy, area

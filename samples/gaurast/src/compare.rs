@@ -5,13 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use gaurast_picture::{Background, OutputError, Picture, PictureFormat, Size, Statistics, ssim};
+use gaurast_picture::{Background, OutputError, Picture, PictureFormat, Size};
 use serde_json::json;
 use thiserror::Error;
 
 use crate::args::{CameraArguments, ModeArguments, SceneArguments};
 use crate::cameras::{self, View, ViewError};
 use crate::drawing::{self, DrawError, Drawing};
+use crate::measures::{Means, Measures, difference, in_eight_bits, shown};
 use crate::progress::Progress;
 use crate::report::write_json;
 use crate::sources::{Source, SourceError, stem};
@@ -60,7 +61,8 @@ impl Error {
     after_help = "PSNR is over red, green and blue, the peak being 1; SSIM is as 3DGS's own evaluation computes \
     it; FLIP is the mean error of the LDR evaluator, 0 to 1. Colours are compared as they are shown, over the background. \
     Folders are compared file by file, by their names without extensions. The PSNR of equal pictures is infinite, and so is a \
-    mean with one of them; JSON has null for it, and says how many pictures are equal."
+    mean with one of them; JSON has null for it, and says how many pictures are equal. JSON also has torchmetrics' SSIM, which \
+    leaves out the border."
 )]
 pub struct CompareArguments {
     /// A picture, or a folder of pictures: .png, .jpg, .webp, .ppm or .exr
@@ -113,8 +115,7 @@ struct Pair {
 /// The result of comparing two pictures.
 struct Compared {
     name: String,
-    statistics: Statistics,
-    ssim: f64,
+    measures: Measures,
 }
 
 /// Compares and prints the results.
@@ -149,9 +150,9 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
         print(arguments, &compared).map_err(Error::Stdout)?;
     }
     if let Some(limit) = arguments.fail_below
-        && let Some(worst) = compared.iter().find(|one| one.statistics.psnr < limit)
+        && let Some(worst) = compared.iter().find(|one| one.measures.decibels() < limit)
     {
-        return Err(Error::Below { name: worst.name.clone(), psnr: worst.statistics.psnr, limit });
+        return Err(Error::Below { name: worst.name.clone(), psnr: worst.measures.decibels(), limit });
     }
     Ok(())
 }
@@ -171,30 +172,15 @@ pub fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Resul
 
 fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> {
     let behind = arguments.background.map_or([0.0; 3], Background::color);
-    // As a screen displays it. Large pictures are changed where they are.
-    let shown = |picture: Picture| {
-        let mut pixels = picture.over(behind).pixels;
-        for channel in pixels.as_flattened_mut() {
-            *channel = if channel.is_nan() { 0.0 } else { channel.clamp(0.0, 1.0) };
-        }
-        pixels
-    };
-    let [width, height] = [pair.a.width, pair.a.height];
-    let (a, b) = (shown(pair.a), shown(pair.b));
-    let statistics = Statistics::new(&a, &b, width);
+    let (a, b) = (shown(pair.a, behind), shown(pair.b, behind));
+    let measures = Measures::of(&a, &b);
     if let Some(path) = &pair.difference {
         if path.is_file() && !arguments.force {
             return Err(Error::There { path: path.clone() });
         }
-        let scale = 1.0 / (statistics.max as f32).max(f32::MIN_POSITIVE);
-        let difference = |(a, b): (&[f32; 4], &[f32; 4])| {
-            let channel = |c: usize| (a[c] - b[c]).abs() * scale;
-            [channel(0), channel(1), channel(2), 1.0]
-        };
-        let picture = Picture { width, height, pixels: a.iter().zip(&b).map(difference).collect() };
-        gaurast_picture::write(path, &picture, None)?;
+        gaurast_picture::write(path, &difference(&a, &b, measures.largest), None)?;
     }
-    Ok(Compared { name: pair.name, statistics, ssim: ssim(&a, &b, width) })
+    Ok(Compared { name: pair.name, measures })
 }
 
 /// Draws the scene for a picture of `size`.
@@ -219,14 +205,6 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(source.background);
     Ok(frame.picture.over(background.map_or([0.0; 3], Background::color)))
-}
-
-/// The picture after rounding to eight bits, as in a file.
-fn in_eight_bits(mut picture: Picture) -> Picture {
-    for value in picture.pixels.as_flattened_mut() {
-        *value = libm::roundf(255.0 * value.clamp(0.0, 1.0)) / 255.0;
-    }
-    picture
 }
 
 /// The pictures in a folder, by name without extension.
@@ -269,43 +247,37 @@ pub fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Erro
 
 fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    let mean =
-        |value: &dyn Fn(&Compared) -> f64| compared.iter().map(value).sum::<f64>() / compared.len().max(1) as f64;
-    let means = [mean(&|one| one.statistics.psnr), mean(&|one| one.ssim), mean(&|one| one.statistics.flip)];
+    let means = Means::of(compared.iter().map(|one| &one.measures));
     if arguments.json {
-        // JSON has no infinity, which is the PSNR of equal pictures.
-        let finite = |value: f64| value.is_finite().then_some(value);
         let one = |one: &Compared| {
+            let Measures { psnr, ssim, ssim_torchmetrics, flip, largest, equal } = one.measures;
             json!({
                 "name": one.name,
-                "psnr": finite(one.statistics.psnr),
-                "ssim": one.ssim,
-                "flip": one.statistics.flip,
-                "largest": one.statistics.max,
-                "equal": one.statistics.max == 0.0,
+                "psnr": psnr,
+                "ssim": ssim,
+                "ssim_torchmetrics": ssim_torchmetrics,
+                "flip": flip,
+                "largest": largest,
+                "equal": equal,
             })
         };
         let pictures: Vec<_> = compared.iter().map(one).collect();
-        let [psnr, ssim, flip] = means;
-        let equal = compared.iter().filter(|one| one.statistics.max == 0.0).count();
-        let mean = json!({"psnr": finite(psnr), "ssim": ssim, "flip": flip, "equal": equal});
-        write_json(&mut stdout, &json!({"pictures": pictures, "mean": mean}))?;
+        write_json(&mut stdout, &json!({"pictures": pictures, "mean": means}))?;
         return stdout.flush();
     }
     for one in compared {
-        let Statistics { psnr, flip, max, .. } = one.statistics;
+        let Measures { ssim, flip, largest, .. } = one.measures;
         writeln!(
             stdout,
-            "{}: PSNR {psnr:.2} dB, SSIM {:.4}, FLIP {flip:.4}, largest difference {:.1} of 255",
+            "{}: PSNR {:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}, largest difference {:.1} of 255",
             one.name,
-            one.ssim,
-            255.0 * max
+            one.measures.decibels(),
+            255.0 * largest
         )?;
     }
     if compared.len() > 1 {
-        let [psnr, ssim, flip] = means;
-        let count = compared.len();
-        writeln!(stdout, "mean of {count}: PSNR {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}")?;
+        let (count, psnr) = (compared.len(), means.decibels());
+        writeln!(stdout, "mean of {count}: PSNR {psnr:.2} dB, SSIM {:.4}, FLIP {:.4}", means.ssim, means.flip)?;
     }
     stdout.flush()
 }

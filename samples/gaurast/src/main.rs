@@ -8,10 +8,12 @@ mod command_line;
 mod compare;
 mod compare_drivers;
 mod drawing;
+mod eval;
 mod heatmap;
 mod icd;
 mod info;
 mod limits;
+mod measures;
 mod messages;
 mod outputs;
 mod progress;
@@ -75,6 +77,9 @@ fn run(command: Command) -> Result<(), Failure> {
         }
         Command::CompareDrivers(arguments) => {
             compare_drivers::run(&arguments).map_err(|error| failure(error.to_string(), false))
+        }
+        Command::Eval(arguments) => {
+            eval::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
         }
         Command::Info(arguments) => info::run(&arguments).map_err(|error| failure(error.to_string(), false)),
         Command::Simulate(arguments) => simulate::run(&arguments).map_err(|error| failure(error.to_string(), false)),

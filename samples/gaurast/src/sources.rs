@@ -40,6 +40,11 @@ pub enum SourceError {
     )]
     Checkpoint { path: PathBuf },
     #[error(
+        "{}: a training checkpoint of gsplat, which is a program for Python: simple_trainer.py writes a .ply with --save-ply",
+        path.display()
+    )]
+    GsplatCheckpoint { path: PathBuf },
+    #[error(
         "{}: the folder holds COLMAP's cameras and points, which are no Gaussians: --cameras reads the cameras",
         path.display()
     )]
@@ -181,6 +186,9 @@ fn part(path: &Path) -> Result<Part, SourceError> {
     if path.is_dir() {
         return folder(path);
     }
+    if path.extension().is_some_and(|extension| extension == "pt") {
+        return Err(SourceError::GsplatCheckpoint { path: path.to_owned() });
+    }
     // Standard input has no name.
     let name = if path == Path::new("-") { DEFAULT_NAME.to_owned() } else { stem(path) };
     Ok(Part { name, file: path.to_owned(), dataparser: beside(path, "dataparser_transforms.json"), ..Part::default() })
@@ -211,6 +219,9 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
     part.file = if let Some((iteration, file)) = newest_iteration(&path.join("point_cloud")) {
         part.notes.push(format!("iteration {iteration} is drawn"));
         file
+    } else if let Some((step, file)) = newest_step(&path.join("ply")) {
+        part.notes.push(format!("step {step} is drawn"));
+        file
     } else if let Some(file) = there("point_cloud.ply").or_else(|| there("splat.ply")) {
         file
     } else if there("meta.json").or_else(|| there("lod-meta.json")).is_some() {
@@ -240,6 +251,18 @@ fn newest_iteration(folder: &Path) -> Option<(u64, PathBuf)> {
             file.is_file().then_some((iteration, file))
         })
         .max_by_key(|(iteration, _)| *iteration)
+}
+
+/// The scene of the highest step in gsplat's folder `ply`.
+fn newest_step(folder: &Path) -> Option<(u64, PathBuf)> {
+    let entries = folder.read_dir().ok()?.flatten();
+    entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let step = name.to_str()?.strip_prefix("point_cloud_")?.strip_suffix(".ply")?.parse().ok()?;
+            Some((step, entry.path()))
+        })
+        .max_by_key(|(step, _)| *step)
 }
 
 /// The scene files in `folder`, by name.
@@ -279,6 +302,8 @@ fn why_none(path: &Path) -> SourceError {
     let holds = |names: &[&str]| names.iter().any(|name| path.join(name).exists());
     if holds(&["nerfstudio_models", "config.yml"]) {
         SourceError::Checkpoint { path: path_buf }
+    } else if holds(&["ckpts"]) {
+        SourceError::GsplatCheckpoint { path: path_buf.join("ckpts") }
     } else if holds(&["sparse", "cameras.bin", "cameras.txt"]) {
         SourceError::Colmap { path: path_buf }
     } else {

@@ -58,7 +58,7 @@ pub fn flip<const N: usize>(reference: &[[f32; N]], test: &[[f32; N]], width: u3
 
 /// The mean of [`flip`]'s errors.
 pub fn mean<const N: usize>(reference: &[[f32; N]], test: &[[f32; N]], width: u32, pixels_per_degree: f64) -> f64 {
-    let sum = |tile: Tile, errors: Vec<f32>| tile.sum(|at| errors[at].into());
+    let sum = |tile: Tile, errors: Vec<f32>| tile.sum(&errors, 0..tile.height, 0..tile.width);
     let sums = by_tile(reference, test, width as usize, pixels_per_degree, sum);
     sums.into_iter().map(|(_, sum)| sum).sum::<f64>() / reference.len() as f64
 }
@@ -152,8 +152,12 @@ impl Vision {
         simd.vectorize(
             #[inline(always)]
             || {
-                let [reference, test] = [reference, test].map(|image| self.perceived(image, width, tile));
-                (0..reference.edges.len()).map(|at| error(&reference, &test, at)).collect()
+                let (reference, test) = (self.perceived(reference, width, tile), self.perceived(test, width, tile));
+                let mut errors = vec![0.0; reference.edges.len()];
+                for (at, value) in errors.iter_mut().enumerate() {
+                    *value = error(&reference, &test, at);
+                }
+                errors
             },
         )
     }
@@ -161,69 +165,94 @@ impl Vision {
     /// A tile of an image after the filters of human vision.
     #[inline(always)]
     fn perceived<const N: usize>(&self, image: &[[f32; N]], width: usize, tile: Tile) -> Perceived {
-        let height = image.len() / width;
         let border = self.border;
-        let opponent = tile.bordered(border, |x, y| {
-            let x = x.clamp(0, width as isize - 1) as usize;
-            let y = y.clamp(0, height as isize - 1) as usize;
-            self.opponent(image[y * width + x])
-        });
-        let [y, cx, cz] =
-            [0, 1, 2].map(|channel| -> Vec<f32> { opponent.iter().map(|color| color[channel]).collect() });
-        let separable = |plane: &[f32], filter: &Filter<f32>| {
-            let along_rows = filter.correlate(plane, tile, border, Along::Rows);
-            filter.correlate(&along_rows, tile, border, Along::Columns)
-        };
-        let [y_seen, cx_seen, cz_seen] = [(&y, 0), (&cx, 1), (&cz, 2)].map(|(plane, channel)| {
-            let mut sums = vec![0.0; tile.columns() * tile.height];
-            for (weight, filter) in &self.sensitivities[channel] {
-                for (sum, value) in sums.iter_mut().zip(separable(plane, filter)) {
-                    *sum += weight * value;
-                }
-            }
-            sums
-        });
-        let colors: Vec<[f32; 3]> =
-            (0..y_seen.len()).map(|at| hunt_lab([y_seen[at], cx_seen[at], cz_seen[at]])).collect();
+        let [y, cx, cz] = self.opponent(image, width, tile);
+        let [of_y, of_cx, of_cz] = &self.sensitivities;
+        let color = hunt_lab(
+            filtered(&y, of_y, tile, border),
+            filtered(&cx, of_cx, tile, border),
+            filtered(&cz, of_cz, tile, border),
+        );
 
-        let luminance: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
+        let mut luminance = y;
+        for value in &mut luminance {
+            *value = (*value + 16.0) / 116.0;
+        }
         let smooth = self.smooth.correlate(&luminance, tile, border, Along::Rows);
-        let gradient = |across: &Filter<f32>| -> Vec<f32> {
-            let horizontal = across.correlate(&luminance, tile, border, Along::Rows);
-            let horizontal = self.smooth.correlate(&horizontal, tile, border, Along::Columns);
-            let vertical = across.correlate(&smooth, tile, border, Along::Columns);
-            horizontal.iter().zip(&vertical).map(|(x, y)| (x * x + y * y).sqrt()).collect()
-        };
         Perceived {
-            color: [0, 1, 2].map(|channel| colors.iter().map(|color| color[channel]).collect()),
-            edges: gradient(&self.edge),
-            points: gradient(&self.point),
+            color,
+            edges: self.gradient(&self.edge, &luminance, &smooth, tile),
+            points: self.gradient(&self.point, &luminance, &smooth, tile),
         }
     }
 
-    /// A pixel in YCxCz, a linear form of L*a*b*, in which filters may be applied.
+    /// The strength of what `across` detects in both directions. `smooth` is the luminance smoothed along rows.
     #[inline(always)]
-    fn opponent<const N: usize>(&self, pixel: [f32; N]) -> [f32; 3] {
-        let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(|value| {
-            let value = value.clamp(0.0, 1.0);
-            let step = (value * 255.0 + 0.5) as usize;
-            if step as f32 / 255.0 == value { self.linear[step] } else { srgb_to_linear(value) }
-        });
-        let xyz = [
-            (10135552.0 * r + 8788810.0 * g + 4435075.0 * b) / 24577794.0,
-            (2613072.0 * r + 8788810.0 * g + 887015.0 * b) / 12288897.0,
-            (1425312.0 * r + 8788810.0 * g + 70074185.0 * b) / 73733382.0,
-        ];
-        let [x, y, z] = [0, 1, 2].map(|axis| xyz[axis] / WHITE[axis]);
-        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)].map(|value| value as f32)
+    fn gradient(&self, across: &Filter<f32>, luminance: &[f32], smooth: &[f32], tile: Tile) -> Vec<f32> {
+        let horizontal = across.correlate(luminance, tile, self.border, Along::Rows);
+        let horizontal = self.smooth.correlate(&horizontal, tile, self.border, Along::Columns);
+        let mut strength = across.correlate(smooth, tile, self.border, Along::Columns);
+        for (strength, x) in strength.iter_mut().zip(horizontal) {
+            let y = *strength;
+            *strength = (x * x + y * y).sqrt();
+        }
+        strength
     }
+
+    /// A tile with its border in YCxCz, a linear form of L*a*b*, in which filters may be applied.
+    #[inline(always)]
+    fn opponent<const N: usize>(&self, image: &[[f32; N]], width: usize, tile: Tile) -> [Vec<f32>; 3] {
+        let height = image.len() / width;
+        let linear = tile.bordered(
+            self.border,
+            #[inline(always)]
+            |x, y| {
+                let x = x.clamp(0, width as isize - 1) as usize;
+                let y = y.clamp(0, height as isize - 1) as usize;
+                let pixel = image[y * width + x];
+                [self.linear(pixel[0]), self.linear(pixel[1]), self.linear(pixel[2])]
+            },
+        );
+        let (mut y, mut cx, mut cz) = (vec![0.0; linear.len()], vec![0.0; linear.len()], vec![0.0; linear.len()]);
+        for (at, &[r, g, b]) in linear.iter().enumerate() {
+            let x_of_white = (10135552.0 * r + 8788810.0 * g + 4435075.0 * b) / 24577794.0 / WHITE[0];
+            let y_of_white = (2613072.0 * r + 8788810.0 * g + 887015.0 * b) / 12288897.0 / WHITE[1];
+            let z_of_white = (1425312.0 * r + 8788810.0 * g + 70074185.0 * b) / 73733382.0 / WHITE[2];
+            y[at] = (116.0 * y_of_white - 16.0) as f32;
+            cx[at] = (500.0 * (x_of_white - y_of_white)) as f32;
+            cz[at] = (200.0 * (y_of_white - z_of_white)) as f32;
+        }
+        [y, cx, cz]
+    }
+
+    /// The linear value of an sRGB value, which is clamped to 0 to 1.
+    #[inline(always)]
+    fn linear(&self, value: f32) -> f64 {
+        let value = value.clamp(0.0, 1.0);
+        let step = (value * 255.0 + 0.5) as usize;
+        if step as f32 / 255.0 == value { self.linear[step] } else { srgb_to_linear(value) }
+    }
+}
+
+/// A channel of a tile under a sensitivity: a sum of weighted filters.
+#[inline(always)]
+fn filtered(plane: &[f32], sensitivity: &[(f32, Filter<f32>)], tile: Tile, border: usize) -> Vec<f32> {
+    let mut sums = vec![0.0; tile.columns() * tile.height];
+    for (weight, filter) in sensitivity {
+        for (sum, value) in sums.iter_mut().zip(filter.correlate_both(plane, tile, border)) {
+            *sum += weight * value;
+        }
+    }
+    sums
 }
 
 /// The error of a pixel.
 #[inline(always)]
 fn error(reference: &Perceived, test: &Perceived, at: usize) -> f32 {
     // The HyAB distance: city-block in lightness, Euclidean in the other two.
-    let [l, a, b] = [0, 1, 2].map(|channel: usize| reference.color[channel][at] - test.color[channel][at]);
+    let l = reference.color[0][at] - test.color[0][at];
+    let a = reference.color[1][at] - test.color[1][at];
+    let b = reference.color[2][at] - test.color[2][at];
     let difference = power(l.abs() + (a * a + b * b).sqrt(), QC as f32);
     // Differences are mapped to 0 to 1, and most of the range to small ones.
     let greatest = power(GREATEST_DIFFERENCE as f32, QC as f32);
@@ -237,31 +266,39 @@ fn error(reference: &Perceived, test: &Perceived, at: usize) -> f32 {
     power(color_error, 1.0 - feature_error)
 }
 
-/// A filtered colour of YCxCz as L*a*b*, with the Hunt effect: colours look more colourful where they are brighter.
+/// Filtered colours of YCxCz as L*a*b*, with the Hunt effect: colours look more colourful where they are brighter. Planes
+/// become planes.
 #[inline(always)]
-fn hunt_lab([y, cx, cz]: [f32; 3]) -> [f32; 3] {
+fn hunt_lab(mut y: Vec<f32>, mut cx: Vec<f32>, mut cz: Vec<f32>) -> [Vec<f32>; 3] {
+    let count = y.len();
+    let (y_plane, cx_plane, cz_plane) = (&mut y[..count], &mut cx[..count], &mut cz[..count]);
+    for at in 0..count {
+        let of_white = (y_plane[at] + 16.0) * (1.0 / 116.0);
+        let x = (of_white + cx_plane[at] * (1.0 / 500.0)) * WHITE[0] as f32;
+        let y = of_white * WHITE[1] as f32;
+        let z = (of_white - cz_plane[at] * (1.0 / 200.0)) * WHITE[2] as f32;
+        let r = (3.241_003_3 * x - 1.537_398_9 * y - 0.498_615_86 * z).clamp(0.0, 1.0);
+        let g = (-0.969_224_33 * x + 1.875_930_1 * y + 0.041554224 * z).clamp(0.0, 1.0);
+        let b = (0.055639423 * x - 0.204_011_2 * y + 1.057_148_9 * z).clamp(0.0, 1.0);
+        let x = (10135552.0 / 24577794.0) * r + (8788810.0 / 24577794.0) * g + (4435075.0 / 24577794.0) * b;
+        let y = (2613072.0 / 12288897.0) * r + (8788810.0 / 12288897.0) * g + (887015.0 / 12288897.0) * b;
+        let z = (1425312.0 / 73733382.0) * r + (8788810.0 / 73733382.0) * g + (70074185.0 / 73733382.0) * b;
+        let (x, y, z) = (lab_root(x, WHITE[0]), lab_root(y, WHITE[1]), lab_root(z, WHITE[2]));
+        let l = 116.0 * y - 16.0;
+        y_plane[at] = l;
+        cx_plane[at] = 0.01 * l * (500.0 * (x - y));
+        cz_plane[at] = 0.01 * l * (200.0 * (y - z));
+    }
+    [y, cx, cz]
+}
+
+/// L*a*b*'s root of a value relative to that of white.
+#[inline(always)]
+fn lab_root(value: f32, white: f64) -> f32 {
     const CUBED: f32 = 216.0 / 24389.0;
-    let y = (y + 16.0) * (1.0 / 116.0);
-    let relative = [y + cx * (1.0 / 500.0), y, y - cz * (1.0 / 200.0)];
-    let [x, y, z] = [0, 1, 2].map(|axis: usize| relative[axis] * WHITE[axis] as f32);
-    let [r, g, b] = [
-        3.241_003_3 * x - 1.537_398_9 * y - 0.498_615_86 * z,
-        -0.969_224_33 * x + 1.875_930_1 * y + 0.041554224 * z,
-        0.055639423 * x - 0.204_011_2 * y + 1.057_148_9 * z,
-    ]
-    .map(|c: f32| c.clamp(0.0, 1.0));
-    let xyz = [
-        (10135552.0 / 24577794.0) * r + (8788810.0 / 24577794.0) * g + (4435075.0 / 24577794.0) * b,
-        (2613072.0 / 12288897.0) * r + (8788810.0 / 12288897.0) * g + (887015.0 / 12288897.0) * b,
-        (1425312.0 / 73733382.0) * r + (8788810.0 / 73733382.0) * g + (70074185.0 / 73733382.0) * b,
-    ];
-    let [x, y, z] = [0, 1, 2].map(|axis: usize| {
-        let relative = xyz[axis] * (1.0 / WHITE[axis]) as f32;
-        let root = power(relative, 1.0 / 3.0);
-        if relative > CUBED { root } else { relative * (841.0 / 108.0) + 4.0 / 29.0 }
-    });
-    let l = 116.0 * y - 16.0;
-    [l, 0.01 * l * (500.0 * (x - y)), 0.01 * l * (200.0 * (y - z))]
+    let relative = value * (1.0 / white) as f32;
+    let root = power(relative, 1.0 / 3.0);
+    if relative > CUBED { root } else { relative * (841.0 / 108.0) + 4.0 / 29.0 }
 }
 
 /// The filter of a kernel of odd length, without what does not change a sum at its ends.

@@ -187,6 +187,16 @@ pub(super) fn read(folder: &Path, options: &CameraFileOptions) -> Result<CameraF
     Ok(file)
 }
 
+/// Reads the points of the model in `folder`.
+pub(super) fn points(folder: &Path) -> Result<Vec<[f64; 3]>, CameraFileError> {
+    let binary = folder.join("points3D.bin");
+    let is_binary = binary.is_file();
+    let path = if is_binary { binary } else { folder.join("points3D.txt") };
+    let bytes = std::fs::read(&path).map_err(|source| CameraFileError::Io { path: path.clone(), source })?;
+    let points = if is_binary { binary_points(&bytes) } else { text_points(&bytes) };
+    points.map_err(|reason| CameraFileError::Colmap { path, reason: reason.to_owned() })
+}
+
 impl Photograph {
     fn view(
         self,
@@ -311,6 +321,21 @@ fn binary_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
     Ok(images)
 }
 
+/// Parses a binary file of points: number, position, colour, error, and the images that see it.
+fn binary_points(bytes: &[u8]) -> Result<Vec<[f64; 3]>, &'static str> {
+    let mut bytes = Bytes(bytes);
+    let count = bytes.u64()?;
+    let mut points = Vec::new();
+    for _ in 0..count {
+        bytes.skip(1, 8)?;
+        points.push([bytes.f64()?, bytes.f64()?, bytes.f64()?]);
+        bytes.skip(1, 3 + 8)?;
+        let images = bytes.u64()?;
+        bytes.skip(images, 8)?;
+    }
+    Ok(points)
+}
+
 fn lines(bytes: &[u8]) -> Result<impl Iterator<Item = &str>, &'static str> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is not text")?;
     Ok(text.lines().filter(|line| !line.starts_with('#')))
@@ -365,6 +390,15 @@ fn text_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
     Ok(images)
 }
 
+/// Parses a text file of points.
+fn text_points(bytes: &[u8]) -> Result<Vec<[f64; 3]>, &'static str> {
+    let point = |line: &str| {
+        let mut words = line.split_whitespace().skip(1);
+        Ok([number(words.next())?, number(words.next())?, number(words.next())?])
+    };
+    lines(bytes)?.filter(|line| !line.trim().is_empty()).map(point).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -395,6 +429,27 @@ mod tests {
                 assert!((at[axis] - expected[axis]).abs() < 1e-9, "{view}: {at:?}");
             }
             assert_eq!((camera.width, camera.height), (200, 100));
+        }
+    }
+
+    #[test]
+    fn points_are_read() {
+        let expected = [[1.0, 2.0, 3.5], [-4.0, 0.0, 6.0]];
+        let text = "# points\n7 1 2 3.5 255 0 9 0.5 1 2 3 4\n9 -4 0 6 0 0 0 0.25\n";
+        assert_eq!(text_points(text.as_bytes()), Ok(expected.to_vec()));
+        assert!(text_points(b"7 1 2").is_err());
+        let mut binary = 2_u64.to_le_bytes().to_vec();
+        for (point, images) in expected.iter().zip([2_usize, 0]) {
+            binary.extend(7_u64.to_le_bytes());
+            binary.extend(point.iter().flat_map(|part| part.to_le_bytes()));
+            binary.extend([255, 0, 9]);
+            binary.extend(0.5_f64.to_le_bytes());
+            binary.extend((images as u64).to_le_bytes());
+            binary.extend(vec![0; 8 * images]);
+        }
+        assert_eq!(binary_points(&binary), Ok(expected.to_vec()));
+        for cut in 0..binary.len() {
+            assert!(binary_points(&binary[..cut]).is_err(), "{cut}");
         }
     }
 

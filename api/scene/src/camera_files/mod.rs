@@ -44,6 +44,15 @@ pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, Came
     parse(path, &text, options, dataparser.as_ref())
 }
 
+/// The points in space that COLMAP has found, of the model in the folder at `path`.
+///
+/// # Errors
+/// Returns an error if there is no such model, or its file of points can't be read.
+pub fn colmap_points(path: &Path) -> Result<Vec<[f64; 3]>, CameraFileError> {
+    let folder = colmap::folder(path).ok_or_else(|| CameraFileError::UnknownKind { path: path.to_owned() })?;
+    colmap::points(&folder)
+}
+
 fn read_text(path: &Path) -> Result<String, CameraFileError> {
     fs::read_to_string(path).map_err(|source| CameraFileError::Io { path: path.to_owned(), source })
 }
