@@ -30,12 +30,12 @@ pub enum Geometry {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SortOrder {
-    /// The depth of their centres along the view direction, as in 3DGS.
+    /// The depth of their centres along the view direction, as in 3DGS: `zDepth` of USD.
     #[default]
     Depth,
-    /// The distance of their centres from the camera: `cameraDistance` of glTF.
+    /// The distance of their centres from the camera: `cameraDistance` of glTF and USD.
     Distance,
-    /// Their depth along each pixel's own ray: no Gaussian pops as the camera turns. No file states it.
+    /// Their depth along each pixel's own ray: no Gaussian pops as the camera turns. `rayHitDistance` of USD.
     PerPixel,
 }
 

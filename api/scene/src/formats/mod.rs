@@ -1,5 +1,6 @@
 //! The table of scene formats, the only place that lists them, and reading of scenes.
 
+mod archive;
 mod gltf;
 mod ground;
 mod input;
@@ -8,6 +9,7 @@ mod ply;
 mod sog;
 mod splat;
 mod spz;
+mod usd;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -141,6 +143,9 @@ static FORMATS: &[&dyn Format] = &[
     &sog::SogFolder,
     &gltf::Glb,
     &gltf::Gltf,
+    &usd::Usda,
+    &usd::Usdc,
+    &usd::Usdz,
     &NotRead { name: "LCC", extensions: &["lcc", "lcc2"] },
 ];
 

@@ -10,6 +10,7 @@ mod scenes;
 mod sog;
 mod spz;
 mod support;
+mod usd;
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -92,7 +93,7 @@ fn formats_that_are_not_read_and_unknown_ones_are_named() {
     assert!(error.to_string().contains(".splat"), "{error}");
     // Without a name, some formats cannot be told.
     let error = read("standard input", b"hello").expect_err("unknown");
-    let hint = "of these, .splat, .ksplat, .json, .gltf are known by the names of their files alone";
+    let hint = "of these, .splat, .ksplat, .json, .gltf, .usdz are known by the names of their files alone";
     assert!(error.to_string().contains(hint), "{error}");
     let (properties, rows) = distinct(0, 1);
     let file = ply(Encoding::Little, &properties, &rows);

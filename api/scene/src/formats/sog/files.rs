@@ -1,13 +1,10 @@
 //! Access to the files of a SOG scene: entries of a zip archive, or files of a folder.
 
-use std::collections::HashMap;
-
-use flate2::bufread::DeflateDecoder;
 use image_webp::WebPDecoder;
-use rawzip::{CompressionMethod, ZipArchive, ZipArchiveEntryWayfinder, ZipSliceArchive};
 
 use crate::error::{Fault, Place, Reason};
-use crate::formats::input::{MAX_EXPANSION, Origin, is_local, read_growing};
+use crate::formats::archive::Archive;
+use crate::formats::input::Origin;
 use crate::formats::spz::one_line;
 
 /// The files of a scene.
@@ -16,21 +13,6 @@ pub(super) enum Files<'a> {
     Archive(Archive<'a>),
     /// The files of this folder, which is below that of the input.
     Folder(Origin<'a>, String),
-}
-
-/// A zip archive and the positions of its entries.
-pub(super) struct Archive<'a> {
-    archive: ZipSliceArchive<&'a [u8]>,
-    entries: HashMap<Vec<u8>, Entry>,
-}
-
-/// An entry of a zip archive.
-#[derive(Clone, Copy)]
-struct Entry {
-    place: ZipArchiveEntryWayfinder,
-    method: CompressionMethod,
-    compressed: u64,
-    size: u64,
 }
 
 /// A decoded image.
@@ -53,20 +35,7 @@ impl Image {
 impl<'a> Files<'a> {
     /// The files in the zip archive `bytes`.
     pub(super) fn archive(bytes: &'a [u8]) -> Result<Self, Fault> {
-        let damaged = |error: rawzip::Error| Reason::Zip(one_line(&error)).at(Place::File);
-        let archive = ZipArchive::from_slice(bytes).map_err(damaged)?;
-        let mut entries = HashMap::new();
-        let mut listed = archive.entries();
-        while let Some(entry) = listed.next_entry().map_err(damaged)? {
-            let found = Entry {
-                place: entry.wayfinder(),
-                method: entry.compression_method(),
-                compressed: entry.compressed_size_hint(),
-                size: entry.uncompressed_size_hint(),
-            };
-            entries.insert(entry.file_path().as_ref().to_owned(), found);
-        }
-        Ok(Self::Archive(Archive { archive, entries }))
+        Ok(Self::Archive(Archive::new(bytes)?))
     }
 
     /// The files in `folder`, which is below that of `origin`.
@@ -78,7 +47,7 @@ impl<'a> Files<'a> {
     pub(super) fn read(&self, name: &str) -> Result<Vec<u8>, Fault> {
         match self {
             Self::Folder(origin, folder) => origin.companion(&join(folder, name)),
-            Self::Archive(archive) => archive.read(name).map_err(|reason| reason.at(Place::Entry(name.to_owned()))),
+            Self::Archive(archive) => archive.read(name),
         }
     }
 
@@ -92,37 +61,6 @@ impl<'a> Files<'a> {
 /// The path of `name` in `folder`.
 pub(super) fn join(folder: &str, name: &str) -> String {
     if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
-}
-
-impl Archive<'_> {
-    fn read(&self, name: &str) -> Result<Vec<u8>, Reason> {
-        if !is_local(name) {
-            return Err(Reason::Name);
-        }
-        let entry = self.entries.get(name.as_bytes()).ok_or(Reason::Missing)?;
-        let damaged = |error: &dyn std::fmt::Display| Reason::Zip(one_line(error));
-        let stored = self.archive.get_entry(entry.place).map_err(|e| damaged(&e))?;
-        let (claimed, available) = (entry.size, entry.compressed.saturating_mul(MAX_EXPANSION));
-        if claimed > available {
-            return Err(Reason::TooShort { claimed, available });
-        }
-        // The reader checks the size and the checksum.
-        let bytes = match entry.method {
-            CompressionMethod::STORE => read_growing(stored.verifying_reader(stored.data()), claimed + 1, 0),
-            CompressionMethod::DEFLATE => {
-                let decoder = DeflateDecoder::new(stored.data());
-                read_growing(stored.verifying_reader(decoder), claimed + 1, 0)
-            }
-            _ => {
-                let text = "its compression is none of those read (none, deflate)";
-                return Err(Reason::Unsupported(text.to_owned()));
-            }
-        };
-        bytes.map_err(|error| match error.kind() {
-            std::io::ErrorKind::OutOfMemory => Reason::Memory(claimed),
-            _ => damaged(&error),
-        })
-    }
 }
 
 /// The WebP image `bytes`, of at least `expected` pixels and not many more.

@@ -1,0 +1,86 @@
+//! USD with prims of type `ParticleField3DGaussianSplat` (OpenUSD 26.03): as text (`.usda`), binary (`.usdc`), in an archive
+//! (`.usdz`), and as `.usd`, which is any of them.
+//!
+//! One layer is read, the first one of an archive. What it composes from other layers, and its variants, are not followed; a
+//! warning names the prims.
+
+mod binary;
+mod gaussians;
+mod layer;
+mod stage;
+mod text;
+mod xform;
+
+use super::archive::Archive;
+use super::input::{Format, Input, Origin};
+use crate::error::{Fault, Place, Reason};
+use crate::scene::Scene;
+use layer::Layer;
+
+/// The format as text.
+pub(super) struct Usda;
+
+/// The format as a binary file.
+pub(super) struct Usdc;
+
+/// The format in an archive.
+pub(super) struct Usdz;
+
+/// The first bytes of a zip archive.
+const ZIP_MAGIC: &[u8] = b"PK\x03\x04";
+
+/// Implements a format whose files are recognized by their first bytes.
+macro_rules! usd_format {
+    ($format:ty, $name:literal, $extensions:expr, $magic:expr) => {
+        impl Format for $format {
+            fn name(&self) -> &'static str {
+                $name
+            }
+
+            fn extensions(&self) -> &'static [&'static str] {
+                &$extensions
+            }
+
+            fn magic(&self) -> Option<&'static [u8]> {
+                $magic
+            }
+
+            fn has_axes_of_cameras(&self) -> bool {
+                false
+            }
+
+            fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+                let bytes = input.rest()?;
+                load(&bytes, input.origin())
+            }
+        }
+    };
+}
+
+usd_format!(Usda, "USD text", ["usda"], Some(text::MAGIC));
+usd_format!(Usdc, "binary USD", ["usdc", "usd"], Some(binary::MAGIC));
+// Other formats are zip archives too.
+usd_format!(Usdz, "USD archive", ["usdz"], None);
+
+/// Reads the scene of the layer or archive `bytes`.
+fn load(bytes: &[u8], origin: Origin<'_>) -> Result<Scene, Fault> {
+    if !bytes.starts_with(ZIP_MAGIC) {
+        return stage::scene(&layer(bytes)?, origin);
+    }
+    let archive = Archive::new(bytes)?;
+    let name = archive.first();
+    let bytes = archive.read(&name)?;
+    let within = |fault: Fault| fault.reason.at(Place::Part(format!("entry {name:?}, {}", fault.place)));
+    layer(&bytes).and_then(|layer| stage::scene(&layer, origin)).map_err(within)
+}
+
+/// The layer `bytes`.
+fn layer(bytes: &[u8]) -> Result<Layer, Fault> {
+    if bytes.starts_with(text::MAGIC) {
+        text::layer(bytes)
+    } else if bytes.starts_with(binary::MAGIC) {
+        binary::layer(bytes)
+    } else {
+        Err(Reason::Magic { expected: "a USD file" }.at(Place::Byte(0)))
+    }
+}
