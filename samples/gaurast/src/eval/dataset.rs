@@ -147,8 +147,7 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     let used: Vec<&Path> = all.iter().filter_map(|(_, photograph, _)| photograph.as_deref()).collect();
     let others = photographs.others(&used);
     if !others.is_empty() {
-        let (count, names) = (others.len(), listed(&others));
-        notes.push(format!("{count} photographs have no camera and are left out: {names}"));
+        notes.push(format!("{} without a camera left out: {}", counted(others.len()), listed(&others)));
     }
 
     let names: Vec<String> = all.iter().map(|(key, ..)| key.clone()).collect();
@@ -172,7 +171,7 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     }
     let missing: Vec<String> = chosen.iter().filter(|at| all[**at].1.is_none()).map(|at| all[*at].0.clone()).collect();
     if !missing.is_empty() {
-        return Err(Error::MissingPhotographs { count: missing.len(), names: listed(&missing), folder });
+        return Err(Error::MissingPhotographs { count: counted(missing.len()), names: listed(&missing), folder });
     }
     let mut views = Vec::new();
     for (at, (key, photograph, view)) in all.into_iter().enumerate() {
@@ -399,6 +398,11 @@ fn model_folder(model: &Path) -> PathBuf {
 
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A number of photographs in words.
+fn counted(photographs: usize) -> String {
+    if photographs == 1 { "1 photograph".to_owned() } else { format!("{photographs} photographs") }
 }
 
 /// Some of the names, and the number of the others.

@@ -38,8 +38,8 @@ pub enum Error {
     NoCameras { data: PathBuf },
     #[error("{}: there is no folder of photographs (--images)", folder.display())]
     NoPhotographs { folder: PathBuf },
-    #[error("{}: {count} photographs are missing: {names}", folder.display())]
-    MissingPhotographs { count: usize, names: String, folder: PathBuf },
+    #[error("{}: {count} missing: {names}", folder.display())]
+    MissingPhotographs { count: String, names: String, folder: PathBuf },
     #[error("{}: no camera is called {names}", cameras.display())]
     NoViews { names: String, cameras: PathBuf },
     #[error("no view is left of {count}: {split} (--split)")]

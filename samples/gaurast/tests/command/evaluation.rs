@@ -252,9 +252,9 @@ fn photographs_too_many_are_named_and_too_few_are_an_error() {
     std::fs::copy(photograph("p01.png"), photograph("z.png")).expect("copied");
     let output = gaurast(&folder, &["eval", "out"]);
     let stderr = text(&output.stderr);
-    assert!(stderr.contains("1 photographs have no camera and are left out: z"), "{stderr}");
+    assert!(stderr.contains("1 photograph without a camera left out: z"), "{stderr}");
     std::fs::remove_file(photograph("p08.png")).expect("removed");
-    fails(&folder, &["eval", "out"], "1 photographs are missing: p08");
+    fails(&folder, &["eval", "out"], "1 photograph missing: p08");
     fails(&folder, &["eval", "out", "nowhere"], "nowhere");
     fails(&folder, &["eval", "clean/p00.png"], "no file of a trainer says");
     fails(&folder, &["eval", "out", "--images", "images_4"], "there is no folder of photographs");
