@@ -18,13 +18,41 @@ shared uint reaching[8];
 
 const uint NOBODY = 0xffffffffu;
 
-bool is_cut(uint l, vec2 center) {
-    if (push.set.cut_off < TILE_SQUARE) {
-        return false;
-    }
-    uvec2 tile = uvec2(floor(max(center - push.set.viewport.xy, vec2(0.0)) / 16.0));
+// Of the pixel: what has accumulated, whether anything has, and whether it is finished.
+vec3 sum, rest;
+float transmittance;
+bool done, is_reached;
+// The pixel's tile of cut-offs.
+uvec2 cut_tile;
+// Of the set.
+float floor_, ceiling, end, ellipse;
+
+// Whether the cut-off of a Gaussian leaves the pixel out.
+bool is_cut(uint l) {
     uint x = members[l].y, y = members[l].z;
-    return tile.x < (x & 0xffffu) || tile.x >= x >> 16 || tile.y < (y & 0xffffu) || tile.y >= y >> 16;
+    return cut_tile.x < (x & 0xffffu) || cut_tile.x >= x >> 16 || cut_tile.y < (y & 0xffffu) || cut_tile.y >= y >> 16;
+}
+
+// Accumulates the Gaussian of a place in the batch, whose alpha is its opacity times 2^exponent.
+void accumulate(uint k, vec2 exponent) {
+    vec4 scalar = scalars[k];
+    float whole = floor(exponent.x + 0.5);
+    precise float part = (exponent.x - whole) + exponent.y;
+    float alpha = min(ceiling, ldexp(scalar.y * exp2(part), int(max(whole, -300.0))));
+    bool is_in = exponent.x > scalar.z && -exponent.x <= ellipse && alpha >= floor_ && !is_cut(k);
+    precise float next = transmittance * (1.0 - alpha);
+    done = is_in && next < end;
+    if (is_in && !done) {
+        is_reached = true;
+        // Kahan's sum: ten thousand layers are as exact as one.
+        precise float weight = transmittance * alpha;
+        precise vec3 added = weight * colors[k].xyz - rest;
+        precise vec3 larger = sum + added;
+        precise vec3 lost = (larger - sum) - added;
+        rest = lost;
+        sum = larger;
+        transmittance = next;
+    }
 }
 
 void main() {
@@ -45,13 +73,20 @@ void main() {
         range = push.set.ranges.at[tile.y * push.set.tiles.x + tile.x];
     }
     uint from = push.side == 0u ? 0u : push.set.pair_capacity;
-    float floor_ = push.set.alpha_floor, ceiling = push.set.alpha_ceiling, least = log2(max(floor_, 1.2e-38));
+    floor_ = push.set.alpha_floor;
+    ceiling = push.set.alpha_ceiling;
+    end = push.set.transmittance_floor;
+    bool has_tiles = push.set.cut_off >= TILE_SQUARE;
+    cut_tile = has_tiles ? uvec2(floor(max(center - push.set.viewport.xy, vec2(0.0)) / 16.0)) : uvec2(0u);
+    float least = log2(max(floor_, 1.2e-38)), deviations = push.set.cut_off_deviations;
     // In the exponent's units: k^2 / (2 ln 2).
-    float ellipse = push.set.cut_off == ELLIPSE ? 0.7213475204 * push.set.cut_off_deviations * push.set.cut_off_deviations : 3.4e38;
+    ellipse = push.set.cut_off == ELLIPSE ? 0.7213475204 * deviations * deviations : 3.4e38;
 
-    bool done = !is_inside, is_reached = false;
-    precise vec3 sum = vec3(0.0), rest = vec3(0.0);
-    precise float transmittance = 1.0;
+    done = !is_inside;
+    is_reached = false;
+    sum = vec3(0.0);
+    rest = vec3(0.0);
+    transmittance = 1.0;
     for (uint first = range.x; first < range.y; first += 256u) {
         if (l == 0u) {
             unfinished = 0u;
@@ -99,48 +134,32 @@ void main() {
             bool is_steep = max(abs(r.f0.x), max(abs(r.f1.x), abs(r.f2.x))) > 3.0 || r.opacity > 16.0;
             scalars[slot] = vec4(r.f2.x, r.opacity, least - log2(r.opacity) - 0.1, is_steep ? 1.0 : 0.0);
             colors[slot] = vec4(r.red, r.green, r.blue, 0.0);
-            members[slot].yz = uvec2(r.cut_x, r.cut_y);
+            // Without a cut-off by tiles, all are within.
+            members[slot].yz = has_tiles ? uvec2(r.cut_x, r.cut_y) : uvec2(0xffff0000u);
         }
         barrier();
         if (unfinished == 0u) {
             break;
         }
-        for (uint k = 0u; k < count && !done; k++) {
-            vec4 line = lines[k], scalar = scalars[k];
-            precise float p = line.x + line.z * dx;
-            precise float q = (line.y + scalar.x * dy) + line.w * dx;
-            precise float exponent = -(p * p + q * q);
-            float low = 0.0;
-            if (scalar.w != 0.0) {
+        // Steep ones have a loop of their own: some devices execute both sides of every branch.
+        uint k = 0u;
+        while (k < count && !done) {
+            while (k < count && !done && scalars[k].w == 0.0) {
+                vec4 line = lines[k];
+                precise float p = line.x + line.z * dx;
+                precise float q = (line.y + scalars[k].x * dy) + line.w * dx;
+                precise float exponent = -(p * p + q * q);
+                accumulate(k, vec2(exponent, 0.0));
+                k++;
+            }
+            while (k < count && !done && scalars[k].w != 0.0) {
                 Record r = push.set.records.at[members[k].x];
                 vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
                 vec2 y = add(two_sum(center.y, -r.mean_y.x), pair(-r.mean_y.y));
-                vec2 p2 = mul(r.f0, x), q2 = add(mul(r.f1, x), mul(r.f2, y)), squares = add(mul(p2, p2), mul(q2, q2));
-                exponent = -squares.x;
-                low = -squares.y;
+                vec2 p = mul(r.f0, x), q = add(mul(r.f1, x), mul(r.f2, y));
+                accumulate(k, -add(mul(p, p), mul(q, q)));
+                k++;
             }
-            if (!(exponent > scalar.z) || -exponent > ellipse || is_cut(k, center)) {
-                continue;
-            }
-            float whole = floor(exponent + 0.5);
-            precise float part = (exponent - whole) + low;
-            float alpha = min(ceiling, ldexp(scalar.y * exp2(part), int(max(whole, -300.0))));
-            if (!(alpha >= floor_)) {
-                continue;
-            }
-            precise float next = transmittance * (1.0 - alpha);
-            if (next < push.set.transmittance_floor) {
-                done = true;
-                break;
-            }
-            is_reached = true;
-            // Kahan's sum: ten thousand layers are as exact as one.
-            precise float weight = transmittance * alpha;
-            precise vec3 added = weight * colors[k].xyz - rest;
-            precise vec3 larger = sum + added;
-            rest = (larger - sum) - added;
-            sum = larger;
-            transmittance = next;
         }
         barrier();
     }

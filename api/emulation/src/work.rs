@@ -204,7 +204,7 @@ impl Work {
     pub(crate) fn extent(&self, pairs: u64) -> Extent {
         let [across, down] = self.tiles().map(u64::from);
         // A guess that later frames correct: what does not fit is drawn slowly, not wrongly.
-        let guess = (4 * self.gaussians).max(1 << 17).max(pairs + pairs / 4);
+        let guess = (8 * self.gaussians + (1 << 20)).max(pairs + pairs / 4);
         let forced = std::env::var("GAURAST_EMULATION_PAIRS").ok().and_then(|value| value.parse().ok());
         Extent {
             gaussians: self.gaussians,

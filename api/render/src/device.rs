@@ -92,6 +92,26 @@ pub struct Device {
     instance: Instance,
 }
 
+/// The names of the entry's devices that draw Gaussians.
+///
+/// # Errors
+/// If Vulkan fails.
+pub fn device_names(entry: ash::Entry) -> Result<Vec<String>, RenderError> {
+    let instance = Instance::new(entry, &DeviceOptions::default())?;
+    // SAFETY: the instance is alive.
+    let handles = unsafe { instance.raw.enumerate_physical_devices() }.during("vkEnumeratePhysicalDevices")?;
+    let mut names = Vec::new();
+    for handle in handles {
+        // SAFETY: the handle was just enumerated.
+        let properties = unsafe { instance.raw.get_physical_device_properties(handle) };
+        let name = properties.device_name_as_c_str().unwrap_or_default().to_string_lossy().into_owned();
+        if PhysicalDevice::suitable(&instance.raw, handle, &properties, &name, Purpose::Gaussians)?.is_some() {
+            names.push(name);
+        }
+    }
+    Ok(names)
+}
+
 /// The properties of a memory type that serves a resource.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryPreference {
@@ -127,7 +147,7 @@ impl Device {
     /// Returns an error if there is none, or Vulkan fails.
     pub fn new(entry: ash::Entry, purpose: Purpose<'_>, options: &DeviceOptions) -> Result<Self, RenderError> {
         let instance = Instance::new(entry, options)?;
-        let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
+        let physical = PhysicalDevice::choose(&instance.raw, purpose, &options.device)?;
 
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
@@ -295,8 +315,8 @@ impl Drop for Device {
 }
 
 impl PhysicalDevice {
-    /// The first physical device that serves the purpose and has a graphics queue.
-    fn choose(instance: &ash::Instance, purpose: Purpose<'_>) -> Result<Self, RenderError> {
+    /// The first physical device with `part` in its name that serves the purpose and has a graphics queue.
+    fn choose(instance: &ash::Instance, purpose: Purpose<'_>, part: &str) -> Result<Self, RenderError> {
         // SAFETY: the instance is alive.
         let handles = unsafe { instance.enumerate_physical_devices() }.during("vkEnumeratePhysicalDevices")?;
         let mut found = Vec::new();
@@ -304,6 +324,10 @@ impl PhysicalDevice {
             // SAFETY: the handle was just enumerated.
             let properties = unsafe { instance.get_physical_device_properties(handle) };
             let name = properties.device_name_as_c_str().unwrap_or_default().to_string_lossy().into_owned();
+            if !name.contains(part) {
+                found.push(name);
+                continue;
+            }
             if let Some(physical) = Self::suitable(instance, handle, &properties, &name, purpose)? {
                 return Ok(physical);
             }
@@ -311,7 +335,8 @@ impl PhysicalDevice {
         }
         let found = if found.is_empty() { "none at all".to_owned() } else { found.join(", ") };
         Err(match purpose {
-            Purpose::Gaussians => RenderError::NoDevice { found },
+            Purpose::Gaussians if part.is_empty() => RenderError::NoDevice { found },
+            Purpose::Gaussians => RenderError::NoSuchDevice { name: part.to_owned(), found },
             Purpose::Triangles(name) => RenderError::NoSuchDevice { name: name.to_owned(), found },
         })
     }

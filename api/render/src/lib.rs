@@ -45,6 +45,7 @@ mod settings;
 mod target;
 
 pub use arrays::{Arrays, Colors};
+pub use device::device_names;
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
 pub use gaurast::WorkTrace;

@@ -23,6 +23,8 @@ pub struct DeviceOptions {
     pub optimizations: Option<CString>,
     /// The receiver of the device's work, which GauRast fills when the device is destroyed.
     pub work_trace: Option<Arc<WorkTrace>>,
+    /// A part of the device's name; the first device that draws Gaussians if it is empty.
+    pub device: String,
     /// The function that receives the driver's warnings and errors.
     pub on_message: Option<MessageFunction>,
 }
@@ -33,6 +35,7 @@ impl fmt::Debug for DeviceOptions {
             .field("threads", &self.threads)
             .field("simd", &self.simd)
             .field("optimizations", &self.optimizations)
+            .field("device", &self.device)
             .finish_non_exhaustive()
     }
 }

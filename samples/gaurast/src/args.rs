@@ -255,6 +255,12 @@ pub struct ModeArguments {
     /// 0.004, one of 255 steps, trained scenes have errors of up to 1.16 steps, and rounding to 8 bits may add one.
     #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
     pub contribution_budget: f32,
+
+    /// Draw on the Vulkan device with NAME in its name, and not on this driver's; `list` prints the names
+    ///
+    /// Devices without the extension draw by compute kernels, in most modes.
+    #[arg(long, value_name = "NAME|list")]
+    pub device: Option<String>,
 }
 
 impl ModeArguments {

@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use crate::args::{Choice, ModeArguments, chosen};
 use crate::cameras::{View, short};
+use crate::devices::{self, DeviceError};
 use crate::messages;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
@@ -26,6 +27,10 @@ pub enum DrawError {
     Thread(std::io::Error),
     #[error("{0}")]
     Nothing(String),
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    #[error("only this driver records its work: --device goes with neither --heatmap nor simulate")]
+    Trace,
 }
 
 /// The settings from the command line and the scene's file.
@@ -104,20 +109,29 @@ pub struct Drawn {
 }
 
 impl Drawing {
-    /// Creates a device for `scene` and `settings`. The scene's copy in host memory is freed. `work_trace` receives the
-    /// device's work when the drawing is dropped.
+    /// Creates a device for `scene` and `settings`: this driver's, or the one with `device` in its name. The scene's copy in
+    /// host memory is freed. `work_trace` receives the device's work when the drawing is dropped.
     ///
     /// # Errors
     /// If there is no device, or not enough memory.
     pub fn new(
         scene: Scene,
         settings: Settings,
+        device: Option<&str>,
         counters: bool,
         work_trace: Option<Arc<WorkTrace>>,
     ) -> Result<Self, DrawError> {
-        let options =
-            DeviceOptions { work_trace, on_message: Some(Arc::new(messages::receive)), ..DeviceOptions::default() };
-        let mut renderer = Renderer::with_options(vulkan_gaurast::entry(), &options)?;
+        if device.is_some() && work_trace.is_some() {
+            return Err(DrawError::Trace);
+        }
+        let entry = if device.is_some() { devices::entry()? } else { vulkan_gaurast::entry() };
+        let options = DeviceOptions {
+            work_trace,
+            device: device.unwrap_or_default().to_owned(),
+            on_message: Some(Arc::new(messages::receive)),
+            ..DeviceOptions::default()
+        };
+        let mut renderer = Renderer::with_options(entry, &options)?;
         if counters {
             renderer.count_everything()?;
         }
@@ -219,6 +233,9 @@ fn reasons(frame: &Frame, view: &View) -> Option<String> {
             format!("{} {}{plane}", counter.value, counter.name)
         })
         .collect();
+    if frame.counters.is_empty() {
+        return Some("there is nothing in the picture".to_owned());
+    }
     let reached = counted("gaussians drawn");
     if reached > 0.0 {
         parts.push(format!("{reached} too faint at every pixel"));

@@ -12,6 +12,7 @@ use timing::work::Trace;
 
 use crate::args::{OutputArguments, RenderArguments};
 use crate::cameras::{self, View, ViewError, Views};
+use crate::devices;
 use crate::drawing::{self, DrawError, Drawing};
 use crate::heatmap::{self, HeatmapError};
 use crate::limits;
@@ -72,6 +73,9 @@ fn parse(trace: &WorkTrace) -> Result<Trace, Error> {
 
 /// Draws a scene and writes the pictures. `trace` receives the device's work.
 fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(), Error> {
+    if devices::list(&arguments.modes).map_err(DrawError::Device)? {
+        return Ok(());
+    }
     let source = Source::of(&arguments.scene)?;
     let outputs = Outputs::new(&arguments.output, &source.name, source.background)?;
     if let Some(path) = &arguments.output.heatmap {
@@ -123,7 +127,13 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
         Vec::new()
     } else {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(scene, settings, arguments.report.counters, trace.cloned())?;
+        let mut drawing = Drawing::new(
+            scene,
+            settings,
+            arguments.modes.device.as_deref(),
+            arguments.report.counters,
+            trace.cloned(),
+        )?;
         step.finish_and_clear();
         drawing.all(&views, &indices, &outputs, arguments.report.strict, progress)?
     };

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use crate::args::{ModeArguments, SceneArguments, Triple};
 use crate::cameras::View;
+use crate::devices;
 use crate::drawing::{self, DrawError, Drawing};
 use crate::progress::Progress;
 use crate::sources::{Source, SourceError};
@@ -77,6 +78,9 @@ pub struct ViewsArguments {
 
 /// Draws the sheet.
 pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
+    if devices::list(&arguments.modes).map_err(DrawError::Device)? {
+        return Ok(());
+    }
     let source = Source::of(&arguments.scene)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
@@ -107,7 +111,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
         }
     }
     let settings = drawing::settings(&arguments.modes, &scene);
-    let mut drawing = Drawing::new(scene, settings, false, None)?;
+    let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
     let background = arguments.background.or(source.background);
     let behind = background.map_or([0.0; 3], Background::color);
     let bar = progress.pictures(8);

@@ -1,7 +1,8 @@
 //! Instances, physical devices, and the creation of devices.
 
 use std::collections::HashMap;
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, c_char, c_void};
+use std::marker::PhantomData;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -126,10 +127,14 @@ pub(super) unsafe extern "system" fn get_physical_device_features2(
         let Some(instance) = Instance::of(physical_device) else {
             return;
         };
-        (instance.next.fp_v1_1().get_physical_device_features2)(physical_device, features);
-        if let Some(own) = find_mut::<Features<'_>>((*features).p_next)
-            && instance.emulates(physical_device)
-        {
+        let next = instance.next.fp_v1_1().get_physical_device_features2;
+        if !instance.emulates(physical_device) {
+            return next(physical_device, features);
+        }
+        let unlinked = Unlinked::<Features<'_>>::new(&raw mut (*features).p_next);
+        next(physical_device, features);
+        drop(unlinked);
+        if let Some(own) = find_mut::<Features<'_>>((*features).p_next) {
             support::answer_features(own);
         }
     }
@@ -144,11 +149,15 @@ pub(super) unsafe extern "system" fn get_physical_device_properties2(
         let Some(instance) = Instance::of(physical_device) else {
             return;
         };
-        (instance.next.fp_v1_1().get_physical_device_properties2)(physical_device, properties);
+        let next = instance.next.fp_v1_1().get_physical_device_properties2;
+        if !instance.emulates(physical_device) {
+            return next(physical_device, properties);
+        }
+        let unlinked = Unlinked::<Properties<'_>>::new(&raw mut (*properties).p_next);
+        next(physical_device, properties);
+        drop(unlinked);
         let limits = (*properties).properties.limits;
-        if let Some(own) = find_mut::<Properties<'_>>((*properties).p_next)
-            && instance.emulates(physical_device)
-        {
+        if let Some(own) = find_mut::<Properties<'_>>((*properties).p_next) {
             support::answer_properties(own, &limits);
         }
     }
@@ -260,11 +269,46 @@ unsafe fn test_queue(
     usable.map(|family| family.queue_family_index).find(computes)
 }
 
+/// A chain from which a structure is taken out that the next layer does not know. It is whole again when this is dropped.
+struct Unlinked<T> {
+    /// The member that names the structure, and the structure.
+    place: Option<(*mut *mut vk::BaseOutStructure<'static>, *mut vk::BaseOutStructure<'static>)>,
+    structure: PhantomData<T>,
+}
+
+impl<T: TaggedStructure> Unlinked<T> {
+    /// # Safety
+    /// `first` is the member that names the first structure of a valid chain, which nobody else uses while this lives.
+    unsafe fn new(first: *mut *mut c_void) -> Self {
+        let mut member = first.cast::<*mut vk::BaseOutStructure<'static>>();
+        // SAFETY: the caller's promise.
+        unsafe {
+            while let Some(structure) = (*member).as_mut() {
+                if structure.s_type == T::STRUCTURE_TYPE {
+                    let place = Some((member, std::ptr::from_mut(structure)));
+                    *member = structure.p_next;
+                    return Self { place, structure: PhantomData };
+                }
+                member = (&raw mut structure.p_next).cast();
+            }
+        }
+        Self { place: None, structure: PhantomData }
+    }
+}
+
+impl<T> Drop for Unlinked<T> {
+    fn drop(&mut self) {
+        if let Some((member, structure)) = self.place {
+            // SAFETY: the chain is as valid as before.
+            unsafe { *member = structure };
+        }
+    }
+}
+
 /// A chain of `VkDeviceCreateInfo` from which the extension's features are taken out, and in which buffer device addresses are
 /// enabled. It is the application's again when this is dropped.
 struct Changed {
-    /// The member that names the extension's features, and what it named.
-    unlinked: Option<(*mut *mut vk::BaseOutStructure<'static>, *mut vk::BaseOutStructure<'static>)>,
+    _unlinked: Unlinked<Features<'static>>,
     /// A feature that was off.
     enabled: Option<*mut vk::Bool32>,
 }
@@ -276,19 +320,10 @@ impl Changed {
         info: &mut vk::DeviceCreateInfo<'a>,
         address: &'a mut vk::PhysicalDeviceBufferDeviceAddressFeatures<'a>,
     ) -> Self {
-        let mut own = Self { unlinked: None, enabled: None };
         // SAFETY: the caller's promise. The structures are restored as soon as the device is created.
         unsafe {
-            let mut member = (&raw mut info.p_next).cast::<*mut vk::BaseOutStructure<'static>>();
-            while !(*member).is_null() {
-                let structure = *member;
-                if (*structure).s_type == Features::STRUCTURE_TYPE {
-                    own.unlinked = Some((member, structure));
-                    *member = (*structure).p_next;
-                    continue;
-                }
-                member = (&raw mut (*structure).p_next).cast();
-            }
+            let unlinked = Unlinked::new((&raw mut info.p_next).cast());
+            let mut own = Self { _unlinked: unlinked, enabled: None };
             let first = info.p_next.cast_mut();
             let feature = if let Some(all) = find_mut::<vk::PhysicalDeviceVulkan12Features<'_>>(first) {
                 Some(&raw mut all.buffer_device_address)
@@ -308,8 +343,8 @@ impl Changed {
                     info.p_next = (&raw const *address).cast();
                 }
             }
+            own
         }
-        own
     }
 }
 
@@ -317,9 +352,6 @@ impl Drop for Changed {
     fn drop(&mut self) {
         // SAFETY: the application's structures are as valid as before.
         unsafe {
-            if let Some((member, structure)) = self.unlinked {
-                *member = structure;
-            }
             if let Some(feature) = self.enabled {
                 *feature = vk::FALSE;
             }
