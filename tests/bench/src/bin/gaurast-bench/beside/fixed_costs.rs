@@ -106,7 +106,8 @@ fn dispatches(gpu: Gpu, count: u32) -> Workload {
         &bindings,
     );
     Workload::of(move || {
-        let _ = &buffer;
+        // A closure keeps only the fields that it names.
+        let _ = (&buffer, &bindings);
         gpu.run(|commands| {
             for _ in 0..count {
                 kernel.dispatch(commands, &[bindings.set], &[], [1, 1, 1]);
@@ -136,7 +137,7 @@ fn image_copies(gpu: Gpu, count: u64) -> Workload {
     let semaphores = [unsafe { gpu.device().create_semaphore(&info, None) }.expect("a timeline semaphore")];
     let mut value = 0;
     Workload::of(move || {
-        let _ = (&from, &to);
+        let _ = (&from, &to, &copy);
         let (device, queue, buffers) = (gpu.device(), gpu.queue(), [copy.raw]);
         let stages = [vk::PipelineStageFlags::ALL_COMMANDS];
         for _ in 0..count {

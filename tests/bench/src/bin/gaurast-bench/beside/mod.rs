@@ -22,6 +22,21 @@ pub use contender::WorkerArguments as BesideWorkerArguments;
 /// The ratio below which a workload counts as this in the mean, so that no single one makes it.
 const LEAST_RATIO: f64 = 0.25;
 
+/// The columns of the table.
+const COLUMNS: [&str; 11] = [
+    "workload",
+    "threads",
+    "driver",
+    "own wall ms",
+    "own processor ms",
+    "own MiB",
+    "driver's wall ms",
+    "driver's processor ms",
+    "driver's MiB",
+    "wall ratio",
+    "processor ratio",
+];
+
 /// Arguments of the comparison.
 #[derive(Args)]
 pub struct BesideArguments {
@@ -71,63 +86,17 @@ pub fn run(arguments: &BesideArguments) -> Result<(), BenchError> {
     }
     let mut threads = arguments.threads.clone();
     threads.dedup();
-    let data = arguments.data.as_deref();
-    let mut rows = Rows::new(&[
-        "workload",
-        "threads",
-        "driver",
-        "own wall ms",
-        "own processor ms",
-        "own MiB",
-        "driver's wall ms",
-        "driver's processor ms",
-        "driver's MiB",
-        "wall ratio",
-        "processor ratio",
-    ]);
+    let mut rows = Rows::new(&COLUMNS);
     for &threads in &threads {
         let mut logarithms = Vec::new();
         for name in WORKLOADS {
             if !arguments.only.is_empty() && !arguments.only.iter().any(|part| name.contains(part)) {
                 continue;
             }
-            let mut own = match Process::start(&Contender::Own, name, threads, data) {
-                Ok(own) => own,
-                Err(error) => {
-                    eprintln!("{name} is left out: {error}");
-                    continue;
-                }
-            };
-            let mut others = Vec::new();
-            for driver in &drivers {
-                match Process::start(driver, name, threads, data) {
-                    Ok(other) => others.push((other, Vec::new())),
-                    Err(error) => eprintln!("{name} is left out beside {driver}: {error}"),
-                }
-            }
-            let mut samples = Vec::new();
-            // Contenders take turns, so that other load on the machine affects all of them equally.
-            for _ in 0..arguments.runs {
-                samples.push(own.run()?);
-                for (other, samples) in &mut others {
-                    samples.push(other.run()?);
-                }
-            }
-            // The ratio to the fastest of the other drivers.
-            let mut worst = 0.0_f64;
-            for (other, theirs) in &others {
-                let (ours, theirs) = (medians(&samples), medians(theirs));
-                let [wall, processor] = [0, 1].map(|cost| ours[cost] / theirs[cost]);
-                worst = worst.max(processor);
-                let cells = [ours, theirs].into_iter().flatten().chain([wall, processor]);
-                let mut row = vec![name.to_owned(), threads.to_string(), other.driver.clone()];
-                row.extend(cells.map(number));
-                eprintln!("{}", row.join(", "));
-                rows.rows.push(row);
-            }
-            if !others.is_empty() {
-                logarithms.push(worst.max(LEAST_RATIO).ln());
-            }
+            let (measured, ratio) = measure(arguments, &drivers, name, threads)?;
+            measured.iter().for_each(|row| eprintln!("{}", row.join(", ")));
+            rows.rows.extend(measured);
+            logarithms.extend(ratio.map(|ratio| ratio.max(LEAST_RATIO).ln()));
         }
         let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
         eprintln!(
@@ -144,6 +113,56 @@ pub fn run(arguments: &BesideArguments) -> Result<(), BenchError> {
             Ok(())
         }
     }
+}
+
+/// Measures a workload. Returns a row for each driver that can do it, and the processor time relative to the best of them.
+fn measure(
+    arguments: &BesideArguments,
+    drivers: &[Contender],
+    name: &str,
+    threads: usize,
+) -> Result<(Vec<Vec<String>>, Option<f64>), BenchError> {
+    let data = arguments.data.as_deref();
+    let mut own = match Process::start(&Contender::Own, name, threads, data) {
+        Ok(own) => own,
+        Err(error) => {
+            eprintln!("{name} is left out: {error}");
+            return Ok((Vec::new(), None));
+        }
+    };
+    let mut others = Vec::new();
+    for driver in drivers {
+        match Process::start(driver, name, threads, data) {
+            Ok(other) => others.push((other, Vec::new())),
+            Err(error) => eprintln!("{name} is left out beside {driver}: {error}"),
+        }
+    }
+    let mut samples = Vec::new();
+    // Contenders take turns, so that other load on the machine affects all of them equally.
+    for _ in 0..arguments.runs {
+        samples.push(own.run()?);
+        others.retain_mut(|(other, samples)| match other.run() {
+            Ok(sample) => {
+                samples.push(sample);
+                true
+            }
+            Err(error) => {
+                eprintln!("{name} is left out beside {}: {error}", other.driver);
+                false
+            }
+        });
+    }
+    let (mut rows, mut greatest) = (Vec::new(), None);
+    for (other, theirs) in &others {
+        let (ours, theirs) = (medians(&samples), medians(theirs));
+        let [wall, processor] = [0, 1].map(|cost| ours[cost] / theirs[cost]);
+        greatest = Some(processor.max(greatest.unwrap_or(0.0)));
+        let cells = [ours, theirs].into_iter().flatten().chain([wall, processor]);
+        let mut row = vec![name.to_owned(), threads.to_string(), other.driver.clone()];
+        row.extend(cells.map(number));
+        rows.push(row);
+    }
+    Ok((rows, greatest))
 }
 
 /// Does the work of a worker process.
