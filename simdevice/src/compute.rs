@@ -1,11 +1,13 @@
-//! Dispatches: workgroups of a compute program. Each workgroup is one batch; the device's workers run them in any
-//! order.
+//! Dispatches: workgroups of a compute program. Each workgroup is one batch, or several small ones share one; the device's
+//! workers run batches in any order.
 
 use crate::packet::Dispatch;
 use crate::program::interface::ComputeInput;
 use crate::program::pool::PooledMachine;
 use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
+use isa::Vector;
+use isa::ir::VECTOR_LANES;
 use isa::machine::{LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
 use std::sync::atomic::AtomicBool;
@@ -24,20 +26,26 @@ pub(crate) fn dispatch(dispatch: &Dispatch, runtime: &Runtime, counters: &mut Co
         return Ok(());
     };
     let bound = dispatch.bindings.bind(runtime.level());
-    let piece = groups / (runtime.threads() as u64 * PIECES_PER_WORKER);
+    // Every worker gets a batch before any batch gets more groups.
+    let threads = runtime.threads() as u64;
+    let together = groups.div_ceil(threads).min(dispatch.program.groups as u64);
+    let batches = groups.div_ceil(together);
+    let piece = batches / (threads * PIECES_PER_WORKER);
     let cancel = AtomicBool::new(false);
     let run = DispatchRun {
         dispatch,
+        groups,
+        together,
         resources: bound.resources(),
         watchdog: Watchdog { limit: runtime.config().shader_timeout, cancel: Some(&cancel) },
     };
     let started = Instant::now();
     let (machines, ran) = runtime.share(
-        0..groups,
+        0..batches,
         piece.max(1),
         &cancel,
         || run.machine(),
-        |machine, group| run.run_group(machine, group),
+        |machine, batch| run.run_batch(machine, batch),
     );
     dispatch.bindings.bump_generations();
     counters.add(Counter::ShaderTime, started.elapsed().as_nanos() as u64);
@@ -59,6 +67,10 @@ fn group_count(count: [u32; 3]) -> Option<u64> {
 /// A dispatch that workers share.
 struct DispatchRun<'a> {
     dispatch: &'a Dispatch,
+    /// The number of workgroups.
+    groups: u64,
+    /// The number of workgroups of a batch. The last batch may have fewer.
+    together: u64,
     resources: Resources<'a>,
     watchdog: Watchdog<'a>,
 }
@@ -67,35 +79,40 @@ impl DispatchRun<'_> {
     /// Lends a machine and sets the inputs that are the same for all workgroups.
     fn machine(&self) -> PooledMachine<'_> {
         let mut machine = self.dispatch.program.machines.lend();
-        self.set_inputs(&mut machine, |input| match input {
-            ComputeInput::WorkgroupCount(axis) => Some(self.dispatch.count[axis]),
-            ComputeInput::WorkgroupId(_) => None,
-        });
+        for (slot, input) in self.dispatch.program.inputs.iter().enumerate() {
+            if let Some(ComputeInput::WorkgroupCount(axis)) = input {
+                machine.fill_input(slot as u32, self.dispatch.count[*axis]);
+            }
+        }
         machine
     }
 
-    fn run_group(&self, machine: &mut Machine, group: u64) -> Result<(), Stopped> {
-        let [width, height, _] = self.dispatch.count.map(u64::from);
-        let number = [group % width, group / width % height, group / width / height];
-        let base = self.dispatch.base;
-        self.set_inputs(machine, |input| match input {
-            ComputeInput::WorkgroupId(axis) => Some(base[axis].wrapping_add(number[axis] as u32)),
-            ComputeInput::WorkgroupCount(_) => None,
-        });
-        machine.run(
-            &LaneMask::first(self.dispatch.program.invocations),
-            &LaneMask::none(),
-            &self.resources,
-            self.watchdog,
-        )
-    }
-
-    /// Sets the inputs that `value` returns a value for.
-    fn set_inputs(&self, machine: &mut Machine, value: impl Fn(ComputeInput) -> Option<u32>) {
-        for (slot, input) in self.dispatch.program.inputs.iter().enumerate() {
-            if let Some(value) = input.and_then(&value) {
-                machine.fill_input(slot as u32, value);
+    fn run_batch(&self, machine: &mut Machine, batch: u64) -> Result<(), Stopped> {
+        let program = &self.dispatch.program;
+        let first = batch * self.together;
+        let end = self.groups.min(first + self.together);
+        for (slot, input) in program.inputs.iter().enumerate() {
+            if let Some(ComputeInput::WorkgroupId(axis)) = input {
+                self.set_group_ids(machine, slot as u32, *axis, first..end);
             }
         }
+        let lanes = (end - first) as usize * program.invocations;
+        machine.run(&LaneMask::first(lanes), &LaneMask::none(), &self.resources, self.watchdog)
+    }
+
+    /// Sets an input to the numbers of workgroups along an axis, each for its lanes.
+    fn set_group_ids(&self, machine: &mut Machine, slot: u32, axis: usize, groups: std::ops::Range<u64>) {
+        let vectors = machine.input_mut(slot);
+        let of_group = (vectors.len() / self.dispatch.program.groups).max(1);
+        for (group, vectors) in groups.zip(vectors.chunks_mut(of_group)) {
+            vectors.fill(Vector([self.group_id(group)[axis]; VECTOR_LANES]));
+        }
+    }
+
+    /// The position of a workgroup, given its number.
+    fn group_id(&self, group: u64) -> [u32; 3] {
+        let [width, height, _] = self.dispatch.count.map(u64::from);
+        let number = [group % width, group / width % height, group / width / height];
+        [0, 1, 2].map(|axis: usize| self.dispatch.base[axis].wrapping_add(number[axis] as u32))
     }
 }

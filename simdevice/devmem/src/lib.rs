@@ -2,7 +2,7 @@
 //!
 //! An [`Allocation`] is a page-aligned, zeroed range that the application may keep mapped while the device works on it,
 //! and on which shader invocations may legally race. Therefore no reference into it is ever formed: bulk access copies
-//! to and from the caller's slices, shader access is a relaxed atomic of 8 to 64 bits, and every access is checked
+//! to and from the caller's slices, shader access is a relaxed atomic of 8 to 64 bits or a vector of such, and every access is checked
 //! against the allocation's length.
 //!
 //! All of the simulated device's `unsafe` is in this crate.
@@ -12,9 +12,11 @@ pub mod host;
 pub mod level;
 mod lookup;
 mod memory;
+mod runs;
 
 #[doc(hidden)]
 pub use fearless_simd;
 pub use hints::prefetch;
 pub use lookup::{gather, look_up};
 pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds, PAGE_SIZE};
+pub use runs::{load_4, load_16, store_16};

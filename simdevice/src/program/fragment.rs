@@ -70,7 +70,8 @@ impl FragmentStage {
     /// [`InvalidProgram`] if it cannot run on the device.
     pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
         let executable = |lanes| {
-            let options = Options { lanes, subgroup_size: DRAW_SUBGROUP_SIZE as usize, count_work: true, level };
+            let options =
+                Options { lanes, subgroup_size: DRAW_SUBGROUP_SIZE as usize, count_work: true, ..Options::new(level) };
             Executable::new(programs.program.clone(), &options)
         };
         let executables = [executable(BATCH_LANES[0])?, executable(BATCH_LANES[1])?];

@@ -66,7 +66,7 @@ impl PrimitiveStage {
             lanes: stage.lanes as usize,
             subgroup_size: DRAW_SUBGROUP_SIZE as usize,
             count_work: true,
-            level,
+            ..Options::new(level)
         };
         let executable = Executable::new(stage.program.clone(), &options)?;
         let meaning = |slot: u32| stage.inputs.get(slot as usize).copied().flatten();

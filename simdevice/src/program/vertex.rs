@@ -116,8 +116,12 @@ impl DrawPipeline {
 impl VertexProgram {
     /// Compiles the vertex program. `varyings` is the number of varyings that are read.
     fn new(level: Level, programs: &DrawPrograms, varyings: u32) -> Result<Self, InvalidProgram> {
-        let options =
-            Options { lanes: VERTEX_BATCH, subgroup_size: DRAW_SUBGROUP_SIZE as usize, count_work: true, level };
+        let options = Options {
+            lanes: VERTEX_BATCH,
+            subgroup_size: DRAW_SUBGROUP_SIZE as usize,
+            count_work: true,
+            ..Options::new(level)
+        };
         let executable = Executable::new(programs.vertex.clone(), &options)?;
         let meaning = |slot: u32| programs.vertex_inputs.get(slot as usize).copied().flatten();
         let is_word = |reg: isa::ir::Reg| {

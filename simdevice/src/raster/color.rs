@@ -243,39 +243,11 @@ impl ColorOutput {
         let blended = match self.equations {
             None => *source,
             Some(equations) => {
-                let destination = if quads.consecutive {
-                    load_texels(simd, &words[4 * quads.first[0]..])
-                } else {
-                    let mut stored = [[0f32; 16]; 4];
-                    for lane in 0..16 {
-                        let texel = &words[4 * quads.texel(lane)..][..4];
-                        for (component, word) in stored.iter_mut().zip(texel) {
-                            component[lane] = f32::from_bits(*word);
-                        }
-                    }
-                    let [r, g, b, a] = stored;
-                    let load = |component| f32x16::simd_from(simd, component);
-                    [load(r), load(g), load(b), load(a)]
-                };
+                let destination = load_texels(simd, words, quads);
                 self.blend(simd, equations, source, second, &destination)
             }
         };
-        if lanes == u16::MAX && self.written == u128::MAX && quads.consecutive {
-            store_texels(&blended, &mut words[4 * quads.first[0]..]);
-            return;
-        }
-        let [r, g, b, a] = blended;
-        let components: [[u32; 16]; 4] = [bits_of(r).into(), bits_of(g).into(), bits_of(b).into(), bits_of(a).into()];
-        for lane in 0..16 {
-            if lanes >> lane & 1 == 1 {
-                let texel = &mut words[4 * quads.texel(lane)..][..4];
-                for (index, (word, component)) in texel.iter_mut().zip(&components).enumerate() {
-                    if self.written >> (32 * index) & 1 == 1 {
-                        *word = component[lane];
-                    }
-                }
-            }
-        }
+        store_texels(simd, &blended, words, quads, lanes, self.written);
     }
 
     /// Blends fragments into texels of any format.
@@ -381,26 +353,52 @@ impl ColorOutput {
     }
 }
 
-/// The components of 16 consecutive texels of four words.
+/// The components of 16 texels of four words.
 #[inline(always)]
-fn load_texels<S: Simd>(simd: S, words: &[u32]) -> Colors<S> {
-    let load = |at: usize| floats_of(u32x16::from_slice(simd, &words[at..at + 16]));
-    let (rb, ga) = load(0).deinterleave(load(16));
-    let (rb_later, ga_later) = load(32).deinterleave(load(48));
+fn load_texels<S: Simd>(simd: S, words: &[u32], quads: &QuadAddresses) -> Colors<S> {
+    let load = |quad: usize| floats_of(u32x16::from_slice(simd, &words[4 * quads.first[quad]..][..16]));
+    let (rb, ga) = load(0).deinterleave(load(1));
+    let (rb_later, ga_later) = load(2).deinterleave(load(3));
     let ((r, b), (g, a)) = (rb.deinterleave(rb_later), ga.deinterleave(ga_later));
     [r, g, b, a]
 }
 
-/// Stores components as 16 consecutive texels of four words.
+/// Stores those components of texels of four words whose bits are in `written`, in some lanes.
 #[inline(always)]
-fn store_texels<S: Simd>([r, g, b, a]: &Colors<S>, words: &mut [u32]) {
+fn store_texels<S: Simd>(
+    simd: S,
+    [r, g, b, a]: &Colors<S>,
+    words: &mut [u32],
+    quads: &QuadAddresses,
+    lanes: u16,
+    written: u128,
+) {
     let ((rb, rb_later), (ga, ga_later)) = (r.interleave(*b), g.interleave(*a));
     let (first, second) = rb.interleave(ga);
     let (third, fourth) = rb_later.interleave(ga_later);
-    bits_of(first).store_slice(&mut words[..16]);
-    bits_of(second).store_slice(&mut words[16..32]);
-    bits_of(third).store_slice(&mut words[32..48]);
-    bits_of(fourth).store_slice(&mut words[48..64]);
+    for (quad, texels) in [first, second, third, fourth].into_iter().enumerate() {
+        let stored = &mut words[4 * quads.first[quad]..][..16];
+        let covered = lanes >> (4 * quad) & 15;
+        let texels = bits_of(texels);
+        if covered == 15 && written == u128::MAX {
+            texels.store_slice(stored);
+        } else if covered != 0 {
+            // Another quad of the vector may have the same address and other lanes.
+            let mask = u32x16::simd_from(simd, written_words(covered, written));
+            ((texels & mask) | (u32x16::from_slice(simd, stored) & !mask)).store_slice(stored);
+        }
+    }
+}
+
+/// The bits that are written of the four words of each texel of a quad.
+#[inline(always)]
+fn written_words(covered: u16, written: u128) -> [u32; 16] {
+    let mut words = [0; 16];
+    for (word, bits) in words.iter_mut().enumerate() {
+        let lane = 0_u32.wrapping_sub(u32::from(covered >> (word / 4) & 1));
+        *bits = lane & (written >> (32 * (word % 4))) as u32;
+    }
+    words
 }
 
 /// A source of 16 fragments. Components that the program does not write are 0.

@@ -89,23 +89,24 @@ pub(super) struct Rows<'a> {
 macro_rules! for_codec {
     ($simd:expr, $codec:expr, $kernel:ident($($argument:expr),*)) => {
         match $codec {
-            TexelCodec::Unorm8 => for_codec!($simd, $kernel, Unorm8, $($argument),*),
-            TexelCodec::Unorm8x2 => for_codec!($simd, $kernel, Unorm8x2, $($argument),*),
-            TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
-            TexelCodec::Srgb8x4 => for_codec!($simd, $kernel, Srgb8x4, $($argument),*),
-            TexelCodec::Unorm16 => for_codec!($simd, $kernel, Unorm16, $($argument),*),
-            TexelCodec::Float16x4 => for_codec!($simd, $kernel, Float16x4, $($argument),*),
-            TexelCodec::Float32 => for_codec!($simd, $kernel, Float32, $($argument),*),
-            TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
+            $crate::texture::texels::TexelCodec::Unorm8 => for_codec!($simd, $kernel, Unorm8, $($argument),*),
+            $crate::texture::texels::TexelCodec::Unorm8x2 => for_codec!($simd, $kernel, Unorm8x2, $($argument),*),
+            $crate::texture::texels::TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
+            $crate::texture::texels::TexelCodec::Srgb8x4 => for_codec!($simd, $kernel, Srgb8x4, $($argument),*),
+            $crate::texture::texels::TexelCodec::Unorm16 => for_codec!($simd, $kernel, Unorm16, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float16x4 => for_codec!($simd, $kernel, Float16x4, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float32 => for_codec!($simd, $kernel, Float32, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
         }
     };
     ($simd:expr, $kernel:ident, $codec:ident, $($argument:expr),*) => {
         $simd.vectorize(
             #[inline(always)]
-            || $kernel::<S, $codec>($simd, $($argument),*),
+            || $kernel::<S, $crate::texture::texels::$codec>($simd, $($argument),*),
         )
     };
 }
+pub(super) use for_codec;
 
 impl TexelCodec {
     /// The number of components that are stored.
@@ -239,6 +240,8 @@ fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
 pub(super) trait Texels {
     /// The number of components that are stored.
     const COMPONENTS: usize;
+    /// True if no component is an infinity or NaN.
+    const FINITE: bool;
 
     /// The stored components of texels. Those beyond [`Texels::COMPONENTS`] are zero.
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4];
@@ -256,10 +259,11 @@ fn gather_narrow<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>, texels_
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| Format::R8Srgb.decode(&[code as u8])[0]));
 
-struct Unorm8;
+pub(super) struct Unorm8;
 
 impl Texels for Unorm8 {
     const COMPONENTS: usize = 1;
+    const FINITE: bool = true;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -269,10 +273,11 @@ impl Texels for Unorm8 {
     }
 }
 
-struct Unorm8x2;
+pub(super) struct Unorm8x2;
 
 impl Texels for Unorm8x2 {
     const COMPONENTS: usize = 2;
+    const FINITE: bool = true;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -286,6 +291,7 @@ pub(super) struct Unorm8x4;
 
 impl Texels for Unorm8x4 {
     const COMPONENTS: usize = 4;
+    const FINITE: bool = true;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -303,6 +309,7 @@ pub(super) struct Srgb8x4;
 
 impl Texels for Srgb8x4 {
     const COMPONENTS: usize = 4;
+    const FINITE: bool = true;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -321,10 +328,11 @@ impl Texels for Srgb8x4 {
     }
 }
 
-struct Unorm16;
+pub(super) struct Unorm16;
 
 impl Texels for Unorm16 {
     const COMPONENTS: usize = 1;
+    const FINITE: bool = true;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -335,7 +343,7 @@ impl Texels for Unorm16 {
     }
 }
 
-struct Float16x4;
+pub(super) struct Float16x4;
 
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
@@ -361,6 +369,7 @@ fn float16<S: Simd>(simd: S, bits: u32x8<S>) -> f32x8<S> {
 
 impl Texels for Float16x4 {
     const COMPONENTS: usize = 4;
+    const FINITE: bool = false;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -370,10 +379,11 @@ impl Texels for Float16x4 {
     }
 }
 
-struct Float32;
+pub(super) struct Float32;
 
 impl Texels for Float32 {
     const COMPONENTS: usize = 1;
+    const FINITE: bool = false;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
@@ -382,10 +392,11 @@ impl Texels for Float32 {
     }
 }
 
-struct Float32x4;
+pub(super) struct Float32x4;
 
 impl Texels for Float32x4 {
     const COMPONENTS: usize = 4;
+    const FINITE: bool = false;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {

@@ -19,7 +19,7 @@ use super::lod::{self, QUADS, Selection};
 use super::sampler::{AddressMode, Filter, Reduction, Sampler};
 use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
-use super::texels::{Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout};
+use super::texels::{Footprint2x2, PackedLevel, Rows, Texels, VectorLayout, for_codec};
 use crate::format::Numeric;
 use crate::simd::spread;
 use crate::state::CompareOp;
@@ -55,14 +55,25 @@ pub(super) fn general<S: Simd>(
     if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() || !is_mean {
         return None;
     }
-    let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {
-        let unorm = surface.format.numeric() == Numeric::Unorm;
-        (op, bits.map(|bits| reference_value(unorm, bits)))
-    });
+    let reference = match (sampler.compare_op, &request.compare) {
+        (Some(op), Some(bits)) => Some((op, references(surface, bits))),
+        _ => None,
+    };
     let batch = Batch { simd, surface, layout, sampler, request, reference };
     let selection = lod::select(surface, sampler, request);
     let texels = batch.select_filter(&selection)?;
     Some(batch.registers(&texels))
+}
+
+/// The reference values of a comparison.
+#[inline(always)]
+fn references(surface: &Surface, bits: &LaneWords) -> Floats {
+    let unorm = surface.format.numeric() == Numeric::Unorm;
+    let mut values = [0.0; VECTOR_LANES];
+    for lane in 0..VECTOR_LANES {
+        values[lane] = reference_value(unorm, bits[lane]);
+    }
+    values
 }
 
 impl<S: Simd> Batch<'_, S> {
@@ -322,7 +333,13 @@ impl<'a> LevelSizes<'a> {
     fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> LaneWords {
         match self.uniform {
             Some(level) => [value(level); VECTOR_LANES],
-            None => self.levels.map(|level| value(&self.table[level as usize])),
+            None => {
+                let mut values = [0; VECTOR_LANES];
+                for lane in 0..VECTOR_LANES {
+                    values[lane] = value(&self.table[self.levels[lane] as usize]);
+                }
+                values
+            }
         }
     }
 }
@@ -380,17 +397,7 @@ pub(super) fn bilinear<S: Simd>(
     if !is_plain(sampler, request) {
         return None;
     }
-    match layout.codec {
-        TexelCodec::Unorm8x4 => Some(simd.vectorize(
-            #[inline(always)]
-            || filter::<S, Unorm8x4>(simd, surface, layout, sampler, request),
-        )),
-        TexelCodec::Srgb8x4 => Some(simd.vectorize(
-            #[inline(always)]
-            || filter::<S, Srgb8x4>(simd, surface, layout, sampler, request),
-        )),
-        _ => None,
-    }
+    Some(for_codec!(simd, layout.codec, filter(surface, layout, sampler, request)))
 }
 
 /// True if a request needs nothing but bilinear filtering and mip levels per quad.
@@ -430,12 +437,14 @@ fn filter<S: Simd, T: Texels>(
     if selection.weight != [0.0; QUADS] {
         let low = level::<S, T>(simd, words, layout, sampler, request, &selection.low);
         let weight = spread(simd, selection.weight);
+        let mixes = weight.simd_gt(0.0);
         for c in 0..T::COMPONENTS {
-            // Texels are finite, so that a weight of zero has no effect.
-            texel[c] = texel[c] + weight * (low[c] - texel[c]);
+            let mixed = texel[c] + weight * (low[c] - texel[c]);
+            // A level of weight zero is not read, so that infinities in it have no effect.
+            texel[c] = if T::FINITE { mixed } else { mixes.select(mixed, texel[c]) };
         }
     }
-    registers(surface, layout, texel)
+    registers(surface, layout, texel, T::COMPONENTS)
 }
 
 /// The weighted mean of the texels of a level for each quad.
@@ -492,17 +501,25 @@ fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
     upper.combine(u32x4::splat(simd, c).combine(u32x4::splat(simd, d)))
 }
 
-/// The result registers for four stored components: reordered and swizzled.
+/// The result registers for stored components: reordered, completed and swizzled.
 #[inline(always)]
-fn registers<S: Simd>(surface: &Surface, layout: &VectorLayout, texel: [f32x16<S>; 4]) -> [LaneWords; 4] {
+fn registers<S: Simd>(
+    surface: &Surface,
+    layout: &VectorLayout,
+    texel: [f32x16<S>; 4],
+    components: usize,
+) -> [LaneWords; 4] {
     let mut stored = [[0.0; VECTOR_LANES]; 4];
-    for c in 0..4 {
+    for c in 0..components {
         stored[c] = texel[c].into();
     }
     let (zero, one) = ([0.0; VECTOR_LANES], [1.0; VECTOR_LANES]);
-    let mut found = [&zero; 4];
+    let mut found = [&zero, &zero, &zero, &one];
     for c in 0..4 {
-        found[c] = &stored[layout.order[c]];
+        // Of four components none is missing.
+        if components == 4 || layout.order[c] < components {
+            found[c] = &stored[layout.order[c]];
+        }
     }
     let mut out = [[0; VECTOR_LANES]; 4];
     for (out, from) in out.iter_mut().zip(surface.swizzle) {

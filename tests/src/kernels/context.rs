@@ -52,7 +52,8 @@ impl Context {
         }
     }
 
-    fn of(gpu: Gpu) -> Self {
+    /// The properties of a device that is open already.
+    pub fn of(gpu: Gpu) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut floats = vk::PhysicalDeviceFloatControlsProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut floats);

@@ -40,9 +40,24 @@ macro_rules! spirv {
     };
 }
 
+/// The kernels, by their names.
+const KERNELS: [(&str, fn(Size) -> Kernel); 6] = [
+    ("mandelbrot", mandelbrot),
+    ("matrix product", matrix_product),
+    ("prefix sum", prefix_sum),
+    ("n-body", n_body),
+    ("blur", blur),
+    ("radix sort", radix_sort),
+];
+
 /// All kernels.
 pub fn all(size: Size) -> Vec<Kernel> {
-    vec![mandelbrot(size), matrix_product(size), prefix_sum(size), n_body(size), blur(size), radix_sort(size)]
+    KERNELS.iter().map(|(_, kernel)| kernel(size)).collect()
+}
+
+/// The kernel of a name.
+pub fn named(name: &str, size: Size) -> Option<Kernel> {
+    KERNELS.iter().find(|(own, _)| *own == name).map(|(_, kernel)| kernel(size))
 }
 
 fn bits(floats: &[f32]) -> Vec<u32> {

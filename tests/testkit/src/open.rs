@@ -22,6 +22,8 @@ pub enum Driver {
     Lavapipe,
     /// Any driver that draws Gaussians, through the loader.
     Extended,
+    /// Any driver, through the loader.
+    Any,
 }
 
 impl Driver {
@@ -31,12 +33,13 @@ impl Driver {
             Self::Loaded => "this driver",
             Self::Lavapipe => "lavapipe",
             Self::Extended => "a device that draws Gaussians",
+            Self::Any => "any device",
         }
     }
 
     fn is(self, id: vk::DriverId) -> bool {
         match self {
-            Self::Embedded | Self::Extended => true,
+            Self::Embedded | Self::Extended | Self::Any => true,
             Self::Loaded => id != vk::DriverId::MESA_LLVMPIPE,
             Self::Lavapipe => id == vk::DriverId::MESA_LLVMPIPE,
         }
@@ -45,7 +48,7 @@ impl Driver {
     fn entry(self) -> Result<ash::Entry, OpenError> {
         match self {
             Self::Embedded => Ok(vulkan_gaurast::entry()),
-            Self::Loaded | Self::Lavapipe | Self::Extended => {
+            Self::Loaded | Self::Lavapipe | Self::Extended | Self::Any => {
                 // SAFETY: the loader is the system's own.
                 unsafe { ash::Entry::load() }.map_err(|error| OpenError::NoLoader(error.to_string()))
             }

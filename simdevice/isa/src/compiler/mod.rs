@@ -34,6 +34,9 @@ pub struct Options {
     /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch
     /// may be smaller.
     pub subgroup_size: usize,
+    /// Lanes of a workgroup, if a batch has several: a divisor of the batch's lanes and a multiple of the subgroup
+    /// size. Lane indices begin again with each.
+    pub workgroup: Option<usize>,
     /// True to count the work done (see [`crate::machine::Machine::take_work`]).
     pub count_work: bool,
     /// The SIMD level of the kernels.
@@ -43,7 +46,7 @@ pub struct Options {
 impl Options {
     /// Options for batches and subgroups of 64 lanes, without counting.
     pub fn new(level: Level) -> Self {
-        Self { lanes: 64, subgroup_size: 64, count_work: false, level }
+        Self { lanes: 64, subgroup_size: 64, workgroup: None, count_work: false, level }
     }
 }
 
@@ -74,6 +77,8 @@ pub struct CompiledProgram {
     pub lanes: usize,
     /// Lanes of a subgroup.
     pub subgroup_size: usize,
+    /// Lanes of a workgroup.
+    pub workgroup: usize,
     /// Bytes of workgroup memory.
     pub shared_bytes: u32,
     /// The first bytes of workgroup memory that the caller sets.
@@ -91,12 +96,22 @@ impl CompiledProgram {
     /// If the program isn't valid, needs too many registers, or the options are out of range.
     pub fn new(mut program: Program, options: &Options) -> Result<Self, InvalidProgram> {
         let structure = |problem| Err(InvalidProgram::Structure { problem });
-        let Options { lanes, subgroup_size, count_work, .. } = *options;
+        let Options { lanes, subgroup_size, workgroup, count_work, .. } = *options;
+        let workgroup = workgroup.unwrap_or(lanes);
         if lanes == 0 || !lanes.is_multiple_of(VECTOR_LANES) || lanes > MAX_LANES {
             return structure("the lanes of a batch aren't a multiple of 16 within bounds");
         }
         if !subgroup_size.is_power_of_two() || !(4..=MAX_SUBGROUP_SIZE).contains(&subgroup_size) {
             return structure("the subgroup size isn't a power of two within bounds");
+        }
+        if workgroup != lanes {
+            let divides = |lanes: usize, by: usize| by != 0 && lanes.is_multiple_of(by);
+            if !divides(lanes, workgroup) || !divides(workgroup, VECTOR_LANES) || !divides(workgroup, subgroup_size) {
+                return structure("the lanes of workgroups don't fit the batch's vectors and subgroups");
+            }
+            if program.shared_bytes > 0 {
+                return structure("workgroups with memory don't share a batch");
+            }
         }
         validate(&program)?;
         fold::fold(&mut program);
@@ -135,6 +150,7 @@ impl CompiledProgram {
             table: table.map(|words| words.into_iter().map(AtomicU32::new).collect()),
             lanes,
             subgroup_size,
+            workgroup,
         })
     }
 

@@ -7,6 +7,7 @@ mod program;
 mod register;
 mod statement;
 pub mod validate;
+mod waiting;
 
 pub use image::{Dimension, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Sample};
 pub use memory::{Address, AtomicOp, Binding, Format, Space};

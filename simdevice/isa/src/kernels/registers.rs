@@ -116,6 +116,12 @@ impl<'a> RegisterFile<'a> {
         &self.vectors[slot.start()..][..count]
     }
 
+    /// The vector of a 32-bit register for 16 lanes of the batch.
+    #[inline(always)]
+    pub fn vector(self, slot: RegisterSlot, index: usize) -> &'a Cell<Vector> {
+        &self.narrow(slot)[if slot.is_varying() { index } else { 0 }]
+    }
+
     /// Returns a register's value in the 16 lanes of a vector of the batch.
     #[inline(always)]
     pub fn lanes<T: Lane>(self, slot: RegisterSlot, index: usize) -> [T; VECTOR_LANES] {

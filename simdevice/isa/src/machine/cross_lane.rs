@@ -1,6 +1,9 @@
 //! Derivatives and subgroup operations.
 
+use fearless_simd::Simd;
+
 use super::batch::Batch;
+use super::subgroup;
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{Axis, Reg, SubgroupOp, Type, VECTOR_LANES};
@@ -24,14 +27,30 @@ pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool)
     }
 }
 
-pub fn subgroup(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
-    let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
+pub fn subgroup<S: Simd>(
+    batch: &Batch<'_>,
+    simd: S,
+    op: SubgroupOp,
+    dst: &[Reg],
+    src: Option<Reg>,
+    index: Option<Reg>,
+) {
     let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
+    if wide {
+        subgroup_by_lane(batch, op, dst, src, index)
+    } else {
+        subgroup::subgroup(batch, simd, op, dst, src, index)
+    }
+}
+
+/// Executes a subgroup operation on values of 64 bits.
+fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
+    let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);
     let active: Vec<bool> =
         (0..lanes).map(|lane| batch.masks.bits(MaskId::ACTIVE, lane / 16) >> (lane % 16) & 1 != 0).collect();
-    let values = src.map_or_else(|| vec![0; lanes], |reg| gather(batch, batch.slot(reg), wide));
+    let values = src.map_or_else(|| vec![0; lanes], |reg| gather(batch, batch.slot(reg), true));
     let indices = index.map_or_else(Vec::new, |reg| gather(batch, batch.slot(reg), false));
     for start in (0..lanes).step_by(size) {
         let end = (start + size).min(lanes);
@@ -46,7 +65,7 @@ pub fn subgroup(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>
             _ => {
                 let indices = indices.get(start..end).unwrap_or_default();
                 for (own, result) in group.run(op, indices).into_iter().enumerate() {
-                    let wide = wide && !matches!(op, SubgroupOp::AllEqual);
+                    let wide = !matches!(op, SubgroupOp::AllEqual);
                     scatter(batch, results[0], wide, start + own, result);
                 }
             }
@@ -81,10 +100,10 @@ fn scatter(batch: &Batch<'_>, slot: RegisterSlot, wide: bool, lane: usize, value
 }
 
 /// One subgroup's lanes.
-struct Group<'a> {
-    active: &'a [bool],
-    values: &'a [u64],
-    size: usize,
+pub(super) struct Group<'a> {
+    pub active: &'a [bool],
+    pub values: &'a [u64],
+    pub size: usize,
 }
 
 /// A bool as a register holds it.
@@ -97,7 +116,7 @@ impl Group<'_> {
         (0..self.active.len()).filter(|lane| self.active[*lane])
     }
 
-    fn ballot(&self) -> [u32; 4] {
+    pub(super) fn ballot(&self) -> [u32; 4] {
         let mut words = [0; 4];
         for lane in self.active_lanes().filter(|lane| self.values[*lane] != 0) {
             words[lane / 32 % 4] |= 1 << (lane % 32);
@@ -106,7 +125,7 @@ impl Group<'_> {
     }
 
     /// The result in each lane. `indices` is empty where the operation has none.
-    fn run(&self, op: SubgroupOp, indices: &[u64]) -> Vec<u64> {
+    pub(super) fn run(&self, op: SubgroupOp, indices: &[u64]) -> Vec<u64> {
         let lanes = 0..self.active.len();
         let index = |lane: usize| indices.get(lane).copied().unwrap_or(0) as usize;
         let fetch = |lane: usize| {
@@ -196,7 +215,7 @@ fn combine(op: Op, a: u64, b: u64) -> u64 {
 }
 
 /// The identity element of [`combine`] for an operation.
-fn identity(op: Op) -> u64 {
+pub(super) fn identity(op: Op) -> u64 {
     match op {
         Op::BAnd | Op::And | Op::UMin => u64::from(u32::MAX),
         Op::And64 | Op::UMin64 => u64::MAX,

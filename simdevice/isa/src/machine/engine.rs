@@ -219,8 +219,10 @@ fn select_lanes(
 fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
     match statement {
         Statement::LaneIndex { dst } => {
+            let vectors = batch.program.workgroup / 16;
             for vector in 0..batch.file.width() {
-                let lanes: [u32; 16] = std::array::from_fn(|lane| (16 * vector + lane) as u32);
+                let first = 16 * (vector % vectors);
+                let lanes: [u32; 16] = std::array::from_fn(|lane| (first + lane) as u32);
                 batch.file.set(batch.slot(*dst), vector, lanes);
             }
         }
@@ -249,7 +251,7 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
         Statement::ImageAtomic(atomic) => image::atomic(batch, atomic),
         Statement::ImageQuery { dst, image, shape, query } => image::query(batch, dst, image, *shape, query),
         Statement::Derivative { dst, src, axis, fine } => cross_lane::derivative(batch, *dst, *src, *axis, *fine),
-        Statement::Subgroup { op, dst, src, index } => cross_lane::subgroup(batch, *op, dst, *src, *index),
+        Statement::Subgroup { op, dst, src, index } => cross_lane::subgroup(batch, simd, *op, dst, *src, *index),
         // All other statements are arithmetic or control flow, which have steps of their own.
         _ => {}
     }

@@ -3,6 +3,7 @@
 use std::cell::Cell;
 
 use fearless_simd::{Simd, prelude::*};
+use smallvec::SmallVec;
 
 use crate::compiler::step::MaskId;
 use crate::kernels::registers::{RegisterFile, RegisterSlot, Span, load_vector, to_mask};
@@ -10,7 +11,7 @@ use crate::kernels::registers::{RegisterFile, RegisterSlot, Span, load_vector, t
 /// A set of lanes that the caller passes or receives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LaneMask {
-    words: Vec<u64>,
+    words: SmallVec<[u64; 4]>,
 }
 
 impl LaneMask {
@@ -21,7 +22,7 @@ impl LaneMask {
 
     /// The first `count` lanes.
     pub fn first(count: usize) -> Self {
-        let mut words = vec![u64::MAX; count / 64];
+        let mut words = SmallVec::from_elem(u64::MAX, count / 64);
         if !count.is_multiple_of(64) {
             words.push((1 << (count % 64)) - 1);
         }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use devmem::BufferRange;
+use devmem::{BufferRange, load_4, load_16, store_16};
 use fearless_simd::{Simd, prelude::*, u32x16};
 
 use super::batch::Batch;
@@ -10,7 +10,7 @@ use super::masks::{bits_to_mask, lanes_of};
 use crate::compiler::step::MaskId;
 use crate::ir::{Address, AtomicOp, Binding, Format, Reg, Space, VECTOR_LANES};
 use crate::kernels::combine;
-use crate::kernels::registers::{RegisterSlot, each_lane, load_vector};
+use crate::kernels::registers::{RegisterSlot, each_lane, load_vector, store_vector};
 use crate::resources::{load_word, range_words};
 
 /// The memory of an access: words, and the number of their bytes that may be accessed.
@@ -488,31 +488,77 @@ fn gather_words<S: Simd, const COUNT: usize>(
     window: Window<'_>,
     starts: u32x16<S>,
 ) {
-    let mut values = [[0; VECTOR_LANES]; COUNT];
+    let simd = starts.simd;
+    let mut values = [u32x16::splat(simd, 0); COUNT];
     if are_apart::<S, 0>(starts) {
         let element = element::<COUNT>(window.words, starts[0]);
         for index in 0..COUNT {
-            values[index] = [element[index].load(Relaxed); VECTOR_LANES];
+            values[index] = u32x16::splat(simd, element[index].load(Relaxed));
         }
-    } else if are_apart::<S, COUNT>(starts) {
+    } else if COUNT != 3 && are_apart::<S, COUNT>(starts) {
         let run = &window.words[starts[0] as usize..][..VECTOR_LANES * COUNT];
-        for lane in 0..VECTOR_LANES {
-            for index in 0..COUNT {
-                values[index][lane] = run[lane * COUNT + index].load(Relaxed);
-            }
+        let mut parts = [u32x16::splat(simd, 0); COUNT];
+        for (part, words) in parts.iter_mut().zip(run.as_chunks().0) {
+            *part = load_16(simd, words);
         }
+        values = separate(parts);
+    } else if COUNT == 4 {
+        let starts: [u32; VECTOR_LANES] = starts.into();
+        let mut parts = values;
+        for (part, starts) in parts.iter_mut().zip(starts.as_chunks::<4>().0) {
+            let a = load_4(simd, element::<4>(window.words, starts[0]));
+            let b = load_4(simd, element::<4>(window.words, starts[1]));
+            let c = load_4(simd, element::<4>(window.words, starts[2]));
+            let d = load_4(simd, element::<4>(window.words, starts[3]));
+            *part = a.combine(b).combine(c.combine(d));
+        }
+        values = separate(parts);
     } else {
         let starts: [u32; VECTOR_LANES] = starts.into();
+        let mut lanes = [[0; VECTOR_LANES]; COUNT];
         for lane in 0..VECTOR_LANES {
             let element = element::<COUNT>(window.words, starts[lane]);
             for index in 0..COUNT {
-                values[index][lane] = element[index].load(Relaxed);
+                lanes[index][lane] = element[index].load(Relaxed);
             }
+        }
+        for index in 0..COUNT {
+            values[index] = u32x16::simd_from(simd, lanes[index]);
         }
     }
     for index in 0..COUNT {
-        batch.file.set(slots[index], vector, values[index]);
+        store_vector(batch.file.vector(slots[index], vector), values[index]);
     }
+}
+
+/// The elements of 16 lanes, given `COUNT` elements of each lane one after the other; `COUNT` is 1, 2 or 4.
+#[inline(always)]
+fn separate<S: Simd, const COUNT: usize>(mut parts: [u32x16<S>; COUNT]) -> [u32x16<S>; COUNT] {
+    if COUNT == 2 {
+        (parts[0], parts[1]) = parts[0].deinterleave(parts[1]);
+    }
+    if COUNT == 4 {
+        let (even, odd) = parts[0].deinterleave(parts[1]);
+        let (even_later, odd_later) = parts[2].deinterleave(parts[3]);
+        (parts[0], parts[2]) = even.deinterleave(even_later);
+        (parts[1], parts[3]) = odd.deinterleave(odd_later);
+    }
+    parts
+}
+
+/// The inverse of [`separate`].
+#[inline(always)]
+fn join<S: Simd, const COUNT: usize>(mut parts: [u32x16<S>; COUNT]) -> [u32x16<S>; COUNT] {
+    if COUNT == 2 {
+        (parts[0], parts[1]) = parts[0].interleave(parts[1]);
+    }
+    if COUNT == 4 {
+        let (even, even_later) = parts[0].interleave(parts[2]);
+        let (odd, odd_later) = parts[1].interleave(parts[3]);
+        (parts[0], parts[1]) = even.interleave(odd);
+        (parts[2], parts[3]) = even_later.interleave(odd_later);
+    }
+    parts
 }
 
 /// Stores words.
@@ -569,6 +615,18 @@ fn scatter_words<S: Simd, const COUNT: usize>(
     window: Window<'_>,
     starts: u32x16<S>,
 ) {
+    if COUNT != 3 && lanes == u16::MAX && are_apart::<S, COUNT>(starts) {
+        let simd = starts.simd;
+        let mut parts = [u32x16::splat(simd, 0); COUNT];
+        for index in 0..COUNT {
+            parts[index] = load_vector(simd, batch.file.vector(slots[index], vector));
+        }
+        let run = &window.words[starts[0] as usize..][..VECTOR_LANES * COUNT];
+        for (words, part) in run.as_chunks().0.iter().zip(join(parts)) {
+            store_16(simd, words, part);
+        }
+        return;
+    }
     let mut values = [[0; VECTOR_LANES]; COUNT];
     for index in 0..COUNT {
         values[index] = batch.file.lanes::<u32>(slots[index], vector);

@@ -36,6 +36,7 @@ mod executable;
 mod image;
 mod masks;
 mod memory;
+mod subgroup;
 mod watchdog;
 
 pub use counters::Work;
@@ -233,8 +234,8 @@ impl Machine {
         let lanes = self.executable.program.lanes;
         let width = lanes.div_ceil(64);
         self.masks.fill(0);
-        let whole = LaneMask::first(lanes);
-        for (index, whole) in whole.words().iter().enumerate() {
+        for index in 0..width {
+            let whole = u64::MAX >> (64 - (lanes - 64 * index).min(64));
             let word = |mask: &LaneMask| mask.words().get(index).copied().unwrap_or(0) & whole;
             self.masks[usize::from(MaskId::ACTIVE.0) * width + index] = word(active);
             self.masks[usize::from(MaskId::ENTRY.0) * width + index] = word(active);

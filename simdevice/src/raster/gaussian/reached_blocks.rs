@@ -23,10 +23,12 @@ pub(crate) fn reached_blocks<S: Simd>(
     let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
     let dy = f64x4::from_slice(simd, &middles.y) - splat.mean[1];
     let (u, v_of_column, v_of_row) = (dx * a, dx * b, dy * c);
-    let row = |row: usize| v_of_column + f64x4::splat(simd, v_of_row[row]);
     let u: f32x8<S> = u.narrow(u);
-    let upper: f32x8<S> = row(0).narrow(row(1));
-    let lower: f32x8<S> = row(2).narrow(row(3));
+    // No closure: one that is not inlined would be compiled without the SIMD level's instructions.
+    let rows =
+        [v_of_column + v_of_row[0], v_of_column + v_of_row[1], v_of_column + v_of_row[2], v_of_column + v_of_row[3]];
+    let upper: f32x8<S> = rows[0].narrow(rows[1]);
+    let lower: f32x8<S> = rows[2].narrow(rows[3]);
     let v = upper.combine(lower);
     let [a, b, c] = [a as f32, b as f32, c as f32];
     let log2_opacity = f32x8::splat(simd, splat.log2_opacity);

@@ -64,6 +64,24 @@ pub struct Record {
     pub depth_slopes: [f32; 2],
 }
 
+/// The lanes of a chunk in groups that are written one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turns {
+    /// The groups, and then zeros.
+    lanes: [u16; 4],
+}
+
+impl Turns {
+    /// Each quad for itself.
+    pub const QUADS: Self = Self { lanes: [0xF, 0xF0, 0xF00, 0xF000] };
+
+    /// The groups.
+    #[inline(always)]
+    pub fn groups(&self) -> impl Iterator<Item = u16> + '_ {
+        self.lanes.iter().copied().take_while(|&lanes| lanes != 0)
+    }
+}
+
 /// Fragments that are shaded together.
 #[derive(Debug)]
 pub struct Batch {
@@ -286,18 +304,33 @@ impl Batch {
         QuadAddresses { first, consecutive: b == a + 4 && c == a + 8 && d == a + 12 }
     }
 
-    /// True if two quads of a chunk cover the same sample, so that their order matters.
+    /// The lanes of a chunk in groups of consecutive quads. Within a group no two quads cover the same sample with lanes
+    /// of `alive`, so that their order does not matter.
     #[inline(always)]
-    pub fn overlaps(&self, chunk: usize) -> bool {
+    pub fn turns(&self, chunk: usize, alive: u16) -> Turns {
         // A primitive covers each sample at most once.
-        self.common[chunk].is_none() && self.overlap(chunk)
+        if self.common[chunk].is_some() { Turns { lanes: [u16::MAX, 0, 0, 0] } } else { self.separate(chunk, alive) }
     }
 
-    fn overlap(&self, chunk: usize) -> bool {
+    fn separate(&self, chunk: usize, alive: u16) -> Turns {
         let quads = self.chunk_quads(chunk);
-        quads.iter().enumerate().any(|(index, a)| {
-            quads[index + 1..].iter().any(|b| (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0)
-        })
+        let mut covers = [0; 4];
+        for (index, (cover, quad)) in covers.iter_mut().zip(quads).enumerate() {
+            *cover = quad.cover & (alive >> (4 * index) & 15) * 0x1111;
+        }
+        let mut turns = Turns { lanes: [0; 4] };
+        let (mut turn, mut first) = (0, 0);
+        for index in 0..4 {
+            let overlaps = |other: usize| {
+                let [a, b] = [&quads[other], &quads[index]];
+                (a.tile, a.place) == (b.tile, b.place) && covers[other] & covers[index] != 0
+            };
+            if (first..index).any(overlaps) {
+                (turn, first) = (turn + 1, index);
+            }
+            turns.lanes[turn] |= 15 << (4 * index);
+        }
+        turns
     }
 
     /// Pads the last chunk, and determines the active lanes and the helper lanes for derivatives.
@@ -443,6 +476,9 @@ impl Batch {
                     };
                     self.interpolate(simd, place, interface.varyings.len(), barycentrics, lanes);
                 }
+                FragmentInput::Varying { interpolation: Interpolation::Flat, .. } => {
+                    self.copy_flat(simd, place, interface.varyings.len(), lanes);
+                }
                 _ => {
                     for (chunk, lanes) in lanes.iter_mut().enumerate() {
                         *lanes = Vector(self.input(simd, kind, place, chunk, interface, samples));
@@ -469,6 +505,22 @@ impl Batch {
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
             *out = Vector(bits_of(varying(attribute, [b1, b2])).into());
+        }
+    }
+
+    /// Copies a flat varying for all chunks of `out`.
+    #[inline(always)]
+    fn copy_flat<S: Simd>(&self, simd: S, place: usize, per_record: usize, out: &mut [Vector]) {
+        for (chunk, out) in out.iter_mut().enumerate() {
+            let value = |record: u16| self.attributes[usize::from(record) * per_record + place][0];
+            let lanes = match self.common[chunk] {
+                Some(record) => f32x16::splat(simd, value(record)),
+                None => {
+                    let [a, b, c, d] = self.chunk_quads(chunk);
+                    spread(simd, [value(a.record), value(b.record), value(c.record), value(d.record)])
+                }
+            };
+            *out = Vector(bits_of(lanes).into());
         }
     }
 
@@ -535,7 +587,7 @@ impl Batch {
         match kind {
             FragmentInput::Varying { interpolation, .. } => {
                 let attribute = self.attribute(simd, chunk, place, interface.varyings.len());
-                // At the centres, [`Batch::interpolate`] is used.
+                // At the centres, [`Batch::interpolate`] is used, and [`Batch::copy_flat`] for flat ones.
                 let linear = self.centroid_at(simd, chunk, samples.positions);
                 let barycentrics = match interpolation {
                     Interpolation::Flat => return bits_of(attribute[0]).into(),
@@ -630,4 +682,31 @@ pub fn perspective_correct<S: Simd>(
 ) -> [f32x16<S>; 2] {
     let inverse = f32x16::splat(simd, 1.0) / inverse_w;
     [b1 * w1 * inverse, b2 * w2 * inverse]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[gaurast_runner::test]
+    fn quads_that_cover_the_same_sample_are_written_in_turn() {
+        let quad = |record, place, cover| Quad { record, place, cover, ..Quad::default() };
+        let groups = |quads: [Quad; 4], alive| {
+            let mut batch = Batch { count: 4, ..Batch::default() };
+            batch.quads[..4].copy_from_slice(&quads);
+            batch.prepare();
+            batch.turns(0, alive).groups().collect::<Vec<_>>()
+        };
+        let apart = [quad(0, 0, 15), quad(0, 4, 15), quad(1, 8, 15), quad(1, 12, 15)];
+        assert_eq!(groups(apart, u16::MAX), [0xFFFF]);
+        let all = [0, 1, 2, 3].map(|record| quad(record, 0, 15));
+        assert_eq!(groups(all, u16::MAX), [0xF, 0xF0, 0xF00, 0xF000]);
+        // The second overlaps the first, and the fourth the third.
+        let pairs = [quad(0, 0, 3), quad(1, 0, 2), quad(2, 4, 1), quad(3, 4, 9)];
+        assert_eq!(groups(pairs, u16::MAX), [0xF, 0xFF0, 0xF000]);
+        // What they have in common is not alive in one of them.
+        assert_eq!(groups(pairs, 0xFFDF), [0xFFF, 0xF000]);
+        // One primitive covers each sample once.
+        assert_eq!(groups(all.map(|all| Quad { record: 0, ..all }), u16::MAX), [0xFFFF]);
+    }
 }

@@ -1,6 +1,6 @@
 //! The output of shaded fragments: removal of samples, late tests, and writes to the colour attachments.
 
-use super::batch::{Batch, offset};
+use super::batch::{Batch, Turns, offset};
 use super::draw::{Path, TriangleTileDraw};
 use crate::program::fragment::Interface;
 use crate::raster::color::load;
@@ -76,9 +76,8 @@ pub fn write<S: Simd>(
         let alive = !(killed as u16);
         // Quads that cover the same sample are processed one after another, and so are quads that may have different
         // faces in a stencil test.
-        let in_turn = batch.overlaps(chunk) || late && draw.tests.stencil.is_some();
-        let turns: &[u16] = if in_turn { &[0xF, 0xF0, 0xF00, 0xF000] } else { &[0xFFFF] };
-        for &turn in turns {
+        let turns = if late && draw.tests.stencil.is_some() { Turns::QUADS } else { batch.turns(chunk, alive) };
+        for turn in turns.groups() {
             let mut samples = sample_lanes(batch, chunk, alive & turn);
             remove(simd, draw, interface, machine, chunk, &mut samples);
             for (sample, lanes) in samples.iter_mut().enumerate().take(draw.samples.positions.len()) {
@@ -147,8 +146,7 @@ fn write_directly<S: Simd>(
             if dual {
                 second = load(simd, &sources[1], chunk);
             }
-            let turns: &[u16] = if batch.overlaps(chunk) { &[0xF, 0xF0, 0xF00, 0xF000] } else { &[0xFFFF] };
-            for &turn in turns {
+            for turn in batch.turns(chunk, u16::MAX).groups() {
                 for sample in 0..count {
                     let lanes = covered.lanes(sample) & turn;
                     if lanes != 0 {

@@ -88,3 +88,20 @@ fn frames_of_a_path_and_a_cold_picture_are_timed() {
     let rows = csv.lines().filter(|row| row.starts_with("synthetic 300,"));
     assert_eq!(rows.count(), 14);
 }
+
+#[gaurast_runner::test(needs = [gaurast_runner::Need::Lavapipe, gaurast_testkit::shader::GLSLANG])]
+fn workloads_are_measured_beside_lavapipe() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["beside", "--only", "prefix sum,500 image copies", "--threads", "1", "--runs", "1"];
+    let arguments = [&arguments[..], &["--csv", "beside.csv"]].concat();
+    let output = bench(&folder, &arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let csv = std::fs::read_to_string(folder.path().join("beside.csv")).expect("written");
+    for name in ["prefix sum", "\"500 image copies, timeline semaphores\""] {
+        let row = csv.lines().find(|row| row.starts_with(name)).expect("measured");
+        assert!(row.contains("llvmpipe"), "{row}");
+        let ratio = row.rsplit(',').next().and_then(|cell| cell.parse::<f64>().ok());
+        assert!(ratio.is_some_and(|ratio| ratio > 0.0), "{row}");
+    }
+}

@@ -18,16 +18,23 @@ use scalar::Splat16;
 #[allow(clippy::approx_constant, reason = "the coefficients are fitted; one comes near ln 2")]
 const POWER_OF_TWO: [f32; 6] = [0.001_326_472_7, 0.009_671_513, 0.055_507_336, 0.240_222_42, 0.693_147, 1.0];
 
+// Closures that use vectors are functions here: one that is not inlined would be compiled without the SIMD level's
+// instructions.
+
+#[inline(always)]
+fn number<S: Simd>(simd: S, value: f32) -> f32x16<S> {
+    f32x16::splat(simd, value)
+}
+
 /// The nearest binary16 number, ties to even; infinite from 65520 on.
 #[inline(always)]
 fn round<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let number = |value: f32| f32x16::splat(simd, value);
     let bits: u32x16<S> = bits_of(x);
     // 13 bits go; a carry into the exponent is right.
     let even = (bits >> 13) & u32x16::splat(simd, 1);
     let normal = (bits + even + 0xFFF) & u32x16::splat(simd, !0x1FFF);
     let normal = floats_of(normal);
-    let infinite = normal * number(f32::INFINITY);
+    let infinite = normal * number(simd, f32::INFINITY);
     let normal = normal.abs().simd_ge(65536.0).select(infinite, normal);
     // Below 2^-14 numbers are 2^-24 apart, as binary32's are between a half and one.
     let small = (x + 0.75) - 0.75;
@@ -37,13 +44,12 @@ fn round<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
 /// 2 to the power of `x`, rounded; 2 above 1.
 #[inline(always)]
 fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let number = |value: f32| f32x16::splat(simd, value);
-    let x = x.max(number(-126.0)).min(number(1.0));
-    let shifter = number(12_582_912.0);
+    let x = x.max(number(simd, -126.0)).min(number(simd, 1.0));
+    let shifter = number(simd, 12_582_912.0);
     let shifted = x + shifter;
     let f = x - (shifted - shifter);
     let [first, rest @ ..] = POWER_OF_TWO;
-    let mut p = number(first);
+    let mut p = number(simd, first);
     for coefficient in rest {
         p = p * f + coefficient;
     }
@@ -94,10 +100,14 @@ impl BlockKernel for Half {
 fn offsets<S: Simd>(simd: S, splat: &Splat, corner: [u32; 2], block: usize) -> [f32x16<S>; 2] {
     let middle = |axis: usize, block: f64| block + (f64::from(corner[axis]) - splat.mean[axis]);
     let (x, y) = (middle(0, BLOCK_X[block]), middle(1, BLOCK_Y[block]));
-    let load = |lanes: &[f64], middle: f64| f64x8::from_slice(simd, lanes) + middle;
-    let dx = load(&LANE_X_64[..8], x).narrow(load(&LANE_X_64[8..], x));
-    let dy = load(&LANE_Y_64[..8], y).narrow(load(&LANE_Y_64[8..], y));
-    [round(simd, dx), round(simd, dy)]
+    [round(simd, from_middle(simd, &LANE_X_64, x)), round(simd, from_middle(simd, &LANE_Y_64, y))]
+}
+
+/// The sums of lanes' offsets and the middle's, in binary32.
+#[inline(always)]
+fn from_middle<S: Simd>(simd: S, lanes: &[f64; 16], middle: f64) -> f32x16<S> {
+    let (first, last) = (f64x8::from_slice(simd, &lanes[..8]), f64x8::from_slice(simd, &lanes[8..]));
+    (first + middle).narrow(last + middle)
 }
 
 /// Alpha at offsets from the mean; negative where it is not a number.

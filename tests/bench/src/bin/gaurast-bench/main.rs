@@ -1,6 +1,7 @@
 //! `gaurast-bench`: run time and error of Gaussian draws, compared with the alternatives on a machine without a GPU.
 
 mod arguments;
+mod beside;
 mod callgrind;
 mod commands;
 mod counts;
@@ -27,6 +28,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use arguments::{FramesArguments, OptimizationsArguments, ParetoArguments, PathArguments, SweepArguments};
+use beside::{BesideArguments, BesideWorkerArguments};
 use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use error::BenchError;
@@ -61,6 +63,8 @@ enum Command {
     Counts(CountsArguments),
     /// Prints hashes of pictures and buffers that are the same on every machine, or compares them with stored ones.
     Exact(ExactArguments),
+    /// Measures workloads of triangles, textures, kernels and small commands beside other drivers.
+    Beside(BesideArguments),
     /// Measures the cost of recording draws and creating pipelines, without the device.
     Commands(CommandsArguments),
     /// Draws for the other commands, which start it as a process.
@@ -72,6 +76,9 @@ enum Command {
     /// Works for `commands`, which starts it as a process.
     #[command(hide = true)]
     CommandsWorker(CommandsWorkerArguments),
+    /// Works for `beside`, which starts it as a process.
+    #[command(hide = true)]
+    BesideWorker(BesideWorkerArguments),
 }
 
 fn main() -> ExitCode {
@@ -100,6 +107,8 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::CountsWorker(arguments) => counts::work(arguments).map_err(counts_failed),
         Command::Commands(arguments) => commands::run(arguments),
         Command::CommandsWorker(arguments) => commands::work(arguments),
+        Command::Beside(arguments) => beside::run(arguments),
+        Command::BesideWorker(arguments) => beside::work(arguments),
     }
 }
 

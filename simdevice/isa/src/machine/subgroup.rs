@@ -1,0 +1,339 @@
+//! Subgroup operations on values of 32 bits, a subgroup at a time.
+//!
+//! [`super::cross_lane`] has the same operations lane by lane for values of any width, which tests compare with these.
+
+use fearless_simd::Simd;
+
+use super::batch::Batch;
+use super::cross_lane::identity;
+use crate::compiler::step::MaskId;
+use crate::ir::op::Op;
+use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, VECTOR_LANES};
+use crate::kernels::float::{greatest, least};
+
+/// The lanes of one subgroup.
+pub(super) struct Subgroup<'a> {
+    pub values: &'a [u32],
+    /// A bit for each active lane.
+    pub active: u128,
+    /// The lanes of a whole subgroup; the last one of a batch may have fewer.
+    pub size: usize,
+}
+
+/// Executes an operation for all lanes of a batch.
+pub(super) fn subgroup<S: Simd>(
+    batch: &Batch<'_>,
+    simd: S,
+    op: SubgroupOp,
+    dst: &[Reg],
+    src: Option<Reg>,
+    index: Option<Reg>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let lanes = batch.program.lanes;
+            let size = batch.program.subgroup_size.min(lanes);
+            // A vector may have several subgroups, and a subgroup several vectors.
+            let part = size.max(VECTOR_LANES);
+            for start in (0..lanes).step_by(part) {
+                run_part(batch, op, dst, src, index, start..(start + part).min(lanes), size);
+            }
+        },
+    );
+}
+
+/// Executes an operation for the subgroups in a range of lanes, which begins and ends with vectors.
+#[inline(always)]
+fn run_part(
+    batch: &Batch<'_>,
+    op: SubgroupOp,
+    dst: &[Reg],
+    src: Option<Reg>,
+    index: Option<Reg>,
+    lanes: std::ops::Range<usize>,
+    size: usize,
+) {
+    let vectors = lanes.start / VECTOR_LANES..lanes.end / VECTOR_LANES;
+    let count = lanes.len();
+    let mut active = 0_u128;
+    let mut values = [0; MAX_SUBGROUP_SIZE];
+    let mut indices = [0; MAX_SUBGROUP_SIZE];
+    for (number, vector) in vectors.clone().enumerate() {
+        active |= u128::from(batch.masks.bits(MaskId::ACTIVE, vector)) << (VECTOR_LANES * number);
+        let at = VECTOR_LANES * number..VECTOR_LANES * (number + 1);
+        if let Some(reg) = src {
+            values[at.clone()].copy_from_slice(&batch.file.lanes::<u32>(batch.slot(reg), vector));
+        }
+        if let Some(reg) = index {
+            indices[at].copy_from_slice(&batch.file.lanes::<u32>(batch.slot(reg), vector));
+        }
+    }
+    let mut results = [[0; MAX_SUBGROUP_SIZE]; 4];
+    for first in (0..count).step_by(size) {
+        let end = (first + size).min(count);
+        let own = active >> first & ones(end - first);
+        let group = Subgroup { values: &values[first..end], active: own, size };
+        if op == SubgroupOp::Ballot {
+            for (word, results) in group.ballot().into_iter().zip(&mut results) {
+                results[first..end].fill(word);
+            }
+        } else {
+            group.run(op, &indices[first..end], &mut results[0][first..end]);
+        }
+    }
+    for (reg, results) in dst.iter().zip(&results) {
+        for (vector, lanes) in vectors.clone().zip(results.as_chunks().0) {
+            batch.file.set(batch.slot(*reg), vector, *lanes);
+        }
+    }
+}
+
+/// As many ones as there are lanes.
+#[inline(always)]
+fn ones(lanes: usize) -> u128 {
+    u128::MAX >> (128 - lanes)
+}
+
+/// A bool as a register holds it.
+#[inline(always)]
+fn truth(value: bool) -> u32 {
+    if value { u32::MAX } else { 0 }
+}
+
+/// Evaluates an expression with the function of an associative operation. Each is compiled on its own. Only sums that do
+/// not depend on their order may be formed in another one.
+macro_rules! with_operation {
+    ($op:expr, |$combine:ident, $any_order:ident| $body:expr) => {{
+        macro_rules! each {
+            ($f:expr, $order:expr) => {{
+                let $combine = $f;
+                let $any_order: bool = $order;
+                $body
+            }};
+        }
+        match $op {
+            Op::BAnd | Op::And => each!(|a: u32, b: u32| a & b, true),
+            Op::BOr | Op::Or => each!(|a: u32, b: u32| a | b, true),
+            Op::BXor | Op::Xor => each!(|a: u32, b: u32| a ^ b, true),
+            Op::IAdd => each!(|a: u32, b: u32| a.wrapping_add(b), true),
+            Op::IMul => each!(|a: u32, b: u32| a.wrapping_mul(b), true),
+            Op::SMin => each!(|a: u32, b: u32| a.cast_signed().min(b.cast_signed()).cast_unsigned(), true),
+            Op::SMax => each!(|a: u32, b: u32| a.cast_signed().max(b.cast_signed()).cast_unsigned(), true),
+            Op::UMin => each!(|a: u32, b: u32| a.min(b), true),
+            Op::UMax => each!(|a: u32, b: u32| a.max(b), true),
+            Op::FAdd => each!(|a: u32, b: u32| (f32::from_bits(a) + f32::from_bits(b)).to_bits(), false),
+            Op::FMul => each!(|a: u32, b: u32| (f32::from_bits(a) * f32::from_bits(b)).to_bits(), false),
+            Op::FMin => each!(|a: u32, b: u32| least(f32::from_bits(a), f32::from_bits(b)).to_bits(), false),
+            Op::FMax => each!(|a: u32, b: u32| greatest(f32::from_bits(a), f32::from_bits(b)).to_bits(), false),
+            // Validation allows no other operation of 32 bits.
+            _ => each!(|a: u32, _: u32| a, false),
+        }
+    }};
+}
+
+impl Subgroup<'_> {
+    #[inline(always)]
+    fn is_active(&self, lane: usize) -> bool {
+        lane < self.values.len() && self.active >> lane & 1 != 0
+    }
+
+    /// The lanes whose value is not zero.
+    #[inline(always)]
+    fn set_lanes(&self) -> u128 {
+        let mut set = 0;
+        for (lane, value) in self.values.iter().enumerate() {
+            set |= u128::from(*value != 0) << lane;
+        }
+        set
+    }
+
+    /// The active lanes whose value is not zero, 32 to a word.
+    #[inline(always)]
+    pub(super) fn ballot(&self) -> [u32; 4] {
+        let set = self.set_lanes() & self.active;
+        [set as u32, (set >> 32) as u32, (set >> 64) as u32, (set >> 96) as u32]
+    }
+
+    /// The result of an operation other than a ballot in each lane.
+    #[inline(always)]
+    pub(super) fn run(&self, op: SubgroupOp, indices: &[u32], out: &mut [u32]) {
+        let first = self.active.trailing_zeros() as usize;
+        let first_value = if self.active == 0 { 0 } else { self.values[first] };
+        let fetch = |lane: usize| if self.is_active(lane) { self.values[lane] } else { 0 };
+        match op {
+            SubgroupOp::Elect => {
+                out.fill(0);
+                if self.active != 0 {
+                    out[first] = u32::MAX;
+                }
+            }
+            SubgroupOp::All => out.fill(truth(self.set_lanes() & self.active == self.active)),
+            SubgroupOp::Any => out.fill(truth(self.set_lanes() & self.active != 0)),
+            SubgroupOp::AllEqual => {
+                let mut differ = 0;
+                for (lane, value) in self.values.iter().enumerate() {
+                    differ |= u128::from(*value != first_value) << lane;
+                }
+                out.fill(truth(differ & self.active == 0));
+            }
+            SubgroupOp::BroadcastFirst => out.fill(first_value),
+            SubgroupOp::Shuffle => {
+                for (out, index) in out.iter_mut().zip(indices) {
+                    *out = fetch(*index as usize);
+                }
+            }
+            SubgroupOp::ShuffleXor => {
+                for (lane, (out, index)) in out.iter_mut().zip(indices).enumerate() {
+                    *out = fetch(lane ^ *index as usize);
+                }
+            }
+            SubgroupOp::ShuffleUp => {
+                for (lane, (out, index)) in out.iter_mut().zip(indices).enumerate() {
+                    *out = fetch(lane.wrapping_sub(*index as usize));
+                }
+            }
+            SubgroupOp::ShuffleDown => {
+                for (lane, (out, index)) in out.iter_mut().zip(indices).enumerate() {
+                    *out = fetch(lane.saturating_add(*index as usize));
+                }
+            }
+            SubgroupOp::QuadBroadcast => {
+                for (lane, (out, index)) in out.iter_mut().zip(indices).enumerate() {
+                    *out = self.values[lane & !3 | *index as usize & 3];
+                }
+            }
+            SubgroupOp::QuadSwap => {
+                for (lane, (out, index)) in out.iter_mut().zip(indices).enumerate() {
+                    *out = self.values[lane ^ *index as usize & 3];
+                }
+            }
+            SubgroupOp::Reduce { op, cluster } => self.reduce(op, (cluster as usize).min(self.size), out),
+            SubgroupOp::InclusiveScan(op) => self.scan(op, true, out),
+            SubgroupOp::ExclusiveScan(op) => self.scan(op, false, out),
+            // A ballot has four results and is done by itself.
+            SubgroupOp::Ballot => out.fill(0),
+        }
+    }
+
+    #[inline(always)]
+    fn reduce(&self, op: Op, cluster: usize, out: &mut [u32]) {
+        let none = identity(op) as u32;
+        with_operation!(op, |combine, any_order| {
+            for (number, out) in out.chunks_mut(cluster).enumerate() {
+                let start = number * cluster;
+                let values = &self.values[start..start + out.len()];
+                let mut rest = self.active >> start & ones(out.len());
+                let mut total = none;
+                if any_order {
+                    for (lane, value) in values.iter().enumerate() {
+                        total = combine(total, if rest >> lane & 1 != 0 { *value } else { none });
+                    }
+                } else if rest != 0 {
+                    total = values[rest.trailing_zeros() as usize];
+                    rest &= rest - 1;
+                    while rest != 0 {
+                        total = combine(total, values[rest.trailing_zeros() as usize]);
+                        rest &= rest - 1;
+                    }
+                }
+                out.fill(total);
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn scan(&self, op: Op, inclusive: bool, out: &mut [u32]) {
+        let none = identity(op) as u32;
+        with_operation!(op, |combine, _any_order| {
+            let (mut sum, mut is_first) = (none, true);
+            for (lane, (out, value)) in out.iter_mut().zip(self.values).enumerate() {
+                *out = 0;
+                if self.active >> lane & 1 != 0 {
+                    let next = if is_first { *value } else { combine(sum, *value) };
+                    *out = if inclusive { next } else { sum };
+                    (sum, is_first) = (next, false);
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::cross_lane::Group;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[gaurast_runner::test]
+    fn every_operation_gives_what_it_gives_lane_by_lane() {
+        use SubgroupOp as Is;
+        let mut rng = ChaCha8Rng::seed_from_u64(31);
+        let combining = [
+            Op::BAnd,
+            Op::Or,
+            Op::Xor,
+            Op::IAdd,
+            Op::IMul,
+            Op::SMin,
+            Op::SMax,
+            Op::UMin,
+            Op::UMax,
+            Op::FAdd,
+            Op::FMul,
+            Op::FMin,
+            Op::FMax,
+        ];
+        let mut operations = vec![
+            Is::Elect,
+            Is::All,
+            Is::Any,
+            Is::AllEqual,
+            Is::BroadcastFirst,
+            Is::Shuffle,
+            Is::ShuffleXor,
+            Is::ShuffleUp,
+            Is::ShuffleDown,
+            Is::QuadBroadcast,
+            Is::QuadSwap,
+        ];
+        for op in combining {
+            operations.extend([Is::InclusiveScan(op), Is::ExclusiveScan(op)]);
+            operations.extend([4, 16, 128].map(|cluster| Is::Reduce { op, cluster }));
+        }
+        for round in 0..200 {
+            let size = [4, 8, 16, 32, 64, 128][round % 6];
+            // The last subgroup of a batch may be shorter.
+            let count = if size > 16 && round % 5 == 0 { size - 16 } else { size };
+            let active = match round % 4 {
+                0 => 0,
+                1 => ones(count),
+                _ => rng.random::<u128>() & ones(count),
+            };
+            let values: Vec<u32> = (0..count)
+                .map(|_| match rng.random_range(0..4) {
+                    0 => 0,
+                    1 => u32::MAX,
+                    2 => rng.random(),
+                    _ => rng.random_range(-2.0..2.0_f32).to_bits(),
+                })
+                .collect();
+            let indices: Vec<u32> = (0..count).map(|_| rng.random_range(0..140)).collect();
+            let wide = |lanes: &[u32]| lanes.iter().map(|lane| u64::from(*lane)).collect::<Vec<_>>();
+            let is_active: Vec<bool> = (0..count).map(|lane| active >> lane & 1 != 0).collect();
+            let (wide_values, wide_indices) = (wide(&values), wide(&indices));
+            let group = Group { active: &is_active, values: &wide_values, size };
+            let fast = Subgroup { values: &values, active, size };
+            assert_eq!(fast.ballot(), group.ballot());
+            for &op in &operations {
+                let mut found = vec![7; count];
+                fast.run(op, &indices, &mut found);
+                let is_nan = |bits: &u64| f32::from_bits(*bits as u32).is_nan();
+                for (found, expected) in wide(&found).iter().zip(group.run(op, &wide_indices)) {
+                    assert!(*found == expected || is_nan(found) && is_nan(&expected), "{op:?}, {size}");
+                }
+            }
+        }
+    }
+}
