@@ -335,8 +335,8 @@ impl<'a> LevelSizes<'a> {
             Some(level) => [value(level); VECTOR_LANES],
             None => {
                 let mut values = [0; VECTOR_LANES];
-                for lane in 0..VECTOR_LANES {
-                    values[lane] = value(&self.table[self.levels[lane] as usize]);
+                for (value_of_lane, level) in values.iter_mut().zip(self.levels) {
+                    *value_of_lane = value(&self.table[*level as usize]);
                 }
                 values
             }

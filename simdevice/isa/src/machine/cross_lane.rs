@@ -37,9 +37,9 @@ pub fn subgroup<S: Simd>(
 ) {
     let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
     if wide {
-        subgroup_by_lane(batch, op, dst, src, index)
+        subgroup_by_lane(batch, op, dst, src, index);
     } else {
-        subgroup::subgroup(batch, simd, op, dst, src, index)
+        subgroup::subgroup(batch, simd, op, dst, src, index);
     }
 }
 

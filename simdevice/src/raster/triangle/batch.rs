@@ -316,7 +316,7 @@ impl Batch {
         let quads = self.chunk_quads(chunk);
         let mut covers = [0; 4];
         for (index, (cover, quad)) in covers.iter_mut().zip(quads).enumerate() {
-            *cover = quad.cover & (alive >> (4 * index) & 15) * 0x1111;
+            *cover = quad.cover & ((alive >> (4 * index) & 15) * 0x1111);
         }
         let mut turns = Turns { lanes: [0; 4] };
         let (mut turn, mut first) = (0, 0);
