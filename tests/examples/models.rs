@@ -5,7 +5,7 @@ use ash::vk;
 use gaurast_testkit::{Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding};
 use gaurast_tests::triangles::clipped::{FRAME, FRAMES, floor};
 use gaurast_tests::triangles::edges::to_clip;
-use gaurast_tests::triangles::models::{Model, Ready};
+use gaurast_workloads::models::{Model, Ready};
 use glam::Vec3;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;

@@ -17,7 +17,7 @@ use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, ToClip, depth_format, held};
 use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
 use gaurast_tests::scenes::SceneBuffers;
-use gaurast_tests::triangles::models::Model;
+use gaurast_workloads::models::Model;
 use glam::{DMat3, DVec3, Vec3};
 
 use super::PLAYBOT;

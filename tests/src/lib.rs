@@ -1,9 +1,7 @@
-//! Code that several test programs share, in addition to the Vulkan application [`gaurast_testkit`]: compute kernels,
-//! random programs, scenes of triangles, and input for fuzzing.
+//! Code that several test programs share, in addition to the Vulkan application [`gaurast_testkit`]: random programs, scenes of triangles, and input for fuzzing.
 
 pub mod fuzzing;
 pub mod hybrid;
-pub mod kernels;
 pub mod long_run;
 pub mod many_gaussians;
 pub mod programs;

@@ -12,7 +12,7 @@ use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{Difference, differences, for_people, write_differences};
 use gaurast_testkit::{Gpu, Output};
 use gaurast_tests::triangles::Expected;
-use gaurast_tests::triangles::models::Model;
+use gaurast_workloads::models::Model;
 
 use crate::drivers::loaded;
 use crate::rasterization::models;

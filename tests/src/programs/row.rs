@@ -4,7 +4,7 @@ use super::assembler::{Assembler, Id};
 use super::inputs::{self, Domain};
 use super::precision::{Interval, Maybe, format};
 use super::types::{Kind, Ty};
-use crate::kernels::{Context, Kernel, Refused};
+use gaurast_workloads::kernels::{Context, Kernel, Refused};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use spirv::{BuiltIn, Capability, ExecutionMode, Op, StorageClass};

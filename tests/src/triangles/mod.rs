@@ -7,7 +7,5 @@ pub mod checksum;
 pub mod clipped;
 pub mod edges;
 mod expected;
-pub mod models;
-pub mod workloads;
 
 pub use expected::{Exception, Expected};

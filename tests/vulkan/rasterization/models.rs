@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use gaurast_testkit::drawn::Drawn;
 use gaurast_testkit::{Gpu, Output, Pass, Target, TargetOptions};
-use gaurast_tests::triangles::models::{Model, Ready};
+use gaurast_workloads::models::{Model, Ready};
 
 fn drawn(gpu: &Gpu, model: &Model, direction: Vec3, samples: u32) -> Output {
     let options = TargetOptions { size: [640, 480], samples, ..TargetOptions::with_depth(vk::Format::D32_SFLOAT) };

@@ -1,7 +1,7 @@
 //! Realistic kernels give the results that the host computes, on this driver and on lavapipe.
 
 use gaurast_runner::Need;
-use gaurast_tests::kernels::{Context, Size, all};
+use gaurast_workloads::kernels::{Context, Size, all};
 
 use super::lavapipe;
 

@@ -8,7 +8,7 @@ mod instructions;
 mod kernels;
 mod structured;
 
-use gaurast_tests::kernels::Context;
+use gaurast_workloads::kernels::Context;
 
 /// The context of lavapipe, if `Need::Lavapipe` is met.
 fn lavapipe() -> Context {

@@ -1,8 +1,8 @@
 //! Programs of random control flow give the results of a scalar interpreter, on this driver and on lavapipe.
 
 use gaurast_runner::Need;
-use gaurast_tests::kernels::{Context, Kernel};
 use gaurast_tests::programs::structured::{INVOCATIONS, Program, assemble, generate, run};
+use gaurast_workloads::kernels::{Context, Kernel};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use gaurast_runner::Variant;
 use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::{Gpu, Settings};
-use gaurast_tests::kernels;
 use gaurast_tests::many_gaussians::{self, Mode};
+use gaurast_workloads::kernels;
 
 use super::results::{DEVICE_MEMORY, HOST_MEMORY, LOST};
 

@@ -15,9 +15,9 @@ mod subgroup;
 
 use super::lavapipe;
 use gaurast_runner::{Case, Missing, Need, Variant, ignore};
-use gaurast_tests::kernels::Context;
 use gaurast_tests::programs::types::Ty;
 use gaurast_tests::programs::{Expect, LANES, Row, check};
+use gaurast_workloads::kernels::Context;
 use rows::{What, whole};
 use spirv::{GlslStd450Op as G, Op};
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_render::DeviceOptions;
 use gaurast_testkit::Gpu;
-use gaurast_tests::kernels::{self, Context, Size};
-use gaurast_tests::triangles::workloads as triangles;
+use gaurast_workloads::kernels::{self, Context, Size};
+use gaurast_workloads::triangles;
 
 use super::{fixed_costs, sampling};
 use crate::workload::{self, Source};

@@ -4,7 +4,7 @@ use ash::vk;
 use glam::Vec3;
 use rand::Rng;
 
-use super::models::{Model, Ready};
+use crate::models::{Model, Ready};
 use gaurast_testkit::drawn::Missing;
 use gaurast_testkit::shader::Stage;
 use gaurast_testkit::shapes;

@@ -33,7 +33,7 @@ macro_rules! spirv {
     ($name:literal) => {
         Cow::Borrowed(include_bytes!(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../driver/spirv/tests/shaders/",
+            "/../../driver/spirv/tests/shaders/",
             $name,
             ".comp.spv"
         )))
