@@ -93,7 +93,7 @@ pub fn run(arguments: &EvalArguments) -> Result<(), Error> {
     }
     if !missing.is_empty() {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(scene, settings, false, None)?;
+        let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
         step.finish_and_clear();
         outcomes.extend(measure(&mut drawing, &dataset, &missing, results.as_ref(), progress)?);
     }
