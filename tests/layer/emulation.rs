@@ -6,7 +6,7 @@ use gaurast_testkit::loader::with_emulation;
 
 /// Parts of the conformance program, each with the least number of its cases that the layer must pass.
 const PARTS: &[(&str, &[&str], usize)] = &[
-    ("commands", &["topology.*.primitive", "draws.indirect", "draws.multi"], 20),
+    ("commands", &["topology.*.primitive.*", "draws.indirect", "draws.multi"], 20),
     ("cameras", &["camera.pinhole", "camera.parallel"], 15),
     ("passes", &["passes"], 12),
     ("instances", &["instances.one", "instances.pinhole"], 10),

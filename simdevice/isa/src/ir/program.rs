@@ -4,6 +4,7 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::register::{Reg, Register, Type};
 use super::statement::{Block, write_block};
+use super::waiting::Accesses;
 
 /// The largest batch, in lanes.
 pub const MAX_LANES: usize = 2048;
@@ -76,6 +77,14 @@ pub struct Program {
     pub private_bytes: u32,
     /// The statements.
     pub body: Block,
+}
+
+impl Program {
+    /// True if an invocation may wait for what one of another workgroup writes: if there are atomics, or a loop reads
+    /// memory that the program writes. Such workgroups must not run in lockstep.
+    pub fn may_wait(&self) -> bool {
+        Accesses::of(&self.body).may_wait()
+    }
 }
 
 impl Display for Program {

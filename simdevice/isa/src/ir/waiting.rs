@@ -1,12 +1,11 @@
 //! Programs that may wait for other workgroups.
 
 use super::memory::{Binding, Space};
-use super::program::Program;
 use super::statement::{Block, Statement};
 
 /// The accesses of a program to memory that other workgroups see.
 #[derive(Default)]
-struct Accesses {
+pub(super) struct Accesses {
     /// Buffers that are read in a loop, by their first bind point and count.
     read_in_loops: Vec<(u32, u32)>,
     written: Vec<(u32, u32)>,
@@ -17,24 +16,26 @@ struct Accesses {
     has_atomics: bool,
 }
 
-impl Program {
-    /// True if an invocation may wait for what one of another workgroup writes: if there are atomics, or a loop reads
-    /// memory that the program writes. Such workgroups must not run in lockstep.
-    pub fn may_wait(&self) -> bool {
-        let mut found = Accesses::default();
-        found.visit(&self.body, false);
-        let overlap = |&(a, count_a): &(u32, u32)| {
-            found.written.iter().any(|&(b, count_b)| a < b.saturating_add(count_b) && b < a.saturating_add(count_a))
-        };
-        found.has_atomics
-            || found.read_in_loops.iter().any(overlap)
-            || found.reads_images_in_loops && found.writes_images
-            || found.writes_addresses && (found.reads_addresses_in_loops || !found.read_in_loops.is_empty())
-            || found.reads_addresses_in_loops && !found.written.is_empty()
-    }
-}
-
 impl Accesses {
+    /// The accesses of a program's `body`.
+    pub(super) fn of(body: &Block) -> Self {
+        let mut found = Self::default();
+        found.visit(body, false);
+        found
+    }
+
+    /// True if an invocation may wait for what one of another workgroup writes.
+    pub(super) fn may_wait(&self) -> bool {
+        let overlap = |&(a, count_a): &(u32, u32)| {
+            self.written.iter().any(|&(b, count_b)| a < b.saturating_add(count_b) && b < a.saturating_add(count_a))
+        };
+        self.has_atomics
+            || self.read_in_loops.iter().any(overlap)
+            || self.reads_images_in_loops && self.writes_images
+            || self.writes_addresses && (self.reads_addresses_in_loops || !self.read_in_loops.is_empty())
+            || self.reads_addresses_in_loops && !self.written.is_empty()
+    }
+
     fn visit(&mut self, block: &Block, in_loop: bool) {
         let of = |binding: &Binding| (binding.slot, binding.count);
         for statement in block {
@@ -64,7 +65,7 @@ impl Accesses {
 mod tests {
     use super::*;
     use crate::builder::Builder;
-    use crate::ir::{Address, Format, Label, Rate, Type};
+    use crate::ir::{Address, Format, Label, Program, Rate, Type};
 
     /// A program that reads a buffer, in a loop or before it, and writes a buffer.
     fn program(in_loop: bool, read: u32, written: u32) -> Program {

@@ -1,12 +1,9 @@
 //! Derivatives and subgroup operations.
 
-use fearless_simd::Simd;
-
 use super::batch::Batch;
-use super::subgroup;
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
-use crate::ir::{Axis, Reg, SubgroupOp, Type, VECTOR_LANES};
+use crate::ir::{Axis, Reg, SubgroupOp, VECTOR_LANES};
 use crate::kernels::float::{greatest, least};
 use crate::kernels::registers::{Lane, RegisterSlot};
 
@@ -27,24 +24,8 @@ pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool)
     }
 }
 
-pub fn subgroup<S: Simd>(
-    batch: &Batch<'_>,
-    simd: S,
-    op: SubgroupOp,
-    dst: &[Reg],
-    src: Option<Reg>,
-    index: Option<Reg>,
-) {
-    let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
-    if wide {
-        subgroup_by_lane(batch, op, dst, src, index);
-    } else {
-        subgroup::subgroup(batch, simd, op, dst, src, index);
-    }
-}
-
 /// Executes a subgroup operation on values of 64 bits.
-fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
+pub(super) fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
     let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);

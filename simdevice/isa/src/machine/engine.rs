@@ -9,7 +9,7 @@ use fearless_simd::{Level, Simd};
 use super::batch::Batch;
 use super::masks::Masks;
 use super::watchdog::{Stopped, Watch};
-use super::{cross_lane, image, memory};
+use super::{cross_lane, image, memory, subgroup};
 use crate::clock::host_time;
 use crate::compiler::step::{MaskId, Step};
 use crate::ir::Statement;
@@ -251,7 +251,7 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
         Statement::ImageAtomic(atomic) => image::atomic(batch, atomic),
         Statement::ImageQuery { dst, image, shape, query } => image::query(batch, dst, image, *shape, query),
         Statement::Derivative { dst, src, axis, fine } => cross_lane::derivative(batch, *dst, *src, *axis, *fine),
-        Statement::Subgroup { op, dst, src, index } => cross_lane::subgroup(batch, simd, *op, dst, *src, *index),
+        Statement::Subgroup { op, dst, src, index } => subgroup::subgroup(batch, simd, *op, dst, *src, *index),
         // All other statements are arithmetic or control flow, which have steps of their own.
         _ => {}
     }

@@ -5,10 +5,10 @@
 use fearless_simd::Simd;
 
 use super::batch::Batch;
-use super::cross_lane::identity;
+use super::cross_lane::{identity, subgroup_by_lane};
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
-use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, VECTOR_LANES};
+use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, Type, VECTOR_LANES};
 use crate::kernels::float::{greatest, least};
 
 /// The lanes of one subgroup.
@@ -22,6 +22,23 @@ pub(super) struct Subgroup<'a> {
 
 /// Executes an operation for all lanes of a batch.
 pub(super) fn subgroup<S: Simd>(
+    batch: &Batch<'_>,
+    simd: S,
+    op: SubgroupOp,
+    dst: &[Reg],
+    src: Option<Reg>,
+    index: Option<Reg>,
+) {
+    let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
+    if wide {
+        subgroup_by_lane(batch, op, dst, src, index);
+    } else {
+        subgroup_by_vector(batch, simd, op, dst, src, index);
+    }
+}
+
+/// Executes an operation on values of 32 bits.
+fn subgroup_by_vector<S: Simd>(
     batch: &Batch<'_>,
     simd: S,
     op: SubgroupOp,

@@ -12,6 +12,7 @@ use gaurast_render::process_stats::{peak_memory, processor_time};
 use gaurast_testkit::gpu::{Driver, Opening};
 use gaurast_testkit::{Gpu, Settings};
 
+use super::list;
 use super::workload::Workload;
 use crate::error::BenchError;
 
@@ -223,6 +224,6 @@ fn prepare(arguments: &WorkerArguments) -> Result<(String, Workload), String> {
     let gpu = Gpu::open(&opening).map_err(|error| error.to_string())?;
     let data = arguments.data.clone().or_else(|| std::env::var_os("GAURAST_TEST_DATA").map(PathBuf::from));
     let name = gpu.name().to_owned();
-    let workload = Workload::new(&gpu, &arguments.workload, arguments.threads, data.as_deref())?;
+    let workload = list::prepare(&gpu, &arguments.workload, arguments.threads, data.as_deref())?;
     Ok((name, workload))
 }

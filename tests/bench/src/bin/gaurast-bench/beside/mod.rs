@@ -2,6 +2,7 @@
 
 mod contender;
 mod fixed_costs;
+mod list;
 mod sampling;
 mod workload;
 
@@ -15,7 +16,7 @@ use crate::median::median;
 use crate::output::{self, Rows, number};
 use crate::worker::lavapipe;
 use contender::{Contender, Process, Sample};
-use workload::WORKLOADS;
+use list::WORKLOADS;
 
 pub use contender::WorkerArguments as BesideWorkerArguments;
 
