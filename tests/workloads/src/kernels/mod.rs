@@ -40,8 +40,11 @@ macro_rules! spirv {
     };
 }
 
+/// A kernel's name, and its maker.
+type Named = (&'static str, fn(Size) -> Kernel);
+
 /// The kernels, by their names.
-const KERNELS: [(&str, fn(Size) -> Kernel); 6] = [
+const KERNELS: [Named; 6] = [
     ("mandelbrot", mandelbrot),
     ("matrix product", matrix_product),
     ("prefix sum", prefix_sum),
