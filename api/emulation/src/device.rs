@@ -14,7 +14,7 @@ use crate::recording::Recording;
 pub(crate) struct Device {
     pub(crate) next: Arc<Next>,
     pub(crate) get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
-    /// Where the application has enabled the extension, and it comes from here.
+    /// The emulation, if the application has enabled the extension and it comes from here.
     pub(crate) emulation: Option<Emulation>,
     /// Command buffers, of devices with the extension.
     recordings: RwLock<HashMap<vk::CommandBuffer, Arc<Mutex<Recording>>>>,
@@ -59,7 +59,7 @@ impl Device {
         unsafe { DEVICES.remove(handle) }
     }
 
-    /// What is known of a command buffer.
+    /// The recording of a command buffer.
     pub(crate) fn recording(&self, commands: vk::CommandBuffer) -> Option<Arc<Mutex<Recording>>> {
         let all = self.recordings.read().unwrap_or_else(PoisonError::into_inner);
         all.get(&commands).cloned()

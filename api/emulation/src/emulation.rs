@@ -1,4 +1,4 @@
-//! What is known of a device that gets the extension: its objects, kernels and scratch.
+//! The emulation of a device that gets the extension: its objects, kernels and scratch.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -31,7 +31,7 @@ pub(crate) struct Objects {
     pub(crate) layouts: HashMap<vk::PipelineLayout, Vec<vk::DescriptorSetLayout>>,
 }
 
-/// What the emulation knows of a device.
+/// The emulation of the extension on a device.
 pub(crate) struct Emulation {
     pub(crate) next: Arc<Next>,
     /// The number of queues of each family.

@@ -80,8 +80,8 @@ impl Drop for Pipeline {
     }
 }
 
-/// Where a pipeline is created: what it needs beside its creation info.
-pub(crate) struct Site<'a> {
+/// The objects that a pipeline's creation needs beside its creation info.
+pub(crate) struct Context<'a> {
     pub(crate) next: &'a Arc<Next>,
     pub(crate) kernels: &'a Kernels,
     /// The view mask of the subpass, in a render pass object.
@@ -201,7 +201,7 @@ impl Attributes {
 /// # Safety
 /// The creation info is valid.
 pub(crate) unsafe fn create(
-    site: &Site<'_>,
+    context: &Context<'_>,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     state: &State<'_>,
     allocator: Option<&vk::AllocationCallbacks<'_>>,
@@ -238,11 +238,11 @@ pub(crate) unsafe fn create(
             is_dynamic(vk::DynamicState::SCISSOR, vk::DynamicState::SCISSOR_WITH_COUNT),
         );
         let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
-        let view_mask = site.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
+        let view_mask = context.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
         let footprint = find::<Footprint<'_>>(info.p_next);
-        let raw = graphics(site, info, &dynamic, view_mask, allocator)?;
+        let raw = graphics(context, info, &dynamic, view_mask, allocator)?;
         let mut own = Pipeline {
-            next: Arc::clone(site.next),
+            next: Arc::clone(context.next),
             raw,
             state: State { p_next: std::ptr::null(), _marker: std::marker::PhantomData, ..*state },
             cut_off: footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned()),
@@ -259,10 +259,10 @@ pub(crate) unsafe fn create(
             camera_buffer: None,
         };
         if state.camera_source == CameraSource::UNIFORM_BUFFER {
-            match camera_buffer(site, state) {
+            match camera_buffer(context, state) {
                 Ok(camera) => own.camera_buffer = Some(camera),
                 Err(error) => {
-                    site.next.destroy_pipeline(raw, allocator);
+                    context.next.destroy_pipeline(raw, allocator);
                     return Err(error);
                 }
             }
@@ -276,16 +276,16 @@ pub(crate) unsafe fn create(
 /// # Safety
 /// The creation info is valid.
 unsafe fn graphics(
-    site: &Site<'_>,
+    context: &Context<'_>,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     dynamic: &[vk::DynamicState],
     view_mask: u32,
     allocator: Option<&vk::AllocationCallbacks<'_>>,
 ) -> Result<vk::Pipeline, vk::Result> {
     let (vertex, fetch) = if view_mask == 0 {
-        (site.kernels.vertex, site.kernels.fetch)
+        (context.kernels.vertex, context.kernels.fetch)
     } else {
-        (site.kernels.vertex_views, site.kernels.fetch_views)
+        (context.kernels.vertex_views, context.kernels.fetch_views)
     };
     let stage = |stage: vk::ShaderStageFlags, module: vk::ShaderModule| {
         vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
@@ -327,13 +327,13 @@ unsafe fn graphics(
             .color_blend_state(&blend)
             .multisample_state(&multisample)
             .dynamic_state(&states)
-            .layout(site.kernels.fetch_layout)
+            .layout(context.kernels.fetch_layout)
             .render_pass(info.render_pass)
             .subpass(info.subpass);
         if info.render_pass == vk::RenderPass::null() {
             own = own.push_next(&mut rendering);
         }
-        match site.next.create_graphics_pipelines(site.cache, &[own], allocator) {
+        match context.next.create_graphics_pipelines(context.cache, &[own], allocator) {
             Ok(created) => created.first().copied().ok_or(vk::Result::ERROR_UNKNOWN),
             Err((_, error)) => Err(error),
         }
@@ -344,7 +344,7 @@ unsafe fn graphics(
 ///
 /// # Safety
 /// The layouts live.
-unsafe fn camera_buffer(site: &Site<'_>, state: &State<'_>) -> Result<CameraBuffer, vk::Result> {
+unsafe fn camera_buffer(context: &Context<'_>, state: &State<'_>) -> Result<CameraBuffer, vk::Result> {
     const OP_DECORATE: u32 = 71;
     const BINDING: u32 = 33;
     const DESCRIPTOR_SET: u32 = 34;
@@ -362,13 +362,13 @@ unsafe fn camera_buffer(site: &Site<'_>, state: &State<'_>) -> Result<CameraBuff
         at += (length as usize).max(1);
     }
     let info = vk::ShaderModuleCreateInfo::default().code(&words);
-    let sets = site.set_layouts.get(..=state.camera_set as usize).unwrap_or(site.set_layouts);
+    let sets = context.set_layouts.get(..=state.camera_set as usize).unwrap_or(context.set_layouts);
     // SAFETY: the caller's promise.
     unsafe {
-        let layout = kernels::layout(site.next, sets, vk::ShaderStageFlags::COMPUTE)?;
-        let module = site.next.create_shader_module(&info, None)?;
-        let pipeline = kernels::compute(site.next, module, layout, Some(8 * state.camera_count.max(1)));
-        site.next.destroy_shader_module(module, None);
+        let layout = kernels::layout(context.next, sets, vk::ShaderStageFlags::COMPUTE)?;
+        let module = context.next.create_shader_module(&info, None)?;
+        let pipeline = kernels::compute(context.next, module, layout, Some(8 * state.camera_count.max(1)));
+        context.next.destroy_shader_module(module, None);
         Ok(CameraBuffer { set: state.camera_set, count: state.camera_count.max(1), pipeline: pipeline?, layout })
     }
 }

@@ -1,7 +1,6 @@
 //! The lookup of commands by name.
 
 use std::ffi::{CStr, c_char};
-use std::mem::transmute;
 
 use ash::vk;
 use gaurast_layer_interface::{LayerFunctions, string};
@@ -12,8 +11,11 @@ use crate::instance::Instance;
 
 /// The functions of a layer, for the loader.
 pub fn layer_functions() -> LayerFunctions {
-    LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr }
+    FUNCTIONS
 }
+
+const FUNCTIONS: LayerFunctions =
+    LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
 
 /// `vkGetInstanceProcAddr` of an instance, or `vkCreateInstance`.
 pub(crate) unsafe extern "system" fn get_instance_proc_addr(
@@ -22,23 +24,16 @@ pub(crate) unsafe extern "system" fn get_instance_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let (get, get_device): (vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkGetDeviceProcAddr) =
-        (get_instance_proc_addr, get_device_proc_addr);
-    // SAFETY: function pointers have one size, and whoever calls it casts it back.
-    unsafe {
-        if command == c"vkGetInstanceProcAddr" {
-            return transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get);
-        }
-        if command == c"vkGetDeviceProcAddr" {
-            return transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device);
-        }
+    if let Some(own) = FUNCTIONS.lookup(command) {
+        return Some(own);
     }
     if instance == vk::Instance::null() {
         return hooks::instance_hook(command).filter(|_| command == c"vkCreateInstance");
     }
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
-    let next = own.next_by_name(command);
+    // SAFETY: the instance lives.
+    let next = unsafe { own.below.command(command) };
     if let Some(hook) = hooks::instance_hook(command) {
         return next.map(|_| hook);
     }
@@ -54,10 +49,8 @@ pub(crate) unsafe extern "system" fn get_device_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
-        // SAFETY: function pointers have one size, and whoever calls it casts it back.
-        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get) };
+        return FUNCTIONS.lookup(command);
     }
     // SAFETY: the device is valid, and the name is a string.
     unsafe {
@@ -81,5 +74,5 @@ unsafe extern "system" fn get_physical_device_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the instance is valid, and the name is a string.
-    unsafe { Instance::of(instance)?.next_of_physical_device(CStr::from_ptr(name)) }
+    unsafe { Instance::of(instance)?.below.command_of_physical_device(CStr::from_ptr(name)) }
 }

@@ -1,4 +1,4 @@
-//! What is known of a command buffer that is being recorded, and the recording of its sets.
+//! Command buffers that are being recorded: their state, and the recording of their sets.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub(crate) enum Bound {
 pub(crate) struct VertexBuffer {
     pub(crate) address: u64,
     pub(crate) size: u64,
-    /// Where it is dynamic.
+    /// The stride, if it is dynamic.
     pub(crate) stride: Option<u32>,
 }
 

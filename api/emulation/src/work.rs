@@ -108,7 +108,7 @@ struct Parameters {
     padding: u32,
 }
 
-/// What kernels are told by push constants.
+/// The push constants of kernels.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Pushed {
@@ -136,7 +136,7 @@ pub(crate) struct Values {
     pub(crate) degree: u32,
 }
 
-/// Where cameras come from.
+/// The source of cameras.
 #[derive(Clone, Debug)]
 pub(crate) enum Cameras {
     Command(Vec<Camera>),
@@ -363,7 +363,7 @@ impl Work {
     }
 }
 
-/// Where dispatches are recorded.
+/// The place in which dispatches are recorded.
 struct Run<'a> {
     next: &'a Next,
     kernels: &'a Kernels,

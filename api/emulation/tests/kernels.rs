@@ -38,7 +38,7 @@ fn instructions(words: &[u32]) -> Vec<(u32, &[u32])> {
     found
 }
 
-/// What is checked in is what the compiler makes of the sources. The word of the generator's version does not count.
+/// The checked-in kernels are those that the compiler makes of the sources. The word of the generator's version does not count.
 #[gaurast_runner::test(needs = [Need::Program("glslangValidator")])]
 fn kernels_are_what_the_sources_say(_case: &Case) {
     let temporary = tempfile::tempdir().expect("a temporary folder");

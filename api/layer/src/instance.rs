@@ -1,12 +1,11 @@
 //! Instances, and the functions of the next layer that belong to them.
 
-use std::ffi::CStr;
 use std::sync::Arc;
 
 use ash::vk;
 
 use crate::report::Messengers;
-use gaurast_layer_interface::{GetInstanceProcAddr, InstanceLink, Live, command};
+use gaurast_layer_interface::{InstanceLink, Live, NextInstance, command};
 
 /// The next layer's commands. They are looked up as the instance is created, since the loader's end of the chain gives
 /// the first layer's functions later.
@@ -46,9 +45,7 @@ impl NextOfInstance {
 
 /// An instance.
 pub(crate) struct Instance {
-    pub(crate) handle: vk::Instance,
-    get_instance_proc_addr: GetInstanceProcAddr,
-    get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
+    pub(crate) below: NextInstance,
     pub(crate) next: NextOfInstance,
     pub(crate) messengers: Messengers,
 }
@@ -63,9 +60,11 @@ impl Instance {
     /// The instance was created by the link's layer a moment ago.
     pub(crate) unsafe fn register(handle: vk::Instance, link: &InstanceLink) {
         let instance = Self {
-            handle,
-            get_instance_proc_addr: link.get_instance_proc_addr,
-            get_physical_device_proc_addr: link.get_physical_device_proc_addr,
+            below: NextInstance {
+                handle,
+                get_instance_proc_addr: link.get_instance_proc_addr,
+                get_physical_device_proc_addr: link.get_physical_device_proc_addr,
+            },
             // SAFETY: the caller has just created it.
             next: unsafe { NextOfInstance::load(handle, link) },
             messengers: Messengers::default(),
@@ -90,18 +89,5 @@ impl Instance {
     pub(crate) unsafe fn forget(handle: vk::Instance) -> Option<Arc<Self>> {
         // SAFETY: the caller's promise.
         unsafe { INSTANCES.remove(handle) }
-    }
-
-    /// A command of the next layer by name, for the application.
-    pub(crate) fn next_by_name(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
-        // SAFETY: the instance lives, and the name is a string.
-        unsafe { (self.get_instance_proc_addr)(self.handle, name.as_ptr()) }
-    }
-
-    /// A command of the next layer whose first parameter is a physical device.
-    pub(crate) fn next_of_physical_device(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
-        let get = self.get_physical_device_proc_addr?;
-        // SAFETY: the instance lives, and the name is a string.
-        unsafe { get(self.handle, name.as_ptr()) }
     }
 }

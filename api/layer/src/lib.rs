@@ -31,7 +31,6 @@ mod rules;
 mod spirv;
 
 use std::ffi::{CStr, c_char};
-use std::mem::transmute;
 
 use ash::vk;
 
@@ -47,10 +46,13 @@ use gaurast_layer_interface::{LayerFunctions, NegotiateLayerInterface, string};
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
     version: *mut NegotiateLayerInterface,
 ) -> vk::Result {
-    let functions = LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
     // SAFETY: the caller's promise.
-    unsafe { gaurast_layer_interface::negotiate(version, functions) }
+    unsafe { gaurast_layer_interface::negotiate(version, FUNCTIONS) }
 }
+
+/// The layer's functions.
+const FUNCTIONS: LayerFunctions =
+    LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
 
 /// `vkGetInstanceProcAddr`.
 unsafe extern "system" fn get_instance_proc_addr(
@@ -59,22 +61,16 @@ unsafe extern "system" fn get_instance_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let get: vk::PFN_vkGetInstanceProcAddr = get_instance_proc_addr;
-    if command == c"vkGetInstanceProcAddr" {
-        // SAFETY: function pointers have one size, and whoever calls it casts it back.
-        return unsafe { transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get) };
+    if let Some(own) = FUNCTIONS.lookup(command) {
+        return Some(own);
     }
     if instance == vk::Instance::null() {
         return hooks::instance_hook(command).filter(|_| command == c"vkCreateInstance");
     }
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
-    let next = own.next_by_name(command)?;
-    let get_device: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
-    if command == c"vkGetDeviceProcAddr" {
-        // SAFETY: as above.
-        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device) };
-    }
+    // SAFETY: the instance lives.
+    let next = unsafe { own.below.command(command) }?;
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
     Some(hook.unwrap_or(next))
 }
@@ -83,10 +79,8 @@ unsafe extern "system" fn get_instance_proc_addr(
 unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
-        // SAFETY: function pointers have one size, and whoever calls it casts it back.
-        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get) };
+        return FUNCTIONS.lookup(command);
     }
     // SAFETY: the device is valid, and the name is a string.
     let next = unsafe { (Device::of(device)?.get_device_proc_addr)(device, name) }?;
@@ -99,5 +93,5 @@ unsafe extern "system" fn get_physical_device_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the instance is valid, and the name is a string.
-    unsafe { Instance::of(instance)?.next_of_physical_device(CStr::from_ptr(name)) }
+    unsafe { Instance::of(instance)?.below.command_of_physical_device(CStr::from_ptr(name)) }
 }

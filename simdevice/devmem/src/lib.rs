@@ -2,8 +2,8 @@
 //!
 //! An [`Allocation`] is a page-aligned, zeroed range that the application may keep mapped while the device works on it,
 //! and on which shader invocations may legally race. Therefore no reference into it is ever formed: bulk access copies
-//! to and from the caller's slices, shader access is a relaxed atomic of 8 to 64 bits or a vector of such, and every access is checked
-//! against the allocation's length.
+//! to and from the caller's slices, shader access is a relaxed atomic of 8 to 64 bits or a vector of such, and every
+//! access is checked against the allocation's length.
 //!
 //! All of the simulated device's `unsafe` is in this crate.
 

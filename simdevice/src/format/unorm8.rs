@@ -3,8 +3,7 @@
 use crate::simd::bits_of;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, mask32x16, u32x8, u32x16};
-use isa::float;
-use isa::float::FusedMultiply;
+use isa::float::{self, FusedMultiply};
 
 /// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest. The sum of the two
 /// products rounds as the quotient does.

@@ -1,8 +1,7 @@
 //! Spherical harmonics: the view-dependent colour of a Gaussian, with the signs and order of 3DGS.
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
-use isa::float;
-use isa::float::FusedMultiply;
+use isa::float::{self, FusedMultiply};
 
 /// The number of coefficients of degrees 0 to 4.
 pub(crate) const MAX_COEFFICIENTS: usize = 25;

@@ -10,7 +10,9 @@ use ash::vk::{self, TaggedStructure};
 use gaurast::gaussian_primitive_topology::{NAME, SPEC_VERSION};
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
-use gaurast_layer_interface::{DeviceLink, InstanceLink, command, find_mut, set_loader_data, slice, string, take_link};
+use gaurast_layer_interface::{
+    DeviceLink, InstanceLink, NextInstance, command, find_mut, set_loader_data, slice, string, take_link,
+};
 
 use crate::below::BELOW;
 use crate::device::Device;
@@ -46,8 +48,12 @@ pub(super) unsafe extern "system" fn create_instance(
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
             let version = (*info).p_application_info.as_ref().map_or(0, |application| application.api_version);
-            let physical = link.and_then(|link| link.get_physical_device_proc_addr);
-            let register = AssertUnwindSafe(|| Instance::register(*instance, version, get, physical));
+            let below = NextInstance {
+                handle: *instance,
+                get_instance_proc_addr: get,
+                get_physical_device_proc_addr: link.and_then(|link| link.get_physical_device_proc_addr),
+            };
+            let register = AssertUnwindSafe(|| Instance::register(below, version));
             let _ = catch_unwind(register);
         }
         result
@@ -190,9 +196,9 @@ unsafe fn create(
             return FAILED;
         };
         let link = take_link::<DeviceLink>(info.p_next);
-        let get_instance = link.map_or(instance.get_instance_proc_addr, |link| link.get_instance_proc_addr);
+        let get_instance = link.map_or(instance.below.get_instance_proc_addr, |link| link.get_instance_proc_addr);
         let get = link.map_or(instance.next.fp_v1_0().get_device_proc_addr, |link| link.get_device_proc_addr);
-        let found = command::<vk::PFN_vkCreateDevice>(get_instance, instance.handle, c"vkCreateDevice");
+        let found = command::<vk::PFN_vkCreateDevice>(get_instance, instance.below.handle, c"vkCreateDevice");
         let Some(create) = found else {
             return FAILED;
         };

@@ -7,7 +7,7 @@ use gaurast_layer_interface::{find_mut, slice};
 
 use crate::device::Device;
 use crate::hooks::site::call;
-use crate::pipeline::{self, Site};
+use crate::pipeline::{self, Context};
 use crate::render_pass;
 
 pub(super) unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const vk::AllocationCallbacks<'_>) {
@@ -277,8 +277,9 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
                         let set_layouts = objects.layouts.get(&info.layout).cloned().unwrap_or_default();
                         drop(objects);
                         let created = emulation.kernels().and_then(|kernels| {
-                            let site = Site { next: &own.next, kernels, view_mask, set_layouts: &set_layouts, cache };
-                            pipeline::create(&site, info, state, allocator.as_ref())
+                            let context =
+                                Context { next: &own.next, kernels, view_mask, set_layouts: &set_layouts, cache };
+                            pipeline::create(&context, info, state, allocator.as_ref())
                         });
                         match created {
                             Ok(pipeline) => {

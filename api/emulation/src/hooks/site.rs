@@ -1,4 +1,4 @@
-//! Where commands run: what is known of their device and command buffer.
+//! The site of a command: the device and the command buffer that it concerns.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;

@@ -109,100 +109,62 @@ pub(super) unsafe extern "system" fn cmd_set_blend_constants(commands: vk::Comma
     }
 }
 
-pub(super) unsafe extern "system" fn cmd_set_viewport(
-    commands: vk::CommandBuffer,
-    first: u32,
-    count: u32,
-    viewports: *const vk::Viewport,
-) {
-    // SAFETY: see the crate.
-    unsafe {
-        let viewports = slice(viewports, count);
-        record(
-            commands,
-            |site, recording| {
-                site.next.cmd_set_viewport(commands, first, viewports);
-                if first == 0 {
-                    let kept = viewports.to_vec();
-                    recording.viewport = kept.first().copied();
-                    repeat(recording, vk::DynamicState::VIEWPORT, move |next, commands| {
-                        next.cmd_set_viewport(commands, first, &kept);
-                    });
-                }
-            },
-            |next| next.cmd_set_viewport(commands, first, viewports),
-        );
-    }
+/// Viewports and scissors are lists, of which the first is kept for sets: name of the command and of the one with a count, and
+/// their states; member of a recording, type.
+macro_rules! lists {
+    ($($name:ident $state:ident, $with_count:ident $state_with_count:ident: $member:ident, $type:ty;)*) => {$(
+        pub(super) unsafe extern "system" fn $name(
+            commands: vk::CommandBuffer,
+            first: u32,
+            count: u32,
+            values: *const $type,
+        ) {
+            // SAFETY: see the crate.
+            unsafe {
+                let values = slice(values, count);
+                record(
+                    commands,
+                    |site, recording| {
+                        site.next.$name(commands, first, values);
+                        if first == 0 {
+                            let kept = values.to_vec();
+                            recording.$member = kept.first().copied();
+                            repeat(recording, vk::DynamicState::$state, move |next, commands| {
+                                next.$name(commands, first, &kept);
+                            });
+                        }
+                    },
+                    |next| next.$name(commands, first, values),
+                );
+            }
+        }
+
+        pub(super) unsafe extern "system" fn $with_count(
+            commands: vk::CommandBuffer,
+            count: u32,
+            values: *const $type,
+        ) {
+            // SAFETY: see the crate.
+            unsafe {
+                let values = slice(values, count);
+                record(
+                    commands,
+                    |site, recording| {
+                        site.next.$with_count(commands, values);
+                        let kept = values.to_vec();
+                        recording.$member = kept.first().copied();
+                        repeat(recording, vk::DynamicState::$state_with_count, move |next, commands| {
+                            next.$with_count(commands, &kept);
+                        });
+                    },
+                    |next| next.$with_count(commands, values),
+                );
+            }
+        }
+    )*};
 }
 
-pub(super) unsafe extern "system" fn cmd_set_viewport_with_count(
-    commands: vk::CommandBuffer,
-    count: u32,
-    viewports: *const vk::Viewport,
-) {
-    // SAFETY: see the crate.
-    unsafe {
-        let viewports = slice(viewports, count);
-        record(
-            commands,
-            |site, recording| {
-                site.next.cmd_set_viewport_with_count(commands, viewports);
-                let kept = viewports.to_vec();
-                recording.viewport = kept.first().copied();
-                repeat(recording, vk::DynamicState::VIEWPORT_WITH_COUNT, move |next, commands| {
-                    next.cmd_set_viewport_with_count(commands, &kept);
-                });
-            },
-            |next| next.cmd_set_viewport_with_count(commands, viewports),
-        );
-    }
-}
-
-pub(super) unsafe extern "system" fn cmd_set_scissor(
-    commands: vk::CommandBuffer,
-    first: u32,
-    count: u32,
-    scissors: *const vk::Rect2D,
-) {
-    // SAFETY: see the crate.
-    unsafe {
-        let scissors = slice(scissors, count);
-        record(
-            commands,
-            |site, recording| {
-                site.next.cmd_set_scissor(commands, first, scissors);
-                if first == 0 {
-                    let kept = scissors.to_vec();
-                    recording.scissor = kept.first().copied();
-                    repeat(recording, vk::DynamicState::SCISSOR, move |next, commands| {
-                        next.cmd_set_scissor(commands, first, &kept);
-                    });
-                }
-            },
-            |next| next.cmd_set_scissor(commands, first, scissors),
-        );
-    }
-}
-
-pub(super) unsafe extern "system" fn cmd_set_scissor_with_count(
-    commands: vk::CommandBuffer,
-    count: u32,
-    scissors: *const vk::Rect2D,
-) {
-    // SAFETY: see the crate.
-    unsafe {
-        let scissors = slice(scissors, count);
-        record(
-            commands,
-            |site, recording| {
-                site.next.cmd_set_scissor_with_count(commands, scissors);
-                let kept = scissors.to_vec();
-                recording.scissor = kept.first().copied();
-                repeat(recording, vk::DynamicState::SCISSOR_WITH_COUNT, move |next, commands| {
-                    next.cmd_set_scissor_with_count(commands, &kept);
-                });
-            },
-            |next| next.cmd_set_scissor_with_count(commands, scissors),
-        );
-    }
+lists! {
+    cmd_set_viewport VIEWPORT, cmd_set_viewport_with_count VIEWPORT_WITH_COUNT: viewport, vk::Viewport;
+    cmd_set_scissor SCISSOR, cmd_set_scissor_with_count SCISSOR_WITH_COUNT: scissor, vk::Rect2D;
 }

@@ -1,6 +1,7 @@
 //! The interface between Vulkan's loader and layers: the structures of `vk_layer.h`, which the registry does not have, and what
 //! a layer does with them and with chains of structures.
 
+mod commands;
 mod live;
 
 use std::ffi::{CStr, c_char, c_void};
@@ -39,6 +40,54 @@ pub struct LayerFunctions {
     pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
     /// `vk_layerGetPhysicalDeviceProcAddr`.
     pub get_physical_device_proc_addr: GetInstanceProcAddr,
+}
+
+impl LayerFunctions {
+    /// A layer's own function, if `command` is one of those by which commands are looked up.
+    pub fn lookup(&self, command: &CStr) -> vk::PFN_vkVoidFunction {
+        // SAFETY: function pointers have one size, and whoever calls it casts it back.
+        unsafe {
+            if command == c"vkGetInstanceProcAddr" {
+                Some(std::mem::transmute::<GetInstanceProcAddr, Function>(self.get_instance_proc_addr))
+            } else if command == c"vkGetDeviceProcAddr" {
+                Some(std::mem::transmute::<vk::PFN_vkGetDeviceProcAddr, Function>(self.get_device_proc_addr))
+            } else {
+                None
+            }
+        }
+    }
+}
+
+/// The next layer's instance: its handle, and the functions by which its commands are looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct NextInstance {
+    /// The instance.
+    pub handle: vk::Instance,
+    /// `vkGetInstanceProcAddr`.
+    pub get_instance_proc_addr: GetInstanceProcAddr,
+    /// `vk_layerGetPhysicalDeviceProcAddr`, if the next layer has it.
+    pub get_physical_device_proc_addr: Option<GetInstanceProcAddr>,
+}
+
+impl NextInstance {
+    /// A command by name, for the application.
+    ///
+    /// # Safety
+    /// The instance lives.
+    pub unsafe fn command(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
+        // SAFETY: the caller's promise, and the name is a string.
+        unsafe { (self.get_instance_proc_addr)(self.handle, name.as_ptr()) }
+    }
+
+    /// A command whose first parameter is a physical device, for the loader.
+    ///
+    /// # Safety
+    /// The instance lives.
+    pub unsafe fn command_of_physical_device(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
+        let get = self.get_physical_device_proc_addr?;
+        // SAFETY: the caller's promise, and the name is a string.
+        unsafe { get(self.handle, name.as_ptr()) }
+    }
 }
 
 /// Agrees with the loader on the version of their interface, and gives it the layer's functions: all that a layer's

@@ -1,4 +1,4 @@
-//! What a layer knows of instances and devices that live.
+//! Instances and devices that live, and what a layer knows of them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -27,7 +27,7 @@ impl<T> Live<T> {
         all.insert(key, Arc::new(known));
     }
 
-    /// What is known of the object that a handle is of: its own handle, or that of a physical device of an instance, a queue
+    /// The knowledge of the object that a handle is of: its own handle, or that of a physical device of an instance, a queue
     /// or a command buffer of a device.
     ///
     /// # Safety

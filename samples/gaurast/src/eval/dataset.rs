@@ -1,4 +1,4 @@
-//! What a training leaves: its photographs, cameras and settings, found in the folders of the model and of the data.
+//! The data set of a training: its photographs, cameras and settings, found in the folders of the model and of the data.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use gaurast_picture::Background;
 use gaurast_scene::Camera;
 use gaurast_scene::camera_files::{self, CameraFileOptions};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::arguments::{EvalArguments, Values};
 use super::cfg_args::CfgArgs;
@@ -82,6 +83,26 @@ struct Found {
 struct Lists {
     test_filenames: Option<Vec<String>>,
     val_filenames: Option<Vec<String>>,
+    #[serde(default)]
+    frames: Vec<ListedFrame>,
+}
+
+/// A view of a transforms.json.
+#[derive(Deserialize)]
+struct ListedFrame {
+    mask_path: Option<IgnoredAny>,
+}
+
+impl Lists {
+    /// The lists of the file `path`, whose form the reader of cameras has checked.
+    fn of(path: &Path) -> Self {
+        std::fs::read_to_string(path).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+    }
+
+    /// Returns true if a view has a mask.
+    fn has_masks(&self) -> bool {
+        self.frames.iter().any(|frame| frame.mask_path.is_some())
+    }
 }
 
 /// Finds the views that `arguments` ask for.
@@ -130,7 +151,10 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     };
     choices.insert("masks", masked);
     if arguments.masks.is_none() && found.data.join("masks").is_dir() {
-        notes.push(format!("{} is of no account (--masks)", found.data.join("masks").display()));
+        notes.push(format!("the masks in {} are not used: --masks names them", found.data.join("masks").display()));
+    }
+    if arguments.masks.is_none() && is_transforms && Lists::of(&cameras_path).has_masks() {
+        notes.push(format!("the masks that {} names are not used: --masks does", cameras_path.display()));
     }
 
     // In the order of the photographs' names; a camera without one has its own.
@@ -332,8 +356,7 @@ impl Found {
                 Split::Every(self.cfg_yml.get("test_every").and_then(|n| n.parse().ok()).unwrap_or(8))
             }
             _ if is_transforms => {
-                let text = std::fs::read_to_string(cameras).unwrap_or_default();
-                let Lists { test_filenames, val_filenames } = serde_json::from_str(&text).unwrap_or_default();
+                let Lists { test_filenames, val_filenames, .. } = Lists::of(cameras);
                 match test_filenames.or(val_filenames) {
                     Some(names) => Split::Names {
                         names: names.iter().map(|name| stem(name)).collect(),

@@ -45,7 +45,7 @@ pub struct Results {
 impl Results {
     /// The file of a view's result.
     pub fn path_of(&self, name: &str) -> PathBuf {
-        self.folder.join("views").join(format!("{}.json", flat(name)))
+        self.folder.join("views").join(format!("{name}.json"))
     }
 
     /// Returns true if there is a result.
@@ -79,9 +79,10 @@ impl Results {
         choices: &BTreeMap<&'static str, String>,
     ) -> Result<(), Error> {
         for (folder, picture) in PICTURES.iter().zip(pictures) {
-            let folder = self.folder.join(folder);
-            std::fs::create_dir_all(&folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-            gaurast_picture::write(&folder.join(format!("{}.png", flat(&outcome.name))), picture, None)?;
+            let path = self.folder.join(folder).join(format!("{}.png", outcome.name));
+            let folder = gaurast_picture::folder(&path);
+            std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
+            gaurast_picture::write(&path, picture, None)?;
         }
         let mut bytes = Vec::new();
         let stored = Stored { outcome: outcome.clone(), choices: owned(choices) };
@@ -109,11 +110,6 @@ impl Results {
 
 fn owned(choices: &BTreeMap<&'static str, String>) -> BTreeMap<String, String> {
     choices.iter().map(|(subject, choice)| ((*subject).to_owned(), choice.clone())).collect()
-}
-
-/// A view's name as that of a file.
-fn flat(name: &str) -> String {
-    name.replace('/', "-")
 }
 
 /// Writes a file as a whole, and its folder.
@@ -218,7 +214,7 @@ impl Report<'_> {
             let _ = writeln!(page, "<h2>{}</h2>\n<p>{line}</p>", text(name));
             let captions = ["picture", "photograph", &format!("difference, {:.0} of 255 being white", 255.0 * largest)];
             for (folder, caption) in PICTURES.iter().zip(captions) {
-                let source = text(&format!("{folder}/{}.png", flat(name)));
+                let source = text(&format!("{folder}/{name}.png"));
                 let _ = writeln!(
                     page,
                     "<figure><a href=\"{source}\"><img src=\"{source}\" alt=\"{caption}\" loading=\"lazy\"></a>\

@@ -1,19 +1,10 @@
 //! Tests of the `gaurast` command: pictures, messages, exit codes.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-/// Runs `gaurast` with `arguments` in `folder`.
-fn gaurast(folder: &TempDir, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gaurast"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the command starts")
-}
+use super::support::gaurast;
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a folder")
@@ -37,7 +28,7 @@ fn write(folder: &TempDir, name: &str, text: &str) {
 fn fails(folder: &TempDir, arguments: &[&str], message: &str) {
     let files = |folder: &TempDir| std::fs::read_dir(folder).expect("readable").count();
     let before = files(folder);
-    let output = gaurast(folder, arguments);
+    let output = gaurast(folder.path(), arguments);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
     assert_eq!(stderr.lines().count(), 1, "{stderr}");
@@ -52,7 +43,7 @@ fn one_gaussian_is_drawn_where_it_is() {
     let folder = folder();
     write(&folder, "one.ply", ONE);
     let arguments = [&["render", "one.ply", "--stats", "-o", "a.png", "--output", "b.exr"], &LOOK[..]].concat();
-    let output = gaurast(&folder, &arguments);
+    let output = gaurast(folder.path(), &arguments);
     let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{stderr}");
     assert!(stdout.contains("65 x 49") && stdout.contains("wrote a.png, b.exr: 65x49, 1 Gaussian "), "{stdout}");
@@ -74,7 +65,7 @@ fn one_gaussian_is_drawn_where_it_is() {
     assert_eq!(png.get_pixel(0, 0).0, [0, 0, 0]);
 
     let arguments = [&["render", "one.ply", "-q", "--background", "0,0,1", "-o", "c.png"], &LOOK[..]].concat();
-    let output = gaurast(&folder, &arguments);
+    let output = gaurast(folder.path(), &arguments);
     assert!(output.status.success());
     assert!(output.stdout.is_empty() && output.stderr.is_empty());
     let png = image::open(folder.path().join("c.png")).expect("a PNG").to_rgb8();
@@ -97,7 +88,7 @@ fn counters_tell_of_every_stage_of_the_simulated_hardware_if_they_are_asked_for(
     for asked in [true, false] {
         let counters: &[&str] = if asked { &["--counters"] } else { &["--stats"] };
         let arguments = [&["render", "one.ply", "--force", "-o", "a.png"], &LOOK[..], counters].concat();
-        let output = gaurast(&folder, &arguments);
+        let output = gaurast(folder.path(), &arguments);
         let stdout = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success());
         for name in ["gaussians read", "tile pairs"] {
@@ -124,7 +115,7 @@ fn a_panorama_and_a_fisheye_see_what_is_behind_and_beside() {
             "render", "one.ply", "--force", "-o", "a.png", "--camera", model, "--size", size, "--eye", "0,0,0",
             "--target", target,
         ];
-        let output = gaurast(&folder, &arguments);
+        let output = gaurast(folder.path(), &arguments);
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{stderr}");
         let picture = image::open(folder.path().join("a.png")).expect("a PNG");
@@ -154,7 +145,7 @@ fn a_camera_file_gives_view_and_size() {
     let render = |arguments: &[&str]| {
         let arguments =
             [&["render", "one.ply", "-q", "--force", "--cameras", "cameras.json", "-o", "a.exr"], arguments].concat();
-        let output = gaurast(&folder, &arguments);
+        let output = gaurast(folder.path(), &arguments);
         assert!(output.status.success(), "{output:?}");
         image::open(folder.path().join("a.exr")).expect("an EXR").to_rgba32f()
     };
@@ -222,12 +213,12 @@ fn misuse_is_exit_code_2_with_the_reason() {
         (&["render", "a.ply", "--cameras", "a", "--fov", "9"], "cannot be used with"),
         (&["paint"], "unrecognized subcommand"),
     ] {
-        let output = gaurast(&folder, arguments);
+        let output = gaurast(folder.path(), arguments);
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
         assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
     }
-    let help = gaurast(&folder, &["render", "--help"]);
+    let help = gaurast(folder.path(), &["render", "--help"]);
     let help = String::from_utf8_lossy(&help.stdout).into_owned();
     assert!(help.contains("opaque over black") && help.contains(".spz"), "{help}");
 }
@@ -235,7 +226,7 @@ fn misuse_is_exit_code_2_with_the_reason() {
 #[gaurast_runner::test]
 fn without_arguments_it_draws_the_garden() {
     let folder = folder();
-    let output = gaurast(&folder, &[]);
+    let output = gaurast(folder.path(), &[]);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{stderr}");
     let stdout = String::from_utf8_lossy(&output.stdout);
@@ -266,7 +257,7 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     write(&folder, "three.ply", &three);
     let simulate = |arguments: &[&str]| {
         let arguments = [&["simulate", "three.ply", "--size", "65x49"], arguments].concat();
-        let output = gaurast(&folder, &arguments);
+        let output = gaurast(folder.path(), &arguments);
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success() && stderr.is_empty(), "{arguments:?}: {stderr}");
         String::from_utf8_lossy(&output.stdout).into_owned()
@@ -332,7 +323,7 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
     let scene = ONE.replace("vertex 1", "vertex 41") + &others;
     write(&folder, "scene.ply", &scene);
     let rendered = ["render", "scene.ply", "-o", "a.png", "--size", "320x200", "--counters"];
-    let output = gaurast(&folder, &rendered);
+    let output = gaurast(folder.path(), &rendered);
     assert!(output.status.success());
     let table = String::from_utf8_lossy(&output.stdout).into_owned();
     // Integers are printed in groups of three digits.
@@ -358,7 +349,7 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
         "--format",
         "json",
     ];
-    let output = gaurast(&folder, &simulated);
+    let output = gaurast(folder.path(), &simulated);
     assert!(output.status.success());
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let frames = json["results"].as_array().expect("frames");
@@ -389,7 +380,7 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
 #[gaurast_runner::test]
 fn the_rasterizer_module_is_written_as_systemverilog() {
     let folder = folder();
-    let output = gaurast(&folder, &["simulate", "--emit-rtl", "rtl"]);
+    let output = gaurast(folder.path(), &["simulate", "--emit-rtl", "rtl"]);
     assert!(output.status.success() && output.stdout.is_empty());
     let read = |name: &str| std::fs::read_to_string(folder.path().join("rtl").join(name)).expect(name);
     for name in ["raster_module", "pe", "fp_add", "fp_mul", "fp_div", "fp_exp2", "exp2_table"] {
@@ -478,7 +469,7 @@ fn machines_and_traces_that_cannot_be_are_refused() {
     }
     // A tile without Gaussians that are needed is simulated.
     write(&folder, "trace.json", &of_tile(r#""at":[0,0],"listed":1,"runs":[]"#));
-    let output = gaurast(&folder, &["simulate", "trace.json", "--format", "csv"]);
+    let output = gaurast(folder.path(), &["simulate", "trace.json", "--format", "csv"]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && text.lines().count() == 2, "{text}");
     assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
@@ -487,7 +478,7 @@ fn machines_and_traces_that_cannot_be_are_refused() {
 #[gaurast_runner::test]
 fn the_papers_numbers_are_printed() {
     let folder = folder();
-    let output = gaurast(&folder, &["simulate", "--paper"]);
+    let output = gaurast(folder.path(), &["simulate", "--paper"]);
     let text = String::from_utf8_lossy(&output.stdout);
     for part in ["bicycle", "GSCore", "predicted", "solved", "calibrated", "fit", "contradiction", "0.64 W"] {
         assert!(text.contains(part), "{part}");

@@ -2,36 +2,17 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+use super::support::{gaurast, succeeds, text};
 
 /// The number of photographs.
 const COUNT: usize = 17;
 
 /// The photographs' size.
 const SIZE: [u32; 2] = [48, 36];
-
-fn gaurast(folder: &TempDir, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gaurast"))
-        .args(arguments)
-        .current_dir(folder.path())
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the command starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-#[track_caller]
-fn succeeds(folder: &TempDir, arguments: &[&str]) -> String {
-    let output = gaurast(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
 
 #[track_caller]
 fn evaluated(folder: &TempDir, arguments: &[&str]) -> Value {
@@ -40,7 +21,7 @@ fn evaluated(folder: &TempDir, arguments: &[&str]) -> Value {
 
 #[track_caller]
 fn fails(folder: &TempDir, arguments: &[&str], message: &str) {
-    let output = gaurast(folder, arguments);
+    let output = gaurast(folder.path(), arguments);
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
     assert_eq!(stderr.lines().filter(|line| line.contains(message)).count(), 1, "{arguments:?}: {stderr}");
@@ -250,7 +231,7 @@ fn photographs_too_many_are_named_and_too_few_are_an_error() {
     let folder = inria();
     let photograph = |name: &str| folder.path().join("data/images").join(name);
     std::fs::copy(photograph("p01.png"), photograph("z.png")).expect("copied");
-    let output = gaurast(&folder, &["eval", "out"]);
+    let output = gaurast(folder.path(), &["eval", "out"]);
     let stderr = text(&output.stderr);
     assert!(stderr.contains("1 photograph without a camera left out: z"), "{stderr}");
     std::fs::remove_file(photograph("p08.png")).expect("removed");

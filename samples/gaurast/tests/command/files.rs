@@ -1,9 +1,10 @@
 //! Tests of what `gaurast` draws of a stranger's file without options, and of the options for files.
 
 use std::fmt::Write;
-use std::process::{Command, Output};
 
 use tempfile::TempDir;
+
+use super::support::gaurast;
 
 /// A round Gaussian.
 #[derive(Clone, Copy)]
@@ -48,15 +49,10 @@ fn write(folder: &TempDir, name: &str, text: &str) {
     std::fs::write(folder.path().join(name), text).expect("written");
 }
 
-fn gaurast(folder: &TempDir, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gaurast"));
-    command.args(arguments).current_dir(folder).env_remove("RUST_LOG").output().expect("the command starts")
-}
-
 /// Runs the command, checks that it succeeds, and returns what it says on stdout and stderr.
 #[track_caller]
 fn succeeds(folder: &TempDir, arguments: &[&str]) -> [String; 2] {
-    let output = gaurast(folder, arguments);
+    let output = gaurast(folder.path(), arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success(), "{arguments:?}: {stderr}");
@@ -66,7 +62,7 @@ fn succeeds(folder: &TempDir, arguments: &[&str]) -> [String; 2] {
 /// Runs the command, checks that it fails with exit code 1 and one sentence, and returns that.
 #[track_caller]
 fn fails(folder: &TempDir, arguments: &[&str]) -> String {
-    let output = gaurast(folder, arguments);
+    let output = gaurast(folder.path(), arguments);
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
     assert_eq!(stderr.lines().count(), 1, "{arguments:?}: {stderr}");
@@ -123,7 +119,7 @@ fn a_vertical_axis_and_given_axes_stand_upright() {
     let given = picture(&folder, "b.png");
     succeeds(&folder, &["unsaid.ply", "--size", "160x120", "-o", "c.png"]);
     assert_eq!(given, picture(&folder, "c.png"));
-    assert_eq!(gaurast(&folder, &["said.ply", "--axes", "xyz"]).status.code(), Some(2));
+    assert_eq!(gaurast(folder.path(), &["said.ply", "--axes", "xyz"]).status.code(), Some(2));
 }
 
 #[gaurast_runner::test]
@@ -142,7 +138,7 @@ fn cameras_of_a_turned_scene_are_turned_with_it() {
     let differs = |(a, b): (&u8, &u8)| a.abs_diff(*b) > 1;
     assert!(!said.iter().zip(unsaid.iter()).any(differs));
     let mirrored = ["unsaid.ply", "--axes", "ruf", "--cameras", "cameras.json", "-o", "m.png"];
-    assert_eq!(gaurast(&folder, &mirrored).status.code(), Some(2));
+    assert_eq!(gaurast(folder.path(), &mirrored).status.code(), Some(2));
 }
 
 #[gaurast_runner::test]

@@ -9,6 +9,7 @@ mod given_files;
 mod interruptions;
 mod renderer;
 mod renderers;
+mod support;
 mod tasks;
 
 fn main() -> std::process::ExitCode {

@@ -1,31 +1,11 @@
 //! Tests of common tasks with `gaurast`: views, folders, outputs, comparisons, and early errors.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use tempfile::TempDir;
 
-fn gaurast(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gaurast"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the command starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// Runs the command, checks that it succeeds, and returns its output.
-#[track_caller]
-fn succeeds(folder: &TempDir, arguments: &[&str]) -> String {
-    let output = gaurast(folder.path(), arguments);
-    let stderr = text(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    text(&output.stdout)
-}
+use super::support::{gaurast, succeeds, text};
 
 /// Runs the command and checks that it fails with exit code 1 and one sentence, and writes no file.
 #[track_caller]

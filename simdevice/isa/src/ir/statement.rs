@@ -132,7 +132,8 @@ pub enum Statement {
         /// Its new value.
         src: Reg,
     },
-    /// The lane's index in its workgroup, or in the batch where that is not of workgroups, `B32`. Its remainder by the subgroup size is the subgroup invocation.
+    /// The lane's index in its workgroup, or in the batch where that is not of workgroups, `B32`. Its remainder by the
+    /// subgroup size is the subgroup invocation.
     LaneIndex {
         /// The value defined.
         dst: Reg,

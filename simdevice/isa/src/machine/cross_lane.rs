@@ -24,9 +24,9 @@ pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool)
     }
 }
 
-/// Executes a subgroup operation on values of 64 bits.
-pub(super) fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], src: Option<Reg>, index: Option<Reg>) {
-    let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
+/// Executes a subgroup operation with one result on values of 64 bits.
+pub(super) fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: Reg, src: Option<Reg>, index: Option<Reg>) {
+    let dst = batch.slot(dst);
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);
     let active: Vec<bool> =
@@ -36,20 +36,10 @@ pub(super) fn subgroup_by_lane(batch: &Batch<'_>, op: SubgroupOp, dst: &[Reg], s
     for start in (0..lanes).step_by(size) {
         let end = (start + size).min(lanes);
         let group = Group { active: &active[start..end], values: &values[start..end], size };
-        match op {
-            SubgroupOp::Ballot => {
-                let words = group.ballot();
-                for (slot, word) in results.iter().zip(words) {
-                    (start..end).for_each(|lane| scatter(batch, *slot, false, lane, u64::from(word)));
-                }
-            }
-            _ => {
-                let indices = indices.get(start..end).unwrap_or_default();
-                for (own, result) in group.run(op, indices).into_iter().enumerate() {
-                    let wide = !matches!(op, SubgroupOp::AllEqual);
-                    scatter(batch, results[0], wide, start + own, result);
-                }
-            }
+        let indices = indices.get(start..end).unwrap_or_default();
+        let wide = !matches!(op, SubgroupOp::AllEqual);
+        for (own, result) in group.run(op, indices).into_iter().enumerate() {
+            scatter(batch, dst, wide, start + own, result);
         }
     }
 }
@@ -97,6 +87,7 @@ impl Group<'_> {
         (0..self.active.len()).filter(|lane| self.active[*lane])
     }
 
+    #[cfg(test)]
     pub(super) fn ballot(&self) -> [u32; 4] {
         let mut words = [0; 4];
         for lane in self.active_lanes().filter(|lane| self.values[*lane] != 0) {

@@ -31,7 +31,7 @@ pub(super) fn subgroup<S: Simd>(
 ) {
     let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
     if wide {
-        subgroup_by_lane(batch, op, dst, src, index);
+        subgroup_by_lane(batch, op, dst[0], src, index);
     } else {
         subgroup_by_vector(batch, simd, op, dst, src, index);
     }

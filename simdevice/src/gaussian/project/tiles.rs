@@ -20,8 +20,7 @@ use crate::state::gaussian::GaussianGeometry;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
-use isa::float;
-use isa::float::FusedMultiply;
+use isa::float::{self, FusedMultiply};
 
 #[cfg(test)]
 mod tests;

@@ -29,7 +29,6 @@ mod request;
 pub mod table;
 
 use std::ffi::c_char;
-use std::mem::transmute;
 
 use ash::vk;
 
@@ -47,10 +46,13 @@ use gaurast_layer_interface::{LayerFunctions, NegotiateLayerInterface, string};
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
     version: *mut NegotiateLayerInterface,
 ) -> vk::Result {
-    let functions = LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
     // SAFETY: the caller's promise.
-    unsafe { gaurast_layer_interface::negotiate(version, functions) }
+    unsafe { gaurast_layer_interface::negotiate(version, FUNCTIONS) }
 }
+
+/// The layer's functions.
+const FUNCTIONS: LayerFunctions =
+    LayerFunctions { get_instance_proc_addr, get_device_proc_addr, get_physical_device_proc_addr };
 
 /// `vkGetInstanceProcAddr`.
 unsafe extern "system" fn get_instance_proc_addr(
@@ -59,16 +61,8 @@ unsafe extern "system" fn get_instance_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let (get, get_device): (vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkGetDeviceProcAddr) =
-        (get_instance_proc_addr, get_device_proc_addr);
-    // SAFETY: function pointers have one size, and whoever calls it casts it back.
-    unsafe {
-        if command == c"vkGetInstanceProcAddr" {
-            return transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get);
-        }
-        if command == c"vkGetDeviceProcAddr" {
-            return transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device);
-        }
+    if let Some(own) = FUNCTIONS.lookup(command) {
+        return Some(own);
     }
     if instance == vk::Instance::null() {
         return hooks::instance_hook(command).filter(|_| command == c"vkCreateInstance");
@@ -83,10 +77,8 @@ unsafe extern "system" fn get_instance_proc_addr(
 unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     // SAFETY: the name is a string, or null.
     let command = unsafe { string(name) };
-    let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
-        // SAFETY: function pointers have one size, and whoever calls it casts it back.
-        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get) };
+        return FUNCTIONS.lookup(command);
     }
     // SAFETY: the device is valid, and the name is a string.
     let next = unsafe { (below()?.get_device_proc_addr?)(device, name) }?;

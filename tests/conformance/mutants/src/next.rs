@@ -3,86 +3,68 @@
 use std::ffi::CStr;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use ash::vk;
-use gaurast::vk as gvk;
+use gaurast_layer_interface::{Function, command_names, command_type};
 
-use gaurast_layer_interface::Function;
-
-/// Calls a macro with a row for each command that the layer intercepts: the name of its hook, its type, and its names,
-/// the promoted one first.
+/// Calls a macro with the hooks of all commands that the layer intercepts.
 macro_rules! device_commands {
     ($use:ident) => {
         $use! {
-            allocate_memory: vk::PFN_vkAllocateMemory = ["vkAllocateMemory"];
-            free_memory: vk::PFN_vkFreeMemory = ["vkFreeMemory"];
-            map_memory: vk::PFN_vkMapMemory = ["vkMapMemory"];
-            unmap_memory: vk::PFN_vkUnmapMemory = ["vkUnmapMemory"];
-            create_image_view: vk::PFN_vkCreateImageView = ["vkCreateImageView"];
-            create_graphics_pipelines: vk::PFN_vkCreateGraphicsPipelines = ["vkCreateGraphicsPipelines"];
-            allocate_descriptor_sets: vk::PFN_vkAllocateDescriptorSets = ["vkAllocateDescriptorSets"];
-            update_descriptor_sets: vk::PFN_vkUpdateDescriptorSets = ["vkUpdateDescriptorSets"];
-            get_query_pool_results: vk::PFN_vkGetQueryPoolResults = ["vkGetQueryPoolResults"];
-            create_query_pool: vk::PFN_vkCreateQueryPool = ["vkCreateQueryPool"];
-            queue_submit: vk::PFN_vkQueueSubmit = ["vkQueueSubmit"];
-            begin_command_buffer: vk::PFN_vkBeginCommandBuffer = ["vkBeginCommandBuffer"];
-            end_command_buffer: vk::PFN_vkEndCommandBuffer = ["vkEndCommandBuffer"];
-            cmd_bind_pipeline: vk::PFN_vkCmdBindPipeline = ["vkCmdBindPipeline"];
-            cmd_bind_vertex_buffers: vk::PFN_vkCmdBindVertexBuffers = ["vkCmdBindVertexBuffers"];
-            cmd_bind_vertex_buffers2: vk::PFN_vkCmdBindVertexBuffers2 =
-                ["vkCmdBindVertexBuffers2", "vkCmdBindVertexBuffers2EXT"];
-            cmd_bind_index_buffer: vk::PFN_vkCmdBindIndexBuffer = ["vkCmdBindIndexBuffer"];
-            cmd_bind_descriptor_sets: vk::PFN_vkCmdBindDescriptorSets = ["vkCmdBindDescriptorSets"];
-            cmd_push_constants: vk::PFN_vkCmdPushConstants = ["vkCmdPushConstants"];
-            cmd_set_viewport: vk::PFN_vkCmdSetViewport = ["vkCmdSetViewport"];
-            cmd_set_viewport_with_count: vk::PFN_vkCmdSetViewportWithCount =
-                ["vkCmdSetViewportWithCount", "vkCmdSetViewportWithCountEXT"];
-            cmd_set_scissor: vk::PFN_vkCmdSetScissor = ["vkCmdSetScissor"];
-            cmd_set_scissor_with_count: vk::PFN_vkCmdSetScissorWithCount =
-                ["vkCmdSetScissorWithCount", "vkCmdSetScissorWithCountEXT"];
-            cmd_clear_attachments: vk::PFN_vkCmdClearAttachments = ["vkCmdClearAttachments"];
-            cmd_begin_render_pass: vk::PFN_vkCmdBeginRenderPass = ["vkCmdBeginRenderPass"];
-            cmd_next_subpass: vk::PFN_vkCmdNextSubpass = ["vkCmdNextSubpass"];
-            cmd_end_render_pass: vk::PFN_vkCmdEndRenderPass = ["vkCmdEndRenderPass"];
-            cmd_begin_rendering: vk::PFN_vkCmdBeginRendering = ["vkCmdBeginRendering", "vkCmdBeginRenderingKHR"];
-            cmd_end_rendering: vk::PFN_vkCmdEndRendering = ["vkCmdEndRendering", "vkCmdEndRenderingKHR"];
-            cmd_execute_commands: vk::PFN_vkCmdExecuteCommands = ["vkCmdExecuteCommands"];
-            cmd_draw: vk::PFN_vkCmdDraw = ["vkCmdDraw"];
-            cmd_draw_indexed: vk::PFN_vkCmdDrawIndexed = ["vkCmdDrawIndexed"];
-            cmd_draw_indirect: vk::PFN_vkCmdDrawIndirect = ["vkCmdDrawIndirect"];
-            cmd_draw_indexed_indirect: vk::PFN_vkCmdDrawIndexedIndirect = ["vkCmdDrawIndexedIndirect"];
-            cmd_draw_indirect_count: vk::PFN_vkCmdDrawIndirectCount =
-                ["vkCmdDrawIndirectCount", "vkCmdDrawIndirectCountKHR"];
-            cmd_draw_indexed_indirect_count: vk::PFN_vkCmdDrawIndexedIndirectCount =
-                ["vkCmdDrawIndexedIndirectCount", "vkCmdDrawIndexedIndirectCountKHR"];
-            cmd_draw_multi: vk::PFN_vkCmdDrawMultiEXT = ["vkCmdDrawMultiEXT"];
-            cmd_draw_multi_indexed: vk::PFN_vkCmdDrawMultiIndexedEXT = ["vkCmdDrawMultiIndexedEXT"];
-            cmd_dispatch: vk::PFN_vkCmdDispatch = ["vkCmdDispatch"];
-            cmd_copy_buffer: vk::PFN_vkCmdCopyBuffer = ["vkCmdCopyBuffer"];
-            cmd_update_buffer: vk::PFN_vkCmdUpdateBuffer = ["vkCmdUpdateBuffer"];
-            cmd_fill_buffer: vk::PFN_vkCmdFillBuffer = ["vkCmdFillBuffer"];
-            cmd_copy_query_pool_results: vk::PFN_vkCmdCopyQueryPoolResults = ["vkCmdCopyQueryPoolResults"];
-            cmd_set_gaussian_cameras: gvk::PFN_vkCmdSetGaussianCamerasGAURAST = ["vkCmdSetGaussianCamerasGAURAST"];
-            cmd_begin_gaussian_set: gvk::PFN_vkCmdBeginGaussianSetGAURAST = ["vkCmdBeginGaussianSetGAURAST"];
-            cmd_end_gaussian_set: gvk::PFN_vkCmdEndGaussianSetGAURAST = ["vkCmdEndGaussianSetGAURAST"];
-            cmd_set_gaussian_order: gvk::PFN_vkCmdSetGaussianOrderGAURAST = ["vkCmdSetGaussianOrderGAURAST"];
-            cmd_set_gaussian_antialiasing: gvk::PFN_vkCmdSetGaussianAntialiasingGAURAST =
-                ["vkCmdSetGaussianAntialiasingGAURAST"];
-            cmd_set_gaussian_low_pass_variance: gvk::PFN_vkCmdSetGaussianLowPassVarianceGAURAST =
-                ["vkCmdSetGaussianLowPassVarianceGAURAST"];
-            cmd_set_gaussian_alpha_floor: gvk::PFN_vkCmdSetGaussianAlphaFloorGAURAST =
-                ["vkCmdSetGaussianAlphaFloorGAURAST"];
-            cmd_set_gaussian_alpha_ceiling: gvk::PFN_vkCmdSetGaussianAlphaCeilingGAURAST =
-                ["vkCmdSetGaussianAlphaCeilingGAURAST"];
-            cmd_set_gaussian_transmittance_floor: gvk::PFN_vkCmdSetGaussianTransmittanceFloorGAURAST =
-                ["vkCmdSetGaussianTransmittanceFloorGAURAST"];
-            cmd_set_gaussian_spherical_harmonics_degree: gvk::PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST =
-                ["vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST"];
-            cmd_set_gaussian_exponential_error: gvk::PFN_vkCmdSetGaussianExponentialErrorGAURAST =
-                ["vkCmdSetGaussianExponentialErrorGAURAST"];
-            cmd_set_gaussian_contribution_budget: gvk::PFN_vkCmdSetGaussianContributionBudgetGAURAST =
-                ["vkCmdSetGaussianContributionBudgetGAURAST"];
-            cmd_bind_gaussian_spherical_harmonics: gvk::PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST =
-                ["vkCmdBindGaussianSphericalHarmonicsGAURAST"];
+            allocate_memory
+            free_memory
+            map_memory
+            unmap_memory
+            create_image_view
+            create_graphics_pipelines
+            allocate_descriptor_sets
+            update_descriptor_sets
+            get_query_pool_results
+            create_query_pool
+            queue_submit
+            begin_command_buffer
+            end_command_buffer
+            cmd_bind_pipeline
+            cmd_bind_vertex_buffers
+            cmd_bind_vertex_buffers2
+            cmd_bind_index_buffer
+            cmd_bind_descriptor_sets
+            cmd_push_constants
+            cmd_set_viewport
+            cmd_set_viewport_with_count
+            cmd_set_scissor
+            cmd_set_scissor_with_count
+            cmd_clear_attachments
+            cmd_begin_render_pass
+            cmd_next_subpass
+            cmd_end_render_pass
+            cmd_begin_rendering
+            cmd_end_rendering
+            cmd_execute_commands
+            cmd_draw
+            cmd_draw_indexed
+            cmd_draw_indirect
+            cmd_draw_indexed_indirect
+            cmd_draw_indirect_count
+            cmd_draw_indexed_indirect_count
+            cmd_draw_multi
+            cmd_draw_multi_indexed
+            cmd_dispatch
+            cmd_copy_buffer
+            cmd_update_buffer
+            cmd_fill_buffer
+            cmd_copy_query_pool_results
+            cmd_set_gaussian_cameras
+            cmd_begin_gaussian_set
+            cmd_end_gaussian_set
+            cmd_set_gaussian_order
+            cmd_set_gaussian_antialiasing
+            cmd_set_gaussian_low_pass_variance
+            cmd_set_gaussian_alpha_floor
+            cmd_set_gaussian_alpha_ceiling
+            cmd_set_gaussian_transmittance_floor
+            cmd_set_gaussian_spherical_harmonics_degree
+            cmd_set_gaussian_exponential_error
+            cmd_set_gaussian_contribution_budget
+            cmd_bind_gaussian_spherical_harmonics
         }
     };
 }
@@ -94,10 +76,10 @@ unsafe extern "system" fn absent() {
 }
 
 macro_rules! structure {
-    ($($name:ident: $type:ty = [$($command:literal),+];)*) => {
+    ($($name:ident)*) => {
         /// The next layer's commands.
         pub(crate) struct Next {
-            $(pub(crate) $name: $type,)*
+            $(pub(crate) $name: command_type!($name),)*
         }
 
         impl Next {
@@ -108,11 +90,9 @@ macro_rules! structure {
             unsafe fn load(find: impl Fn(&CStr) -> Option<Function>) -> Self {
                 Self {$(
                     $name: {
-                        let mut found = [$(concat!($command, "\0")),+].into_iter().filter_map(|name| {
-                            find(CStr::from_bytes_with_nul(name.as_bytes()).ok()?)
-                        });
+                        let found = command_names!($name).into_iter().find_map(&find);
                         // SAFETY: the caller's promise: a command of this name is a function of this type.
-                        unsafe { std::mem::transmute::<Function, $type>(found.next().unwrap_or(absent)) }
+                        unsafe { std::mem::transmute::<Function, command_type!($name)>(found.unwrap_or(absent)) }
                     },
                 )*}
             }

@@ -12,24 +12,13 @@ use super::workload::Workload;
 use super::{fixed_costs, sampling};
 use crate::workload::{self, Source};
 
-/// The names of all workloads.
-pub(super) const WORKLOADS: [&str; 33] = [
-    "quads, synthetic 50k",
-    "quads, captured-like 50k",
-    "quads, playbot-125k.ply",
-    "quads, skull.ply",
-    "fill",
-    "small triangles",
-    "trilinear texture",
-    "layers front to back",
-    "layers back to front",
-    "vertices",
-    "blended layers",
-    "four samples",
+/// The workloads of quads, by their scenes.
+const QUADS: [&str; 4] =
+    ["quads, synthetic 50k", "quads, captured-like 50k", "quads, playbot-125k.ply", "quads, skull.ply"];
+
+/// The workloads that are neither quads nor scenes of triangles.
+const OTHERS: [&str; 18] = [
     "a million points",
-    "geometry shader",
-    "tessellation",
-    "african head 1080p",
     "sampled, 16-bit floats",
     "sampled, one 32-bit float",
     "sampled, depth comparison",
@@ -48,6 +37,11 @@ pub(super) const WORKLOADS: [&str; 33] = [
     "500 image copies, timeline semaphores",
     "blits between formats",
 ];
+
+/// The names of all workloads.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    QUADS.into_iter().chain(triangles::NAMES).chain(OTHERS)
+}
 
 /// Width and height of pictures of quads.
 const SIZE: [u32; 2] = [1280, 720];

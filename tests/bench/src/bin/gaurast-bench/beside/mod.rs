@@ -16,7 +16,6 @@ use crate::median::median;
 use crate::output::{self, Rows, number};
 use crate::worker::lavapipe;
 use contender::{Contender, Process, Sample};
-use list::WORKLOADS;
 
 pub use contender::WorkerArguments as BesideWorkerArguments;
 
@@ -90,7 +89,7 @@ pub fn run(arguments: &BesideArguments) -> Result<(), BenchError> {
     let mut rows = Rows::new(&COLUMNS);
     for &threads in &threads {
         let mut logarithms = Vec::new();
-        for name in WORKLOADS {
+        for name in list::names() {
             if !arguments.only.is_empty() && !arguments.only.iter().any(|part| name.contains(part)) {
                 continue;
             }
