@@ -98,6 +98,10 @@ pub fn run(arguments: &BesideArguments) -> Result<(), BenchError> {
             rows.rows.extend(measured);
             logarithms.extend(ratio.map(|ratio| ratio.max(LEAST_RATIO).ln()));
         }
+        if logarithms.is_empty() {
+            eprintln!("{threads} threads: no workload was measured beside another driver");
+            continue;
+        }
         let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
         eprintln!(
             "{threads} threads: geometric mean of the processor time of {} workloads, relative to the best other driver: {}",
