@@ -10,7 +10,7 @@ use crate::support;
 
 /// An instance.
 pub(crate) struct Instance {
-    pub(crate) below: NextInstance,
+    pub(crate) next_instance: NextInstance,
     /// The version of Vulkan that the application uses.
     pub(crate) api_version: u32,
     /// The next layer's commands. They are looked up as the instance is created, since the loader's end of the chain gives the
@@ -28,12 +28,12 @@ impl Instance {
     ///
     /// # Safety
     /// The instance was created a moment ago by the layer of these functions.
-    pub(crate) unsafe fn register(below: NextInstance, api_version: u32) {
-        let NextInstance { handle, get_instance_proc_addr, .. } = below;
+    pub(crate) unsafe fn register(next_instance: NextInstance, api_version: u32) {
+        let NextInstance { handle, get_instance_proc_addr, .. } = next_instance;
         // SAFETY: the caller's promise.
         unsafe {
             let next = ash::Instance::load(&ash::StaticFn { get_instance_proc_addr }, handle);
-            INSTANCES.insert(handle, Self { below, api_version, next, is_emulated: Mutex::default() });
+            INSTANCES.insert(handle, Self { next_instance, api_version, next, is_emulated: Mutex::default() });
         }
     }
 

@@ -45,7 +45,7 @@ impl NextOfInstance {
 
 /// An instance.
 pub(crate) struct Instance {
-    pub(crate) below: NextInstance,
+    pub(crate) next_instance: NextInstance,
     pub(crate) next: NextOfInstance,
     pub(crate) messengers: Messengers,
 }
@@ -60,7 +60,7 @@ impl Instance {
     /// The instance was created by the link's layer a moment ago.
     pub(crate) unsafe fn register(handle: vk::Instance, link: &InstanceLink) {
         let instance = Self {
-            below: NextInstance {
+            next_instance: NextInstance {
                 handle,
                 get_instance_proc_addr: link.get_instance_proc_addr,
                 get_physical_device_proc_addr: link.get_physical_device_proc_addr,

@@ -70,7 +70,7 @@ unsafe extern "system" fn get_instance_proc_addr(
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
     // SAFETY: the instance lives.
-    let next = unsafe { own.below.command(command) }?;
+    let next = unsafe { own.next_instance.command(command) }?;
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
     Some(hook.unwrap_or(next))
 }
@@ -93,5 +93,5 @@ unsafe extern "system" fn get_physical_device_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the instance is valid, and the name is a string.
-    unsafe { Instance::of(instance)?.below.command_of_physical_device(CStr::from_ptr(name)) }
+    unsafe { Instance::of(instance)?.next_instance.command_of_physical_device(CStr::from_ptr(name)) }
 }

@@ -48,12 +48,12 @@ pub(super) unsafe extern "system" fn create_instance(
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
             let version = (*info).p_application_info.as_ref().map_or(0, |application| application.api_version);
-            let below = NextInstance {
+            let next_instance = NextInstance {
                 handle: *instance,
                 get_instance_proc_addr: get,
                 get_physical_device_proc_addr: link.and_then(|link| link.get_physical_device_proc_addr),
             };
-            let register = AssertUnwindSafe(|| Instance::register(below, version));
+            let register = AssertUnwindSafe(|| Instance::register(next_instance, version));
             let _ = catch_unwind(register);
         }
         result
@@ -196,9 +196,10 @@ unsafe fn create(
             return FAILED;
         };
         let link = take_link::<DeviceLink>(info.p_next);
-        let get_instance = link.map_or(instance.below.get_instance_proc_addr, |link| link.get_instance_proc_addr);
+        let get_instance =
+            link.map_or(instance.next_instance.get_instance_proc_addr, |link| link.get_instance_proc_addr);
         let get = link.map_or(instance.next.fp_v1_0().get_device_proc_addr, |link| link.get_device_proc_addr);
-        let found = command::<vk::PFN_vkCreateDevice>(get_instance, instance.below.handle, c"vkCreateDevice");
+        let found = command::<vk::PFN_vkCreateDevice>(get_instance, instance.next_instance.handle, c"vkCreateDevice");
         let Some(create) = found else {
             return FAILED;
         };

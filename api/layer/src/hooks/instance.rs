@@ -114,7 +114,7 @@ pub(super) unsafe extern "system" fn create_device(
             return failed;
         };
         let get = link.get_instance_proc_addr;
-        let Some(create) = get(instance.below.handle, c"vkCreateDevice".as_ptr()) else {
+        let Some(create) = get(instance.next_instance.handle, c"vkCreateDevice".as_ptr()) else {
             return failed;
         };
         let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
