@@ -98,7 +98,7 @@ step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
 # The documentation of the crates that applications use: no broken link.
 public=()
-for crate in gaurast gaurast-emulation gaurast-scene gaurast-picture gaurast-render gaurast-layer vulkan_gaurast; do
+for crate in gaurast gaurast-emulation gaurast-scene gaurast-picture gaurast-render gaurast-layer gaurast-driver; do
     public+=(-p "$crate")
 done
 step documentation env RUSTDOCFLAGS="-D warnings" cargo doc --profile checked --no-deps --quiet "${public[@]}"

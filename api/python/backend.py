@@ -21,7 +21,7 @@ _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE if (_HERE / "Cargo.lock").exists() else _HERE.parent.parent
 _PACKAGE = _ROOT / "api/python"
 _TARGET = "x86_64-unknown-linux-gnu"
-_PACKAGES = ["vulkan_gaurast-icd", "gaurast-layer", "gaurast-cli"]
+_PACKAGES = ["gaurast-icd", "gaurast-layer", "gaurast-cli"]
 _MANIFESTS = {"gaurast_icd.json": "driver/icd", "gaurast_layer.json": "api/layer"}
 _LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so"]
 

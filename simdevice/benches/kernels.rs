@@ -1,4 +1,4 @@
-//! The kernels of a Gaussian draw: `cargo bench -p simdevice [NAME]`, by the SIMD level in `GAURAST_SIMD`.
+//! The kernels of a Gaussian draw: `cargo bench -p gaurast-simdevice [NAME]`, by the SIMD level in `GAURAST_SIMD`.
 //!
 //! Projection is timed for each degree of spherical harmonics, whose evaluation is the difference; the stages behind it
 //! see nothing of Gaussians that are off the screen. The tile kernel works on one tile that stays in the first-level

@@ -1,4 +1,4 @@
-//! The texture unit: `cargo bench -p simdevice --bench texture [NAME]`, by the SIMD level in `GAURAST_SIMD`.
+//! The texture unit: `cargo bench -p gaurast-simdevice --bench texture [NAME]`, by the SIMD level in `GAURAST_SIMD`.
 //!
 //! Quads of a slightly turned surface sample all over a 1024x1024 image. An item is a sample.
 

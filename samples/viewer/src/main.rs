@@ -62,7 +62,7 @@ impl Viewer {
         let size = PhysicalSize::new(self.arguments.width, self.arguments.height);
         let window = events.create_window(Window::default_attributes().with_title("GauRast").with_inner_size(size))?;
         // SAFETY: the system's loader is sound.
-        let entry = if self.arguments.loader { unsafe { ash::Entry::load()? } } else { vulkan_gaurast_window::entry() };
+        let entry = if self.arguments.loader { unsafe { ash::Entry::load()? } } else { gaurast_window::entry() };
         let (fifo, immediate) = (vk::PresentModeKHR::FIFO, vk::PresentModeKHR::IMMEDIATE);
         let mode = if self.arguments.immediate { immediate } else { fifo };
         self.shown = Some((Gpu::new(entry, &window, mode, &self.scene, &torus())?, window));

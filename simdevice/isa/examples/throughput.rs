@@ -1,6 +1,6 @@
 //! Measures the shader cores' speed: an arithmetic loop and a divergent one, at every SIMD level of this processor.
 //!
-//! `cargo run --release -p isa --example throughput`
+//! `cargo run --release -p gaurast-isa --example throughput`
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

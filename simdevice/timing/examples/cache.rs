@@ -1,4 +1,4 @@
-//! Replays the reads of a trace's last frame into a cache: `cargo run -p timing --example cache -- work.json [KIB]`.
+//! Replays the reads of a trace's last frame into a cache: `cargo run -p gaurast-timing --example cache -- work.json [KIB]`.
 //! A module reads an entry of its tile's list, then the record that the entry names.
 
 use timing::trace_file;

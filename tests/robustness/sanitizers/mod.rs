@@ -52,7 +52,7 @@ fn run(command: &mut Command, folder: &TempDir) -> Output {
     let text = serde_json::json!({
         "file_format_version": "1.0.0",
         "ICD": {
-            "library_path": built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so"),
+            "library_path": built_library("gaurast-icd", "libvulkan_gaurast.so"),
             "api_version": "1.3.281",
         },
     });

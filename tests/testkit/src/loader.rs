@@ -14,7 +14,7 @@ use gaurast_runner::Case;
 /// # Panics
 /// If the library is not built, or the folder cannot be written.
 pub fn manifest(folder: &Path) -> PathBuf {
-    let library = gaurast_runner::built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so");
+    let library = gaurast_runner::built_library("gaurast-icd", "libvulkan_gaurast.so");
     let library = library.to_str().expect("a path of Unicode");
     let template = include_str!("../../../driver/icd/gaurast_icd.json");
     let text = template.replace("../../target/release/libvulkan_gaurast.so", library);

@@ -108,7 +108,7 @@ fn forbidden(code: &[u8], address: u64) -> Vec<(u64, Mnemonic)> {
 
 /// The driver's library.
 fn library() -> Vec<u8> {
-    std::fs::read(built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so")).expect("the library is read")
+    std::fs::read(built_library("gaurast-icd", "libvulkan_gaurast.so")).expect("the library is read")
 }
 
 #[gaurast_runner::test]

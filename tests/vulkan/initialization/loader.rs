@@ -91,7 +91,7 @@ fn vulkaninfo_lists_the_device(case: &Case) {
 fn only_the_loaders_symbols_are_exported() {
     let output = Command::new("nm")
         .args(["--dynamic", "--defined-only", "--format=just-symbols"])
-        .arg(built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so"))
+        .arg(built_library("gaurast-icd", "libvulkan_gaurast.so"))
         .output()
         .expect("nm runs");
     assert!(output.status.success());

@@ -123,6 +123,6 @@ fn windows_are_there_with_their_systems_only() {
     assert!(has(&bare, "VK_KHR_surface") && has(&bare, "VK_EXT_headless_surface"));
     let of_systems = ["VK_KHR_xcb_surface", "VK_KHR_xlib_surface", "VK_KHR_wayland_surface"];
     assert!(of_systems.iter().all(|name| !has(&bare, name)));
-    let with_windows = names(&vulkan_gaurast_window::entry());
+    let with_windows = names(&gaurast_window::entry());
     assert!(of_systems.iter().all(|name| has(&with_windows, name)));
 }

@@ -89,7 +89,7 @@ impl Window {
     }
 
     fn presenter(&self) -> Presenter {
-        Presenter::new(vulkan_gaurast_window::entry(), ash::khr::xcb_surface::NAME, |entry, instance| {
+        Presenter::new(gaurast_window::entry(), ash::khr::xcb_surface::NAME, |entry, instance| {
             let functions = ash::khr::xcb_surface::Instance::new(entry, instance);
             let info = vk::XcbSurfaceCreateInfoKHR::default()
                 .connection(self.connection.get_raw_xcb_connection())

@@ -287,7 +287,8 @@ vk_flags! {
 /// Chain it to `VkPhysicalDeviceFeatures2` to ask, to `VkDeviceCreateInfo` to enable.
 #[doc(alias = "VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     /// The structure's type.
@@ -439,7 +440,8 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
 /// takes 29.
 #[doc(alias = "VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'a> {
     /// The structure's type.
@@ -502,7 +504,8 @@ impl PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
 /// compress; further components are ignored. Attributes may be per vertex or per instance.
 #[doc(alias = "VkGaussianAttributeLocationsGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianAttributeLocationsGAURAST {
     /// The mean p, 3 components, in world space (or model space, with a model matrix). Required.
@@ -553,7 +556,8 @@ impl GaussianAttributeLocationsGAURAST {
 /// The locations that are used must differ from one another.
 #[doc(alias = "VkGaussianVertexOutputLocationsGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianVertexOutputLocationsGAURAST {
     /// The 2D covariance, a `vec3` (xx, xy, yy) in px^2 along the framebuffer's axes, before the
@@ -583,7 +587,8 @@ impl GaussianVertexOutputLocationsGAURAST {
 /// place of writing (C, 1 - T) to location 0. Needs `resolveFragmentShader`.
 #[doc(alias = "VkGaussianResolveInputLocationsGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianResolveInputLocationsGAURAST {
     /// The accumulated colour and alpha, a `vec4`: (C, 1 - T), premultiplied.
@@ -624,7 +629,8 @@ impl GaussianResolveInputLocationsGAURAST {
 /// without it fails creation with `VK_ERROR_VALIDATION_FAILED_EXT`.
 #[doc(alias = "VkPipelineGaussianStateCreateInfoGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
     /// The structure's type.
@@ -726,7 +732,8 @@ impl PipelineGaussianStateCreateInfoGAURAST<'_> {
 /// `transmittanceFloor` / (1 - `alphaCeiling`) adds to the factor.
 #[doc(alias = "VkPipelineGaussianApproximationStateCreateInfoGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct PipelineGaussianApproximationStateCreateInfoGAURAST<'a> {
     /// The structure's type.
@@ -777,7 +784,8 @@ impl PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
 /// alpha reaches `alphaFloor`, and compensation has no floor.
 #[doc(alias = "VkPipelineGaussianFootprintStateCreateInfoGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct PipelineGaussianFootprintStateCreateInfoGAURAST<'a> {
     /// The structure's type.
@@ -837,7 +845,8 @@ impl PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
 /// depths.
 #[doc(alias = "VkGaussianCameraGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianCameraGAURAST<'a> {
     /// The structure's type.
@@ -888,7 +897,8 @@ impl GaussianCameraGAURAST<'_> {
 /// `coefficient_stride` from `device_address` on. What lies beyond `size` reads as zeros.
 #[doc(alias = "VkGaussianSphericalHarmonicsBufferGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianSphericalHarmonicsBufferGAURAST<'a> {
     /// The structure's type.
@@ -949,7 +959,8 @@ impl GaussianSphericalHarmonicsBufferGAURAST<'_> {
 /// A shader without 64-bit floats writes the eye as three pairs of words, low word first.
 #[doc(alias = "VkGaussianCameraDataGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug, PartialEq)]
+#[derive(Copy, Clone, PartialEq)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct GaussianCameraDataGAURAST {
     /// As [`GaussianCameraGAURAST::eye`].
@@ -1092,7 +1103,8 @@ pub type PFN_vkWorkTraceCallbackGAURAST =
 /// default of each option. No option changes a picture.
 #[doc(alias = "VkDriverOptionsGAURAST")]
 #[repr(C)]
-#[derive(Copy, Clone, Debug)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
 #[must_use]
 pub struct DriverOptionsGAURAST<'a> {
     /// The structure's type.

@@ -155,9 +155,9 @@ fn add_structure(code: &mut String, comments: Comments<'_>, structure: &Structur
     let (declared, any) = if is_tagged { ("<'a>", "<'_>") } else { ("", "") };
     let has_floats = structure.members.iter().any(|member| matches!(&*member.ty, "float" | "double"));
     let traits = match (is_tagged, has_floats) {
-        (true, _) => "Copy, Clone, Debug",
-        (false, true) => "Copy, Clone, Debug, PartialEq",
-        (false, false) => "Copy, Clone, Debug, PartialEq, Eq, Hash",
+        (true, _) => "Copy, Clone",
+        (false, true) => "Copy, Clone, PartialEq",
+        (false, false) => "Copy, Clone, PartialEq, Eq, Hash",
     };
     let mut fields = String::new();
     for member in &structure.members {
@@ -175,6 +175,7 @@ fn add_structure(code: &mut String, comments: Comments<'_>, structure: &Structur
         code,
         "{}#[repr(C)]
         #[derive({traits})]
+        #[cfg_attr(feature = \"debug\", derive(Debug))]
         #[must_use]
         pub struct {name}{declared} {{ {fields} }}\n",
         comments.item(&structure.name, &structure.comment, Some(structure))

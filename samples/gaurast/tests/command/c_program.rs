@@ -42,7 +42,7 @@ fn compile(folder: &Path) -> PathBuf {
 fn the_c_program_draws_what_the_rust_program_draws() {
     let folder = tempfile::tempdir().expect("a folder");
     let program = compile(folder.path());
-    let driver = gaurast_runner::built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so");
+    let driver = gaurast_runner::built_library("gaurast-icd", "libvulkan_gaurast.so");
     let manifest = folder.path().join("gaurast_icd.json");
     let text = serde_json::json!({
         "file_format_version": "1.0.0",

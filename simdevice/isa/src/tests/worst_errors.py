@@ -1,6 +1,6 @@
 """Compares the worst errors of elementary functions with MPFR, 200 bits wide.
 
-    GAURAST_TEST_LONG=1 cargo test --release -p isa --lib errors:: > errors.txt
+    GAURAST_TEST_LONG=1 cargo test --release -p gaurast-isa --lib errors:: > errors.txt
     python3 simdevice/isa/src/tests/worst_errors.py errors.txt
 
 It reads the lines `worst,FUNCTION,ARGUMENT,RESULT,ULPS` of the test: the bits of the argument and of the result in binary32, and

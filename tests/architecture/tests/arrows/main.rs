@@ -68,7 +68,7 @@ fn all_crates_are_found() {
     let targets = targets();
     for name in [
         "gaurast",
-        "vulkan_gaurast",
+        "gaurast-driver",
         "registry-gen/main",
         "gaurast-cli/main",
         "gaurast-examples/hello_triangle",

@@ -11,7 +11,7 @@ fn the_report_in_the_repository_is_up_to_date() {
         assert_eq!(
             stored,
             generated,
-            "line {}: run `cargo run -p timing-studies --example paper > simdevice/timing/studies/PAPER.md`",
+            "line {}: run `cargo run -p gaurast-timing-studies --example paper > simdevice/timing/studies/PAPER.md`",
             line + 1
         );
     }

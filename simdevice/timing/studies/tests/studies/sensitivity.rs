@@ -2,7 +2,7 @@
 
 use timing_studies::sensitivity;
 
-const HOW: &str = "run `cargo run --release -p timing-studies --example sensitivity`";
+const HOW: &str = "run `cargo run --release -p gaurast-timing-studies --example sensitivity`";
 
 fn stored(file: &str) -> String {
     let path = format!("{}/{file}", env!("CARGO_MANIFEST_DIR"));
