@@ -5,6 +5,21 @@
 //!
 //! The driver has Vulkan's objects, a file for each chapter of the specification, and replays recorded commands as
 //! [`simdevice`] packets. It never computes a pixel.
+//!
+//! ```
+//! # fn main() -> Result<(), ash::vk::Result> {
+//! let entry = vulkan_gaurast::entry();
+//! // SAFETY: the entry lives as long as the program, and the instance is destroyed once.
+//! unsafe {
+//!     let instance = entry.create_instance(&ash::vk::InstanceCreateInfo::default(), None)?;
+//!     let device = instance.enumerate_physical_devices()?[0];
+//!     let properties = instance.get_physical_device_properties(device);
+//!     assert!(properties.device_name_as_c_str().is_ok_and(|name| name.to_string_lossy().contains("GauRast")));
+//!     instance.destroy_instance(None);
+//! }
+//! # Ok(())
+//! # }
+//! ```
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 

@@ -8,6 +8,15 @@
 //! layer, which `api/emulation/layer` makes a library for the Vulkan loader of. Where a driver has the extension itself, both
 //! step aside, unless the environment's `GAURAST_EMULATION_FORCE` is 1.
 //!
+//! ```no_run
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // SAFETY: the system's Vulkan loader is sound.
+//! let entry = gaurast_emulation::entry(unsafe { ash::Entry::load()? });
+//! // From here on, devices of `entry` have the extension.
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! | module | has |
 //! |---|---|
 //! | `proc_addr`, `entry` | the lookup of commands by name; the two doors |

@@ -1,4 +1,16 @@
 //! Pictures of 32-bit floats: files that are written atomically, and differences between pictures.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use gaurast_picture::Picture;
+//!
+//! let grey = Picture { width: 2, height: 1, pixels: vec![[0.5, 0.5, 0.5, 1.0]; 2] };
+//! let path = std::env::temp_dir().join("grey.exr");
+//! gaurast_picture::write(&path, &grey, None)?;
+//! assert_eq!(gaurast_picture::read(&path)?.pixels, grey.pixels);
+//! # Ok(())
+//! # }
+//! ```
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 

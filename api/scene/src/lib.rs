@@ -2,6 +2,14 @@
 //!
 //! Every [`Scene`] is in the frame of the original 3D Gaussian splatting code and its PLY files: +x right, +y **down**,
 //! +z forward. Files in other frames are rotated when they are read; `docs/files.md` has the formats and their frames.
+//!
+//! ```
+//! // `open("scene.ply")` reads a file; a generated scene needs none.
+//! let garden = gaurast_scene::garden::scene(1, 1000);
+//! // A camera that sees all of it, with a vertical field of view of 50 degrees.
+//! let camera = gaurast_scene::frame(&garden, 50.0, [640, 360]);
+//! assert_eq!((garden.len(), camera.width), (1000, 640));
+//! ```
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 

@@ -54,8 +54,8 @@ impl ImageTable {
         self.surfaces.get(image as usize)?.as_ref()
     }
 
-    /// Takes an isotropic sample.
-    #[inline]
+    /// Takes an isotropic sample. It has the kernels of all codecs, so there is one copy of it.
+    #[inline(never)]
     fn sample_once(&self, surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [LaneWords; 4] {
         let has_seams = sampler.has_seams && request.shape.dimension == Dimension::Cube;
         let batched = if self.batched && !has_seams {

@@ -433,13 +433,22 @@ fn filter<S: Simd, T: Texels>(
 ) -> [LaneWords; 4] {
     let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
-    let mut texel = level::<S, T>(simd, words, layout, sampler, request, &selection.high);
-    if selection.weight != [0.0; QUADS] {
-        let low = level::<S, T>(simd, words, layout, sampler, request, &selection.low);
+    let zero = f32x16::splat(simd, 0.0);
+    let mut texel = [zero; 4];
+    // A loop, so that one copy of the level's code serves both levels.
+    for (is_low, levels) in [(false, &selection.high), (true, &selection.low)] {
+        if is_low && selection.weight == [0.0; QUADS] {
+            break;
+        }
+        let found = level::<S, T>(simd, words, layout, sampler, request, levels);
+        if !is_low {
+            texel = found;
+            continue;
+        }
         let weight = spread(simd, selection.weight);
         let mixes = weight.simd_gt(0.0);
         for c in 0..T::COMPONENTS {
-            let mixed = texel[c] + weight * (low[c] - texel[c]);
+            let mixed = texel[c] + weight * (found[c] - texel[c]);
             // A level of weight zero is not read, so that infinities in it have no effect.
             texel[c] = if T::FINITE { mixed } else { mixes.select(mixed, texel[c]) };
         }

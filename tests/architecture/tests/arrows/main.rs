@@ -1,6 +1,6 @@
 //! Checks that the modules of each crate of the workspace have no import cycles: there is no cycle between the children
 //! of any module. Packages depend on each other as the layers say, and bindings are named after their types. What packets add
-//! to the device is allocated by functions that can fail.
+//! to the device is allocated by functions that can fail. `cargo package` takes the packages that are published.
 //!
 //! All paths in the sources count (imports, expressions, types, macro arguments), except those of tests within a crate.
 //! An `impl` outside the module of its type counts as an arrow from the type's module to that of the `impl`, since
@@ -12,6 +12,7 @@ mod bindings;
 mod graph;
 mod harness;
 mod layers;
+mod packages;
 mod refusals;
 mod source;
 mod workspace;

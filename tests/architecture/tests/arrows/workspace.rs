@@ -54,9 +54,18 @@ pub fn packages() -> Vec<Package> {
         .collect()
 }
 
+/// The name of the package that a manifest depends on by `key`: dependencies may have other names than their packages,
+/// which the manifest says, or the root's.
+fn package_name<'a>(key: &'a str, dependency: &'a Value, inherited: &'a Table) -> &'a str {
+    let name = |value: &'a Value| value.get("package").and_then(Value::as_str);
+    name(dependency).or_else(|| inherited.get(key).and_then(name)).unwrap_or(key)
+}
+
 /// The dependencies of the workspace's packages on each other.
 pub fn dependencies() -> Vec<Dependency> {
     let packages = packages();
+    let manifest = read(&root().join("Cargo.toml"));
+    let inherited = manifest["workspace"]["dependencies"].as_table().expect("dependencies");
     let folders: BTreeMap<&str, &str> =
         packages.iter().map(|package| (package.name.as_str(), package.folder.as_str())).collect();
     let mut found = Vec::new();
@@ -68,9 +77,7 @@ pub fn dependencies() -> Vec<Dependency> {
             for kind in ["dependencies", "dev-dependencies", "build-dependencies"] {
                 let listed = table.get(kind).and_then(Value::as_table);
                 for (key, value) in listed.into_iter().flatten() {
-                    // A dependency may have another name than its package.
-                    let name = value.get("package").and_then(Value::as_str).unwrap_or(key);
-                    if let Some(to) = folders.get(name) {
+                    if let Some(to) = folders.get(package_name(key, value, inherited)) {
                         found.push(Dependency {
                             from: package.folder.clone(),
                             to: (*to).to_owned(),
