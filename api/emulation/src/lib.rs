@@ -18,6 +18,7 @@
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `set`, `work` | a sorted set that is recorded, and its dispatches |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
+//! | `times` | the times of a set's stages |
 //! | `self_test`, `pair` | the test of a device's arithmetic |
 //!
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid usage, so
@@ -43,6 +44,7 @@ mod scratch;
 mod self_test;
 mod set;
 mod support;
+mod times;
 mod work;
 
 pub use entry::entry;
