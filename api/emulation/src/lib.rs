@@ -14,7 +14,7 @@
 //! | `hooks` | the commands that are intercepted |
 //! | `instance`, `device` | what lives, by the loader's key |
 //! | `support` | the features and properties that devices get |
-//! | `formats`, `pipeline`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
+//! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `set`, `work` | a sorted set that is recorded, and its dispatches |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
@@ -32,6 +32,7 @@ mod formats;
 mod hooks;
 mod instance;
 mod kernels;
+mod library;
 mod next;
 mod pair;
 mod pass;
