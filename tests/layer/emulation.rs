@@ -13,6 +13,9 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("footprints", &["footprint.ellipse", "footprint.tile_square"], 20),
     ("dynamic states", &["dynamic_state"], 15),
     ("numerics", &["numerics.needles", "numerics.discs"], 12),
+    ("views", &["views"], 14),
+    ("updates", &["updates"], 20),
+    ("libraries", &["libraries"], 9),
 ];
 
 fn parts() -> Vec<Variant> {
@@ -42,7 +45,7 @@ fn lavapipe_draws_gaussians(case: &Case) {
 }
 
 /// Pairs that do not fit are looked for by every tile: the pictures are as right.
-#[gaurast_runner::test(needs = [Need::Lavapipe], each = vec![Variant::new("commands")])]
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = ["commands", "views", "footprints"].map(Variant::new).to_vec())]
 fn pairs_that_do_not_fit_are_drawn(case: &Case) {
     with_emulation(case, &[("GAURAST_EMULATION_PAIRS", "10")], || holds(case));
 }

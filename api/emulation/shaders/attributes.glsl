@@ -136,8 +136,14 @@ bool lies_within(uint index, uint stride, uint offset, uint bytes, uint size, ou
     return high == 0u && carry == 0u && place <= size && size - place >= bytes;
 }
 
-vec4 read_attribute(uint draw, uint which, uint vertex, uint instance, uint first_instance, uint wanted) {
-    Attribute a = push.set.attributes[which];
+// The element's place in its buffer, if it lies within.
+struct Place {
+    uvec2 address;
+    uint offset, bytes;          // the buffer's
+    bool is_within;              // before the buffer's end
+};
+
+Place place_of(uint draw, Attribute a, uint vertex, uint instance, uint first_instance) {
     Source source = push.set.sources.at[draw * push.set.source_count + a.source];
     uint index = vertex;
     if (source.divisor == 0u) {
@@ -145,7 +151,28 @@ vec4 read_attribute(uint draw, uint which, uint vertex, uint instance, uint firs
     } else if (source.divisor != 0xffffffffu) {
         index = first_instance + (instance - first_instance) / source.divisor;
     }
-    uint place;
-    bool is_within = lies_within(index, source.stride, a.offset, format_bytes(a.format), source.bytes, place);
-    return element(source.address, place, is_within, a.format, wanted);
+    Place p = Place(source.address, 0u, source.bytes, false);
+    p.is_within = lies_within(index, source.stride, a.offset, format_bytes(a.format), source.bytes, p.offset);
+    return p;
+}
+
+// The first components of 32-bit floats.
+vec4 floats(uvec2 address, uint offset, bool is_within, uint wanted) {
+    vec4 value = vec4(0.0);
+    if (is_within) {
+        uvec2 at = advanced(address, offset);
+        for (uint i = 0u; i < wanted; i++) {
+            value[i] = uintBitsToFloat(Word(advanced(at, 4u * i)).word);
+        }
+    }
+    return value;
+}
+
+vec4 read_attribute(uint draw, uint which, uint vertex, uint instance, uint first_instance, uint wanted) {
+    Attribute a = push.set.attributes[which];
+    Place p = place_of(draw, a, vertex, instance, first_instance);
+    if (IS_FLOAT32) {
+        return floats(p.address, p.offset, p.is_within, wanted);
+    }
+    return element(p.address, p.offset, p.is_within, a.format, wanted);
 }

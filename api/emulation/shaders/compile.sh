@@ -11,5 +11,5 @@ for shader in *.comp *.vert *.frag; do
     compile -o "$folder/$shader.spv" "$shader"
 done
 # Passes with views need a capability.
-compile -DVIEWS -o "$folder/full_views.vert.spv" full.vert
+compile -DVIEWS -o "$folder/tiles_views.vert.spv" tiles.vert
 compile -DVIEWS -o "$folder/fetch_views.frag.spv" fetch.frag

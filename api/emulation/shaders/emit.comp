@@ -7,17 +7,19 @@
 layout(local_size_x = 256) in;
 
 void main() {
-    uint i = group() * 256u + gl_LocalInvocationID.x;
+    uint i = group() * 256u + gl_LocalInvocationIndex;
     if (i >= push.set.counters.at[SEEN] || push.set.counters.at[STORED] == 0u) {
         return;
     }
-    uint at = push.set.counts.at[i] + push.set.sums.at[i / BLOCK];
-    uint index = push.set.values.at[i], rows = push.set.records.at[index].tiles_y;
-    for (uint y = rows & 0xffffu; y <= rows >> 16; y++) {
-        uvec2 row = tiles_of_row(index, y);
-        for (uint x = row.x; x < row.y && at < push.set.pair_capacity; x++) {
-            push.set.pair_keys.at[at] = y * push.set.tiles.x + x;
-            push.set.pair_values.at[at] = index;
+    uint at = push.set.before_each.at[i] + push.set.sums.at[i / BLOCK], index = push.set.values.at[i];
+    Words keys = push.set.pair_keys, values = push.set.pair_values;
+    uint capacity = push.set.pair_capacity, across = push.set.tiles.x;
+    Reach reach = reach_of(index);
+    for (uint y = reach.tiles_y & 0xffffu; y <= reach.tiles_y >> 16; y++) {
+        uvec2 row = tiles_of_row(reach, y, across);
+        for (uint x = row.x; x < row.y && at < capacity; x++) {
+            keys.at[at] = y * across + x;
+            values.at[at] = index;
             at++;
         }
     }

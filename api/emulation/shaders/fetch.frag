@@ -2,12 +2,7 @@
 // The fragment that a set has made of its pixel, if it has.
 #extension GL_GOOGLE_include_directive : require
 #include "head.glsl"
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pixels { vec4 at[]; };
-layout(push_constant) uniform Push {
-    Pixels image;
-    ivec2 area_origin;
-    uvec2 area_size;
-} push;
+#include "shown.glsl"
 #ifdef VIEWS
 layout(location = 0) flat in uint view;
 #else

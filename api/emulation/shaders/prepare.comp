@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "head.glsl"
 #include "set.glsl"
+#include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
 layout(local_size_x = 256) in;
@@ -87,7 +88,7 @@ void derive() {
 }
 
 void main() {
-    uint l = gl_LocalInvocationID.x;
+    uint l = gl_LocalInvocationIndex;
     uint all = 0u;
     for (uint first = 0u; first < push.set.draw_count; first += 256u) {
         uint index = first + l;
@@ -122,5 +123,4 @@ void main() {
     counters.at[STORED] = 0u;
     set_groups(counters, BY_GAUSSIAN, blocks(n, 256u));
     set_groups(counters, SORT_GAUSSIANS, blocks(n, BLOCK));
-    set_groups(counters, SCAN_GAUSSIANS, blocks(256u * blocks(n, BLOCK), BLOCK));
 }

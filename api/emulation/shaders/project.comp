@@ -4,9 +4,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "head.glsl"
 #include "set.glsl"
+#include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
 #include "harmonics.glsl"
+#include "tiles.glsl"
 layout(local_size_x = 256) in;
 
 bool is_finite(float x) {
@@ -41,11 +43,10 @@ uint index_at(Draw d, uint place) {
 }
 
 void main() {
-    uint i = group() * 256u + gl_LocalInvocationID.x;
+    uint i = group() * 256u + gl_LocalInvocationIndex;
     if (i >= push.set.counters.at[GAUSSIANS]) {
         return;
     }
-    push.set.values.at[i] = i;
     push.set.keys.at[i] = NOT_SEEN;
 
     // The vertex and its attributes.
@@ -56,9 +57,8 @@ void main() {
         vertex = index_at(d, vertex) + uint(d.vertex_offset);
     }
     vec4 values[8];
-    bool has_matrix = (push.set.flags & HAS_MATRIX) != 0u, has_factor = (push.set.flags & HAS_FACTOR) != 0u;
     for (uint which = 0u; which < 8u; which++) {
-        bool is_used = which < MATRIX || (which == FACTOR ? has_factor : has_matrix);
+        bool is_used = which < MATRIX || (which == FACTOR ? HAS_FACTOR : HAS_MATRIX);
         bool is_three = which == POSITION || which == SCALE, is_one = which == OPACITY || which == FACTOR;
         values[which] = vec4(0.0);
         if (is_used) {
@@ -68,7 +68,7 @@ void main() {
     vec3 position = values[POSITION].xyz, scale = values[SCALE].xyz;
     vec4 rotation = values[ROTATION];
     float opacity = values[OPACITY].x;
-    if (has_factor) {
+    if (HAS_FACTOR) {
         precise float product = opacity * values[FACTOR].x;
         opacity = product;
     }
@@ -79,7 +79,7 @@ void main() {
     vec4 sizes = abs(rotation);
     float largest = max(max(sizes.x, sizes.y), max(sizes.z, sizes.w));
     usable = usable && largest > 0.0;
-    if (has_matrix) {
+    if (HAS_MATRIX) {
         usable = usable && are_finite(values[MATRIX]) && are_finite(values[MATRIX + 1u]) && are_finite(values[MATRIX + 2u]);
     }
     if (!usable) {
@@ -92,7 +92,7 @@ void main() {
     for (int j = 0; j < 3; j++) {
         vec3 eye = push.set.derived.of.eye[j];
         vec2 from;
-        if (has_matrix) {
+        if (HAS_MATRIX) {
             vec4 row = values[MATRIX + uint(j)];
             from = add(add(two_product(row.x, position.x), two_product(row.y, position.y)), two_product(row.z, position.z));
             from = add(add(from, pair(row.w)), pair(-eye.x));
@@ -143,7 +143,7 @@ void main() {
         for (int c = 0; c < 3; c++) {
             b[c] = mul(factor, sub(pair(camera.rotation[r][c]), mul(slope, camera.rotation[2][c])));
         }
-        if (has_matrix) {
+        if (HAS_MATRIX) {
             vec2 w[3];
             for (int c = 0; c < 3; c++) {
                 w[c] = add(add(mul(b[0], values[MATRIX][c]), mul(b[1], values[MATRIX + 1u][c])), mul(b[2], values[MATRIX + 2u][c]));
@@ -168,7 +168,7 @@ void main() {
     // The inverse of a matrix but for its determinant, which also says whether it is singular.
     vec2 adjoint[9];
     vec2 volume = pair(1.0);
-    if (has_matrix) {
+    if (HAS_MATRIX) {
         vec3 r0 = values[MATRIX].xyz, r1 = values[MATRIX + 1u].xyz, r2 = values[MATRIX + 2u].xyz;
         // Rows of length about 1, so that nothing overflows.
         vec3 size = vec3(max(max(abs(r0.x), abs(r0.y)), abs(r0.z)), max(max(abs(r1.x), abs(r1.y)), abs(r1.z)),
@@ -225,7 +225,7 @@ void main() {
 
     // Step 5: the colour.
     vec3 direction = vec3(e[0].x, e[1].x, e[2].x);
-    if (has_matrix) {
+    if (HAS_MATRIX) {
         for (int j = 0; j < 3; j++) {
             vec2 sum = dot3(adjoint[j * 3], adjoint[j * 3 + 1], adjoint[j * 3 + 2], e[0], e[1], e[2]);
             direction[j] = volume.x < 0.0 ? -sum.x : sum.x;
@@ -238,16 +238,23 @@ void main() {
     }
     float functions[25];
     harmonics(direction, functions);
-    uint functions_count = (push.set.degree + 1u) * (push.set.degree + 1u);
+    uint used = (push.set.degree + 1u) * (push.set.degree + 1u), step_ = push.set.harmonics_step;
+    Place first = place_of(draw, push.set.attributes[HARMONICS], vertex, instance, d.first_instance);
     vec3 color = vec3(0.5);
-    for (uint f = 0u; f < functions_count; f++) {
+    for (uint f = 0u; f < (DEGREE + 1u) * (DEGREE + 1u); f++) {
+        if (f >= used) {
+            break;
+        }
         vec3 coefficient;
-        if ((push.set.flags & HARMONICS_IN_BUFFER) != 0u) {
+        if (HARMONICS_IN_BUFFER) {
             uint high, low, place;
             umulExtended(f, d.harmonics_coefficient_stride, high, low);
             bool is_within = high == 0u
                 && lies_within(vertex, d.harmonics_stride, low, format_bytes(d.harmonics_format), d.harmonics_bytes, place);
             coefficient = element(d.harmonics, place, is_within, d.harmonics_format, 3u).xyz;
+        } else if (ARE_HARMONICS_EVEN) {
+            bool is_within = first.is_within && first.bytes - first.offset >= f * step_ + 12u;
+            coefficient = floats(first.address, first.offset + f * step_, is_within, 3u).xyz;
         } else {
             coefficient = read_attribute(draw, HARMONICS + f, vertex, instance, d.first_instance, 3u).xyz;
         }
@@ -261,7 +268,7 @@ void main() {
 
     // Tiles of a cut-off, from the viewport's corner.
     uvec2 cut_x = uvec2(0u), cut_y = uvec2(0u);
-    if (push.set.cut_off >= TILE_SQUARE) {
+    if (HAS_CUT_TILES) {
         vec2 from = vec2(sub(mean_x, pair(push.set.viewport.x)).x, sub(mean_y, pair(push.set.viewport.y)).x), first, end;
         if (push.set.cut_off == TILE_SQUARE) {
             vec2 half_difference = mul(sub(a, c), 0.5);
@@ -303,6 +310,17 @@ void main() {
     r.cut_y = cut_y.x | cut_y.y << 16;
     r.unused = 0.0;
     push.set.records.at[i] = r;
+
+    // The number of its tiles.
+    vec2 mean = vec2(mean_x.x, mean_y.x), origin = vec2(push.set.area_origin);
+    float margin = margin_of(mean, origin, half_width, half_height);
+    Reach ellipse = Reach(x, y, margin, r.slope, r.curve, half_height, r.reach, r.tiles_x, r.tiles_y);
+    uint reached = 0u, across = push.set.tiles.x;
+    for (uint row = first_tile.y; row <= last_tile.y; row++) {
+        uvec2 tiles = tiles_of_row(ellipse, row, across);
+        reached += tiles.y - tiles.x;
+    }
+    push.set.reached.at[i] = reached;
 
     // The key, as an unsigned number in the same order.
     float by = depth;

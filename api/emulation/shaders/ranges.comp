@@ -6,16 +6,17 @@
 layout(local_size_x = 256) in;
 
 void main() {
-    uint i = group() * 256u + gl_LocalInvocationID.x, count = push.set.counters.at[STORED];
+    uint i = group() * 256u + gl_LocalInvocationIndex, count = push.set.counters.at[STORED];
     if (i >= count) {
         return;
     }
     Words keys = push.set.pair_keys;
+    Couples ranges = push.set.ranges;
     uint from = push.side == 0u ? 0u : push.set.pair_capacity, key = keys.at[from + i];
     if (i == 0u || keys.at[from + i - 1u] != key) {
-        push.set.ranges.at[key].x = i;
+        ranges.at[key].x = i;
     }
     if (i + 1u == count || keys.at[from + i + 1u] != key) {
-        push.set.ranges.at[key].y = i + 1u;
+        ranges.at[key].y = i + 1u;
     }
 }

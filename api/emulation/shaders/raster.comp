@@ -1,169 +1,232 @@
 #version 460
-// Accumulates the Gaussians of a tile front to back: a workgroup is a tile, an invocation a pixel. A pixel without a contribution gets
-// a negative alpha.
+// Accumulates the Gaussians of a tile front to back: a workgroup is a tile, an invocation four pixels below one another. A pixel without
+// a contribution gets a negative alpha, unless its tile has none at all.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_vote : require
 #include "head.glsl"
 #include "set.glsl"
 #include "pair.glsl"
 #include "tiles.glsl"
-layout(local_size_x = 16, local_size_y = 16) in;
-// Of the Gaussians of a batch: what gives the exponent at a pixel, opacity, exponent at which alpha is below the floor; colour; index.
-shared vec4 lines[256];
-shared vec4 scalars[256];
-shared vec4 colors[256];
-shared uvec4 members[256];
-shared uint unfinished;
-// Of a batch of which only some reach the tile, a bit for each that does.
-shared uint reaching[8];
+layout(local_size_x = 16, local_size_y = 4) in;
+// A cut-off by tiles of the viewport.
+layout(constant_id = 0) const bool HAS_CUT_TILES = false;
 
+const uint INVOCATIONS = 64u;
+// Gaussians that are looked at together.
+const uint BATCH = 128u;
+const uint ROWS = 4u;
 const uint NOBODY = 0xffffffffu;
 
-// Of the pixel: what has accumulated, whether anything has, and whether it is finished.
-vec3 sum, rest;
-float transmittance;
-bool done, is_reached;
-// The pixel's tile of cut-offs.
-uvec2 cut_tile;
-// Of the set.
-float floor_, ceiling, end, ellipse;
+// Of the Gaussians of a batch: what gives the exponent at a pixel; its lowest value that reaches the floor; opacity; colour; tiles of the
+// cut-off; index.
+shared vec4 lines[BATCH];
+shared vec3 scalars[BATCH];
+shared vec3 colors[BATCH];
+shared uvec2 cuts[BATCH];
+shared uint members[BATCH];
+// Of a batch of which only some reach the tile, a bit for each that does.
+shared uint reaching[BATCH / 32u];
+shared uint unfinished, steep;
 
-// Whether the cut-off of a Gaussian leaves the pixel out.
-bool is_cut(uint l) {
-    uint x = members[l].y, y = members[l].z;
-    return cut_tile.x < (x & 0xffffu) || cut_tile.x >= x >> 16 || cut_tile.y < (y & 0xffffu) || cut_tile.y >= y >> 16;
+// Of the invocation's pixels: what has accumulated in batches before and in this one, what is left, and whether a pixel goes on and
+// has had a contribution. Sums of batches are summed, so that ten thousand layers are as exact as a hundred.
+vec3 total[ROWS], sum[ROWS];
+vec4 transmittance;
+bvec4 goes_on, is_reached;
+uint cut_column;
+uvec4 cut_rows;
+// Of the set.
+float floor_, ceiling, end;
+
+// Accumulates the Gaussian of a place in the batch, with the exponents and alphas that it has at the pixels.
+void accumulate(uint k, vec4 exponent, vec4 alpha) {
+    vec3 scalar = scalars[k], color = colors[k];
+    alpha = min(vec4(ceiling), alpha);
+    bvec4 is_in = bvec4(uvec4(goes_on) & uvec4(greaterThanEqual(exponent, vec4(scalar.y))) & uvec4(greaterThanEqual(alpha, vec4(floor_))));
+    if (HAS_CUT_TILES) {
+        uint x = cuts[k].x, y = cuts[k].y;
+        bool is_column = cut_column >= (x & 0xffffu) && cut_column < x >> 16;
+        bvec4 is_row = bvec4(uvec4(greaterThanEqual(cut_rows, uvec4(y & 0xffffu))) & uvec4(lessThan(cut_rows, uvec4(y >> 16))));
+        is_in = bvec4(uvec4(is_in) & uvec4(is_row) & uint(is_column));
+    }
+    precise vec4 next = transmittance * (1.0 - alpha);
+    bvec4 ends = bvec4(uvec4(is_in) & uvec4(lessThan(next, vec4(end))));
+    is_in = bvec4(uvec4(is_in) & uvec4(not(ends)));
+    goes_on = bvec4(uvec4(goes_on) & uvec4(not(ends)));
+    is_reached = bvec4(uvec4(is_reached) | uvec4(is_in));
+    vec4 weight = mix(vec4(0.0), transmittance * alpha, is_in);
+    transmittance = mix(transmittance, next, is_in);
+    for (uint j = 0u; j < ROWS; j++) {
+        sum[j] += weight[j] * color;
+    }
 }
 
-// Accumulates the Gaussian of a place in the batch, whose alpha is its opacity times 2^exponent.
-void accumulate(uint k, vec2 exponent) {
-    vec4 scalar = scalars[k];
-    float whole = floor(exponent.x + 0.5);
-    precise float part = (exponent.x - whole) + exponent.y;
-    float alpha = min(ceiling, ldexp(scalar.y * exp2(part), int(max(whole, -300.0))));
-    bool is_in = exponent.x > scalar.z && -exponent.x <= ellipse && alpha >= floor_ && !is_cut(k);
-    precise float next = transmittance * (1.0 - alpha);
-    done = is_in && next < end;
-    if (is_in && !done) {
-        is_reached = true;
-        // Kahan's sum: ten thousand layers are as exact as one.
-        precise float weight = transmittance * alpha;
-        precise vec3 added = weight * colors[k].xyz - rest;
-        precise vec3 larger = sum + added;
-        precise vec3 lost = (larger - sum) - added;
-        rest = lost;
-        sum = larger;
-        transmittance = next;
+// Puts a Gaussian into the batch.
+void admit(uint slot, uint index, vec2 middle, float least, float ellipse) {
+    Record r = push.set.records.at[index];
+    vec2 x = add(two_sum(middle.x, -r.mean_x.x), pair(-r.mean_x.y)), y = add(two_sum(middle.y, -r.mean_y.x), pair(-r.mean_y.y));
+    lines[slot] = vec4(mul(r.f0, x).x, add(mul(r.f1, x), mul(r.f2, y)).x, r.f0.x, r.f1.x);
+    scalars[slot] = vec3(r.f2.x, max(least - log2(r.opacity) - 0.1, -ellipse), r.opacity);
+    colors[slot] = vec3(r.red, r.green, r.blue);
+    members[slot] = index;
+    if (HAS_CUT_TILES) {
+        cuts[slot] = uvec2(r.cut_x, r.cut_y);
+    }
+    // Steep exponents and large opacities need pairs at every pixel.
+    if (max(abs(r.f0.x), max(abs(r.f1.x), abs(r.f2.x))) > 3.0 || r.opacity > 16.0) {
+        atomicOr(steep, 1u);
     }
 }
 
 void main() {
     uint l = gl_LocalInvocationIndex;
-    uvec2 tile = gl_WorkGroupID.xy, at = gl_GlobalInvocationID.xy;
-    bool is_inside = all(lessThan(at, push.set.area_size));
-    ivec2 place = ivec2(at) + push.set.area_origin;
-    vec2 center = vec2(place) + 0.5;
-    vec2 middle = vec2(ivec2(tile * TILE) + push.set.area_origin) + 8.0;
+    uvec2 tile = gl_WorkGroupID.xy, size = push.set.area_size;
+    uvec2 at = tile * TILE + uvec2(gl_LocalInvocationID.x, ROWS * gl_LocalInvocationID.y);
+    ivec2 origin = push.set.area_origin;
+    vec4 viewport = push.set.viewport;
+    vec2 center = vec2(ivec2(at) + origin) + 0.5, middle = vec2(ivec2(tile * TILE) + origin) + 8.0;
     float dx = float(at.x & 15u) - 7.5, dy = float(at.y & 15u) - 7.5;
-    is_inside = is_inside && all(greaterThanEqual(center, push.set.viewport.xy))
-        && all(lessThan(center, push.set.viewport.xy + push.set.viewport.zw));
+    vec4 down = vec4(0.0, 1.0, 2.0, 3.0), rows = center.y + down;
+    bool is_column = at.x < size.x && center.x >= viewport.x && center.x < viewport.x + viewport.z;
+    goes_on = bvec4(uvec4(lessThan(uvec4(at.y) + uvec4(down), uvec4(size.y))) & uvec4(greaterThanEqual(rows, vec4(viewport.y)))
+                    & uvec4(lessThan(rows, vec4(viewport.y + viewport.w))) & uint(is_column));
+    if (HAS_CUT_TILES) {
+        cut_column = uint(floor(max(center.x - viewport.x, 0.0) / 16.0));
+        cut_rows = uvec4(floor(max(rows - viewport.y, vec4(0.0)) / 16.0));
+    }
 
     // Where the pairs did not fit, every Gaussian that is seen is looked at.
     bool is_overflow = push.set.counters.at[PAIRS] != push.set.counters.at[STORED];
-    uvec2 range = uvec2(0u, push.set.counters.at[SEEN]);
-    if (!is_overflow) {
-        range = push.set.ranges.at[tile.y * push.set.tiles.x + tile.x];
+    uvec2 range = is_overflow ? uvec2(0u, push.set.counters.at[SEEN]) : push.set.ranges.at[tile.y * push.set.tiles.x + tile.x];
+    if (range.x == range.y) {
+        return;
     }
+    Words values = push.set.pair_values, sorted = push.set.values;
     uint from = push.side == 0u ? 0u : push.set.pair_capacity;
     floor_ = push.set.alpha_floor;
     ceiling = push.set.alpha_ceiling;
     end = push.set.transmittance_floor;
-    bool has_tiles = push.set.cut_off >= TILE_SQUARE;
-    cut_tile = has_tiles ? uvec2(floor(max(center - push.set.viewport.xy, vec2(0.0)) / 16.0)) : uvec2(0u);
     float least = log2(max(floor_, 1.2e-38)), deviations = push.set.cut_off_deviations;
     // In the exponent's units: k^2 / (2 ln 2).
-    ellipse = push.set.cut_off == ELLIPSE ? 0.7213475204 * deviations * deviations : 3.4e38;
+    float ellipse = push.set.cut_off == ELLIPSE ? 0.7213475204 * deviations * deviations : 3.4e38;
 
-    done = !is_inside;
-    is_reached = false;
-    sum = vec3(0.0);
-    rest = vec3(0.0);
-    transmittance = 1.0;
-    for (uint first = range.x; first < range.y; first += 256u) {
+    is_reached = bvec4(false);
+    transmittance = vec4(1.0);
+    for (uint j = 0u; j < ROWS; j++) {
+        total[j] = vec3(0.0);
+    }
+    for (uint first = range.x; first < range.y; first += BATCH) {
         if (l == 0u) {
             unfinished = 0u;
+            steep = 0u;
+        }
+        if (l < BATCH / 32u) {
+            reaching[l] = 0u;
         }
         barrier();
-        if (!done) {
+        if (any(goes_on)) {
             atomicOr(unfinished, 1u);
         }
-        uint index = NOBODY;
-        if (first + l < range.y) {
-            if (is_overflow) {
-                index = push.set.values.at[first + l];
-                uint rows = push.set.records.at[index].tiles_y;
-                uvec2 row = tile.y >= (rows & 0xffffu) && tile.y <= rows >> 16 ? tiles_of_row(index, tile.y) : uvec2(0u);
-                index = tile.x >= row.x && tile.x < row.y ? index : NOBODY;
-            } else {
-                index = push.set.pair_values.at[from + first + l];
-            }
-        }
-        // The place in the batch: those that reach the tile move together, in their order.
-        uint slot = l, count = min(256u, range.y - first);
+        uint count = min(BATCH, range.y - first);
         if (is_overflow) {
-            if (l < 8u) {
-                reaching[l] = 0u;
+            // Those that reach the tile move together, in their order.
+            uint index[BATCH / INVOCATIONS];
+            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
+                uint m = j * INVOCATIONS + l;
+                index[j] = NOBODY;
+                if (m < count) {
+                    uint candidate = sorted.at[first + m];
+                    Reach reach = reach_of(candidate);
+                    bool is_row = tile.y >= (reach.tiles_y & 0xffffu) && tile.y <= reach.tiles_y >> 16;
+                    uvec2 row = tiles_of_row(reach, tile.y, push.set.tiles.x);
+                    if (is_row && tile.x >= row.x && tile.x < row.y) {
+                        index[j] = candidate;
+                        atomicOr(reaching[m >> 5], 1u << (m & 31u));
+                    }
+                }
             }
             barrier();
-            if (index != NOBODY) {
-                atomicOr(reaching[l >> 5], 1u << (l & 31u));
+            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
+                uint m = j * INVOCATIONS + l, slot = bitCount(reaching[m >> 5] & ((1u << (m & 31u)) - 1u));
+                for (uint k = 0u; k < m >> 5; k++) {
+                    slot += bitCount(reaching[k]);
+                }
+                if (index[j] != NOBODY) {
+                    admit(slot, index[j], middle, least, ellipse);
+                }
             }
-            barrier();
-            slot = bitCount(reaching[l >> 5] & ((1u << (l & 31u)) - 1u));
             count = 0u;
-            for (uint k = 0u; k < 8u; k++) {
-                uint own = bitCount(reaching[k]);
-                slot += k < l >> 5 ? own : 0u;
-                count += own;
+            for (uint k = 0u; k < BATCH / 32u; k++) {
+                count += bitCount(reaching[k]);
             }
-        }
-        if (index != NOBODY) {
-            members[slot].x = index;
-            Record r = push.set.records.at[index];
-            vec2 x = add(two_sum(middle.x, -r.mean_x.x), pair(-r.mean_x.y)), y = add(two_sum(middle.y, -r.mean_y.x), pair(-r.mean_y.y));
-            lines[slot] = vec4(mul(r.f0, x).x, add(mul(r.f1, x), mul(r.f2, y)).x, r.f0.x, r.f1.x);
-            // Steep exponents and large opacities need pairs at every pixel.
-            bool is_steep = max(abs(r.f0.x), max(abs(r.f1.x), abs(r.f2.x))) > 3.0 || r.opacity > 16.0;
-            scalars[slot] = vec4(r.f2.x, r.opacity, least - log2(r.opacity) - 0.1, is_steep ? 1.0 : 0.0);
-            colors[slot] = vec4(r.red, r.green, r.blue, 0.0);
-            // Without a cut-off by tiles, all are within.
-            members[slot].yz = has_tiles ? uvec2(r.cut_x, r.cut_y) : uvec2(0xffff0000u);
+        } else {
+            for (uint m = l; m < count; m += INVOCATIONS) {
+                admit(m, values.at[from + first + m], middle, least, ellipse);
+            }
         }
         barrier();
         if (unfinished == 0u) {
             break;
         }
-        // Steep ones have a loop of their own: some devices execute both sides of every branch.
-        uint k = 0u;
-        while (k < count && !done) {
-            while (k < count && !done && scalars[k].w == 0.0) {
+        for (uint j = 0u; j < ROWS; j++) {
+            sum[j] = vec3(0.0);
+        }
+        // Loops, not branches: some devices execute both sides of every branch.
+        uint end_of_flat = steep == 0u ? count : 0u, k = 0u;
+        while (k < end_of_flat && subgroupAny(any(goes_on))) {
+            // The next that reaches a pixel of the subgroup.
+            vec4 exponent;
+            bool is_next = false;
+            while (k < end_of_flat) {
                 vec4 line = lines[k];
+                vec2 scalar = scalars[k].xy;
                 precise float p = line.x + line.z * dx;
-                precise float q = (line.y + scalars[k].x * dy) + line.w * dx;
-                precise float exponent = -(p * p + q * q);
-                accumulate(k, vec2(exponent, 0.0));
+                precise float square = p * p, along = line.w * dx;
+                precise vec4 q = (line.y + scalar.x * (dy + down)) + along;
+                precise vec4 both = square + q * q;
+                exponent = -both;
+                is_next = subgroupAny(any(bvec4(uvec4(greaterThanEqual(exponent, vec4(scalar.y))) & uvec4(goes_on))));
+                if (is_next) {
+                    break;
+                }
                 k++;
             }
-            while (k < count && !done && scalars[k].w != 0.0) {
-                Record r = push.set.records.at[members[k].x];
-                vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
-                vec2 y = add(two_sum(center.y, -r.mean_y.x), pair(-r.mean_y.y));
-                vec2 p = mul(r.f0, x), q = add(mul(r.f1, x), mul(r.f2, y));
-                accumulate(k, -add(mul(p, p), mul(q, q)));
+            if (is_next) {
+                // The native function is exact enough near 0. 2^whole is made of its bits.
+                vec4 whole = floor(exponent + 0.5);
+                uvec4 power = uvec4(ivec4(max(whole, vec4(-126.0))) + 127) << 23;
+                accumulate(k, exponent, scalars[k].z * exp2(exponent - whole) * uintBitsToFloat(power));
                 k++;
             }
         }
+        for (k = steep == 0u ? count : 0u; k < count; k++) {
+            Record r = push.set.records.at[members[k]];
+            vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
+            vec2 p = mul(r.f0, x), square = mul(p, p), along = mul(r.f1, x);
+            vec4 exponent, rest;
+            for (uint j = 0u; j < ROWS; j++) {
+                vec2 y = add(two_sum(rows[j], -r.mean_y.x), pair(-r.mean_y.y)), q = add(along, mul(r.f2, y));
+                vec2 both = -add(square, mul(q, q));
+                exponent[j] = both.x;
+                rest[j] = both.y;
+            }
+            vec4 whole = floor(exponent + 0.5);
+            precise vec4 part = (exponent - whole) + rest;
+            accumulate(k, exponent, ldexp(r.opacity * exp2(part), ivec4(max(whole, vec4(-300.0)))));
+        }
+        for (uint j = 0u; j < ROWS; j++) {
+            total[j] += sum[j];
+        }
         barrier();
     }
-    if (all(lessThan(at, push.set.area_size))) {
-        push.set.image.at[push.plane + at.y * push.set.area_size.x + at.x] = is_reached ? vec4(sum, 1.0 - transmittance) : vec4(0.0, 0.0, 0.0, -1.0);
+    Pixels image = push.set.image;
+    if (any(is_reached)) {
+        push.set.shown.at[(push.view * push.set.tiles.y + tile.y) * push.set.tiles.x + tile.x] = 1u;
+    }
+    for (uint j = 0u; j < ROWS; j++) {
+        if (at.x < size.x && at.y + j < size.y) {
+            vec4 value = is_reached[j] ? vec4(total[j], 1.0 - transmittance[j]) : vec4(0.0, 0.0, 0.0, -1.0);
+            image.at[push.plane + (at.y + j) * size.x + at.x] = value;
+        }
     }
 }

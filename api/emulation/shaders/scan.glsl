@@ -1,32 +1,25 @@
-// What is scanned: the histogram of a sort, or, with sort = 2, the numbers of tiles that Gaussians reach.
-#include "sort.glsl"
+// Sums over a workgroup of INVOCATIONS, a multiple of 16.
 
-uint scanned_count() {
-    if (push.sort == 2u) {
-        return push.set.counters.at[SEEN];
-    }
-    return 256u * blocks(sorted_count(), BLOCK);
-}
+shared uint scanned[INVOCATIONS];
+shared uint sixteens[INVOCATIONS / 16u];
 
-Words scanned() {
-    if (push.sort == 2u) {
-        return push.set.counts;
-    }
-    return push.set.histogram;
-}
-
-shared uint partial[256];
-
-// The sum of what the invocations before this one give; partial[255] is the sum of all.
-uint sum_before(uint own) {
-    uint l = gl_LocalInvocationID.x;
-    partial[l] = own;
+// The sum of what the invocations before this one give, and that of all.
+uint sum_before(uint own, out uint all) {
+    uint l = gl_LocalInvocationIndex, row = l / 16u, before = 0u;
+    scanned[l] = own;
     barrier();
-    for (uint d = 1u; d < 256u; d <<= 1) {
-        uint other = l >= d ? partial[l - d] : 0u;
-        barrier();
-        partial[l] += other;
-        barrier();
+    for (uint i = row * 16u; i < l; i++) {
+        before += scanned[i];
     }
-    return partial[l] - own;
+    if ((l & 15u) == 15u) {
+        sixteens[row] = before + own;
+    }
+    barrier();
+    all = 0u;
+    for (uint i = 0u; i < INVOCATIONS / 16u; i++) {
+        before += i < row ? sixteens[i] : 0u;
+        all += sixteens[i];
+    }
+    barrier();
+    return before;
 }

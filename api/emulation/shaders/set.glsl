@@ -1,6 +1,7 @@
 // A sorted set of Gaussians, as src/set.rs writes it. Every array is reached by its address.
 
-layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint at[]; };
+#include "counters.glsl"
+
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Couples { uvec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { vec4 at[]; };
 
@@ -68,22 +69,26 @@ const uint POSITION = 0u, SCALE = 1u, ROTATION = 2u, OPACITY = 3u, MATRIX = 4u, 
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Set {
     Words counters;
-    Words keys, values, pair_keys, pair_values, histogram, sums, counts;
+    Words keys, values, pair_keys, pair_values, sums;
+    Words reached;               // the number of tiles that each Gaussian reaches
+    Words before_each;           // and of those before it in their order, within its block
     Couples ranges;
     Records records;
     Pixels image;
+    Words shown;                 // 1 for each tile, of each view, that has a contribution; 0 before
     Words feedback;
     Draws draws;
     Sources sources;
     Cameras cameras;
     DerivedCamera derived;
+    uvec2 unused2;
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative
     uvec2 tiles;
     uint reserve, pair_capacity;
     uint draw_count, source_count, camera_count, degree;
-    uint order, compensated, cut_off, flags;
+    uint order, compensated, cut_off, harmonics_step;
     float low_pass, alpha_floor, alpha_ceiling, transmittance_floor;
     float compensation_floor, cut_off_deviations;
     uint unused0, unused1;
@@ -93,43 +98,14 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
 layout(push_constant) uniform Push {
     Set set;
     uint view;
-    uint sort;                   // 0: Gaussians by depth, 1: pairs by tile
-    uint shift;                  // of the digit
-    uint is_first;               // the first digit of depths: what is not seen is dropped
-    uint side;                   // the half of the arrays that is read
+    uint side;                   // the half of the pairs that is read
     uint plane;                  // the view's first pixel
 } push;
 
-// Flags of a set.
-const uint HAS_MATRIX = 1u, HAS_FACTOR = 2u, HARMONICS_IN_BUFFER = 4u;
 // Orders.
 const uint VIEW_DEPTH = 0u, RADIAL_DISTANCE = 1u, PRIMITIVE = 2u;
 // Cut-offs.
 const uint NO_CUT_OFF = 0u, ELLIPSE = 1u, TILE_SQUARE = 2u, TILE_RECTANGLE = 3u;
 
-// Places in the counters: the numbers of Gaussians, of those that are seen, of pairs, and of pairs that fit the arrays.
-const uint GAUSSIANS = 0u, SEEN = 1u, PAIRS = 2u, STORED = 3u;
-// Workgroups of indirect dispatches, three words each.
-const uint BY_GAUSSIAN = 4u, SORT_GAUSSIANS = 7u, SCAN_GAUSSIANS = 10u, BY_SEEN = 13u, SORT_SEEN = 16u, SCAN_SEEN = 19u,
-           SCAN_COUNTS = 22u, BY_PAIR = 25u, SORT_PAIRS = 28u, SCAN_PAIRS = 31u;
-
-const uint NOT_SEEN = 0xffffffffu;
+// Width and height of a tile.
 const uint TILE = 16u;
-// Keys of a workgroup in sorts and scans.
-const uint BLOCK = 2048u;
-
-uint blocks(uint count, uint size) {
-    return count / size + uint(count % size != 0u);
-}
-
-// The workgroup's number in a dispatch whose groups are spread over two dimensions.
-uint group() {
-    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-}
-
-void set_groups(Words counters, uint place, uint groups) {
-    const uint wide = 32768u;
-    counters.at[place] = min(groups, wide);
-    counters.at[place + 1u] = blocks(groups, wide);
-    counters.at[place + 2u] = 1u;
-}

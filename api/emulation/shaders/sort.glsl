@@ -1,32 +1,20 @@
-// The keys of the sort that is under way.
+// A digit of a sort: keys and values move from one pair of arrays to another, by eight bits of the keys.
+
+layout(push_constant) uniform Push {
+    Words keys, values, sorted_keys, sorted_values;
+    Words histogram;             // of each digit, by blocks of keys
+    Words totals;                // of each digit
+    Words counters;
+    uint shift;                  // of the digit
+    uint count_place;            // the counter that has the number of keys
+    uint is_first_of_depths;     // values are the places of the keys, and what is not seen is dropped
+    uint unused;
+} push;
 
 uint sorted_count() {
-    if (push.sort == 1u) {
-        return push.set.counters.at[STORED];
-    }
-    return push.set.counters.at[push.is_first != 0u ? GAUSSIANS : SEEN];
-}
-
-Words sorted_keys() {
-    if (push.sort == 1u) {
-        return push.set.pair_keys;
-    }
-    return push.set.keys;
-}
-
-Words sorted_values() {
-    if (push.sort == 1u) {
-        return push.set.pair_values;
-    }
-    return push.set.values;
-}
-
-// The place of a half of the arrays.
-uint sorted_half(uint side) {
-    uint size = push.sort == 1u ? push.set.pair_capacity : push.set.reserve;
-    return side == 0u ? 0u : size;
+    return push.counters.at[push.count_place];
 }
 
 bool is_dropped(uint key) {
-    return push.is_first != 0u && key == NOT_SEEN;
+    return push.is_first_of_depths != 0u && key == NOT_SEEN;
 }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockRea
 use ash::vk;
 
 use crate::kernels::Kernels;
+use crate::library::Library;
 use crate::next::Next;
 use crate::pipeline::Pipeline;
 use crate::render_pass::RenderPass;
@@ -26,6 +27,7 @@ pub(crate) struct Objects {
     pub(crate) pools: HashMap<vk::CommandPool, Pool>,
     pub(crate) render_passes: HashMap<vk::RenderPass, Arc<RenderPass>>,
     pub(crate) pipelines: HashMap<vk::Pipeline, Arc<Pipeline>>,
+    pub(crate) libraries: HashMap<vk::Pipeline, Arc<Library>>,
     /// The number of dynamic descriptors of each layout.
     pub(crate) set_layouts: HashMap<vk::DescriptorSetLayout, usize>,
     pub(crate) layouts: HashMap<vk::PipelineLayout, Vec<vk::DescriptorSetLayout>>,

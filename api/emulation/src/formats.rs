@@ -60,3 +60,8 @@ pub(crate) fn code(format: vk::Format) -> Option<u32> {
     };
     Some(kind | components << 8)
 }
+
+/// Reports whether a format's code is that of 32-bit floats, with as many components as are wanted or more.
+pub(crate) fn is_float32(code: u32, wanted: u32) -> bool {
+    code & 0xFF == 0 && code >> 8 >= wanted
+}

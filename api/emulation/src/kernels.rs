@@ -1,7 +1,8 @@
 //! The kernels, as pipelines of a device.
 
+use std::collections::HashMap;
 use std::io::Cursor;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 
@@ -23,43 +24,79 @@ pub(crate) const SELF_TEST: &[u8] = spirv!("self_test.comp");
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kernel {
     Prepare,
-    Project,
     Histogram,
-    ScanBlocks,
-    ScanSums,
+    ScanDigits,
     Scatter,
-    Count,
+    ScanTiles,
+    CountPairs,
     Emit,
     Ranges,
-    Raster,
 }
 
 impl Kernel {
-    const ALL: [(Self, &'static [u8]); 10] = [
+    const ALL: [(Self, &'static [u8]); 8] = [
         (Self::Prepare, spirv!("prepare.comp")),
-        (Self::Project, spirv!("project.comp")),
         (Self::Histogram, spirv!("histogram.comp")),
-        (Self::ScanBlocks, spirv!("scan_blocks.comp")),
-        (Self::ScanSums, spirv!("scan_sums.comp")),
+        (Self::ScanDigits, spirv!("scan_digits.comp")),
         (Self::Scatter, spirv!("scatter.comp")),
-        (Self::Count, spirv!("count.comp")),
+        (Self::ScanTiles, spirv!("scan_tiles.comp")),
+        (Self::CountPairs, spirv!("count_pairs.comp")),
         (Self::Emit, spirv!("emit.comp")),
         (Self::Ranges, spirv!("ranges.comp")),
-        (Self::Raster, spirv!("raster.comp")),
     ];
 }
 
+/// What a pipeline of Gaussians fixes of the kernels, as `shaders/variant.glsl` has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Variant {
+    pub(crate) has_matrix: bool,
+    pub(crate) has_factor: bool,
+    pub(crate) harmonics_in_buffer: bool,
+    pub(crate) is_float32: bool,
+    pub(crate) are_harmonics_even: bool,
+    pub(crate) has_cut_tiles: bool,
+    pub(crate) degree: u32,
+}
+
+impl Variant {
+    /// The specialization constants of the kernel that projects.
+    fn of_projection(&self) -> [u32; 7] {
+        [
+            u32::from(self.has_matrix),
+            u32::from(self.has_factor),
+            u32::from(self.harmonics_in_buffer),
+            u32::from(self.is_float32),
+            u32::from(self.are_harmonics_even),
+            u32::from(self.has_cut_tiles),
+            self.degree,
+        ]
+    }
+
+    /// The specialization constants of the rasterizer.
+    fn of_rasterizer(&self) -> [u32; 1] {
+        [u32::from(self.has_cut_tiles)]
+    }
+}
+
+/// The kernels of a variant.
+#[derive(Clone, Copy)]
+pub(crate) struct Specialized {
+    pub(crate) project: vk::Pipeline,
+    pub(crate) raster: vk::Pipeline,
+}
+
 /// Bytes of push constants of kernels, and of the fragment shader that fetches.
-pub(crate) const PUSHED: u32 = 32;
+pub(crate) const PUSHED: u32 = 72;
 
 /// The pipelines of all kernels, and the shaders of the pipelines that the application creates.
 pub(crate) struct Kernels {
     next: Arc<Next>,
     /// Of the kernels.
     pub(crate) layout: vk::PipelineLayout,
-    /// Of the fragment shaders.
+    /// Of the shaders that show a set.
     pub(crate) fetch_layout: vk::PipelineLayout,
     pipelines: Vec<vk::Pipeline>,
+    specialized: Mutex<HashMap<Variant, Specialized>>,
     pub(crate) vertex: vk::ShaderModule,
     pub(crate) fetch: vk::ShaderModule,
     /// For passes with views.
@@ -78,18 +115,19 @@ impl Kernels {
             let mut own = Self {
                 next: Arc::clone(next),
                 layout: layout(next, &[], vk::ShaderStageFlags::COMPUTE)?,
-                fetch_layout: layout(next, &[], vk::ShaderStageFlags::FRAGMENT)?,
+                fetch_layout: layout(next, &[], vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)?,
                 pipelines: Vec::new(),
-                vertex: module(next, spirv!("full.vert"))?,
+                specialized: Mutex::default(),
+                vertex: module(next, spirv!("tiles.vert"))?,
                 fetch: module(next, spirv!("fetch.frag"))?,
                 // A device without views has no such passes.
-                vertex_views: module(next, spirv!("full_views.vert")).unwrap_or_default(),
+                vertex_views: module(next, spirv!("tiles_views.vert")).unwrap_or_default(),
                 fetch_views: module(next, spirv!("fetch_views.frag"))?,
                 feedback,
             };
             for (_, words) in Kernel::ALL {
                 let module = module(next, words)?;
-                let pipeline = compute(next, module, own.layout, None);
+                let pipeline = compute(next, module, own.layout, &[]);
                 next.destroy_shader_module(module, None);
                 own.pipelines.push(pipeline?);
             }
@@ -100,13 +138,41 @@ impl Kernels {
     pub(crate) fn pipeline(&self, kernel: Kernel) -> vk::Pipeline {
         self.pipelines[kernel as usize]
     }
+
+    /// The kernels of a variant, which are compiled when it is first asked for.
+    pub(crate) fn specialized(&self, variant: Variant) -> Result<Specialized, vk::Result> {
+        let mut all = self.specialized.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = all.get(&variant) {
+            return Ok(*known);
+        }
+        let create = |words: &[u8], constants: &[u32]| {
+            // SAFETY: the device lives, and the module is valid.
+            unsafe {
+                let module = module(&self.next, words)?;
+                let pipeline = compute(&self.next, module, self.layout, constants);
+                self.next.destroy_shader_module(module, None);
+                pipeline
+            }
+        };
+        let project = create(spirv!("project.comp"), &variant.of_projection())?;
+        let raster = create(spirv!("raster.comp"), &variant.of_rasterizer());
+        let raster = raster.inspect_err(|_| {
+            // SAFETY: nothing uses it yet.
+            unsafe { self.next.destroy_pipeline(project, None) };
+        })?;
+        let new = Specialized { project, raster };
+        all.insert(variant, new);
+        Ok(new)
+    }
 }
 
 impl Drop for Kernels {
     fn drop(&mut self) {
         // SAFETY: nothing is executed on the device any more.
         unsafe {
-            for &pipeline in &self.pipelines {
+            let specialized = std::mem::take(self.specialized.get_mut().unwrap_or_else(PoisonError::into_inner));
+            let specialized = specialized.values().flat_map(|own| [own.project, own.raster]);
+            for pipeline in self.pipelines.drain(..).chain(specialized) {
                 self.next.destroy_pipeline(pipeline, None);
             }
             for module in [self.vertex, self.fetch, self.vertex_views, self.fetch_views] {
@@ -148,7 +214,7 @@ pub(crate) unsafe fn layout(
     unsafe { next.create_pipeline_layout(&info, None) }
 }
 
-/// A compute pipeline; `rows` is the module's specialization constant.
+/// A compute pipeline, with the module's specialization constants in the order of their numbers.
 ///
 /// # Safety
 /// The device, the module and the layout live.
@@ -156,16 +222,16 @@ pub(crate) unsafe fn compute(
     next: &ash::Device,
     module: vk::ShaderModule,
     layout: vk::PipelineLayout,
-    rows: Option<u32>,
+    constants: &[u32],
 ) -> Result<vk::Pipeline, vk::Result> {
-    let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: 4 }];
-    let data = rows.unwrap_or(0).to_ne_bytes();
-    let special = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
-    let mut stage =
-        vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module).name(c"main");
-    if rows.is_some() {
-        stage = stage.specialization_info(&special);
-    }
+    let entry = |index: u32| vk::SpecializationMapEntry { constant_id: index, offset: 4 * index, size: 4 };
+    let entries: Vec<vk::SpecializationMapEntry> = (0..constants.len() as u32).map(entry).collect();
+    let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(constants));
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(vk::ShaderStageFlags::COMPUTE)
+        .module(module)
+        .name(c"main")
+        .specialization_info(&special);
     let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
     // SAFETY: the caller's promise.
     let created = unsafe { next.create_compute_pipelines(vk::PipelineCache::null(), &info, None) };

@@ -23,10 +23,11 @@
 //! | `hooks` | the commands that are intercepted |
 //! | `instance`, `device` | what lives, by the loader's key |
 //! | `support` | the features and properties that devices get |
-//! | `formats`, `pipeline`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
+//! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `set`, `work` | a sorted set that is recorded, and its dispatches |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
+//! | `times` | the times of a set's stages |
 //! | `self_test`, `pair` | the test of a device's arithmetic |
 //!
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid usage, so
@@ -40,6 +41,7 @@ mod formats;
 mod hooks;
 mod instance;
 mod kernels;
+mod library;
 mod next;
 mod pair;
 mod pass;
@@ -52,6 +54,7 @@ mod scratch;
 mod self_test;
 mod set;
 mod support;
+mod times;
 mod work;
 
 pub use entry::entry;

@@ -11,6 +11,8 @@ use crate::instance::Instance;
 pub(crate) struct Next {
     device: ash::Device,
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
+    /// Nanoseconds of a step of timestamps.
+    pub(crate) timestamp_period: f32,
     pub(crate) draw_multi: Option<vk::PFN_vkCmdDrawMultiEXT>,
     pub(crate) draw_multi_indexed: Option<vk::PFN_vkCmdDrawMultiIndexedEXT>,
     pub(crate) begin_conditional_rendering: Option<vk::PFN_vkCmdBeginConditionalRenderingEXT>,
@@ -32,6 +34,7 @@ impl Next {
             Self {
                 device: ash::Device::load_with(load, handle),
                 memory: instance.next.get_physical_device_memory_properties(physical_device),
+                timestamp_period: instance.next.get_physical_device_properties(physical_device).limits.timestamp_period,
                 draw_multi: find(get, handle, c"vkCmdDrawMultiEXT"),
                 draw_multi_indexed: find(get, handle, c"vkCmdDrawMultiIndexedEXT"),
                 begin_conditional_rendering: find(get, handle, c"vkCmdBeginConditionalRenderingEXT"),

@@ -14,7 +14,7 @@ use gaurast::vk::{
 use gaurast_layer_interface::{find, slice};
 
 use crate::formats;
-use crate::kernels::{self, CAMERA, Kernels};
+use crate::kernels::{self, CAMERA, Kernels, Specialized, Variant};
 use crate::next::Next;
 use crate::report::tell;
 
@@ -56,8 +56,10 @@ pub(crate) struct Pipeline {
     pub(crate) cut_off: u32,
     pub(crate) cut_off_deviations: f32,
     pub(crate) compensation_floor: f32,
-    pub(crate) has_matrix: bool,
-    pub(crate) has_factor: bool,
+    /// The kernels for what the pipeline fixes.
+    pub(crate) specialized: Specialized,
+    /// Bytes from a harmonic's attribute to the next one's.
+    pub(crate) harmonics_step: u32,
     pub(crate) attributes: [Attribute; 33],
     pub(crate) sources: Vec<Source>,
     pub(crate) dynamic: Vec<vk::DynamicState>,
@@ -136,6 +138,27 @@ const SHOWN: [vk::DynamicState; 8] = [
 struct Attributes {
     list: [Attribute; 33],
     sources: Vec<Source>,
+    /// Every attribute is of 32-bit floats, as many as are wanted or more.
+    is_float32: bool,
+    /// Bytes from a harmonic's attribute to the next one's, if all are of one buffer and as far apart.
+    harmonics_step: Option<u32>,
+}
+
+/// The place of the first harmonic in the list of attributes.
+const HARMONICS: usize = 8;
+
+/// Bytes from each harmonic's attribute to the next one's, if they are the same.
+fn step(harmonics: &[Attribute]) -> Option<u32> {
+    let [first, ..] = harmonics else {
+        return None;
+    };
+    let step = harmonics.get(1).map_or(0, |second| second.offset.wrapping_sub(first.offset));
+    // Small ones, so that no place overflows.
+    let mut all = (0_u32..).zip(harmonics);
+    let are_even = all.all(|(index, harmonic)| {
+        harmonic.source == first.source && harmonic.offset.checked_sub(first.offset) == step.checked_mul(index)
+    });
+    Some(step).filter(|step| are_even && *step < 1 << 16)
 }
 
 impl Attributes {
@@ -156,7 +179,8 @@ impl Attributes {
                     .unwrap_or_default(),
             )
         };
-        let mut own = Self { list: [Attribute::default(); 33], sources: Vec::new() };
+        let mut own =
+            Self { list: [Attribute::default(); 33], sources: Vec::new(), is_float32: true, harmonics_step: None };
         let at = &state.attribute_locations;
         let harmonics = if state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
             0
@@ -167,7 +191,9 @@ impl Attributes {
         let matrix = matrix.filter(|_| at.first_model_matrix != UNUSED);
         let factor = Some((7, at.model_opacity)).filter(|_| at.model_opacity != UNUSED);
         let places = [(0, at.position), (1, at.scale), (2, at.rotation), (3, at.opacity)];
-        let harmonics = (0..harmonics).map(|k| (8 + k as usize, at.first_spherical_harmonics.saturating_add(k)));
+        let count = harmonics as usize;
+        let harmonics =
+            (0..harmonics).map(|k| (HARMONICS + k as usize, at.first_spherical_harmonics.saturating_add(k)));
         let used =
             places.into_iter().chain(matrix.map(|(place, at)| (place as usize, at))).chain(factor).chain(harmonics);
         for (place, location) in used {
@@ -191,7 +217,14 @@ impl Attributes {
                 own.sources.len() - 1
             });
             own.list[place] = Attribute { source: source as u32, offset: attribute.offset, format };
+            let wanted = match place {
+                2 | 4..7 => 4,
+                3 | 7 => 1,
+                _ => 3,
+            };
+            own.is_float32 &= formats::is_float32(format, wanted);
         }
+        own.harmonics_step = step(&own.list[HARMONICS..HARMONICS + count]).filter(|_| own.is_float32);
         Ok(own)
     }
 }
@@ -240,16 +273,26 @@ pub(crate) unsafe fn create(
         let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
         let view_mask = context.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
         let footprint = find::<Footprint<'_>>(info.p_next);
+        let cut_off = footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned());
+        let specialized = context.kernels.specialized(Variant {
+            has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
+            has_factor: state.attribute_locations.model_opacity != UNUSED,
+            harmonics_in_buffer: state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER),
+            is_float32: attributes.is_float32,
+            are_harmonics_even: attributes.harmonics_step.is_some(),
+            has_cut_tiles: cut_off >= 2,
+            degree: state.spherical_harmonics_degree,
+        })?;
         let raw = graphics(context, info, &dynamic, view_mask, allocator)?;
         let mut own = Pipeline {
             next: Arc::clone(context.next),
             raw,
             state: State { p_next: std::ptr::null(), _marker: std::marker::PhantomData, ..*state },
-            cut_off: footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned()),
+            cut_off,
             cut_off_deviations: footprint.map_or(0.0, |footprint| footprint.cut_off_deviations),
             compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
-            has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
-            has_factor: state.attribute_locations.model_opacity != UNUSED,
+            specialized,
+            harmonics_step: attributes.harmonics_step.unwrap_or(0),
             attributes: attributes.list,
             sources: attributes.sources,
             viewport: viewport.filter(|_| !viewport_is_dynamic),
@@ -367,7 +410,7 @@ unsafe fn camera_buffer(context: &Context<'_>, state: &State<'_>) -> Result<Came
     unsafe {
         let layout = kernels::layout(context.next, sets, vk::ShaderStageFlags::COMPUTE)?;
         let module = context.next.create_shader_module(&info, None)?;
-        let pipeline = kernels::compute(context.next, module, layout, Some(8 * state.camera_count.max(1)));
+        let pipeline = kernels::compute(context.next, module, layout, &[8 * state.camera_count.max(1)]);
         context.next.destroy_shader_module(module, None);
         Ok(CameraBuffer { set: state.camera_set, count: state.camera_count.max(1), pipeline: pipeline?, layout })
     }
@@ -408,3 +451,19 @@ pub(crate) use gvk::{
     DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST as SPHERICAL_HARMONICS_DEGREE,
     DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST as TRANSMITTANCE_FLOOR,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn harmonics_are_even_in_one_buffer() {
+        let at = |source: u32, offset: u32| Attribute { source, offset, format: 3 << 8 };
+        assert_eq!(step(&[]), None);
+        assert_eq!(step(&[at(0, 40)]), Some(0));
+        assert_eq!(step(&[at(0, 40), at(0, 52), at(0, 64)]), Some(12));
+        assert_eq!(step(&[at(0, 40), at(0, 52), at(0, 68)]), None, "gaps differ");
+        assert_eq!(step(&[at(0, 40), at(0, 52), at(1, 64)]), None, "buffers differ");
+        assert_eq!(step(&[at(0, 40), at(0, 28), at(0, 16)]), None, "offsets go down");
+    }
+}

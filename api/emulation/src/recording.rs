@@ -15,6 +15,7 @@ use crate::report::tell;
 use crate::scratch::{Memory, Places};
 use crate::set::{DynamicValues, Set, SetState};
 use crate::support::MAX_GAUSSIANS;
+use crate::times::Times;
 use crate::work::{Camera, Cameras, Draw, DrawSource, Work, barrier};
 
 /// The graphics pipeline that is bound.
@@ -135,6 +136,7 @@ pub(crate) struct Recording {
     /// Memory that recorded commands use.
     scratch: Option<Arc<Memory>>,
     kept: Vec<Arc<Memory>>,
+    times: Vec<Times>,
     pub(crate) failure: Option<vk::Result>,
 }
 
@@ -163,6 +165,7 @@ impl Recording {
             works: Vec::new(),
             scratch: None,
             kept: Vec::new(),
+            times: Vec::new(),
             failure: None,
         }
     }
@@ -376,7 +379,7 @@ impl Recording {
                 let places = Places::of(&extent);
                 match emulation.scratch(self.family, &mut self.scratch, places.end) {
                     Ok(scratch) => {
-                        work.record(next, kernels, self.commands, &scratch, &extent);
+                        self.times.extend(work.record(next, kernels, self.commands, &scratch, &extent));
                         address = work.pixels_at(&scratch, &places);
                         if !self.kept.iter().any(|kept| Arc::ptr_eq(kept, &scratch)) {
                             self.kept.push(scratch);
@@ -435,16 +438,18 @@ impl Recording {
             min_depth: 0.0,
             max_depth: 1.0,
         };
-        let pushed = [pixels as u32, (pixels >> 32) as u32, x.cast_unsigned(), y.cast_unsigned(), width, height, 0, 0];
-        let (graphics, fragment) = (vk::PipelineBindPoint::GRAPHICS, vk::ShaderStageFlags::FRAGMENT);
+        let picture = work.picture(pixels);
+        let [across, down] = work.tiles();
+        let graphics = vk::PipelineBindPoint::GRAPHICS;
+        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         // SAFETY: the caller's promise: the application has recorded what is repeated.
         unsafe {
             self.activate_queries(next);
             next.cmd_bind_pipeline(commands, graphics, work.pipeline.raw);
             next.cmd_set_viewport(commands, 0, &[viewport]);
             next.cmd_set_scissor(commands, 0, &[area]);
-            next.cmd_push_constants(commands, kernels.fetch_layout, fragment, 0, bytemuck::cast_slice(&pushed));
-            next.cmd_draw(commands, 3, 1, 0, 0);
+            next.cmd_push_constants(commands, kernels.fetch_layout, stages, 0, bytemuck::bytes_of(&picture));
+            next.cmd_draw(commands, 6 * across * down, 1, 0, 0);
             for repeat in self.states.values() {
                 repeat(next, commands);
             }

@@ -125,8 +125,9 @@ pub(crate) struct Places {
     pub(crate) pair_keys: u64,
     pub(crate) pair_values: u64,
     pub(crate) histogram: u64,
+    pub(crate) totals: u64,
     pub(crate) sums: u64,
-    pub(crate) counts: u64,
+    pub(crate) reached: u64,
     pub(crate) ranges: u64,
     pub(crate) records: u64,
     pub(crate) pixels: u64,
@@ -161,8 +162,9 @@ impl Places {
         places.pair_keys = take(8 * pairs);
         places.pair_values = take(8 * pairs);
         places.histogram = take(4 * histogram);
-        places.sums = take(4 * histogram.max(n).div_ceil(BLOCK).max(1));
-        places.counts = take(4 * n);
+        places.totals = take(4 * 256);
+        places.sums = take(4 * n.div_ceil(BLOCK).max(1));
+        places.reached = take(4 * n);
         places.ranges = take(8 * extent.tiles);
         places.records = take(RECORD * n);
         places.pixels = take(extent.pixels);

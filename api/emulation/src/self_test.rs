@@ -75,7 +75,7 @@ pub(crate) unsafe fn passes(next: &Arc<Next>, queue: TestQueue) -> Result<bool, 
             next.create_command_pool(&vk::CommandPoolCreateInfo::default().queue_family_index(queue.family), None)?;
         let module = kernels::module(next, kernels::SELF_TEST)?;
         let layout = kernels::layout(next, &[], vk::ShaderStageFlags::COMPUTE)?;
-        let pipeline = kernels::compute(next, module, layout, None)?;
+        let pipeline = kernels::compute(next, module, layout, &[])?;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
         let commands = next.allocate_command_buffers(&info)?[0];
         let raw_queue = next.get_device_queue(queue.family, 0);

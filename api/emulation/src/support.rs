@@ -34,7 +34,13 @@ pub(crate) unsafe fn can_be_emulated(
     // SAFETY: the caller's promise.
     unsafe { next.get_physical_device_features2(physical_device, &mut features) };
     let limits = properties.limits;
+    let mut subgroups = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut more = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroups);
+    // SAFETY: the caller's promise.
+    unsafe { next.get_physical_device_properties2(physical_device, &mut more) };
     vulkan_1_2.buffer_device_address != vk::FALSE
+        && subgroups.supported_operations.contains(vk::SubgroupFeatureFlags::VOTE)
+        && subgroups.supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
         && limits.max_compute_work_group_invocations >= 256
         && limits.max_compute_shared_memory_size >= 16384
         && limits.max_vertex_input_attributes >= 24
@@ -62,6 +68,7 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .spherical_harmonics_buffer(true)
         .gaussian_dynamic_state(true)
         .gaussian_cut_off(true)
+        .gaussian_multiview(true)
         .opacity_compensation_floor(true);
     (features.s_type, features.p_next) = (s_type, p_next);
 }

@@ -8,6 +8,7 @@ use crate::kernels::{Kernel, Kernels, PUSHED};
 use crate::next::Next;
 use crate::pipeline::{Attribute, Pipeline};
 use crate::scratch::{Extent, Memory, Places};
+use crate::times::Times;
 
 /// Width and height of a tile.
 const TILE: u32 = 16;
@@ -72,17 +73,19 @@ struct Parameters {
     values: u64,
     pair_keys: u64,
     pair_values: u64,
-    histogram: u64,
     sums: u64,
-    counts: u64,
+    reached: u64,
+    before_each: u64,
     ranges: u64,
     records: u64,
     image: u64,
+    shown: u64,
     feedback: u64,
     draws: u64,
     sources: u64,
     cameras: u64,
     derived: u64,
+    unused2: u64,
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -96,7 +99,7 @@ struct Parameters {
     order: u32,
     compensated: u32,
     cut_off: u32,
-    flags: u32,
+    harmonics_step: u32,
     low_pass: f32,
     alpha_floor: f32,
     alpha_ceiling: f32,
@@ -108,21 +111,37 @@ struct Parameters {
     padding: u32,
 }
 
-/// The push constants of kernels.
-#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+/// The push constants of kernels of a set.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Pushed {
     set: u64,
     view: u32,
-    sort: u32,
-    shift: u32,
-    is_first: u32,
+    /// The half of the pairs that is read.
     side: u32,
     /// The view's first pixel.
     plane: u32,
+    unused: u32,
 }
 
-const _: () = assert!(size_of::<Pushed>() == PUSHED as usize);
+/// The push constants of kernels of a sort's digit.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct PushedDigit {
+    keys: u64,
+    values: u64,
+    sorted_keys: u64,
+    sorted_values: u64,
+    histogram: u64,
+    totals: u64,
+    counters: u64,
+    shift: u32,
+    count_place: u32,
+    is_first_of_depths: u32,
+    unused: u32,
+}
+
+const _: () = assert!(size_of::<Pushed>() <= PUSHED as usize && size_of::<PushedDigit>() <= PUSHED as usize);
 
 /// The numbers of a pipeline that may be dynamic, as they are at the set's first draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,6 +161,18 @@ pub(crate) enum Cameras {
     Command(Vec<Camera>),
     /// A descriptor set with its dynamic offsets.
     Buffer(vk::DescriptorSet, Vec<u32>),
+}
+
+/// What a set has made of its area, as `shaders/shown.glsl` has it.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Picture {
+    /// The address of the pixels.
+    image: u64,
+    /// The address of a word for each tile.
+    shown: u64,
+    origin: [i32; 2],
+    size: [u32; 2],
 }
 
 /// The part of the framebuffer that a set may reach.
@@ -168,19 +199,29 @@ pub(crate) struct Work {
     pub(crate) pixels: Option<Arc<Memory>>,
 }
 
-/// Places of dispatches' sizes in the counters, as `shaders/set.glsl` has them.
+/// Places in the counters, as `shaders/counters.glsl` has them: numbers, and sizes of dispatches.
 #[derive(Clone, Copy)]
-enum Groups {
+enum Counter {
+    Gaussians = 0,
+    Seen = 1,
+    Stored = 3,
     ByGaussian = 4,
     SortGaussians = 7,
-    ScanGaussians = 10,
-    BySeen = 13,
-    SortSeen = 16,
-    ScanSeen = 19,
-    ScanCounts = 22,
-    ByPair = 25,
-    SortPairs = 28,
-    ScanPairs = 31,
+    BySeen = 10,
+    SortSeen = 13,
+    ByPair = 16,
+    SortPairs = 19,
+}
+
+/// A sort: two halves of keys and of values, and the number of keys.
+#[derive(Clone, Copy)]
+struct Sort {
+    keys: u64,
+    values: u64,
+    /// Bytes from a half to the other.
+    half: u64,
+    count: Counter,
+    groups: Counter,
 }
 
 impl Work {
@@ -189,8 +230,24 @@ impl Work {
     }
 
     /// Bytes of the pixels of all views.
-    pub(crate) fn pixel_bytes(&self) -> u64 {
+    fn image_bytes(&self) -> u64 {
         16 * u64::from(self.area.size[0]) * u64::from(self.area.size[1]) * u64::from(self.pipeline.planes())
+    }
+
+    /// The number of tiles of all views.
+    fn all_tiles(&self) -> u64 {
+        let [across, down] = self.tiles();
+        u64::from(across) * u64::from(down) * u64::from(self.pipeline.planes())
+    }
+
+    /// Bytes of what the set makes: pixels, and a word for each tile that says whether it is shown.
+    pub(crate) fn pixel_bytes(&self) -> u64 {
+        self.image_bytes() + 4 * self.all_tiles()
+    }
+
+    /// What the set makes, for the shaders that show it.
+    pub(crate) fn picture(&self, address: u64) -> Picture {
+        Picture { image: address, shown: address + self.image_bytes(), origin: self.area.origin, size: self.area.size }
     }
 
     fn camera_count(&self) -> u32 {
@@ -225,25 +282,27 @@ impl Work {
 
     fn parameters(&self, scratch: &Memory, places: &Places, extent: &Extent, feedback: u64) -> Parameters {
         let at = |place: u64| scratch.address + place;
-        let pipeline = &self.pipeline;
-        let flags = [(pipeline.has_matrix, 1), (pipeline.has_factor, 2), (pipeline.has_harmonics_buffer(), 4)];
+        let (pipeline, picture) = (&self.pipeline, self.picture(self.pixels_at(scratch, places)));
         Parameters {
             counters: at(places.counters),
             keys: at(places.keys),
             values: at(places.values),
             pair_keys: at(places.pair_keys),
             pair_values: at(places.pair_values),
-            histogram: at(places.histogram),
             sums: at(places.sums),
-            counts: at(places.counts),
+            reached: at(places.reached),
+            // The keys are not needed any more.
+            before_each: at(places.keys),
             ranges: at(places.ranges),
             records: at(places.records),
-            image: self.pixels_at(scratch, places),
+            image: picture.image,
+            shown: picture.shown,
             feedback,
             draws: at(places.draws),
             sources: at(places.sources),
             cameras: at(places.cameras),
             derived: at(places.derived),
+            unused2: 0,
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -257,7 +316,7 @@ impl Work {
             order: self.values.order,
             compensated: u32::from(self.values.is_compensated),
             cut_off: pipeline.cut_off,
-            flags: flags.iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).sum(),
+            harmonics_step: pipeline.harmonics_step,
             low_pass: self.values.low_pass,
             alpha_floor: self.values.alpha_floor,
             alpha_ceiling: self.values.alpha_ceiling,
@@ -276,17 +335,18 @@ impl Work {
     /// The command buffer is being recorded, and the scratch is as large as the places say.
     pub(crate) unsafe fn record(
         &self,
-        next: &Next,
+        next: &Arc<Next>,
         kernels: &Kernels,
         commands: vk::CommandBuffer,
         scratch: &Memory,
         extent: &Extent,
-    ) {
+    ) -> Option<Times> {
         let places = Places::of(extent);
         let parameters = self.parameters(scratch, &places, extent, kernels.feedback.address);
-        let run = Run { next, kernels, commands, scratch, places };
         // SAFETY: the caller's promise, for all below.
         unsafe {
+            let times = Times::begin(next, commands);
+            let mut run = Run { next, kernels, commands, scratch, extent, places, times };
             run.barrier();
             run.write(places.parameters, bytemuck::bytes_of(&parameters));
             run.write(places.draws, bytemuck::cast_slice(&self.draws));
@@ -295,10 +355,16 @@ impl Work {
                 Cameras::Command(cameras) => run.write(places.cameras, bytemuck::cast_slice(cameras)),
                 Cameras::Buffer(set, offsets) => self.copy_cameras(&run, *set, offsets),
             }
+            let (shown, buffer) = match &self.pixels {
+                Some(memory) => (self.image_bytes(), memory.buffer),
+                None => (places.pixels + self.image_bytes(), scratch.buffer),
+            };
+            next.cmd_fill_buffer(commands, buffer, shown, 4 * self.all_tiles(), 0);
             for view in self.pipeline.views() {
-                self.record_view(&run, view);
+                self.record_view(&mut run, view);
             }
             run.barrier();
+            run.times
         }
     }
 
@@ -308,7 +374,7 @@ impl Work {
         let Some(camera) = &self.pipeline.camera_buffer else {
             return;
         };
-        let pushed = Pushed { set: run.scratch.address + run.places.cameras, ..Pushed::default() };
+        let copied = run.scratch.address + run.places.cameras;
         let compute = vk::PipelineBindPoint::COMPUTE;
         // SAFETY: the caller's promise.
         unsafe {
@@ -316,49 +382,62 @@ impl Work {
             next.cmd_bind_pipeline(commands, compute, camera.pipeline);
             next.cmd_bind_descriptor_sets(commands, compute, camera.layout, camera.set, &[set], offsets);
             let stages = vk::ShaderStageFlags::COMPUTE;
-            next.cmd_push_constants(commands, camera.layout, stages, 0, bytemuck::bytes_of(&pushed));
+            next.cmd_push_constants(commands, camera.layout, stages, 0, bytemuck::bytes_of(&copied));
             next.cmd_dispatch(commands, 1, 1, 1);
         }
     }
 
     /// # Safety
     /// As [`Self::record`].
-    unsafe fn record_view(&self, run: &Run<'_>, view: u32) {
+    unsafe fn record_view(&self, run: &mut Run<'_>, view: u32) {
         let [across, down] = self.tiles();
         let tiles = across * down;
         let plane = view * self.area.size[0] * self.area.size[1];
-        let pushed = Pushed { set: run.scratch.address + run.places.parameters, view, plane, ..Pushed::default() };
+        let pushed = Pushed { set: run.scratch.address + run.places.parameters, view, side: 0, plane, unused: 0 };
+        let (places, specialized) = (run.places, self.pipeline.specialized);
+        let by_depth = Sort {
+            keys: run.scratch.address + places.keys,
+            values: run.scratch.address + places.values,
+            half: 4 * run.extent.gaussians,
+            count: Counter::Seen,
+            groups: Counter::SortSeen,
+        };
+        let by_tile = Sort {
+            keys: run.scratch.address + places.pair_keys,
+            values: run.scratch.address + places.pair_values,
+            half: 4 * run.extent.pairs,
+            count: Counter::Stored,
+            groups: Counter::SortPairs,
+        };
         // SAFETY: the caller's promise.
         unsafe {
             run.barrier();
             run.next.cmd_fill_buffer(run.commands, run.scratch.buffer, run.places.ranges, 8 * u64::from(tiles), 0);
             run.one(Kernel::Prepare, pushed);
-            run.indirect(Kernel::Project, pushed, Groups::ByGaussian);
-            // By depth: what is not seen falls out with the first digit.
-            for digit in 0..4 {
-                let is_first = u32::from(digit == 0);
-                let pushed = Pushed { sort: 0, shift: 8 * digit, is_first, side: digit & 1, ..pushed };
-                let (by, scan) = if digit == 0 {
-                    (Groups::SortGaussians, Groups::ScanGaussians)
-                } else {
-                    (Groups::SortSeen, Groups::ScanSeen)
-                };
-                run.sort(pushed, by, scan);
+            run.end_stage("prepare");
+            run.indirect(specialized.project, &pushed, Counter::ByGaussian);
+            run.end_stage("project");
+            // What is not seen falls out with the first digit.
+            let unseen = Sort { count: Counter::Gaussians, groups: Counter::SortGaussians, ..by_depth };
+            run.digit(unseen, 0, true);
+            for digit in 1..4 {
+                run.digit(by_depth, digit, false);
             }
-            run.indirect(Kernel::Count, pushed, Groups::BySeen);
-            let counted = Pushed { sort: 2, ..pushed };
-            run.indirect(Kernel::ScanBlocks, counted, Groups::ScanCounts);
-            run.one(Kernel::ScanSums, counted);
-            run.indirect(Kernel::Emit, pushed, Groups::BySeen);
-            // By tile.
+            run.end_stage("sort by depth");
+            run.indirect(run.kernels.pipeline(Kernel::ScanTiles), &pushed, Counter::SortSeen);
+            run.one(Kernel::CountPairs, pushed);
+            run.indirect(run.kernels.pipeline(Kernel::Emit), &pushed, Counter::BySeen);
+            run.end_stage("pairs");
             let digits = (u32::BITS - (tiles - 1).leading_zeros()).div_ceil(8).max(1);
             for digit in 0..digits {
-                let pushed = Pushed { sort: 1, shift: 8 * digit, is_first: 0, side: digit & 1, ..pushed };
-                run.sort(pushed, Groups::SortPairs, Groups::ScanPairs);
+                run.digit(by_tile, digit, false);
             }
+            run.end_stage("sort by tile");
             let sorted = Pushed { side: digits & 1, ..pushed };
-            run.indirect(Kernel::Ranges, sorted, Groups::ByPair);
-            run.dispatch(Kernel::Raster, sorted, [across, down]);
+            run.indirect(run.kernels.pipeline(Kernel::Ranges), &sorted, Counter::ByPair);
+            run.end_stage("ranges");
+            run.dispatch(specialized.raster, &sorted, [across, down]);
+            run.end_stage("rasterize");
         }
     }
 }
@@ -369,14 +448,24 @@ struct Run<'a> {
     kernels: &'a Kernels,
     commands: vk::CommandBuffer,
     scratch: &'a Memory,
+    extent: &'a Extent,
     places: Places,
+    times: Option<Times>,
 }
 
 impl Run<'_> {
-    /// All that was written before is there for what follows.
+    /// Notes that a stage ends.
     ///
     /// # Safety
     /// The command buffer is being recorded, outside of a render pass; here and below.
+    unsafe fn end_stage(&mut self, stage: &'static str) {
+        if let Some(times) = &mut self.times {
+            // SAFETY: the caller's promise.
+            unsafe { times.end_stage(self.commands, stage) };
+        }
+    }
+
+    /// All that was written before is there for what follows.
     unsafe fn barrier(&self) {
         // SAFETY: the caller's promise.
         unsafe { barrier(self.next, self.commands) };
@@ -404,48 +493,61 @@ impl Run<'_> {
         }
     }
 
-    unsafe fn bind(&self, kernel: Kernel, pushed: Pushed) {
+    unsafe fn bind<P: bytemuck::Pod>(&self, pipeline: vk::Pipeline, pushed: &P) {
         let stages = vk::ShaderStageFlags::COMPUTE;
         // SAFETY: the caller's promise.
         unsafe {
             self.kernel_barrier();
-            let pipeline = self.kernels.pipeline(kernel);
             self.next.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline);
-            let bytes = bytemuck::bytes_of(&pushed);
+            let bytes = bytemuck::bytes_of(pushed);
             self.next.cmd_push_constants(self.commands, self.kernels.layout, stages, 0, bytes);
         }
     }
 
-    unsafe fn dispatch(&self, kernel: Kernel, pushed: Pushed, [x, y]: [u32; 2]) {
+    unsafe fn dispatch<P: bytemuck::Pod>(&self, pipeline: vk::Pipeline, pushed: &P, [x, y]: [u32; 2]) {
         // SAFETY: the caller's promise.
         unsafe {
-            self.bind(kernel, pushed);
+            self.bind(pipeline, pushed);
             self.next.cmd_dispatch(self.commands, x, y, 1);
         }
     }
 
     unsafe fn one(&self, kernel: Kernel, pushed: Pushed) {
         // SAFETY: the caller's promise.
-        unsafe { self.dispatch(kernel, pushed, [1, 1]) };
+        unsafe { self.dispatch(self.kernels.pipeline(kernel), &pushed, [1, 1]) };
     }
 
-    unsafe fn indirect(&self, kernel: Kernel, pushed: Pushed, groups: Groups) {
+    unsafe fn indirect<P: bytemuck::Pod>(&self, pipeline: vk::Pipeline, pushed: &P, groups: Counter) {
         // SAFETY: the caller's promise.
         unsafe {
-            self.bind(kernel, pushed);
+            self.bind(pipeline, pushed);
             let at = self.places.counters + 4 * groups as u64;
             self.next.cmd_dispatch_indirect(self.commands, self.scratch.buffer, at);
         }
     }
 
     /// A digit of a sort.
-    unsafe fn sort(&self, pushed: Pushed, by: Groups, scan: Groups) {
+    unsafe fn digit(&self, sort: Sort, digit: u32, is_first_of_depths: bool) {
+        let at = |place: u64| self.scratch.address + place;
+        let (from, to) = if digit.is_multiple_of(2) { (0, sort.half) } else { (sort.half, 0) };
+        let pushed = PushedDigit {
+            keys: sort.keys + from,
+            values: sort.values + from,
+            sorted_keys: sort.keys + to,
+            sorted_values: sort.values + to,
+            histogram: at(self.places.histogram),
+            totals: at(self.places.totals),
+            counters: at(self.places.counters),
+            shift: 8 * digit,
+            count_place: sort.count as u32,
+            is_first_of_depths: u32::from(is_first_of_depths),
+            unused: 0,
+        };
         // SAFETY: the caller's promise.
         unsafe {
-            self.indirect(Kernel::Histogram, pushed, by);
-            self.indirect(Kernel::ScanBlocks, pushed, scan);
-            self.one(Kernel::ScanSums, pushed);
-            self.indirect(Kernel::Scatter, pushed, by);
+            self.indirect(self.kernels.pipeline(Kernel::Histogram), &pushed, sort.groups);
+            self.dispatch(self.kernels.pipeline(Kernel::ScanDigits), &pushed, [256, 1]);
+            self.indirect(self.kernels.pipeline(Kernel::Scatter), &pushed, sort.groups);
         }
     }
 }

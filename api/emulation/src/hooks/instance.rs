@@ -103,11 +103,7 @@ pub(super) unsafe extern "system" fn enumerate_device_extension_properties(
                 Err(error) => return error,
             }
         };
-        all.retain(|extension| {
-            // Parts of pipelines of Gaussians cannot be linked yet.
-            let hidden = [NAME, ash::ext::graphics_pipeline_library::NAME];
-            !extension.extension_name_as_c_str().is_ok_and(|name| hidden.contains(&name))
-        });
+        all.retain(|extension| extension.extension_name_as_c_str() != Ok(NAME));
         let mut own = vk::ExtensionProperties { spec_version: SPEC_VERSION, ..Default::default() };
         for (to, from) in own.extension_name.iter_mut().zip(NAME.to_bytes_with_nul()) {
             *to = *from as c_char;

@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use ash::vk;
+use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST as State;
 use gaurast_layer_interface::{find_mut, slice};
 
 use crate::device::Device;
+use crate::emulation::Emulation;
 use crate::hooks::site::call;
-use crate::pipeline::{self, Context};
+use crate::library::{self, Library};
+use crate::pipeline::{self, Context, Pipeline};
 use crate::render_pass;
 
 pub(super) unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const vk::AllocationCallbacks<'_>) {
@@ -247,6 +250,91 @@ pub(super) unsafe extern "system" fn destroy_render_pass(
     }
 }
 
+/// Creates a pipeline: of Gaussians or not, whole or linked from libraries, or a library.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn create_graphics_pipeline(
+    own: &Device,
+    emulation: &Emulation,
+    cache: vk::PipelineCache,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    allocator: Option<&vk::AllocationCallbacks<'_>>,
+    place: &mut vk::Pipeline,
+) -> vk::Result {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let pass_on = |place: &mut vk::Pipeline| {
+            let allocator = allocator.map_or(std::ptr::null(), std::ptr::from_ref);
+            (own.next.fp_v1_0().create_graphics_pipelines)(own.next.handle(), cache, 1, info, allocator, place)
+        };
+        let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
+        let libraries = library::linked(info);
+        let created = if is_library || !libraries.is_empty() {
+            let objects = emulation.objects();
+            let linked: Vec<Arc<Library>> =
+                libraries.iter().filter_map(|library| objects.libraries.get(library)).cloned().collect();
+            drop(objects);
+            let parts = Library::new(info, &linked);
+            if is_library {
+                let result = if parts.is_gaussian() {
+                    library::empty(&own.next, allocator).map_or_else(
+                        |error| error,
+                        |empty| {
+                            *place = empty;
+                            vk::Result::SUCCESS
+                        },
+                    )
+                } else {
+                    pass_on(place)
+                };
+                if result == vk::Result::SUCCESS {
+                    emulation.objects_mut().libraries.insert(*place, Arc::new(parts));
+                }
+                return result;
+            }
+            parts.with_info(info.flags, info.layout, |info, state| {
+                create_gaussian_pipeline(own, emulation, cache, info, state, allocator)
+            })
+        } else {
+            let state = pipeline::gaussian_state(info);
+            state.map(|state| create_gaussian_pipeline(own, emulation, cache, info, state, allocator))
+        };
+        match created {
+            None => pass_on(place),
+            Some(Ok(pipeline)) => {
+                *place = pipeline.raw;
+                emulation.objects_mut().pipelines.insert(pipeline.raw, Arc::new(pipeline));
+                vk::Result::SUCCESS
+            }
+            Some(Err(error)) => error,
+        }
+    }
+}
+
+/// Creates a pipeline of Gaussians.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn create_gaussian_pipeline(
+    own: &Device,
+    emulation: &Emulation,
+    cache: vk::PipelineCache,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    state: &State<'_>,
+    allocator: Option<&vk::AllocationCallbacks<'_>>,
+) -> Result<Pipeline, vk::Result> {
+    let objects = emulation.objects();
+    let known = objects.render_passes.get(&info.render_pass);
+    let view_mask = known.and_then(|known| known.view_masks.get(info.subpass as usize)).copied();
+    let set_layouts = objects.layouts.get(&info.layout).cloned().unwrap_or_default();
+    drop(objects);
+    let context =
+        Context { next: &own.next, kernels: emulation.kernels()?, view_mask, set_layouts: &set_layouts, cache };
+    // SAFETY: the caller's promise.
+    unsafe { pipeline::create(&context, info, state, allocator) }
+}
+
 pub(super) unsafe extern "system" fn create_graphics_pipelines(
     device: vk::Device,
     cache: vk::PipelineCache,
@@ -260,37 +348,18 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
         call(device, |own| {
             let create = own.next.fp_v1_0().create_graphics_pipelines;
             let all = slice(infos, count);
-            let are_gaussian = all.iter().any(|info| pipeline::gaussian_state(info).is_some());
-            let Some(emulation) = own.emulation.as_ref().filter(|_| are_gaussian) else {
+            let is_plain = |info: &vk::GraphicsPipelineCreateInfo<'_>| {
+                let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
+                pipeline::gaussian_state(info).is_none() && !is_library && library::linked(info).is_empty()
+            };
+            let Some(emulation) = own.emulation.as_ref().filter(|_| !all.iter().all(is_plain)) else {
                 return create(device, cache, count, infos, allocator, pipelines);
             };
             let mut first_error = vk::Result::SUCCESS;
             for (index, info) in all.iter().enumerate() {
                 let place = pipelines.add(index);
                 *place = vk::Pipeline::null();
-                let result = match pipeline::gaussian_state(info) {
-                    None => create(device, cache, 1, info, allocator, place),
-                    Some(state) => {
-                        let objects = emulation.objects();
-                        let known = objects.render_passes.get(&info.render_pass);
-                        let view_mask = known.and_then(|known| known.view_masks.get(info.subpass as usize)).copied();
-                        let set_layouts = objects.layouts.get(&info.layout).cloned().unwrap_or_default();
-                        drop(objects);
-                        let created = emulation.kernels().and_then(|kernels| {
-                            let context =
-                                Context { next: &own.next, kernels, view_mask, set_layouts: &set_layouts, cache };
-                            pipeline::create(&context, info, state, allocator.as_ref())
-                        });
-                        match created {
-                            Ok(pipeline) => {
-                                *place = pipeline.raw;
-                                emulation.objects_mut().pipelines.insert(pipeline.raw, Arc::new(pipeline));
-                                vk::Result::SUCCESS
-                            }
-                            Err(error) => error,
-                        }
-                    }
-                };
+                let result = create_graphics_pipeline(own, emulation, cache, info, allocator.as_ref(), &mut *place);
                 if first_error == vk::Result::SUCCESS {
                     first_error = result;
                 }
@@ -315,7 +384,9 @@ pub(super) unsafe extern "system" fn destroy_pipeline(
     unsafe {
         let _ = call(device, |own| {
             if let Some(emulation) = &own.emulation {
-                emulation.objects_mut().pipelines.remove(&pipeline);
+                let mut objects = emulation.objects_mut();
+                objects.pipelines.remove(&pipeline);
+                objects.libraries.remove(&pipeline);
             }
             own.next.destroy_pipeline(pipeline, allocator.as_ref());
             vk::Result::SUCCESS

@@ -1,0 +1,12 @@
+// What a pipeline of Gaussians fixes of the kernel that projects, so that what it does not use costs nothing.
+
+layout(constant_id = 0) const bool HAS_MATRIX = false;
+layout(constant_id = 1) const bool HAS_FACTOR = false;
+layout(constant_id = 2) const bool HARMONICS_IN_BUFFER = false;
+// Every attribute is of 32-bit floats, as many as are wanted or more.
+layout(constant_id = 3) const bool IS_FLOAT32 = false;
+// Harmonics are of one vertex buffer, each as many bytes after the one before.
+layout(constant_id = 4) const bool ARE_HARMONICS_EVEN = false;
+layout(constant_id = 5) const bool HAS_CUT_TILES = false;
+// Of the attributes.
+layout(constant_id = 6) const uint DEGREE = 3u;
