@@ -52,6 +52,12 @@ pub enum OutputError {
         /// The file.
         path: PathBuf,
     },
+    /// No supported format of depths has the extension.
+    #[error("{}: depths are written as .png or .npy", path.display())]
+    UnknownDepthFormat {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file cannot be written.
     #[error("{}: {source}", path.display())]
     Io {

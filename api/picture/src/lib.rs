@@ -16,6 +16,7 @@
 
 mod atomic;
 mod color;
+mod depth;
 mod files;
 #[cfg(feature = "metrics")]
 #[allow(clippy::disallowed_methods, reason = "a metric: it judges pictures and is no part of one")]
@@ -36,6 +37,7 @@ mod tiles;
 
 pub use atomic::{folder, write_atomically};
 pub use color::Background;
+pub use depth::{DepthFormat, DepthMap, write_depths};
 pub use files::{
     Colors, DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb, write,
     write_encoded,

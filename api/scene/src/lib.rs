@@ -17,6 +17,8 @@ mod axes;
 pub mod camera;
 pub mod camera_files;
 pub mod camera_path;
+pub mod camera_tracks;
+mod crop;
 mod error;
 mod formats;
 mod framing;
@@ -32,6 +34,7 @@ mod transform;
 
 pub use axes::{Axes, AxesReason, FileAxes};
 pub use camera::Camera;
+pub use crop::Crop;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{Options, known_extensions, open, open_with, read, read_with};
 pub use framing::{DEFAULT_UP, Extent, Framed, Framing, Subject, default_angles, frame, frame_middle, inside};

@@ -236,6 +236,23 @@ impl Scene {
         }
     }
 
+    /// Leaves out the Gaussians for whose position `keep` is false.
+    pub(crate) fn retain(&mut self, keep: impl Fn([f32; 3]) -> bool) {
+        let stride = self.sh_stride();
+        let mut kept = 0;
+        for index in 0..self.len() {
+            if keep(self.positions[index]) {
+                self.positions[kept] = self.positions[index];
+                self.shapes[kept] = self.shapes[index];
+                self.sh.copy_within(index * stride..(index + 1) * stride, kept * stride);
+                kept += 1;
+            }
+        }
+        self.positions.truncate(kept);
+        self.shapes.truncate(kept);
+        self.sh.truncate(kept * stride);
+    }
+
     /// Raises the degree to `degree`; new coefficients are zero.
     fn raise_degree(&mut self, degree: u32) {
         if degree == self.sh_degree {

@@ -277,8 +277,8 @@ pub struct OutputArguments {
     /// The file, folder or video for the pictures; may be given more than once [default: the scene's name with .png]
     ///
     /// PNG and WebP (lossless) and JPEG have 8 bits, with colours as they are trained; EXR has 32-bit floats. Several
-    /// views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4, .webm or .gif,
-    /// made by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
+    /// views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4, .webm, .gif or
+    /// animated .webp, made by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
 
@@ -316,6 +316,17 @@ pub struct OutputArguments {
     /// Write depths to EXR files, too: the median as Z, the expected one as expected.Z
     #[arg(long)]
     pub depth: bool,
+
+    /// Also write the median depths: 16-bit PNG or .npy; a file, a pattern such as depth_%04d.png, or a folder
+    ///
+    /// A PNG file has whole steps of --depth-step, 0 where nothing is, and 65535 for that depth and greater ones. A .npy file
+    /// has NumPy's array of binary32, in the scene's units, infinite where nothing is.
+    #[arg(long, value_name = "FILE")]
+    pub depth_output: Vec<PathBuf>,
+
+    /// The step of depths in PNG files, in the scene's units
+    #[arg(long, value_name = "UNITS", default_value_t = 0.001, value_parser = positive, requires = "depth_output")]
+    pub depth_step: f64,
 
     /// Also draw a picture of the work in each 16x16 tile, from black to white
     #[arg(long, value_name = "FILE")]

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use gaurast_picture::Background;
 use gaurast_scene::camera::{Camera, CameraError, DEFAULT_FOV, Model};
-use gaurast_scene::camera_files::{self, CameraFileError, CameraFileOptions};
+use gaurast_scene::camera_files::{self, CameraFileError, CameraFileOptions, CroppedScene};
 use gaurast_scene::camera_path::{self, Keyframe};
-use gaurast_scene::{Axes, DEFAULT_UP, Extent, Framing, Scene, Subject, default_angles};
+use gaurast_scene::camera_tracks;
+use gaurast_scene::{Axes, DEFAULT_UP, Extent, Framing, Scene, Subject};
 use glam::DVec3;
 use thiserror::Error;
 
@@ -39,7 +41,7 @@ pub enum ViewError {
     NoCameras,
     #[error("{}: {source}", path.display())]
     PathFile { path: PathBuf, source: std::io::Error },
-    #[error("{}: not a list of keyframes: {source}", path.display())]
+    #[error("{}: not a list of keyframes, nor a camera track: {source}", path.display())]
     Path { path: PathBuf, source: serde_json::Error },
     #[error("--axes {0}: these axes mirror the scene, and a camera file can't be mirrored with it")]
     Mirrored(Axes),
@@ -66,6 +68,8 @@ pub struct View {
 #[derive(Debug, Default)]
 pub struct Views {
     pub views: Vec<View>,
+    /// The part of the scene that a camera file shows, if not all of it.
+    pub cropped: Option<CroppedScene>,
     /// Notes for the user, a sentence each.
     pub notes: Vec<String>,
     /// The options that give the same view again, if the view was chosen to fit the scene.
@@ -80,6 +84,42 @@ pub enum Known {
     Path(Vec<Camera>),
     /// The cameras depend on the scene.
     Scene,
+}
+
+impl Known {
+    /// The number of views.
+    pub fn count(&self, arguments: &CameraArguments) -> usize {
+        match self {
+            Self::File(views) => views.views.len(),
+            Self::Path(cameras) => cameras.len(),
+            Self::Scene => arguments.orbit.map_or(1, |count| count as usize),
+        }
+    }
+
+    /// The background of the scene that a camera file gives.
+    pub fn background(&self) -> Option<Background> {
+        match self {
+            Self::File(views) => views.cropped.map(|cropped| Background::Color(cropped.background)),
+            Self::Path(_) | Self::Scene => None,
+        }
+    }
+
+    /// Leaves out the part of the scene that a camera file does not show.
+    pub fn crop(&mut self, scene: &mut Scene) {
+        let Self::File(views) = self else {
+            return;
+        };
+        let Some(CroppedScene { crop, .. }) = views.cropped else {
+            return;
+        };
+        let turned = scene.metadata().axes.filter(|axes| axes.of_cameras);
+        let count = scene.len();
+        turned.map_or(crop, |axes| crop.with_axes(axes.axes)).apply(scene);
+        views.notes.push(format!(
+            "{} of {count} Gaussians are in the box to which the camera file crops the scene",
+            scene.len()
+        ));
+    }
 }
 
 /// Reads the camera file or the path, if the arguments have one.
@@ -123,6 +163,7 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
     }
     let file = camera_files::read(path, &options)?;
     views.notes.extend(file.ignored);
+    views.cropped = file.crop;
     let chosen = if arguments.view.is_empty() {
         choose("0", path, &file.views)?
     } else {
@@ -132,12 +173,17 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
         }
         chosen
     };
+    let training_size = source.training_size.as_ref().filter(|_| source.cameras.as_ref() == Some(path));
     for index in chosen {
         let camera_files::View { name, camera } = file.views[index].clone();
-        let camera = match size {
-            Some(size) => camera.resized(size),
-            None => camera,
-        };
+        let own = [camera.width, camera.height];
+        let [width, height] = size.or(training_size.map(|sizes| sizes.of(&name, own))).unwrap_or(own);
+        if size.is_none() && [width, height] != own && views.views.is_empty() {
+            views.notes.push(format!(
+                "the pictures are as large as those of the training, {width}x{height}, as cfg_args says"
+            ));
+        }
+        let camera = if [width, height] == own { camera } else { camera.resized([width, height]) };
         let name = if name.is_empty() { format!("{index:05}") } else { name };
         views.views.push(View { name: Some(name), camera });
     }
@@ -174,6 +220,10 @@ pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden
         let near = arguments.near.unwrap_or(camera.near);
         view.camera = camera.with_planes(near, arguments.far.unwrap_or(camera.far));
         view.camera.check()?;
+    }
+    if let Some(view) = views.views.first().filter(|view| view.camera.model == Model::Orthographic) {
+        let scale = short(1.0 / view.camera.focal[1]);
+        views.notes.push(format!("the scale of the picture is {scale} units a pixel"));
     }
     Ok(views)
 }
@@ -270,13 +320,9 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, scene: &Scene, garden: 
             };
             let subject = Subject::of(scene);
             let framed = if arguments.orbit.is_some() { framing.orbit(&subject)? } else { framing.framed(&subject)? };
-            let (azimuth, elevation) = default_angles();
-            let placed = format!(
-                "framed by --azimuth {:.1} --elevation {:.1} --distance {}",
-                arguments.azimuth.unwrap_or(azimuth),
-                arguments.elevation.unwrap_or(elevation),
-                short(framed.distance),
-            );
+            let (azimuth, elevation) = framing.angles();
+            let distance = short(framed.distance);
+            let placed = format!("framed by --azimuth {azimuth:.1} --elevation {elevation:.1} --distance {distance}");
             let given = [
                 ("--target", Some(place(framed.target, framed.distance))),
                 ("--up", arguments.up.map(|up| triple(up.0))),
@@ -321,8 +367,10 @@ fn triple(values: [f64; 3]) -> String {
 
 fn path_cameras(arguments: &CameraArguments, path: &std::path::Path, size: [u32; 2]) -> Result<Vec<Camera>, ViewError> {
     let text = std::fs::read_to_string(path).map_err(|source| ViewError::PathFile { path: path.to_owned(), source })?;
-    let keyframes: Vec<Keyframe> =
-        serde_json::from_str(&text).map_err(|source| ViewError::Path { path: path.to_owned(), source })?;
+    let is_track = text.trim_start().starts_with('{');
+    let keyframes: Result<Vec<Keyframe>, _> =
+        if is_track { camera_tracks::parse(&text, size) } else { serde_json::from_str(&text) };
+    let keyframes = keyframes.map_err(|source| ViewError::Path { path: path.to_owned(), source })?;
     if keyframes.is_empty() {
         return Err(ViewError::NoKeyframe { path: path.to_owned() });
     }

@@ -191,8 +191,10 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
         size: Some(arguments.camera.size.unwrap_or(Size(size))),
         ..arguments.modes.cameras(&arguments.camera)
     };
-    let known = cameras::read(&camera, &source)?;
-    let (scene, _) = source.load(progress)?;
+    let mut known = cameras::read(&camera, &source)?;
+    let (mut scene, _) = source.load(progress)?;
+    known.crop(&mut scene);
+    let trained = known.background().or(source.background);
     let views = cameras::of_scene(known, &camera, &scene, false)?.views;
     if !arguments.quiet && !arguments.json {
         for note in drawing::notes(&arguments.modes, &scene) {
@@ -203,7 +205,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let settings = drawing::settings(&arguments.modes, &scene);
     let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
     let frame = drawing.frame(&view)?;
-    let background = arguments.background.or(source.background);
+    let background = arguments.background.or(trained);
     Ok(frame.picture.over(background.map_or([0.0; 3], Background::color)))
 }
 

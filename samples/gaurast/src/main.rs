@@ -4,6 +4,7 @@
 
 mod args;
 mod cameras;
+mod cfg_args;
 mod command_line;
 mod compare;
 mod compare_drivers;
@@ -17,6 +18,7 @@ mod limits;
 mod measures;
 mod messages;
 mod outputs;
+mod photographs;
 mod progress;
 mod render;
 mod renderers;
@@ -27,6 +29,7 @@ mod simulate_machines;
 mod simulate_plot;
 mod simulate_report;
 mod sources;
+mod training_size;
 
 use std::process::ExitCode;
 

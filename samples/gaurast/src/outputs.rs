@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-use gaurast_picture::{Background, Colors, Encoding, OutputError, Picture, PictureFormat};
+use gaurast_picture::{Background, Colors, DepthFormat, DepthMap, Encoding, OutputError, Picture, PictureFormat};
 use thiserror::Error;
 
 use crate::args::OutputArguments;
@@ -18,12 +18,13 @@ const EVEN: [&str; 4] = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yu
 const PALETTE: [&str; 2] = ["-filter_complex", "split[a][b];[a]palettegen[p];[b][p]paletteuse"];
 
 /// File extensions of videos, and ffmpeg's arguments for them: its filters, and those of the encoder.
-const VIDEOS: [(&str, &[&str], &[&str]); 5] = [
+const VIDEOS: [(&str, &[&str], &[&str]); 6] = [
     ("mp4", &EVEN, &["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"]),
     ("mov", &EVEN, &["-c:v", "libx264", "-crf", "18"]),
     ("mkv", &EVEN, &["-c:v", "libx264", "-crf", "18"]),
     ("webm", &EVEN, &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"]),
     ("gif", &PALETTE, &["-loop", "0"]),
+    ("webp", &[], &["-c:v", "libwebp_anim", "-loop", "0", "-quality", "70"]),
 ];
 
 /// A failure to write pictures. Displayed as one sentence.
@@ -80,18 +81,42 @@ enum Place {
 }
 
 impl Place {
-    fn of(path: &Path) -> Result<Self, WriteError> {
+    /// The place of the pictures of `views` views.
+    fn of(path: &Path, views: usize) -> Result<Self, WriteError> {
         let text = path.to_string_lossy();
         if text == "-" {
             return Ok(Self::Stdout);
         }
-        if text.ends_with('/') || path.is_dir() {
-            return Ok(Self::Folder(path.to_owned()));
+        if let Some(folder) = Self::of_folder(path) {
+            return Ok(folder);
         }
-        if video_options(path).is_some() {
+        let format = PictureFormat::of(path);
+        // A file that may have one picture is animated if there are several.
+        if video_options(path).is_some() && (format.is_err() || views > 1 && !text.contains('%')) {
             return Ok(Self::Video(path.to_owned()));
         }
-        PictureFormat::of(path)?;
+        format?;
+        Self::of_files(path)
+    }
+
+    /// The place of depths.
+    fn of_depths(path: &Path) -> Result<Self, WriteError> {
+        if let Some(folder) = Self::of_folder(path) {
+            return Ok(folder);
+        }
+        DepthFormat::of(path)?;
+        Self::of_files(path)
+    }
+
+    /// The folder `path`, if it is one.
+    fn of_folder(path: &Path) -> Option<Self> {
+        let is_folder = path.to_string_lossy().ends_with('/') || path.is_dir();
+        is_folder.then(|| Self::Folder(path.to_owned()))
+    }
+
+    /// The file `path`, or the files of its pattern.
+    fn of_files(path: &Path) -> Result<Self, WriteError> {
+        let text = path.to_string_lossy();
         let Some((before, rest)) = text.split_once('%') else {
             return Ok(Self::File(path.to_owned()));
         };
@@ -134,6 +159,9 @@ fn video_options(path: &Path) -> Option<[&'static [&'static str]; 2]> {
 /// The destinations of all pictures, checked before anything is drawn.
 pub struct Outputs {
     places: Vec<Place>,
+    depth_places: Vec<Place>,
+    /// The unit of depths in PNG files.
+    depth_step: f64,
     /// True if the command line names no place. The default one is replaced without asking.
     is_default: bool,
     background: Option<Background>,
@@ -168,15 +196,22 @@ pub struct Finished<'a> {
 }
 
 impl Outputs {
-    /// The destinations in `arguments`, or `default`; nothing is written yet.
+    /// The destinations in `arguments`, or `default`, of the pictures of `views` views; nothing is written yet.
     ///
     /// # Errors
     /// Errors that can be found before there are pictures.
-    pub fn new(arguments: &OutputArguments, default: &str, trained: Option<Background>) -> Result<Self, WriteError> {
+    pub fn new(
+        arguments: &OutputArguments,
+        default: &str,
+        trained: Option<Background>,
+        views: usize,
+    ) -> Result<Self, WriteError> {
         let default = [PathBuf::from(format!("{default}.png"))];
         let paths = if arguments.output.is_empty() { &default[..] } else { &arguments.output };
         let outputs = Self {
-            places: paths.iter().map(|path| Place::of(path)).collect::<Result<_, _>>()?,
+            places: paths.iter().map(|path| Place::of(path, views)).collect::<Result<_, _>>()?,
+            depth_places: arguments.depth_output.iter().map(|path| Place::of_depths(path)).collect::<Result<_, _>>()?,
+            depth_step: arguments.depth_step,
             is_default: arguments.output.is_empty(),
             background: arguments.background.or(trained),
             quality: arguments.quality,
@@ -189,7 +224,7 @@ impl Outputs {
         if (arguments.depth || arguments.linear) && !paths.iter().any(exr) {
             return Err(WriteError::NoExr { path: paths[0].clone() });
         }
-        for (path, place) in paths.iter().zip(&outputs.places) {
+        for (path, place) in paths.iter().chain(&arguments.depth_output).zip(outputs.all_places()) {
             match place {
                 Place::File(_) | Place::Video(_) => gaurast_picture::check_place(path)?,
                 Place::Numbered { before, .. } => {
@@ -197,6 +232,8 @@ impl Outputs {
                 }
                 Place::Folder(_) | Place::Stdout => {}
             }
+        }
+        for (path, place) in paths.iter().zip(&outputs.places) {
             let opaque = match place {
                 Place::Video(_) => true,
                 Place::Stdout => arguments.raw,
@@ -215,6 +252,11 @@ impl Outputs {
             }
         }
         Ok(outputs)
+    }
+
+    /// The places of pictures and of depths.
+    fn all_places(&self) -> impl Iterator<Item = &Place> {
+        self.places.iter().chain(&self.depth_places)
     }
 
     /// The same destinations for a scene whose colours are linear or not.
@@ -255,7 +297,7 @@ impl Outputs {
         let is_file = |path: &Path| path.metadata().is_ok_and(|metadata| metadata.is_file());
         let mut taken = std::collections::HashSet::new();
         for (index, view) in views.iter().enumerate() {
-            for place in &self.places {
+            for place in self.all_places() {
                 match place {
                     Place::File(path) if views.len() > 1 => {
                         let (path, views) = (path.clone(), views.len());
@@ -285,7 +327,7 @@ impl Outputs {
             let files = self.files(index, &views[index]);
             let there = files.iter().find(|path| is_file(path));
             if arguments.resume {
-                let streams = self.places.len() > files.len();
+                let streams = self.all_places().count() > files.len();
                 if streams || !files.iter().all(|path| is_file(path)) {
                     missing.push(index);
                 }
@@ -298,10 +340,9 @@ impl Outputs {
         Ok(missing)
     }
 
-    /// The files of view `index`.
+    /// The files of view `index`, those of depths last.
     pub fn files(&self, index: usize, view: &View) -> Vec<PathBuf> {
-        let places = self.places.iter();
-        places.filter_map(|place| place.file(index, view)).collect()
+        self.all_places().filter_map(|place| place.file(index, view)).collect()
     }
 
     /// Describes the destinations of views `first` to `last`.
@@ -327,7 +368,7 @@ impl Outputs {
     /// If that fails.
     pub fn writer(&self, size: [u32; 2]) -> Result<Writer<'_>, WriteError> {
         let mut videos = Vec::new();
-        for place in &self.places {
+        for place in self.all_places() {
             match place {
                 Place::Folder(folder) => {
                     std::fs::create_dir_all(folder)
@@ -355,8 +396,19 @@ impl Writer<'_> {
             linear: outputs.linear,
             colors: outputs.colors,
         };
-        for path in outputs.files(finished.index, finished.view) {
+        let files = |places: &[Place]| -> Vec<PathBuf> {
+            places.iter().filter_map(|place| place.file(finished.index, finished.view)).collect()
+        };
+        for path in files(&outputs.places) {
             gaurast_picture::write_encoded(&path, &finished.picture, &encoding)?;
+        }
+        if let Some(depth) = finished.depth.as_ref().filter(|_| !outputs.depth_places.is_empty()) {
+            let medians: Vec<f32> = depth.iter().map(|[_, median]| *median).collect();
+            let Picture { width, height, .. } = finished.picture;
+            let map = DepthMap { width, height, depths: &medians };
+            for path in files(&outputs.depth_places) {
+                gaurast_picture::write_depths(&path, &map, outputs.depth_step)?;
+            }
         }
         if outputs.use_stdout() {
             let bytes = if outputs.raw {
@@ -455,7 +507,7 @@ mod tests {
     #[test]
     fn places_name_their_files() {
         let file = |place: &str, name| {
-            let place = Place::of(Path::new(place)).expect(place);
+            let place = Place::of(Path::new(place), 1).expect(place);
             let file = place.file(7, &view(name)).expect("a file");
             file.to_str().expect("text").to_owned()
         };
@@ -464,9 +516,27 @@ mod tests {
         assert_eq!(file("%d.exr", None), "7.exr");
         assert_eq!(file("out/", None), "out/00007.png");
         assert_eq!(file("out/", Some("images/DSC1.JPG")), "out/DSC1.png");
-        assert_eq!(Place::of(Path::new("-")).expect("stdout"), Place::Stdout);
+        assert_eq!(Place::of(Path::new("-"), 1).expect("stdout"), Place::Stdout);
         for bad in ["a_%x.png", "a_%4d.png", "%d%d.png", "a.bmp"] {
-            assert!(Place::of(Path::new(bad)).is_err(), "{bad}");
+            assert!(Place::of(Path::new(bad), 1).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn webp_is_animated_if_there_are_several_views() {
+        let of = |path: &str, views: usize| Place::of(Path::new(path), views).expect(path);
+        assert_eq!(of("a.webp", 1), Place::File("a.webp".into()));
+        assert_eq!(of("a.webp", 2), Place::Video("a.webp".into()));
+        assert_eq!(of("a.gif", 1), Place::Video("a.gif".into()));
+        assert!(matches!(of("a_%d.webp", 2), Place::Numbered { .. }));
+    }
+
+    #[test]
+    fn depths_go_to_files_and_folders() {
+        let of = |path: &str| Place::of_depths(Path::new(path));
+        assert_eq!(of("a.npy").expect("a file"), Place::File("a.npy".into()));
+        assert!(matches!(of("a_%d.png").expect("files"), Place::Numbered { .. }));
+        assert!(matches!(of("depths/").expect("a folder"), Place::Folder(_)));
+        assert!(of("a.exr").is_err() && of("-").is_err());
     }
 }

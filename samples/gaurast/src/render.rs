@@ -77,22 +77,24 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
         return Ok(());
     }
     let source = Source::of(&arguments.scene)?;
-    let outputs = Outputs::new(&arguments.output, &source.name, source.background)?;
+    // The camera file is read first, so that its errors are reported before a large scene is read.
+    let mut known = cameras::read(&arguments.camera, &source)?;
+    let background = known.background().or(source.background);
+    let outputs = Outputs::new(&arguments.output, &source.name, background, known.count(&arguments.camera))?;
     if let Some(path) = &arguments.output.heatmap {
         gaurast_picture::check(path)?;
     }
-    // The camera file is read first, so that its errors are reported before a large scene is read.
-    let known = cameras::read(&arguments.camera, &source)?;
     let quiet = arguments.report.quiet;
     let progress = Progress { quiet };
-    let (scene, loading) = source.load(progress)?;
+    let (mut scene, loading) = source.load(progress)?;
     if arguments.report.strict {
         sources::check_strictly(&scene)?;
     }
+    known.crop(&mut scene);
     let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
     let garden = source.is_garden();
     let camera = arguments.modes.cameras(&arguments.camera);
-    let Views { views, mut notes, framing } = cameras::of_scene(known, &camera, &scene, garden)?;
+    let Views { views, mut notes, framing, .. } = cameras::of_scene(known, &camera, &scene, garden)?;
     if arguments.camera.frame {
         return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }
@@ -104,7 +106,7 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
         }
     }
     let mut settings = drawing::settings(&arguments.modes, &scene);
-    settings.depth = arguments.output.depth;
+    settings.depth = arguments.output.depth || !arguments.output.depth_output.is_empty();
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;
         if !scene.mesh().is_empty() {

@@ -8,7 +8,9 @@ use gaurast_scene::{AxesReason, FileAxes, Options, Scene, SceneError, Transform}
 use thiserror::Error;
 
 use crate::args::{Choice, SceneArguments};
+use crate::cfg_args::CfgArgs;
 use crate::progress::Progress;
+use crate::training_size::TrainingSize;
 
 /// The generated garden's seed.
 const SEED: u64 = 1;
@@ -56,7 +58,7 @@ pub enum SourceError {
 }
 
 /// The scene's files, and the files that belong to them.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Source {
     /// The files; the generated garden if there is none.
     pub files: Vec<SourceFile>,
@@ -64,6 +66,8 @@ pub struct Source {
     pub name: String,
     /// Cameras that belong to it.
     pub cameras: Option<PathBuf>,
+    /// The sizes in which the photographs of these cameras were trained.
+    pub training_size: Option<TrainingSize>,
     /// nerfstudio's dataparser_transforms.json.
     pub dataparser: Option<PathBuf>,
     /// The background with which it was trained.
@@ -98,9 +102,9 @@ impl Source {
         let given = transforms.iter().map(|placement| placement.0);
         let given = given.chain(std::iter::repeat(Transform::default()));
         for (index, (path, transform)) in scenes.iter().zip(given).enumerate() {
-            let Part { name, file, cameras, dataparser, background, notes } = part(path)?;
+            let Part { name, file, cameras, training_size, dataparser, background, notes } = part(path)?;
             if source.files.is_empty() {
-                (source.name, source.cameras) = (name, cameras);
+                (source.name, source.cameras, source.training_size) = (name, cameras, training_size);
                 (source.dataparser, source.background) = (dataparser, background);
             }
             let axes = match arguments.axes.get(index).or(arguments.axes.last()) {
@@ -177,6 +181,7 @@ struct Part {
     file: PathBuf,
     name: String,
     cameras: Option<PathBuf>,
+    training_size: Option<TrainingSize>,
     dataparser: Option<PathBuf>,
     background: Option<Background>,
     notes: Vec<String>,
@@ -232,10 +237,13 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
     };
     if let Some(arguments) = there("cfg_args")
         && let Ok(text) = std::fs::read_to_string(arguments)
-        && text.contains("white_background=True")
     {
-        part.background = Some(Background::Color([1.0; 3]));
-        part.notes.push("the background is white, as cfg_args says".to_owned());
+        let arguments = CfgArgs::parse(&text);
+        if arguments.flag("white_background") == Some(true) {
+            part.background = Some(Background::Color([1.0; 3]));
+            part.notes.push("the background is white, as cfg_args says".to_owned());
+        }
+        part.training_size = Some(TrainingSize::new(&arguments, path));
     }
     Ok(part)
 }

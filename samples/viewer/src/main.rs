@@ -5,7 +5,8 @@
 
 mod gpu;
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use ash::vk;
@@ -15,16 +16,24 @@ use glam::{DMat4, DVec3, DVec4};
 use gpu::{Gpu, Outcome, Vertex, View};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
-use winit::event::WindowEvent;
+use winit::event::{ElementState, KeyEvent, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop};
+use winit::keyboard::{Key, NamedKey};
 use winit::window::{Window, WindowId};
 
 /// The time, in seconds, of the camera's orbit around the scene and of the mesh's rotation.
 const ORBIT: f64 = 20.0;
 const TURN: f64 = 6.0;
 
+/// The keys, in the window's title and in the help.
+const KEYS: &str = "arrows turn, + and - zoom, space stops, Escape ends";
+
+/// The angle in radians, and the factor of the distance, of a key press.
+const STEP: f64 = 0.05;
+
 /// Flies around a scene of Gaussians with a mesh in it
 #[derive(Parser)]
+#[command(after_help = format!("Keys: {KEYS}."))]
 struct Arguments {
     /// The scene file [default: a generated garden]
     file: Option<std::path::PathBuf>,
@@ -53,14 +62,56 @@ struct Viewer {
     /// The device is dropped before the window to which it presents.
     shown: Option<(Gpu, Window)>,
     begin: Instant,
+    orbit: Orbit,
     frames: u32,
     outcome: Outcome<()>,
+}
+
+/// The camera's place around the scene's centre.
+struct Orbit {
+    /// The angles around the scene and above the horizon, in radians.
+    azimuth: f64,
+    elevation: f64,
+    /// The distance from the centre, in radii of the scene.
+    distance: f64,
+    /// True until the space key stops it.
+    moves: bool,
+    /// The seconds at which it was moved last.
+    seconds: f64,
+}
+
+impl Orbit {
+    /// The camera moves on until this second.
+    fn advance(&mut self, seconds: f64) {
+        if self.moves { self.azimuth += TAU * (seconds - self.seconds) / ORBIT }
+        self.seconds = seconds;
+    }
+
+    /// Follows a key.
+    fn follow(&mut self, key: &Key) {
+        match key.as_ref() {
+            Key::Named(NamedKey::ArrowLeft) => self.azimuth -= STEP,
+            Key::Named(NamedKey::ArrowRight) => self.azimuth += STEP,
+            Key::Named(NamedKey::ArrowUp) => self.elevation = (self.elevation + STEP).min(FRAC_PI_2 - STEP),
+            Key::Named(NamedKey::ArrowDown) => self.elevation = (self.elevation - STEP).max(STEP - FRAC_PI_2),
+            Key::Named(NamedKey::Space) => self.moves = !self.moves,
+            Key::Character("+" | "=") => self.distance *= 1.0 - STEP,
+            Key::Character("-") => self.distance *= 1.0 + STEP,
+            _ => {}
+        }
+    }
+}
+
+impl Default for Orbit {
+    fn default() -> Self {
+        Self { azimuth: 0.0, elevation: 0.34, distance: 1.48, moves: true, seconds: 0.0 }
+    }
 }
 
 impl Viewer {
     fn open(&mut self, events: &ActiveEventLoop) -> Outcome<()> {
         let size = PhysicalSize::new(self.arguments.width, self.arguments.height);
-        let window = events.create_window(Window::default_attributes().with_title("GauRast").with_inner_size(size))?;
+        let window = events.create_window(Window::default_attributes().with_title(format!("GauRast: {KEYS}")).with_inner_size(size))?;
         // SAFETY: the system's loader is sound.
         let entry = if self.arguments.loader { unsafe { ash::Entry::load()? } } else { gaurast_window::entry() };
         let (fifo, immediate) = (vk::PresentModeKHR::FIFO, vk::PresentModeKHR::IMMEDIATE);
@@ -78,7 +129,8 @@ impl Viewer {
             return Ok(());
         }
         let seconds = self.begin.elapsed().as_secs_f64();
-        gpu.draw([width, height], &view(&self.extent, seconds, f64::from(height) / f64::from(width)))?;
+        self.orbit.advance(seconds);
+        gpu.draw([width, height], &view(&self.extent, &self.orbit, f64::from(height) / f64::from(width)))?;
         self.frames += 1;
         if self.arguments.frames == Some(self.frames) {
             gpu.wait()?;
@@ -110,6 +162,9 @@ impl ApplicationHandler for Viewer {
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         match event {
             WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::KeyboardInput { event: KeyEvent { logical_key, state: ElementState::Pressed, .. }, .. } => {
+                if logical_key == Key::Named(NamedKey::Escape) { events.exit() } else { self.orbit.follow(&logical_key); }
+            }
             WindowEvent::RedrawRequested | WindowEvent::Resized(_) => {
                 let drawn = self.draw(events);
                 self.check(events, drawn);
@@ -119,12 +174,12 @@ impl ApplicationHandler for Viewer {
     }
 }
 
-/// The view after a number of seconds. The camera moves on a circle around the scene's centre and looks along +z, with
-/// x to the right and y downwards. The mesh rotates at the centre.
-fn view(extent: &Extent, seconds: f64, aspect: f64) -> View {
+/// The view from a place around the scene's centre. The camera looks along +z, with x to the right and y downwards. The mesh
+/// rotates at the centre.
+fn view(extent: &Extent, orbit: &Orbit, aspect: f64) -> View {
     let (centre, radius) = (DVec3::from_array(extent.centre), extent.radius());
-    let (sin, cos) = (TAU * seconds / ORBIT).sin_cos();
-    let eye = centre + radius * 1.4 * DVec3::new(sin, -0.35, -cos);
+    let ((sin, cos), (up, level)) = (orbit.azimuth.sin_cos(), orbit.elevation.sin_cos());
+    let eye = centre + radius * orbit.distance * DVec3::new(level * sin, -up, -level * cos);
     let forward = (centre - eye).normalize();
     let right = DVec3::Y.cross(forward).normalize();
     let down = forward.cross(right);
@@ -135,7 +190,7 @@ fn view(extent: &Extent, seconds: f64, aspect: f64) -> View {
     let projection = DMat4::from_cols(
         DVec4::X * focal * aspect, DVec4::Y * focal, DVec4::new(0.0, 0.0, slope, 1.0), DVec4::Z * -slope * near,
     );
-    let turn = TAU * seconds / TURN;
+    let turn = TAU * orbit.seconds / TURN;
     let mesh = DMat4::from_translation(centre) * DMat4::from_rotation_y(turn) * DMat4::from_rotation_x(0.5 * turn)
         * DMat4::from_scale(DVec3::splat(0.22 * radius));
     View { world_to_view: rotation.transpose() * DMat4::from_translation(-eye), projection, mesh }
@@ -157,8 +212,19 @@ fn torus() -> Vec<Vertex> {
     }).collect()
 }
 
-fn main() -> Outcome<()> {
-    let arguments = Arguments::parse();
+fn main() -> ExitCode {
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gaurast-viewer: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Outcome<()> {
+    let no_display = |error| format!("there is no display for a window ({error}); the command gaurast draws without one");
+    let events = EventLoop::new().map_err(no_display)?;
     let scene = match &arguments.file {
         Some(file) => gaurast_scene::open(file)?,
         None => garden::scene(0, garden::DEFAULT_COUNT),
@@ -166,7 +232,30 @@ fn main() -> Outcome<()> {
     let (mut extent, begin) = (Extent::of(&scene), Instant::now());
     // The positions on the device are relative to the origin.
     extent.centre = std::array::from_fn(|axis| extent.centre[axis] - scene.origin()[axis]);
-    let mut viewer = Viewer { arguments, scene, extent, shown: None, begin, frames: 0, outcome: Ok(()) };
-    EventLoop::new()?.run_app(&mut viewer)?;
+    let (orbit, outcome) = (Orbit::default(), Ok(()));
+    let mut viewer = Viewer { arguments, scene, extent, shown: None, begin, orbit, frames: 0, outcome };
+    events.run_app(&mut viewer)?;
     viewer.outcome
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_turn_and_stop_the_camera() {
+        let mut orbit = Orbit::default();
+        orbit.advance(ORBIT / 4.0);
+        assert!((orbit.azimuth - TAU / 4.0).abs() < 1e-12);
+        orbit.follow(&Key::Named(NamedKey::Space));
+        orbit.advance(ORBIT);
+        assert!((orbit.azimuth - TAU / 4.0).abs() < 1e-12);
+        orbit.follow(&Key::Named(NamedKey::ArrowLeft));
+        assert!((orbit.azimuth - TAU / 4.0 + STEP).abs() < 1e-12);
+        for _ in 0..100 { orbit.follow(&Key::Named(NamedKey::ArrowUp)) }
+        assert!(orbit.elevation < FRAC_PI_2);
+        let before = orbit.distance;
+        orbit.follow(&Key::Character("+".into()));
+        assert!(orbit.distance < before);
+    }
 }

@@ -1,5 +1,5 @@
-//! Camera files: `cameras.json` of the original 3DGS code, nerfstudio's `transforms.json` and `camera_path.json`, and
-//! COLMAP's folders of cameras and images.
+//! Camera files: `cameras.json` of the original 3DGS code, nerfstudio's `transforms.json` and `camera_path.json`, camera
+//! tracks, and COLMAP's folders of cameras and images.
 
 mod colmap;
 mod nerfstudio;
@@ -10,10 +10,12 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::camera::Model;
+use crate::camera::{CameraError, Model};
+use crate::camera_path::Keyframe;
+use crate::camera_tracks;
 use nerfstudio::{CameraPath, Dataparser, Transforms};
 use view::Numbers;
-pub use view::{CameraFile, CameraFileError, CameraFileOptions, View, ViewError};
+pub use view::{CameraFile, CameraFileError, CameraFileOptions, CroppedScene, View, ViewError};
 
 /// Reads all cameras of the file at `path`. `size` replaces an image size that a transforms.json doesn't give.
 ///
@@ -70,7 +72,7 @@ fn parse(
 ) -> Result<CameraFile, CameraFileError> {
     let json = |source| CameraFileError::Json { path: path.to_owned(), source };
     let unknown = || CameraFileError::UnknownKind { path: path.to_owned() };
-    let mut ignored = Vec::new();
+    let (mut crop, mut ignored) = (None, Vec::new());
     let views: Vec<Result<View, ViewError>> = match text.trim_start().as_bytes().first() {
         Some(b'[') => {
             let cameras: Vec<InriaCamera> = serde_json::from_str(text).map_err(json)?;
@@ -83,11 +85,17 @@ fn parse(
             let transforms: Transforms = serde_json::from_str(text).map_err(json)?;
             if transforms.is_camera_path() {
                 let path: CameraPath = serde_json::from_str(text).map_err(json)?;
+                crop = path.crop();
                 path.views(options)
-            } else {
+            } else if transforms.has_frames() {
                 let folder = path.parent().unwrap_or(Path::new(""));
-                let frames = transforms.views(options, folder, dataparser, &mut ignored).ok_or_else(unknown)?;
-                frames.collect()
+                transforms.views(options, folder, dataparser, &mut ignored).collect()
+            } else {
+                let keyframes = camera_tracks::parse(text, options.size).map_err(json)?;
+                if keyframes.is_empty() {
+                    return Err(unknown());
+                }
+                keyframes.iter().map(|keyframe| keyframe_view(keyframe, options.size)).collect()
             }
         }
         _ => return Err(unknown()),
@@ -97,7 +105,17 @@ fn parse(
         .enumerate()
         .map(|(view, result)| result.map_err(|reason| CameraFileError::View { path: path.to_owned(), view, reason }))
         .collect::<Result<_, _>>()?;
-    Ok(CameraFile { views, ignored })
+    Ok(CameraFile { views, crop, ignored })
+}
+
+/// The view of a keyframe, which has no name.
+fn keyframe_view(keyframe: &Keyframe, size: [u32; 2]) -> Result<View, ViewError> {
+    let camera = keyframe.camera(size).map_err(|error| match error {
+        CameraError::NotFinite => ViewError::NotFinite,
+        CameraError::FieldOfView | CameraError::Focal | CameraError::Planes => ViewError::Focal,
+        CameraError::NoDirection | CameraError::NoUp => ViewError::Rotation,
+    })?;
+    Ok(View { name: String::new(), camera })
 }
 
 /// An entry of cameras.json. The rotation is camera to world: its columns are the directions right, down and forward.
@@ -275,5 +293,35 @@ mod tests {
         let camera = &read(text).expect("a camera")[0].camera;
         assert_eq!((camera.width, camera.height, camera.eye), (200, 100, [1.0, 2.0, 3.0]));
         assert!((camera.focal[0] - 50.0).abs() < 1e-9);
+        // nerfstudio takes a fisheye's focal length from the angle as that of a pinhole.
+        let camera = &read(&text.replace("perspective", "fisheye")).expect("a camera")[0].camera;
+        assert_eq!(camera.model, Model::Fisheye);
+        assert!((camera.focal[0] - 50.0).abs() < 1e-9);
+        let panorama = text.replace("perspective", "equirectangular").replace(", \"fov\": 90", "");
+        let camera = &read(&panorama).expect("a camera")[0].camera;
+        assert_eq!(camera.model, Model::Equirectangular);
+        let stereo = read(&text.replace("perspective", "omnidirectional")).expect_err("two pictures").to_string();
+        assert!(stereo.contains("camera model omnidirectional is not read"), "{stereo}");
+    }
+
+    #[test]
+    fn a_camera_path_crops_the_scene() {
+        let text = r#"{"render_height": 100, "render_width": 200, "camera_path": [{"camera_to_world":
+            [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1], "fov": 90}], "crop": {"crop_center": [1, 2, 3],
+            "crop_scale": [2, 4, 6], "crop_rot": [0, 0, 0], "crop_bg_color": {"r": 255, "g": 0, "b": 51}}}"#;
+        let cropped = read_with(text, false, None).expect("a path").crop.expect("a crop");
+        assert_eq!((cropped.crop.centre, cropped.crop.lengths), ([1.0, 2.0, 3.0], [2.0, 4.0, 6.0]));
+        assert_eq!(cropped.background, [1.0, 0.0, 0.2]);
+        let whole = text.replace("\"crop\": {", "\"crop\": null, \"other\": {");
+        assert_eq!(read_with(&whole, false, None).expect("a path").crop, None);
+    }
+
+    #[test]
+    fn a_camera_track_has_a_view_for_each_keyframe() {
+        let text = r#"{"version": 4, "keyframes": [{"time": 0, "position": [1, -2, -3], "rotation": [1, 0, 0, 0],
+            "focal_length_mm": 24, "easing": 0}]}"#;
+        let camera = &read(text).expect("a track")[0].camera;
+        assert_eq!((camera.width, camera.height, camera.eye), (640, 480, [1.0, 2.0, 3.0]));
+        assert!(read(&text.replace("[1, 0, 0, 0]", "[0, 0, 0, 0]")).is_err());
     }
 }

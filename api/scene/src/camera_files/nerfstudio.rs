@@ -5,8 +5,9 @@ use std::path::Path;
 use glam::{DMat3, DMat4, DVec3};
 use serde::Deserialize;
 
-use super::view::{CameraFileOptions, Distortion, Numbers, View, ViewError};
+use super::view::{CameraFileOptions, CroppedScene, Distortion, Numbers, View, ViewError};
 use crate::camera::Model;
+use crate::crop::Crop;
 
 /// A transforms.json, or any other JSON object.
 #[derive(Deserialize)]
@@ -26,14 +27,19 @@ impl Transforms {
         self.frames.is_none() && self.camera_path.is_some()
     }
 
-    /// The views, if there are frames.
+    /// Returns true if the file has frames.
+    pub(super) fn has_frames(&self) -> bool {
+        self.frames.is_some()
+    }
+
+    /// The views of the frames.
     pub(super) fn views(
         self,
         options: &CameraFileOptions,
         folder: &Path,
         dataparser: Option<&Dataparser>,
         ignored: &mut Vec<String>,
-    ) -> Option<impl Iterator<Item = Result<View, ViewError>>> {
+    ) -> impl Iterator<Item = Result<View, ViewError>> {
         let placement = dataparser.map(|dataparser| {
             let applied = self.applied_transform.map_or(DMat4::IDENTITY, matrix);
             Placement {
@@ -41,7 +47,7 @@ impl Transforms {
                 scale: dataparser.scale / self.applied_scale.unwrap_or(1.0),
             }
         });
-        let views: Vec<_> = (self.frames?.into_iter())
+        let views: Vec<_> = (self.frames.unwrap_or_default().into_iter())
             .map(|mut frame| {
                 let given = frame.intrinsics.size(&self.intrinsics);
                 let given = given.or_else(|| size_of_photograph(folder, &frame.file_path));
@@ -59,7 +65,7 @@ impl Transforms {
                 frame.view(&self.intrinsics, options, placement.as_ref(), ignored)
             })
             .collect();
-        Some(views.into_iter())
+        views.into_iter()
     }
 }
 
@@ -198,17 +204,47 @@ pub(super) struct CameraPath {
     render_width: f64,
     render_height: f64,
     camera_path: Vec<PathFrame>,
+    crop: Option<PathCrop>,
 }
 
 #[derive(Deserialize)]
 struct PathFrame {
     /// The camera-to-world matrix, row by row.
     camera_to_world: Vec<f64>,
-    /// The vertical field of view in degrees.
+    /// The vertical field of view in degrees. A panorama has none.
+    #[serde(default)]
     fov: f64,
 }
 
+/// The box to which the viewer crops the scene.
+#[derive(Deserialize)]
+struct PathCrop {
+    crop_center: [f64; 3],
+    /// The lengths of the sides.
+    crop_scale: [f64; 3],
+    /// Roll, pitch and yaw in radians.
+    #[serde(default)]
+    crop_rot: [f64; 3],
+    crop_bg_color: PathColor,
+}
+
+/// A colour, each channel 0 to 255.
+#[derive(Deserialize)]
+struct PathColor {
+    r: f32,
+    g: f32,
+    b: f32,
+}
+
 impl CameraPath {
+    /// The part of the scene that is shown, if it is cropped.
+    pub(super) fn crop(&self) -> Option<CroppedScene> {
+        let PathCrop { crop_center, crop_scale, crop_rot, crop_bg_color: PathColor { r, g, b } } =
+            self.crop.as_ref()?;
+        let crop = Crop::turned_by(*crop_center, *crop_rot, *crop_scale);
+        Some(CroppedScene { crop, background: [*r, *g, *b].map(|channel| channel / 255.0) })
+    }
+
     /// The views, named by their numbers.
     pub(super) fn views(self, _: &CameraFileOptions) -> Vec<Result<View, ViewError>> {
         let size = [self.render_width, self.render_height];
@@ -216,6 +252,8 @@ impl CameraPath {
             let half = libm::tan(frame.fov.to_radians() / 2.0);
             let (model, focal) = match self.camera_type.as_deref() {
                 None | Some("perspective") => (Model::Pinhole, [size[1] / 2.0 / half; 2]),
+                // nerfstudio takes the focal length of a pinhole with this angle.
+                Some("fisheye") => (Model::Fisheye, [size[1] / 2.0 / half; 2]),
                 Some("equirectangular") => {
                     (Model::Equirectangular, [size[0] / std::f64::consts::TAU, size[1] / std::f64::consts::PI])
                 }

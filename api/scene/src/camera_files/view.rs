@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::camera::{Camera, DEFAULT_NEAR, Model};
+use crate::crop::Crop;
 
 /// The most pixels along an axis that a camera file may give.
 const MAX_SIZE: f64 = 1e6;
@@ -43,7 +44,8 @@ pub enum CameraFileError {
     },
     /// The file is of none of the kinds.
     #[error(
-        "{}: this is neither a cameras.json (a list) nor a transforms.json (with frames), a camera_path.json or COLMAP's",
+        "{}: this is neither a cameras.json (a list) nor a transforms.json (with frames), a camera_path.json, a camera track \
+         or COLMAP's",
         path.display()
     )]
     UnknownKind {
@@ -110,8 +112,19 @@ pub struct CameraFileOptions {
 pub struct CameraFile {
     /// The cameras, in the file's order; COLMAP's in the order of their names.
     pub views: Vec<View>,
+    /// The part of the scene that the file shows, if it does not show all of it.
+    pub crop: Option<CroppedScene>,
     /// Parts of the file that are ignored, a sentence each.
     pub ignored: Vec<String>,
+}
+
+/// The part of a scene that a camera file shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CroppedScene {
+    /// The box around it, in the coordinates of the cameras.
+    pub crop: Crop,
+    /// The background's red, green and blue, each 0 to 1.
+    pub background: [f32; 3],
 }
 
 /// The distortion of a lens: the names and values of its coefficients.

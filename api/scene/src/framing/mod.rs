@@ -210,21 +210,41 @@ impl Framing {
         if !given && self.up == DEFAULT_UP {
             return Ok((FROM, DVec3::from_array(self.up)));
         }
-        let (default_azimuth, default_elevation) = default_angles();
-        let azimuth = self.azimuth.unwrap_or(default_azimuth).to_radians();
-        let elevation = self.elevation.unwrap_or(default_elevation).to_radians();
+        let up = (DVec3::from_array(self.up).try_normalize()).ok_or(CameraError::NoUp)?;
+        let (azimuth, elevation) = self.angles();
         if !(azimuth.is_finite() && elevation.is_finite()) {
             return Err(CameraError::NotFinite);
         }
-        let up = (DVec3::from_array(self.up).try_normalize()).ok_or(CameraError::NoUp)?;
+        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
         let front = front(up);
         let side = up.cross(front);
         let level = libm::cos(azimuth) * front + libm::sin(azimuth) * side;
         let from = libm::cos(elevation) * level + libm::sin(elevation) * up;
         // Seen straight from above or below, the picture's upper edge is the far or the near one.
-        let upwards = if libm::cos(elevation).abs() < 1e-6 { -level * libm::sin(elevation).signum() } else { up };
+        let upwards = if is_vertical(elevation) { -level * libm::sin(elevation).signum() } else { up };
         Ok((from, upwards))
     }
+
+    /// The azimuth and the elevation in degrees. Seen straight from above or below, the default azimuth has north upwards
+    /// in the picture: +z, or +y if the scene's z axis points up.
+    pub fn angles(&self) -> (f64, f64) {
+        let (default_azimuth, default_elevation) = default_angles();
+        let elevation = self.elevation.unwrap_or(default_elevation);
+        let azimuth = self.azimuth.unwrap_or_else(|| {
+            let up = DVec3::from_array(self.up).try_normalize();
+            match up.filter(|_| is_vertical(elevation.to_radians())) {
+                None => default_azimuth,
+                Some(up) if (front(up).y > 0.5) == (elevation > 0.0) => 180.0,
+                Some(_) => 0.0,
+            }
+        });
+        (azimuth, elevation)
+    }
+}
+
+/// True if a camera at this elevation, in radians, looks straight up or down.
+fn is_vertical(elevation: f64) -> bool {
+    libm::cos(elevation).abs() < 1e-6
 }
 
 /// The default azimuth and elevation of a framing, in degrees.
@@ -384,6 +404,23 @@ mod tests {
         near(at(azimuth, elevation, DEFAULT_UP), (FROM.normalize() * 10.0).to_array());
         let no_up = Framing { up: [0.0; 3], ..Framing::new(DEFAULT_FOV, [64, 64]) };
         assert_eq!(no_up.camera(&Subject::of_box(extent)), Err(CameraError::NoUp));
+    }
+
+    #[test]
+    fn a_plan_has_north_upwards() {
+        let extent = Extent { centre: [1.0, 2.0, 3.0], half: [1.0; 3] };
+        for (up, north) in [(DEFAULT_UP, DVec3::Z), ([0.0, 1.0, 0.0], DVec3::Z), ([0.0, 0.0, 1.0], DVec3::Y)] {
+            for elevation in [90.0, -90.0] {
+                let framing = Framing { elevation: Some(elevation), up, ..Framing::new(DEFAULT_FOV, [64, 64]) };
+                let camera = framing.camera(&Subject::of_box(extent)).expect("a camera");
+                let [_, down, forward] = camera.rotation.map(DVec3::from_array);
+                assert!(down.abs_diff_eq(-north, 1e-9), "{up:?} {elevation}: {down}");
+                let from = DVec3::from_array(up) * elevation.signum();
+                assert!(forward.abs_diff_eq(-from, 1e-9), "{up:?} {elevation}: {forward}");
+            }
+        }
+        let turned = Framing { azimuth: Some(30.0), elevation: Some(90.0), ..Framing::new(DEFAULT_FOV, [64, 64]) };
+        assert_eq!(turned.angles(), (30.0, 90.0));
     }
 
     #[test]

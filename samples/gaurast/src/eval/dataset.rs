@@ -10,12 +10,12 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::arguments::{EvalArguments, Values};
-use super::cfg_args::CfgArgs;
 use super::error::Error;
 use super::gsplat_world::Worlds;
-use super::photographs::{Photographs, SizeRule};
-use super::split::{Split, stem};
+use super::split::Split;
 use crate::cameras::{DEFAULT_SIZE, View};
+use crate::cfg_args::CfgArgs;
+use crate::photographs::{self, Photographs, SizeRule, stem};
 use crate::sources::Source;
 
 /// The background with which nerfstudio's splatfacto evaluates: the grey of its viewer.
@@ -219,7 +219,7 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
             }
             None => None,
         };
-        let exposure = exposures.get(&stem(super::split::file_name(&key))).copied();
+        let exposure = exposures.get(&stem(photographs::file_name(&key))).copied();
         let camera = camera.resized(rule.of(size));
         let view = View { name: Some(view.name), camera };
         views.push(Measured { view, name: stem(&key), photograph, mask, exposure });

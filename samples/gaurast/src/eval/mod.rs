@@ -1,11 +1,9 @@
 //! `gaurast eval`: a trained model against its photographs.
 
 mod arguments;
-mod cfg_args;
 mod dataset;
 mod error;
 mod gsplat_world;
-mod photographs;
 mod report;
 mod split;
 

@@ -1,8 +1,10 @@
 //! The views that are measured, of all that a model was trained with.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
+
+use crate::photographs::{file_name, stem};
 
 /// The share of the views that nerfstudio trains with.
 const TRAIN_FRACTION: f64 = 0.9;
@@ -113,21 +115,6 @@ impl Split {
             Self::File(path) => path.display().to_string(),
         }
     }
-}
-
-/// A photograph's name without its extension and a leading `./`.
-pub fn stem(name: &str) -> String {
-    let name = name.trim_start_matches("./");
-    let known = gaurast_picture::PictureFormat::of(Path::new(name)).is_ok();
-    match name.rsplit_once('.') {
-        Some((stem, _)) if known => stem.to_owned(),
-        _ => name.to_owned(),
-    }
-}
-
-/// A name without its folders.
-pub fn file_name(name: &str) -> &str {
-    name.rsplit('/').next().unwrap_or(name)
 }
 
 #[cfg(test)]

@@ -370,6 +370,18 @@ fn a_video_goes_through_ffmpeg() {
     let told = std::fs::read_to_string(folder.path().join("told")).expect("told");
     assert!(told.contains("-s 15x7") && told.contains("palettegen") && !told.contains("yuv420p"), "{told}");
     std::fs::remove_file(folder.path().join("b.gif")).expect("removed");
+    let output = run(&["two.ply", "--orbit", "2", "--size", "15x7", "-o", "b.webp"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told = std::fs::read_to_string(folder.path().join("told")).expect("told");
+    assert!(told.contains("libwebp_anim -loop 0"), "{told}");
+    std::fs::remove_file(folder.path().join("b.webp")).expect("removed");
+    // A single picture needs no ffmpeg.
+    std::fs::remove_file(folder.path().join("told")).expect("removed");
+    let output = run(&["two.ply", "--size", "15x7", "-o", "b.webp"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(!folder.path().join("told").exists());
+    std::fs::remove_file(folder.path().join("b.webp")).expect("removed");
+    std::fs::write(folder.path().join("told"), "").expect("written");
     // A fake encoder that fails: its last line is reported, and no file is left.
     std::fs::write(&program, "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 1\n").expect("written");
     let output = run(&[&video[..], &["--force"]].concat());
@@ -377,6 +389,80 @@ fn a_video_goes_through_ffmpeg() {
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("a.mp4: ffmpeg: Unknown encoder"), "{stderr}");
     assert_eq!(files(&folder), ["a.mp4", "told", "two.ply"]);
+}
+
+#[gaurast_runner::test]
+fn depths_are_written_as_png_and_npy() {
+    let folder = folder();
+    let view = ["two.ply", "--size", "32x24", "--eye", "0,0,-3", "--target", "0,0,0", "-o", "a.exr", "--depth"];
+    let depths = ["--depth-output", "a.png", "--depth-output", "a.npy", "--depth-step", "0.0005"];
+    succeeds(&folder, &[&view[..], &depths].concat());
+    let exr = exr::prelude::read_first_flat_layer_from_file(folder.path().join("a.exr")).expect("an EXR");
+    let channel = exr.layer_data.channel_data.list.iter().find(|channel| channel.name.eq("Z")).expect("depths");
+    let expected: Vec<f32> = channel.sample_data.values_as_f32().collect();
+    let npy = std::fs::read(folder.path().join("a.npy")).expect("an array");
+    let array: Vec<f32> = npy[128..].as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    assert_eq!(array, expected);
+    let png = image::open(folder.path().join("a.png")).expect("a PNG").to_luma16();
+    for (steps, depth) in png.as_raw().iter().zip(&expected) {
+        let found = if *steps == 0 { f32::INFINITY } else { f32::from(*steps) * 0.0005 };
+        assert!(found == *depth || (found - depth).abs() < 0.0003, "{found} {depth}");
+    }
+    assert!(expected.contains(&f32::INFINITY) && expected.iter().any(|depth| (2.0..3.0).contains(depth)));
+    fails(&folder, &["two.ply", "-o", "b.png", "--depth-output", "b.exr"], "depths are written as .png or .npy");
+    fails(&folder, &["two.ply", "-o", "b.png", "--depth-output", "b.png"], "two outputs are the same file");
+}
+
+#[gaurast_runner::test]
+fn a_plan_has_north_upwards_and_tells_its_scale() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Red is in the north, where z is greatest, and green in the south.
+    let gaussians = [([0.0, 0.0, 1.0], RED), ([0.0, 0.0, -1.0], GREEN)];
+    std::fs::write(folder.path().join("two.ply"), scene(0.1, &gaussians)).expect("written");
+    let plan = ["two.ply", "--camera", "orthographic", "--elevation", "90", "--size", "60x60"];
+    let output = gaurast(folder.path(), &plan);
+    let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+    assert!(stdout.contains("--azimuth 0.0 --elevation 90.0"), "{stdout}");
+    let scale = stderr.split("the scale of the picture is ").nth(1).and_then(|rest| rest.split(' ').next());
+    let scale: f64 = scale.and_then(|scale| scale.parse().ok()).expect("a scale");
+    let picture = image::open(folder.path().join("two.png")).expect("a picture").to_rgb8();
+    let row = |channel: usize| {
+        let rows = picture.enumerate_pixels().map(|(_, y, pixel)| (f64::from(y) + 0.5, f64::from(pixel.0[channel])));
+        let (sum, weight) = rows.fold((0.0, 0.0), |(sum, total), (y, value)| (sum + y * value, total + value));
+        sum / weight
+    };
+    let apart = (row(1) - row(0)) * scale;
+    assert!((apart - 2.0).abs() < 0.02, "{apart}");
+}
+
+#[gaurast_runner::test]
+fn a_camera_path_crops_the_scene_and_a_track_gives_views() {
+    let folder = folder();
+    let path = r#"{"camera_type": "perspective", "render_height": 24, "render_width": 32, "camera_path": [{"camera_to_world":
+        [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, -3, 0, 0, 0, 1], "fov": 60}], "crop": {"crop_center": [0, 0, 0.5],
+        "crop_scale": [0.5, 0.5, 0.5], "crop_bg_color": {"r": 0, "g": 0, "b": 255}}}"#;
+    std::fs::write(folder.path().join("camera_path.json"), path).expect("written");
+    let output = gaurast(folder.path(), &["two.ply", "--cameras", "camera_path.json", "-o", "a.png"]);
+    assert!(text(&output.stderr).contains("1 of 2 Gaussians are in the box"), "{}", text(&output.stderr));
+    let picture = image::open(folder.path().join("a.png")).expect("a picture").to_rgb8();
+    assert_eq!(picture.dimensions(), (32, 24));
+    assert_eq!(picture.get_pixel(0, 0).0, [0, 0, 255]);
+    let [red, green, _] = picture.get_pixel(16, 12).0;
+    assert!(red < 10 && green > 200, "{red} {green}");
+
+    let track = r#"{"timeline": {"frameRate": 30}, "poseSets": [{"poses": [
+        {"frame": 0, "position": [0, 0, -3], "target": [0, 0, 0], "fov": 60},
+        {"frame": 30, "position": [0, 0, 3], "target": [0, 0, 0], "fov": 60}]}]}"#;
+    std::fs::write(folder.path().join("document.json"), track).expect("written");
+    let small = ["two.ply", "--size", "32x24", "-o"];
+    succeeds(&folder, &[&small[..], &["v%d.png", "--cameras", "document.json", "--view", "all"]].concat());
+    succeeds(&folder, &[&small[..], &["p%d.png", "--path", "document.json", "--frames", "2"]].concat());
+    for (index, channel) in [(0, 0), (1, 1)] {
+        let read = |name: String| image::open(folder.path().join(name)).expect("a picture").to_rgb8();
+        let view = read(format!("v{index}.png"));
+        assert!(view.get_pixel(16, 12).0[channel] > 200, "{index}");
+        assert_eq!(view, read(format!("p{index}.png")), "{index}");
+    }
 }
 
 #[gaurast_runner::test]
@@ -411,6 +497,12 @@ fn a_training_folder_is_a_scene_with_cameras() {
     assert!(middle[0] > 240 && middle[1] < 20, "{middle:?}");
     assert_eq!(corner, [255; 3]);
     at("out/far.png");
+    // The training may have smaller photographs than the cameras are of.
+    std::fs::write(model.join("cfg_args"), "Namespace(images='images_2', resolution=-1)").expect("written");
+    let output = gaurast(folder.path(), &["model", "--view", "far", "-o", "small.png"]);
+    assert!(text(&output.stderr).contains("20x15, as cfg_args says"), "{}", text(&output.stderr));
+    assert_eq!(image::image_dimensions(folder.path().join("small.png")).expect("a picture"), (20, 15));
+    std::fs::write(model.join("cfg_args"), "Namespace(white_background=True)").expect("written");
     // The same pictures, compared with the scene itself.
     let compared = succeeds(&folder, &["compare", "out/far.png", "model", "--view", "far", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&compared).expect("JSON");

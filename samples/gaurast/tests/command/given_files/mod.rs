@@ -2,6 +2,7 @@
 //! camera of a camera file.
 
 mod cameras;
+mod faults;
 mod fixtures;
 mod golden;
 

@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 
 use gaurast_picture::PictureFormat;
 
-use super::split::{file_name, stem};
-
 /// The width above which 3DGS makes photographs smaller.
 const INRIA_MAX_WIDTH: f64 = 1600.0;
 
@@ -65,6 +63,21 @@ impl Photographs {
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()
     }
+}
+
+/// A photograph's name without its extension and a leading `./`.
+pub fn stem(name: &str) -> String {
+    let name = name.trim_start_matches("./");
+    let known = PictureFormat::of(Path::new(name)).is_ok();
+    match name.rsplit_once('.') {
+        Some((stem, _)) if known => stem.to_owned(),
+        _ => name.to_owned(),
+    }
+}
+
+/// A name without its folders.
+pub fn file_name(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
 }
 
 /// The rule by which a photograph's size becomes that of the compared pictures.
