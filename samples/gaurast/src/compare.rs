@@ -200,7 +200,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
         }
     }
     let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
-    let settings = drawing::settings(&arguments.modes, &scene);
+    let settings = drawing::settings(&arguments.modes, &scene, [&view.camera]);
     let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(source.background);

@@ -103,7 +103,7 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
             eprintln!("gaurast: {note}");
         }
     }
-    let mut settings = drawing::settings(&arguments.modes, &scene);
+    let mut settings = drawing::settings(&arguments.modes, &scene, views.iter().map(|view| &view.camera));
     settings.depth = arguments.output.depth;
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;

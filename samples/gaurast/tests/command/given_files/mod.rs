@@ -4,6 +4,7 @@
 mod cameras;
 mod fixtures;
 mod golden;
+mod gpu;
 
 use std::ffi::OsStr;
 use std::path::Path;
