@@ -7,6 +7,7 @@ mod cameras;
 mod command_line;
 mod compare;
 mod compare_drivers;
+mod compliance;
 mod devices;
 mod drawing;
 mod eval;
