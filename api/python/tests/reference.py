@@ -88,7 +88,7 @@ def rasterize(means, quats, scales, opacities, colors, viewmat, K, width, height
     plane = plane + eps * np.eye(2)
     after = np.linalg.det(plane)
     if options.get("rasterize_mode") == "antialiased":
-        opacities = opacities * np.sqrt(np.maximum(before / after, 0.0))
+        opacities = opacities * np.sqrt(np.maximum(before / after, options.get("ratio_floor", 0.0)))
 
     values = np.zeros((height, width, colors.shape[1]))
     transmittance = np.ones((height, width))

@@ -5,6 +5,7 @@ use gaurast::gaussian_primitive_topology;
 
 use crate::device::Device;
 use crate::device_scene::DeviceScene;
+use crate::listed::List;
 use crate::mesh;
 use crate::modes::Kept;
 use crate::pipeline::BINDINGS;
@@ -22,10 +23,15 @@ pub(super) struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// Draws `scene`, its triangles first, into the target's image, which is then in the layout of a colour attachment.
-    pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera) {
+    /// Draws `scene`, its triangles first, into the target's image, which is then in the layout of a colour attachment. Of the
+    /// Gaussians, those of `list` are drawn, in its order, or all.
+    pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera, list: Option<&List>) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
         let mut vulkan = camera.to_vulkan();
+        if list.is_some() {
+            // What lies beyond the planes is not listed.
+            vulkan = vulkan.near_plane(f32::MIN_POSITIVE).far_plane(f32::INFINITY);
+        }
         if matches!(target.kept, Some((Kept::Depths, ..))) {
             vulkan = vulkan.depth_coefficients(DepthScale::of(camera).coefficients);
         }
@@ -77,7 +83,7 @@ impl Recorder<'_> {
         let commands = self.commands;
         // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
         // device and live until the submission has ended; the pipeline's dynamic state, vertex
-        // buffers and camera are all set before the draw, whose vertices lie within the buffers.
+        // buffers and camera are all set before the draw, whose vertices and indices lie within the buffers.
         unsafe {
             raw.cmd_begin_rendering(commands, &rendering);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
@@ -94,7 +100,13 @@ impl Recorder<'_> {
             raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
             raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             (self.gaussian).cmd_set_gaussian_cameras(commands, &[vulkan]);
-            raw.cmd_draw(commands, scene.count, 1, 0, 0);
+            match list {
+                Some(list) => {
+                    raw.cmd_bind_index_buffer(commands, list.indices.handle(), 0, vk::IndexType::UINT32);
+                    raw.cmd_draw_indexed(commands, list.count, 1, 0, 0, 0);
+                }
+                None => raw.cmd_draw(commands, scene.count, 1, 0, 0),
+            }
             raw.cmd_end_rendering(commands);
         }
     }

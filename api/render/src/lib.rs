@@ -33,6 +33,7 @@ pub mod device;
 mod device_scene;
 mod draw;
 mod error;
+mod listed;
 mod mesh;
 mod modes;
 mod options;

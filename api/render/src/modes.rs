@@ -54,6 +54,9 @@ impl Precision {
     }
 }
 
+/// The pipeline's value for the order of Gaussians that the host has listed.
+pub(crate) const LISTED: GaussianOrderGAURAST = GaussianOrderGAURAST::PRIMITIVE;
+
 /// The pipeline's value for a sort order.
 pub(crate) fn raw_order(order: SortOrder) -> GaussianOrderGAURAST {
     match order {

@@ -93,7 +93,7 @@ impl GaussianPipeline {
             .alpha_floor(settings.alpha_floor)
             .alpha_ceiling(settings.alpha_ceiling)
             .transmittance_floor(settings.transmittance_floor)
-            .order(modes::raw_order(settings.order))
+            .order(if settings.by_z { modes::LISTED } else { modes::raw_order(settings.order) })
             .geometry(modes::raw_geometry(settings.geometry))
             .precision(settings.precision.raw())
             .antialiasing(modes::raw_antialiasing(settings.antialiasing))

@@ -13,6 +13,7 @@ use crate::device::{Device, Purpose};
 use crate::device_scene::DeviceScene;
 use crate::draw::{DepthScale, Recorder};
 use crate::error::RenderError;
+use crate::listed::{self, List};
 use crate::mesh::{self, DeviceMesh, MeshPipeline};
 use crate::modes::Kept;
 use crate::options::DeviceOptions;
@@ -178,7 +179,7 @@ impl Renderer {
     /// A device-local vertex buffer of `bytes`, copied through a staging buffer.
     fn upload_bytes(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
         use vk::BufferUsageFlags as Usage;
-        let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST;
+        let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST | Usage::TRANSFER_SRC;
         // Vulkan has no empty buffers; an empty scene is drawn without reading this one.
         let size = (bytes.len() as u64).max(4);
         let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
@@ -194,7 +195,7 @@ impl Renderer {
         Ok(buffer)
     }
 
-    /// Copies regions of buffers to others, from which the next submission's draws read vertices.
+    /// Copies regions of buffers to others, from which the next submission's draws read vertices, or the host.
     fn copy(&mut self, regions: &[(&Buffer, &Buffer, vk::BufferCopy)]) -> Result<(), RenderError> {
         self.commands.record(0, |device, commands| {
             for (from, to, region) in regions {
@@ -204,13 +205,13 @@ impl Renderer {
             }
             let barrier = vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ);
+                .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ | vk::AccessFlags::HOST_READ);
             // SAFETY: the command buffer is recording, outside a render pass.
             unsafe {
                 device.cmd_pipeline_barrier(
                     commands,
                     vk::PipelineStageFlags::TRANSFER,
-                    vk::PipelineStageFlags::VERTEX_INPUT,
+                    vk::PipelineStageFlags::VERTEX_INPUT | vk::PipelineStageFlags::HOST,
                     vk::DependencyFlags::empty(),
                     &[barrier],
                     &[],
@@ -302,6 +303,21 @@ impl Renderer {
         Buffer::new(&self.device, bytes.max(4), usage, Memory::Host)
     }
 
+    /// The list of what `camera` sees of `scene`, by z.
+    fn list(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<List, RenderError> {
+        let bytes = u64::from(scene.count) * size_of::<[f32; 3]>() as u64;
+        // Vulkan has no empty buffers.
+        let read = Buffer::new(&self.device, bytes.max(4), vk::BufferUsageFlags::TRANSFER_DST, Memory::HostCached)?;
+        if scene.count > 0 {
+            self.copy(&[(&scene.buffers[0], &read, vk::BufferCopy::default().size(bytes))])?;
+        }
+        let numbers = read.look(scene.count as usize, |positions| listed::by_z(positions, camera))?;
+        let size = (size_of_val(&numbers[..]) as u64).max(4);
+        let indices = Buffer::new(&self.device, size, vk::BufferUsageFlags::INDEX_BUFFER, Memory::Host)?;
+        indices.write(bytemuck::cast_slice(&numbers))?;
+        Ok(List { indices, count: numbers.len() as u32 })
+    }
+
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
     ///
     /// # Errors
@@ -316,6 +332,7 @@ impl Renderer {
         if tested {
             scene.settings.check_mesh(camera)?;
         }
+        let list = if scene.settings.by_z { Some(self.list(scene, camera)?) } else { None };
         let kept = scene.settings.kept();
         let target = match self.target.take() {
             Some(target)
@@ -340,7 +357,7 @@ impl Renderer {
                 query.begin(commands);
             }
             let recorder = Recorder { device: &self.device, gaussian: &self.gaussian, commands };
-            recorder.record(target, scene, camera);
+            recorder.record(target, scene, camera, list.as_ref());
             if let Some(query) = &self.query {
                 query.end(commands);
             }

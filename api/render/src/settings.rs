@@ -39,6 +39,9 @@ pub struct Settings {
     pub cut_off_deviations: f32,
     /// The variance of the screen filter in px^2; `None` is 3DGS's 0.3, or 0.5 of flat Gaussians.
     pub low_pass_variance: Option<f32>,
+    /// Leave out Gaussians, and sort them, by the z of their centres, whatever `order` says: the renderer lists them for each
+    /// frame. Else a fisheye and a panorama go by distance, and the near plane cuts each ray that meets a flat Gaussian.
+    pub by_z: bool,
     /// Keep depths, too: see [`Frame::depth`](crate::Frame::depth).
     pub depth: bool,
     /// Keep depths whose expected value is the mean depth itself, not the reciprocal of the mean reciprocal.
@@ -65,6 +68,7 @@ impl Default for Settings {
             cut_off: CutOff::None,
             cut_off_deviations: 3.0,
             low_pass_variance: None,
+            by_z: false,
             depth: false,
             linear_depth: false,
             gaussians: false,

@@ -414,15 +414,17 @@ impl ValueEnum for Choice<SortOrder> {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, help) = match self {
-            Self::Auto => ("auto", "As in the file; depth if the file has no order"),
-            Self::Given(SortOrder::Depth) => ("depth", "Depth along the camera's axis, as 3DGS does"),
-            Self::Given(SortOrder::Distance) => ("distance", "Distance from the camera"),
+        // The second name is that of glTF and USD.
+        let (name, alias, help) = match self {
+            Self::Auto => ("auto", None, "As in the file; depth if the file has no order"),
+            Self::Given(SortOrder::Depth) => ("depth", Some("zDepth"), "Depth along the camera's axis, as 3DGS does"),
+            Self::Given(SortOrder::Distance) => ("distance", Some("cameraDistance"), "Distance from the camera"),
             Self::Given(SortOrder::PerPixel) => {
-                ("per-pixel", "Depth along each pixel's own ray: nothing pops as the camera rotates")
+                let help = "Depth along each pixel's own ray: nothing pops as the camera rotates";
+                ("per-pixel", Some("rayHitDistance"), help)
             }
         };
-        Some(PossibleValue::new(name).help(help))
+        Some(PossibleValue::new(name).aliases(alias).help(help))
     }
 }
 
@@ -433,12 +435,15 @@ impl ValueEnum for Choice<Geometry> {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, help) = match self {
-            Self::Auto => ("auto", "As in the file; volumes if the file has no shape"),
-            Self::Given(Geometry::Volume) => ("3d", "Volumes with three axes, as in 3DGS"),
-            Self::Given(Geometry::Surfel) => ("2d", "Flat discs with two axes, as in 2DGS; a third scale is ignored"),
+        // The second name is that of USD's kernels.
+        let (name, alias, help) = match self {
+            Self::Auto => ("auto", None, "As in the file; volumes if the file has no shape"),
+            Self::Given(Geometry::Volume) => ("3d", Some("ellipsoid"), "Volumes with three axes, as in 3DGS"),
+            Self::Given(Geometry::Surfel) => {
+                ("2d", Some("surflet"), "Flat discs with two axes, as in 2DGS; a third scale is ignored")
+            }
         };
-        Some(PossibleValue::new(name).help(help))
+        Some(PossibleValue::new(name).aliases(alias).help(help))
     }
 }
 

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use crate::args::{CameraArguments, ModeArguments, SceneArguments};
 use crate::cameras::{self, View, ViewError};
+use crate::compliance;
 use crate::drawing::{self, DrawError, Drawing};
 use crate::measures::{Means, Measures, difference, in_eight_bits, shown};
 use crate::progress::Progress;
@@ -44,6 +45,10 @@ pub enum Error {
     There { path: PathBuf },
     #[error("{name}: the PSNR of {psnr:.2} dB is below {limit}")]
     Below { name: String, psnr: f64, limit: f64 },
+    #[error(transparent)]
+    Compliance(#[from] compliance::Error),
+    #[error("a picture is compared with another one, or with a scene")]
+    Nothing,
     #[error("output: {0}")]
     Stdout(std::io::Error),
 }
@@ -69,7 +74,15 @@ pub struct CompareArguments {
     pub a: PathBuf,
 
     /// The reference: a picture, a folder of pictures, or a scene, which is drawn
-    pub b: PathBuf,
+    #[arg(required_unless_present = "compliance")]
+    pub b: Option<PathBuf>,
+
+    /// Compare a renderer's pictures of the cases in FOLDER, such as tests/compliance, with the exact ones
+    ///
+    /// FOLDER has a manifest.json with scenes, cameras and clauses; A is a folder of pictures that are named after its cases.
+    /// A table by clause is printed. The exit code is 1 if a normative picture differs.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["b", "difference", "fail_below", "background"])]
+    pub compliance: Option<PathBuf>,
 
     #[command(flatten)]
     pub camera: CameraArguments,
@@ -121,8 +134,16 @@ struct Compared {
 /// Compares and prints the results.
 pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     let mut compared = Vec::new();
+    let b = match (&arguments.b, &arguments.compliance) {
+        (Some(b), _) => b,
+        (None, Some(cases)) => {
+            let theirs = pictures(&arguments.a)?;
+            return Ok(compliance::run(cases, &arguments.a, &theirs, arguments.json, arguments.quiet)?);
+        }
+        (None, None) => return Err(Error::Nothing),
+    };
     if arguments.a.is_dir() {
-        for (name, a, b) in pairs(&arguments.a, &arguments.b)? {
+        for (name, a, b) in pairs(&arguments.a, b)? {
             let difference = arguments.difference.as_ref().map(|folder| folder.join(format!("{name}.png")));
             if let Some(path) = &difference {
                 let folder = gaurast_picture::folder(path);
@@ -134,16 +155,17 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
         }
     } else {
         let a = gaurast_picture::read(&arguments.a)?;
-        let is_picture = PictureFormat::of(&arguments.b).is_ok();
-        let b = if is_picture {
-            gaurast_picture::read(&arguments.b)?
+        let is_picture = PictureFormat::of(b).is_ok();
+        let second = if is_picture {
+            gaurast_picture::read(b)?
         } else {
-            let drawn = draw(arguments, [a.width, a.height])?;
+            let drawn = draw(arguments, b, [a.width, a.height])?;
             let floats = matches!(PictureFormat::of(&arguments.a), Ok(PictureFormat::Exr));
             if floats { drawn } else { in_eight_bits(drawn) }
         };
-        check_sizes(&a, &arguments.a, &b, &arguments.b)?;
-        let pair = Pair { name: arguments.a.display().to_string(), a, b, difference: arguments.difference.clone() };
+        check_sizes(&a, &arguments.a, &second, b)?;
+        let name = arguments.a.display().to_string();
+        let pair = Pair { name, a, b: second, difference: arguments.difference.clone() };
         compared.push(compare(pair, arguments)?);
     }
     if !arguments.quiet || arguments.json {
@@ -183,10 +205,10 @@ fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> 
     Ok(Compared { name: pair.name, measures })
 }
 
-/// Draws the scene for a picture of `size`.
-fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> {
+/// Draws the scene at `path` for a picture of `size`.
+fn draw(arguments: &CompareArguments, path: &Path, size: [u32; 2]) -> Result<Picture, Error> {
     let progress = Progress { quiet: arguments.quiet || arguments.json };
-    let source = Source::of(&SceneArguments { scenes: vec![arguments.b.clone()], ..SceneArguments::default() })?;
+    let source = Source::of(&SceneArguments { scenes: vec![path.to_owned()], ..SceneArguments::default() })?;
     let camera = CameraArguments {
         size: Some(arguments.camera.size.unwrap_or(Size(size))),
         ..arguments.modes.cameras(&arguments.camera)
@@ -202,7 +224,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
         }
     }
     let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
-    let settings = drawing::settings(&arguments.modes, &scene);
+    let settings = drawing::settings(&arguments.modes, &scene, [&view.camera]);
     let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(trained);

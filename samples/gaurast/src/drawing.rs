@@ -5,7 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, WorkTrace};
-use gaurast_scene::{Antialiasing, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
+use gaurast_scene::{Antialiasing, Camera, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
 use thiserror::Error;
 
 use crate::args::{Choice, ModeArguments, chosen};
@@ -33,10 +33,10 @@ pub enum DrawError {
     Trace,
 }
 
-/// The settings from the command line and the scene's file.
-pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
+/// The settings from the command line and the scene's file, for `cameras`.
+pub fn settings<'a>(modes: &ModeArguments, scene: &Scene, cameras: impl IntoIterator<Item = &'a Camera>) -> Settings {
     let order_of_file = match modes.renderer {
-        Some(renderer) => renderer.order(),
+        Some(renderer) => renderer.order(scene.metadata().order),
         None => scene.metadata().order.unwrap_or_default(),
     };
     let settings = Settings {
@@ -50,7 +50,7 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         ..Settings::default()
     };
     match modes.renderer {
-        Some(renderer) => renderer.settings(settings),
+        Some(renderer) => renderer.settings(settings, cameras),
         None => settings,
     }
 }

@@ -8,6 +8,7 @@ mod cfg_args;
 mod command_line;
 mod compare;
 mod compare_drivers;
+mod compliance;
 mod devices;
 mod drawing;
 mod eval;

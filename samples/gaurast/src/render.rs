@@ -105,7 +105,7 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
             eprintln!("gaurast: {note}");
         }
     }
-    let mut settings = drawing::settings(&arguments.modes, &scene);
+    let mut settings = drawing::settings(&arguments.modes, &scene, views.iter().map(|view| &view.camera));
     settings.depth = arguments.output.depth || !arguments.output.depth_output.is_empty();
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use gaurast_render::{CutOff, Settings};
-use gaurast_scene::{Antialiasing, SortOrder};
+use gaurast_scene::camera::Model;
+use gaurast_scene::{Antialiasing, Camera, Geometry, SortOrder};
 
 /// Values of `--as`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -16,14 +17,17 @@ pub enum OtherRenderer {
     Gsplat15,
     /// As KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
     Gltf,
+    /// As OpenUSD's ParticleField3DGaussianSplat says: no cut-off, by depth unless the file has a hint
+    Usd,
 }
 
 impl OtherRenderer {
-    /// The order in which it composites.
-    pub fn order(self) -> SortOrder {
+    /// The order in which it composites, if a file's hint has no say.
+    pub fn order(self, of_file: Option<SortOrder>) -> SortOrder {
         match self {
             Self::Inria | Self::Gsplat | Self::Gsplat15 => SortOrder::Depth,
             Self::Gltf => SortOrder::Distance,
+            Self::Usd => of_file.unwrap_or(SortOrder::Depth),
         }
     }
 
@@ -32,32 +36,39 @@ impl OtherRenderer {
         match self {
             Self::Inria => Some(0.2),
             Self::Gsplat | Self::Gsplat15 => Some(0.01),
-            Self::Gltf => None,
+            Self::Gltf | Self::Usd => None,
         }
     }
 
-    /// The settings by which its pictures are drawn. All of them dilate by 0.3 px^2, leave out alphas below 1/255, and
-    /// finish pixels at 0.0001.
-    pub fn settings(self, settings: Settings) -> Settings {
+    /// The settings by which its pictures for `cameras` are drawn. All of them dilate by 0.3 px^2, leave out alphas below
+    /// 1/255, and finish pixels at 0.0001.
+    pub fn settings<'a>(self, settings: Settings, cameras: impl IntoIterator<Item = &'a Camera>) -> Settings {
+        let is_surfel = settings.geometry == Geometry::Surfel;
+        let is_gsplat = matches!(self, Self::Gsplat | Self::Gsplat15);
         let (cut_off, cut_off_deviations) = match self {
             Self::Inria => (CutOff::TileSquare, 3.0),
+            // The device has no cut-off of 2D Gaussians.
+            Self::Gsplat | Self::Gsplat15 if is_surfel => (CutOff::None, 3.33),
             Self::Gsplat | Self::Gsplat15 => (CutOff::TileRectangle, 3.33),
             Self::Gltf => (CutOff::Ellipse, 3.0),
+            Self::Usd => (CutOff::None, 3.0),
         };
         let is_compensated = settings.antialiasing == Antialiasing::Compensated;
+        let is_other_depth = is_surfel || cameras.into_iter().any(|camera| camera.model == Model::Fisheye);
         Settings {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: match self {
                 Self::Gsplat15 => 0.999,
-                Self::Inria | Self::Gsplat | Self::Gltf => 0.99,
+                Self::Inria | Self::Gsplat | Self::Gltf | Self::Usd => 0.99,
             },
             transmittance_floor: 1e-4,
             cut_off,
             cut_off_deviations,
             compensation_floor: match self {
-                Self::Inria if is_compensated => 0.000_025,
+                Self::Inria | Self::Gsplat if is_compensated => 0.000_025,
                 _ => 0.0,
             },
+            by_z: is_gsplat && settings.order == SortOrder::Depth && is_other_depth,
             ..settings
         }
     }

@@ -110,7 +110,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
             eprintln!("gaurast: {note}");
         }
     }
-    let settings = drawing::settings(&arguments.modes, &scene);
+    let settings = drawing::settings(&arguments.modes, &scene, &cameras);
     let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
     let background = arguments.background.or(source.background);
     let behind = background.map_or([0.0; 3], Background::color);

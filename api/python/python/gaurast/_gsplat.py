@@ -17,6 +17,9 @@ from ._device import device as device_of
 # The ceiling of alpha of each version.
 _CEILINGS = {"1.5": 0.999, "1.6": 0.99}
 
+# The least ratio of determinants of each version, of "antialiased".
+_COMPENSATION_FLOORS = {"1.5": 0.0, "1.6": 0.000_025}
+
 _MODELS = {"pinhole": "pinhole", "ortho": "orthographic", "fisheye": "fisheye"}
 
 _MODES = ("RGB", "D", "ED", "RGB+D", "RGB+ED")
@@ -136,27 +139,17 @@ def _scene_of(*arrays: Any) -> Optional[_gaurast.NativeScene]:
 
 
 class _Batch:
-    """The arguments of one batch: Gaussians, their colours, and C cameras."""
+    """The colours of one batch of Gaussians, and C cameras."""
 
-    def __init__(self, arrays: Gaussians, colors: Optional[Floats], cameras: list[Camera]) -> None:
-        self.arrays = arrays
+    def __init__(self, colors: Optional[Floats], cameras: list[Camera]) -> None:
         self.colors = colors
         self.cameras = cameras
 
-    def by_camera(self, split: bool) -> list[tuple[Gaussians, Optional[Floats], list[Camera]]]:
-        """What is drawn at once: each camera alone if its colours are its own, or if `split`."""
+    def by_camera(self) -> list[tuple[Optional[Floats], list[Camera]]]:
+        """What is drawn at once: each camera alone if its colours are its own."""
         if self.colors is None or self.colors.ndim == 3:
-            if not split:
-                return [(self.arrays, self.colors, self.cameras)]
-            return [(self.arrays, self.colors, [camera]) for camera in self.cameras]
-        return [(self.arrays, colors, [camera]) for colors, camera in zip(self.colors, self.cameras)]
-
-
-def _hidden(arrays: Gaussians, camera: Camera, near: float, far: float) -> Gaussians:
-    """The arrays with opacity 0 before the near and beyond the far plane, for cameras whose depth is a distance."""
-    view = camera.viewmat
-    depths = arrays.means @ view[2, :3] + view[2, 3]
-    return arrays._replace(opacities=np.where((depths > near) & (depths < far), arrays.opacities, np.float32(0.0)))
+            return [(self.colors, self.cameras)]
+        return [(colors, [camera]) for colors, camera in zip(self.colors, self.cameras)]
 
 
 def rasterization(
@@ -230,9 +223,9 @@ def rasterization(
         backgrounds: Values behind the Gaussians, `[..., C, D]`.
         render_mode: "RGB", "D" (accumulated depth), "ED" (mean depth), "RGB+D" or "RGB+ED".
         rasterize_mode: "classic" or "antialiased".
-        camera_model: "pinhole", "ortho" or "fisheye". A fisheye sorts by distance, where gsplat sorts by depth.
+        camera_model: "pinhole", "ortho" or "fisheye". Depths of a fisheye are distances, where gsplat's are z.
         covars: Covariances `[..., N, 3, 3]`, instead of `quats` and `scales`.
-        version: "1.6" (alpha is at most 0.99) or "1.5" (0.999).
+        version: "1.6" (alpha is at most 0.99, and antialiasing leaves at least 0.005 of the opacity) or "1.5" (0.999, and 0).
         threads: The number of the device's threads; 0 is one for each processor.
 
     `packed`, `segmented` and `channel_chunk` change nothing.
@@ -327,21 +320,20 @@ def rasterization(
         "cut_off": "TileRectangle",
         "cut_off_deviations": 3.33,
         "low_pass_variance": float(eps2d),
+        "compensation_floor": _COMPENSATION_FLOORS[version],
+        "by_z": is_fisheye,
     }
-    near, far = (1e-6, math.inf) if is_fisheye else (near_plane, far_plane)
     model = _MODELS[camera_model]
     device = device_of(threads)
     pictures, alphas = [], []
     for index in range(batches):
         arrays = Gaussians(**{name: values[index] for name, values in gaussians.items()})
         cameras = [
-            Camera.from_matrices(view, K, width, height, model=model, near=near, far=far)
+            Camera.from_matrices(view, K, width, height, model=model, near=near_plane, far=far_plane)
             for view, K in zip(views[index], intrinsics[index])
         ]
-        for drawn, channels, some in _Batch(arrays, by_batch[index], cameras).by_camera(is_fisheye):
-            if is_fisheye:
-                drawn = _hidden(drawn, some[0], near_plane, far_plane)
-            frame, alpha = _draw(device, scene, drawn, channels, some, settings, sh_degree, render_mode)
+        for channels, some in _Batch(by_batch[index], cameras).by_camera():
+            frame, alpha = _draw(device, scene, arrays, channels, some, settings, sh_degree, render_mode)
             pictures.append(frame)
             alphas.append(alpha)
 

@@ -24,6 +24,7 @@ _RENDERERS: dict[str, tuple[str, float, float, str, Optional[float]]] = {
     "gsplat": ("TileRectangle", 3.33, 0.99, "depth", 0.01),
     "gsplat-1.5": ("TileRectangle", 3.33, 0.999, "depth", 0.01),
     "gltf": ("Ellipse", 3.0, 0.99, "distance", None),
+    "usd": ("None", 3.0, 0.99, "depth", None),
 }
 
 _GEOMETRIES = {"3d": "volume", "2d": "surfel"}
@@ -116,7 +117,7 @@ def render(
     Args:
         camera: A camera or several of one size; without one, `scene.frame(size)`.
         size: The picture's width and height in pixels, instead of the camera's.
-        as_: Draw what another renderer would: "inria", "gsplat" (1.6), "gsplat-1.5" or "gltf". With `antialiasing`
+        as_: Draw what another renderer would: "inria", "gsplat" (1.6), "gsplat-1.5", "gltf" or "usd". With `antialiasing`
             "compensated" it is that renderer's compensated mode. Their near planes are not taken over: a camera has its own.
         sh_degree: The highest degree of spherical harmonics that is drawn.
         order: "depth", "distance" or "per-pixel"; "auto" is what the file says.
@@ -161,13 +162,21 @@ def render(
     settings["antialiasing"] = compensated
     stated_order = metadata["order"]
     if as_ is not None:
-        cut_off, deviations, ceiling, stated_order, _ = _RENDERERS[_choice("as_", as_, list(_RENDERERS))]
+        cut_off, deviations, ceiling, own_order, _ = _RENDERERS[_choice("as_", as_, list(_RENDERERS))]
+        if as_ != "usd":
+            stated_order = own_order
         settings.update(cut_off=cut_off, cut_off_deviations=deviations, alpha_ceiling=ceiling)
-        if as_ == "inria" and compensated == "compensated":
+        if as_ in ("inria", "gsplat") and compensated == "compensated":
             settings["compensation_floor"] = 0.000_025
     settings["order"] = chosen("order", order, ["depth", "distance", "per-pixel"], stated_order, "depth")
     shape = chosen("geometry", geometry, list(_GEOMETRIES), metadata["geometry"], "3d")
     settings["geometry"] = _GEOMETRIES.get(shape, shape)
+    if as_ in ("gsplat", "gsplat-1.5"):
+        is_surfel = settings["geometry"] == "surfel"
+        if is_surfel:
+            settings["cut_off"] = "None"
+        is_other_depth = is_surfel or any(camera.model == "fisheye" for camera in cameras)
+        settings["by_z"] = is_other_depth and settings["order"] == "depth"
 
     drawing = device_of(threads)
     first = {**settings, "linear_depth": True} if depth else settings

@@ -65,9 +65,9 @@ pub fn run(arguments: &EvalArguments) -> Result<(), Error> {
     for (measured, view) in dataset.views.iter_mut().zip(views) {
         measured.view = view;
     }
-    let settings = drawing::settings(&arguments.modes, &scene);
-    let largest = dataset.views.iter().map(|measured| &measured.view.camera);
-    if let Some(camera) = largest.max_by_key(|c| u64::from(c.width) * u64::from(c.height)) {
+    let cameras = dataset.views.iter().map(|measured| &measured.view.camera);
+    let settings = drawing::settings(&arguments.modes, &scene, cameras.clone());
+    if let Some(camera) = cameras.max_by_key(|c| u64::from(c.width) * u64::from(c.height)) {
         settings.check(camera).map_err(DrawError::Render)?;
         limits::check_memory(camera, false, BYTES_PER_PIXEL, dataset.views.len()).map_err(Error::Limit)?;
     }

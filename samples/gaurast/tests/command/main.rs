@@ -2,6 +2,7 @@
 
 mod c_program;
 mod command_line;
+mod compliance;
 mod evaluation;
 mod files;
 mod given_files;

@@ -378,9 +378,14 @@ fn gsplat_s_pictures_are_drawn() {
     let older = Rules { ceiling: 0.999, ..rules };
     let open = check(&folder, &["--as", "gsplat-1.5"], &older);
     assert!(open <= FEW, "{open}");
-    let compensated = Rules { compensated: true, ..rules };
+    // gsplat 1.6: `MIN_COMPENSATION` is the root of the ratio.
+    let compensated = Rules { compensated: true, ratio_floor: 0.005 * 0.005, ..rules };
     let arguments = ["--as", "gsplat", "--antialiasing", "compensated"];
     let open = check(&folder, &arguments, &compensated);
+    assert!(open <= FEW, "{open}");
+    let older = Rules { ratio_floor: 0.0, ceiling: 0.999, ..compensated };
+    let arguments = ["--as", "gsplat-1.5", "--antialiasing", "compensated"];
+    let open = check(&folder, &arguments, &older);
     assert!(open <= FEW, "{open}");
 }
 
@@ -402,9 +407,9 @@ fn pictures_of_gltf_s_extension_are_drawn() {
 #[gaurast_runner::test]
 fn renderers_differ_and_pictures_are_compared_with_them() {
     let folder = folder();
-    let plain = drawn(&folder, &["--near", "0.2"]);
+    let plain = drawn(&folder, &["--near", "0.3"]);
     let mut pictures = vec![plain];
-    for renderer in ["inria", "gsplat", "gsplat-1.5", "gltf"] {
+    for renderer in ["inria", "gsplat", "gsplat-1.5", "usd", "gltf"] {
         pictures.push(drawn(&folder, &["--as", renderer]));
     }
     for (index, picture) in pictures.iter().enumerate() {

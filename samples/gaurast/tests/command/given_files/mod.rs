@@ -5,6 +5,7 @@ mod cameras;
 mod faults;
 mod fixtures;
 mod golden;
+mod gpu;
 
 use std::ffi::OsStr;
 use std::path::Path;
