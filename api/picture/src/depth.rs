@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::atomic::write_atomically;
-use crate::files::OutputError;
+use crate::files::{EncodeError, OutputError};
 
 /// A format of files of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,9 +47,8 @@ impl DepthFormat {
 /// See [`OutputError`].
 pub fn write_depths(path: &Path, map: &DepthMap<'_>, step: f64) -> Result<(), OutputError> {
     let encoded = match DepthFormat::of(path)? {
-        DepthFormat::Png => {
-            png(map, step).map_err(|error| OutputError::Encode { path: path.to_owned(), reason: error.to_string() })?
-        }
+        DepthFormat::Png => png(map, step)
+            .map_err(|error| OutputError::Encode { path: path.to_owned(), reason: EncodeError::of(error) })?,
         DepthFormat::Npy => npy(map),
     };
     write_atomically(path, &encoded).map_err(|source| OutputError::Io { path: path.to_owned(), source })

@@ -30,6 +30,7 @@ const MAX_WEBP_SIDE: u32 = 16_384;
 
 /// A format of picture files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PictureFormat {
     /// 8-bit RGB, or RGBA if the background is transparent.
     Png,
@@ -43,8 +44,21 @@ pub enum PictureFormat {
     Ppm,
 }
 
-/// The reason that a picture could not be written or read.
+/// The reason that a picture does not become a file of a format: the format cannot hold it, or its encoder failed.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct EncodeError(pub(crate) String);
+
+impl EncodeError {
+    /// An encoder's error.
+    pub(crate) fn of(error: impl ToString) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// The reason that a picture could not be written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum OutputError {
     /// No supported format has the extension.
     #[error("{}: pictures are written as {EXTENSIONS}", path.display())]
@@ -71,13 +85,13 @@ pub enum OutputError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// The encoder's message.
-        reason: String,
+        /// The encoder's reason.
+        reason: EncodeError,
     },
 }
 
 /// The extensions of all formats, as messages show them.
-const EXTENSIONS: &str = ".png, .jpg, .webp, .ppm or .exr";
+pub(crate) const EXTENSIONS: &str = ".png, .jpg, .webp, .ppm or .exr";
 
 impl PictureFormat {
     /// The format of the file `path`, by its extension.
@@ -212,14 +226,16 @@ pub fn write_encoded(path: &Path, picture: &Picture, encoding: &Encoding<'_>) ->
 /// The bytes of a file of `picture`.
 ///
 /// # Errors
-/// Returns the reason that the picture doesn't fit the format.
-pub fn encode(format: PictureFormat, picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, String> {
+/// If the picture doesn't fit the format.
+pub fn encode(format: PictureFormat, picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, EncodeError> {
     let side = picture.width.max(picture.height);
     let transparent = encoding.background == Some(Background::Transparent);
     match format {
-        PictureFormat::Png => png(picture, encoding).map_err(|error| error.to_string()),
-        PictureFormat::Jpeg if transparent => Err("JPEG files cannot be transparent".to_owned()),
-        PictureFormat::Jpeg if side > MAX_JPEG_SIDE => Err(format!("JPEG files have sides of at most {MAX_JPEG_SIDE}")),
+        PictureFormat::Png => png(picture, encoding).map_err(EncodeError::of),
+        PictureFormat::Jpeg if transparent => Err(EncodeError("JPEG files cannot be transparent".to_owned())),
+        PictureFormat::Jpeg if side > MAX_JPEG_SIDE => {
+            Err(EncodeError(format!("JPEG files have sides of at most {MAX_JPEG_SIDE}")))
+        }
         PictureFormat::Jpeg => {
             let mut file = Vec::new();
             let mut encoder = jpeg_encoder::Encoder::new(&mut file, encoding.quality);
@@ -229,10 +245,12 @@ pub fn encode(format: PictureFormat, picture: &Picture, encoding: &Encoding<'_>)
             }
             let [width, height] = [picture.width, picture.height].map(|side| side as u16);
             let bytes = rgb(picture, encoding);
-            encoder.encode(&bytes, width, height, jpeg_encoder::ColorType::Rgb).map_err(|error| error.to_string())?;
+            encoder.encode(&bytes, width, height, jpeg_encoder::ColorType::Rgb).map_err(EncodeError::of)?;
             Ok(file)
         }
-        PictureFormat::WebP if side > MAX_WEBP_SIDE => Err(format!("WebP files have sides of at most {MAX_WEBP_SIDE}")),
+        PictureFormat::WebP if side > MAX_WEBP_SIDE => {
+            Err(EncodeError(format!("WebP files have sides of at most {MAX_WEBP_SIDE}")))
+        }
         PictureFormat::WebP => {
             let mut file = Vec::new();
             let (bytes, color) = if transparent {
@@ -242,11 +260,11 @@ pub fn encode(format: PictureFormat, picture: &Picture, encoding: &Encoding<'_>)
             };
             image_webp::WebPEncoder::new(&mut file)
                 .encode(&bytes, picture.width, picture.height, color)
-                .map_err(|error| error.to_string())?;
+                .map_err(EncodeError::of)?;
             Ok(file)
         }
-        PictureFormat::Exr => exr(picture, encoding).map_err(|error| error.to_string()),
-        PictureFormat::Ppm if transparent => Err("PPM files cannot be transparent".to_owned()),
+        PictureFormat::Exr => exr(picture, encoding).map_err(EncodeError::of),
+        PictureFormat::Ppm if transparent => Err(EncodeError("PPM files cannot be transparent".to_owned())),
         PictureFormat::Ppm => {
             let mut file = format!("P6\n{} {}\n255\n", picture.width, picture.height).into_bytes();
             file.extend(rgb(picture, encoding));

@@ -39,11 +39,11 @@ pub use atomic::{folder, write_atomically};
 pub use color::Background;
 pub use depth::{DepthFormat, DepthMap, write_depths};
 pub use files::{
-    Colors, DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb, write,
+    Colors, DEFAULT_QUALITY, EncodeError, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb, write,
     write_encoded,
 };
 pub use picture::Picture;
-pub use read::read;
+pub use read::{ReadError, read};
 #[cfg(feature = "metrics")]
 pub use resize::resized;
 pub use size::Size;

@@ -1,26 +1,54 @@
 //! Reading of picture files.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::Path;
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
 
 use exr::prelude::{ReadChannels, ReadLayers};
+use thiserror::Error;
 
-use crate::files::{OutputError, PictureFormat};
+use crate::files::{EXTENSIONS, PictureFormat};
 use crate::picture::Picture;
 
 /// The most pixels of a picture that is read. A larger size is probably a damaged header.
 const MAX_PIXELS: u64 = 1 << 29;
 
+/// The reason that a picture could not be read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// No supported format has the extension.
+    #[error("{}: pictures are read from {EXTENSIONS}", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// The file is damaged, or has something that is not read.
+    #[error("{}: {reason}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's reason.
+        reason: String,
+    },
+}
+
 /// Reads the picture file at `path`, whose extension gives the format. Values of eight or sixteen bits are scaled to 0
 /// to 1 and premultiplied by alpha; floats are unchanged.
 ///
 /// # Errors
-/// [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
-pub fn read(path: &Path) -> Result<Picture, OutputError> {
-    let format = PictureFormat::of(path)?;
-    let io = |source| OutputError::Io { path: path.to_owned(), source };
-    let damaged = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
+/// See [`ReadError`].
+pub fn read(path: &Path) -> Result<Picture, ReadError> {
+    let format = PictureFormat::of(path).map_err(|_| ReadError::UnknownFormat { path: path.to_owned() })?;
+    let io = |source| ReadError::Io { path: path.to_owned(), source };
     let file = BufReader::new(File::open(path).map_err(io)?);
     let picture = match format {
         PictureFormat::Png => png(file),
@@ -29,7 +57,7 @@ pub fn read(path: &Path) -> Result<Picture, OutputError> {
         PictureFormat::Exr => exr(file),
         PictureFormat::Ppm => ppm(file),
     };
-    picture.map_err(damaged)
+    picture.map_err(|reason| ReadError::Malformed { path: path.to_owned(), reason })
 }
 
 /// Checks a size before memory is allocated for it.
@@ -160,7 +188,7 @@ mod tests {
         for name in ["a.png", "a.jpg", "a.webp", "a.exr", "a.ppm"] {
             let path = folder.path().join(name);
             let missing = read(&path).expect_err("it is missing");
-            assert!(matches!(missing, OutputError::Io { .. }), "{missing}");
+            assert!(matches!(missing, ReadError::Io { .. }), "{missing}");
             std::fs::write(&path, "neither").expect("written");
             let damaged = read(&path).expect_err("it is no picture").to_string();
             assert!(damaged.starts_with(&path.display().to_string()), "{damaged}");

@@ -8,6 +8,7 @@ use crate::options::take_error;
 
 /// The reason that rendering failed.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// A Vulkan call failed.
     #[error("{}", message.clone().unwrap_or_else(|| format!("{call} failed: {result}")))]

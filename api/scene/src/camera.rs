@@ -74,6 +74,7 @@ fn is_infinite(value: &f64) -> bool {
 
 /// The reason that a camera's parameters are invalid.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CameraError {
     /// A number is infinite or not a number.
     #[error("the camera has a number that is not finite")]

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// The reason that a scene could not be read. Displayed as one sentence: file, place, reason.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be opened or read.
     #[error("{}: {source}", path.display())]
@@ -50,6 +51,7 @@ pub enum SceneError {
 
 /// A place in a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Place {
     /// The file as a whole.
     File,
@@ -93,6 +95,7 @@ impl fmt::Display for Place {
 
 /// The problem at a [`Place`].
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum Reason {
     /// The system failed to read.
     #[error("{0}")]

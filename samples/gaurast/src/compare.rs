@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use gaurast_picture::{Background, OutputError, Picture, PictureFormat, Size};
+use gaurast_picture::{Background, OutputError, Picture, PictureFormat, ReadError, Size};
 use serde_json::json;
 use thiserror::Error;
 
@@ -21,6 +21,8 @@ use crate::sources::{Source, SourceError, stem};
 /// A failure of the comparison. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
+    #[error(transparent)]
+    Read(#[from] ReadError),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{}: {source}", path.display())]

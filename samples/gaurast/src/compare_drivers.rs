@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{self, ExitStatus};
 
 use clap::Args;
-use gaurast_picture::{OutputError, Picture, Statistics, write_atomically};
+use gaurast_picture::{OutputError, Picture, ReadError, Statistics, write_atomically};
 use serde::Serialize;
 use serde_json::json;
 use thiserror::Error;
@@ -53,6 +53,8 @@ pub enum Error {
     NoPicture { program: String },
     #[error(transparent)]
     Compare(#[from] compare::Error),
+    #[error(transparent)]
+    Read(#[from] ReadError),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{name}: the largest difference is {largest:.1} steps of 255, and {limit} are allowed")]

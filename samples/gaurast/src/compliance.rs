@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
-use gaurast_picture::{OutputError, Picture, PictureFormat};
+use gaurast_picture::{Picture, PictureFormat, ReadError};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use thiserror::Error;
@@ -26,7 +26,7 @@ const STEEPEST: f64 = 2.4 / 1.055;
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
-    Picture(#[from] OutputError),
+    Picture(#[from] ReadError),
     #[error("{}: {source}", path.display())]
     Io { path: PathBuf, source: std::io::Error },
     #[error("{}: {source}", path.display())]

@@ -1,5 +1,6 @@
 //! The scene's files and folders.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,9 @@ use crate::training_size::TrainingSize;
 
 /// The generated garden's seed.
 const SEED: u64 = 1;
+
+/// The path that stands for standard input.
+const STANDARD_INPUT: &str = "-";
 
 /// The name of outputs if the scene has none.
 const DEFAULT_NAME: &str = "gaurast";
@@ -136,12 +140,17 @@ impl Source {
         }
         let mut scene = Scene::default();
         for SourceFile { path, transform, options } in &self.files {
-            let bar = progress.bytes("reading", 0);
-            let part = gaurast_scene::open_with(path, options, |file, len| {
-                bar.set_length(len);
-                bar.wrap_read(file)
-            })?;
-            bar.finish_and_clear();
+            let part = if path == Path::new(STANDARD_INPUT) {
+                read_standard_input(options)?
+            } else {
+                let bar = progress.bytes("reading", 0);
+                let part = gaurast_scene::open_with(path, options, |file, len| {
+                    bar.set_length(len);
+                    bar.wrap_read(file)
+                })?;
+                bar.finish_and_clear();
+                part
+            };
             let first = scene.is_empty() && scene.mesh().is_empty();
             if first && *transform == Transform::default() {
                 scene = part;
@@ -151,6 +160,15 @@ impl Source {
         }
         Ok((scene, start.elapsed()))
     }
+}
+
+/// Reads the scene on standard input, which is read whole before its format is chosen.
+fn read_standard_input(options: &Options) -> Result<Scene, SceneError> {
+    let path = Path::new("standard input");
+    let mut bytes = Vec::new();
+    let read = std::io::stdin().lock().read_to_end(&mut bytes);
+    read.map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+    gaurast_scene::read_with(path, &mut &bytes[..], bytes.len() as u64, options)
 }
 
 /// Checks that no scene's file holds what the picture may lack.
@@ -195,7 +213,7 @@ fn part(path: &Path) -> Result<Part, SourceError> {
         return Err(SourceError::GsplatCheckpoint { path: path.to_owned() });
     }
     // Standard input has no name.
-    let name = if path == Path::new("-") { DEFAULT_NAME.to_owned() } else { stem(path) };
+    let name = if path == Path::new(STANDARD_INPUT) { DEFAULT_NAME.to_owned() } else { stem(path) };
     Ok(Part { name, file: path.to_owned(), dataparser: beside(path, "dataparser_transforms.json"), ..Part::default() })
 }
 

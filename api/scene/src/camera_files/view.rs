@@ -25,6 +25,7 @@ pub struct View {
 
 /// The reason that a camera file could not be read. Displayed as one sentence: file, place, reason.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CameraFileError {
     /// The file cannot be opened or read.
     #[error("{}: {source}", path.display())]
@@ -74,6 +75,7 @@ pub enum CameraFileError {
 
 /// The problem of a camera in a file.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ViewError {
     /// The image size is not positive and reasonable.
     #[error("the image size is not positive whole numbers of pixels")]

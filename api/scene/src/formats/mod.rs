@@ -26,10 +26,7 @@ use crate::transform::Motion;
 pub use input::Options;
 use input::{Format, Input, Origin};
 
-/// The path that stands for standard input.
-const STANDARD_INPUT: &str = "-";
-
-/// Reads the scene file at `path`, or the one in the folder `path`, or standard input if it is `-`.
+/// Reads the scene file at `path`, or the one in the folder `path`.
 ///
 /// # Errors
 /// If the file cannot be opened or read, is of no known kind, or is malformed.
@@ -38,7 +35,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
 }
 
 /// Reads like [`open`], through the reader that `wrap` makes of the file and its size in bytes; it can show progress,
-/// for example. Standard input, whose size is unknown, is not wrapped; it is read whole before its format is chosen.
+/// for example.
 ///
 /// # Errors
 /// As [`open`].
@@ -47,12 +44,6 @@ pub fn open_with<R: Read>(
     options: &Options,
     wrap: impl FnOnce(File, u64) -> R,
 ) -> Result<Scene, SceneError> {
-    if path == Path::new(STANDARD_INPUT) {
-        let path = Path::new("standard input");
-        let bytes = input::read_growing(std::io::stdin().lock(), u64::MAX, 0);
-        let bytes = bytes.map_err(|source| io_error(path, source))?;
-        return read_with(path, &mut &bytes[..], bytes.len() as u64, options);
-    }
     let path = &inside(path);
     let io = |source| io_error(path, source);
     let file = File::open(path).map_err(io)?;

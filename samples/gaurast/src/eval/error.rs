@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gaurast_picture::OutputError;
+use gaurast_picture::{OutputError, ReadError};
 use gaurast_scene::camera_files::CameraFileError;
 use thiserror::Error;
 
@@ -21,6 +21,8 @@ pub enum Error {
     View(#[from] ViewError),
     #[error(transparent)]
     Draw(#[from] DrawError),
+    #[error(transparent)]
+    Read(#[from] ReadError),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{}: {source}", path.display())]
