@@ -5,7 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, WorkTrace};
-use gaurast_scene::{Antialiasing, Camera, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
+use gaurast_scene::{Antialiasing, Axes, AxesReason, Camera, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
 use thiserror::Error;
 
 use crate::args::{Choice, ModeArguments, chosen};
@@ -66,7 +66,9 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     let mut notes = metadata.warnings.clone();
     notes.extend(metadata.notes.iter().cloned());
     if let Some(axes) = &metadata.axes {
-        notes.push(format!("the file's axes are {} (--axes)", axes_and_reason(axes)));
+        let is_guess = axes.reason == AxesReason::Format && axes.axes == Axes::RIGHT_UP_BACK;
+        let option = if is_guess { "--axes rdf if it stands on its head" } else { "--axes" };
+        notes.push(format!("the file's axes are {} ({option})", axes_and_reason(axes)));
     }
     let origin = scene.origin();
     if origin != [0.0; 3] {

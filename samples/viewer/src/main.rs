@@ -222,9 +222,14 @@ fn main() -> ExitCode {
     }
 }
 
+/// The sentence on a system without a display, from winit's error, which may begin with a place in its source.
+fn no_display(error: &str) -> String {
+    let reason = error.rsplit(": ").next().unwrap_or(error).trim_end_matches('.');
+    format!("there is no display for a window: {reason}; the command gaurast draws without one")
+}
+
 fn run(arguments: Arguments) -> Outcome<()> {
-    let no_display = |error| format!("there is no display for a window ({error}); the command gaurast draws without one");
-    let events = EventLoop::new().map_err(no_display)?;
+    let events = EventLoop::new().map_err(|error| no_display(&error.to_string()))?;
     let scene = match &arguments.file {
         Some(file) => gaurast_scene::open(file)?,
         None => garden::scene(0, garden::DEFAULT_COUNT),
@@ -241,6 +246,13 @@ fn run(arguments: Arguments) -> Outcome<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_display_is_one_sentence() {
+        let error = "os error at src/mod.rs:765: neither WAYLAND_DISPLAY nor DISPLAY is set.";
+        let said = "there is no display for a window: neither WAYLAND_DISPLAY nor DISPLAY is set; the command gaurast draws without one";
+        assert_eq!(no_display(error), said);
+    }
 
     #[test]
     fn keys_turn_and_stop_the_camera() {

@@ -9,6 +9,14 @@ use crate::scene::Scene;
 /// far-off Gaussians.
 const TAIL: f64 = 0.04;
 
+/// The distance from the middle within which the middle's Gaussians lie, relative to that within which half of the opacity
+/// lies.
+const NEAR: f64 = 2.0;
+
+/// The least distance within which half of the area lies, relative to that of the opacity, of a scene of which most is far
+/// from its middle.
+const SCATTERED: f64 = 4.0;
+
 /// The most Gaussians that the box is computed from.
 const SAMPLE: usize = 1 << 18;
 
@@ -28,7 +36,7 @@ impl Extent {
     /// The box around most of `scene`'s opacity and all of its triangles.
     pub fn of(scene: &Scene) -> Self {
         let sample = sample(scene);
-        let (mut min, mut max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
+        let (mut min, mut max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect(), TAIL);
         if let Some((least, greatest)) = scene.mesh().bounds() {
             let (least, greatest) = (DVec3::from_array(least), DVec3::from_array(greatest));
             (min, max) = if sample.is_empty() { (least, greatest) } else { (min.min(least), max.max(greatest)) };
@@ -45,6 +53,28 @@ impl Extent {
         };
         let centre = (min + max) / 2.0 + DVec3::from_array(scene.origin());
         Self { centre: centre.into(), half: half.max(DVec3::splat(least)).into() }
+    }
+
+    /// The box around the middle of a scene of which most is far from there: half of its opacity lies within a distance that
+    /// is less than a quarter of the one within which half of its area lies. None of another scene, or one with triangles.
+    pub(super) fn of_middle(scene: &Scene) -> Option<Self> {
+        let sample = sample(scene);
+        if sample.is_empty() || !scene.mesh().is_empty() {
+            return None;
+        }
+        let (middle, _) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect(), 0.5);
+        let within = |weight: &dyn Fn(&Sample) -> f64| {
+            half_of(sample.iter().map(|s| (s.position.distance(middle), weight(s))).collect())
+        };
+        let distance = within(&|s| s.opacity);
+        if within(&|s| s.area) <= SCATTERED * distance {
+            return None;
+        }
+        let near = sample.iter().filter(|s| s.position.distance(middle) <= NEAR * distance);
+        let (min, max) = bounds(near.map(|s| (s.position, s.opacity)).collect(), TAIL);
+        let centre = (min + max) / 2.0 + DVec3::from_array(scene.origin());
+        let half = ((max - min) / 2.0).max(DVec3::splat(LEAST * distance));
+        Some(Self { centre: centre.into(), half: half.into() })
     }
 
     /// Half of the box's diagonal.
@@ -66,13 +96,16 @@ impl Extent {
 /// The distance from `centre` within which half of the scene's opacity lies.
 pub(super) fn median_distance(scene: &Scene, centre: [f64; 3]) -> f64 {
     let centre = DVec3::from_array(centre) - DVec3::from_array(scene.origin());
-    let mut distances: Vec<(f64, f64)> =
-        sample(scene).iter().map(|s| (s.position.distance(centre), s.opacity)).collect();
+    half_of(sample(scene).iter().map(|s| (s.position.distance(centre), s.opacity)).collect())
+}
+
+/// The distance within which half of the weight lies, of distances and weights; 0 if there are none.
+fn half_of(mut distances: Vec<(f64, f64)>) -> f64 {
     distances.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
-    let half = distances.iter().map(|(_, opacity)| opacity).sum::<f64>() / 2.0;
+    let half = distances.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
     let mut sum = 0.0;
-    let median = distances.iter().find(|(_, opacity)| {
-        sum += opacity;
+    let median = distances.iter().find(|(_, weight)| {
+        sum += weight;
         sum >= half
     });
     median.map_or(0.0, |(distance, _)| *distance)
@@ -85,6 +118,8 @@ struct Sample {
     opacity: f64,
     /// Its greatest standard deviation.
     size: f64,
+    /// The product of its two greatest standard deviations and the opacity.
+    area: f64,
 }
 
 fn sample(scene: &Scene) -> Vec<Sample> {
@@ -94,10 +129,14 @@ fn sample(scene: &Scene) -> Vec<Sample> {
         .iter()
         .zip(scene.shapes())
         .step_by(step)
-        .map(|(position, shape)| Sample {
-            position: DVec3::from_array(position.map(f64::from)),
-            opacity: f64::from(shape.opacity),
-            size: shape.scale.iter().copied().fold(0.0, f32::max).into(),
+        .map(|(position, shape)| {
+            let mut scale = shape.scale.map(f64::from);
+            scale.sort_unstable_by(f64::total_cmp);
+            let opacity = f64::from(shape.opacity);
+            let size = shape.scale.iter().copied().fold(0.0, f32::max).into();
+            let area = opacity * scale[1] * scale[2];
+            let area = if area.is_finite() { area } else { 0.0 };
+            Sample { position: DVec3::from_array(position.map(f64::from)), opacity, size, area }
         })
         .filter(|s| s.position.is_finite() && s.opacity > 0.0 && s.opacity < 1e6)
         .collect()
@@ -113,8 +152,8 @@ fn typical_size(sample: &[Sample]) -> f64 {
     *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Opposite corners of a box around most of the opacity.
-fn bounds(mut sample: Vec<(DVec3, f64)>) -> (DVec3, DVec3) {
+/// Opposite corners of a box around most of the opacity: `tail` of it lies outside at each end of each axis.
+fn bounds(mut sample: Vec<(DVec3, f64)>, tail: f64) -> (DVec3, DVec3) {
     let total: f64 = sample.iter().map(|(_, opacity)| opacity).sum();
     let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
     for axis in 0..3 {
@@ -130,7 +169,7 @@ fn bounds(mut sample: Vec<(DVec3, f64)>) -> (DVec3, DVec3) {
                 .or(sample.last())
                 .map_or(0.0, |(position, _)| position[axis])
         };
-        (min[axis], max[axis]) = (beyond(TAIL), beyond(1.0 - TAIL));
+        (min[axis], max[axis]) = (beyond(tail), beyond(1.0 - tail));
     }
     (min, max)
 }

@@ -40,11 +40,16 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// The scene as an object, or the box around its middle if it surrounds that.
+    /// The scene as an object, or the box around its middle if it surrounds that or most of it is far from there.
     pub fn of(scene: &'a Scene) -> Self {
         let extent = Extent::of(scene);
-        let object = (!surroundings::surrounds(scene, &extent)).then_some(scene);
-        Self { extent, object }
+        if surroundings::surrounds(scene, &extent) {
+            return Self::of_box(extent);
+        }
+        match Extent::of_middle(scene) {
+            Some(middle) => Self::of_box(middle),
+            None => Self { extent, object: Some(scene) },
+        }
     }
 
     /// A box.
@@ -404,6 +409,28 @@ mod tests {
         near(at(azimuth, elevation, DEFAULT_UP), (FROM.normalize() * 10.0).to_array());
         let no_up = Framing { up: [0.0; 3], ..Framing::new(DEFAULT_FOV, [64, 64]) };
         assert_eq!(no_up.camera(&Subject::of_box(extent)), Err(CameraError::NoUp));
+    }
+
+    #[test]
+    fn remnants_of_a_background_are_not_framed() {
+        // Most Gaussians are a small thing, and most of the area is a few large ones on one side, far away.
+        let thing = (0..900_u16).map(|i| [f32::from(i % 30) / 30.0, f32::from(i / 30) / 30.0, 0.0]);
+        let mut remnants = scene(0.02, thing.clone());
+        let large = GaussianShape { scale: [1.0; 3], opacity: 0.9, ..GaussianShape::default() };
+        for i in 0..50_u8 {
+            remnants.push([f32::from(i % 10) - 5.0, f32::from(i / 10), 12.0], large, &[[0.0; 3]]);
+        }
+        let subject = Subject::of(&remnants);
+        assert!(!subject.is_object());
+        let [x, y, z] = subject.extent.centre;
+        assert!((x - 0.5).abs() < 0.05 && (y - 0.5).abs() < 0.05 && z.abs() < 0.05, "{:?}", subject.extent);
+        assert!(subject.extent.half.iter().all(|half| *half < 0.6), "{:?}", subject.extent);
+        // Large ones that are near belong to the thing.
+        let mut whole = scene(0.02, thing);
+        for i in 0..50_u8 {
+            whole.push([f32::from(i) / 50.0, 1.2, 0.0], large, &[[0.0; 3]]);
+        }
+        assert!(Subject::of(&whole).is_object());
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! USD files with Gaussians, of OpenUSD's own writer: `usd/make.py` makes them.
 
 use gaurast_runner::data;
-use gaurast_scene::{Axes, Options, Reason, Scene, SortOrder};
+use gaurast_scene::{Axes, Geometry, Options, Reason, Scene, SortOrder};
 
 use super::support::*;
 
 const FLOATS: [&[u8]; 2] = [include_bytes!("usd/floats.usda"), include_bytes!("usd/floats.usdc")];
 const HALVES: [&[u8]; 2] = [include_bytes!("usd/halves.usda"), include_bytes!("usd/halves.usdc")];
 const STAGE: [&[u8]; 2] = [include_bytes!("usd/stage.usda"), include_bytes!("usd/stage.usdc")];
+const SURFLETS: [&[u8]; 2] = [include_bytes!("usd/surflets.usda"), include_bytes!("usd/surflets.usdc")];
+const COMPOSED: &[u8] = include_bytes!("usd/composed/root.usdc");
 const OLD: &[u8] = include_bytes!("usd/old.usdc");
 const PACKAGE: &[u8] = include_bytes!("usd/package.usdz");
 
@@ -47,32 +49,119 @@ fn both_encodings_and_precisions_have_the_written_values() {
     }
 }
 
+/// What OpenUSD computes of a stage.
+#[derive(serde::Deserialize)]
+struct Expected {
+    positions: Vec<[f64; 3]>,
+    volumes: Vec<f64>,
+}
+
+impl Expected {
+    /// Checks that `scene` has these Gaussians, in the order of their positions.
+    #[track_caller]
+    fn check(&self, name: &str, scene: &Scene) {
+        assert_eq!(scene.len(), self.positions.len(), "{name}");
+        let gaussian = |position: [f64; 3], volume: f64| [position[0], position[1], position[2], volume];
+        let mut expected: Vec<[f64; 4]> =
+            self.positions.iter().zip(&self.volumes).map(|(position, volume)| gaussian(*position, *volume)).collect();
+        let volume = |scale: [f32; 3]| scale.iter().map(|scale| f64::from(*scale)).product();
+        let mut found: Vec<[f64; 4]> = (scene.positions().iter().zip(scene.shapes()))
+            .map(|(position, shape)| gaussian(position.map(f64::from), volume(shape.scale)))
+            .collect();
+        // Rounding does not change the order of positions that differ.
+        let key = |gaussian: &[f64; 4]| gaussian.map(|value| (value * 1e3).round() as i64);
+        expected.sort_by_key(key);
+        found.sort_by_key(key);
+        for (found, expected) in found.iter().zip(&expected) {
+            close(&found.map(|value| value as f32), &expected.map(|value| value as f32), 1e-4);
+        }
+    }
+}
+
+#[gaurast_runner::test]
+fn layers_are_composed_as_openusd_composes_them() {
+    let expected: Expected = serde_json::from_str(include_str!("usd/composed/root.json")).expect("the script's file");
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats/usd/composed");
+    let options = Options { axes: Some(Axes::RIGHT_DOWN_FRONT), ..Options::default() };
+    for name in ["root.usda", "root.usdc"] {
+        let scene = gaurast_scene::open_with(&folder.join(name), &options, |file, _| file).expect("a good file");
+        expected.check(name, &scene);
+        assert_eq!(scene.metadata().warnings, [""; 0], "{name}");
+    }
+    // A part that is not there is named, and the others are read.
+    let alone = tempfile::tempdir().expect("a folder");
+    let copy = alone.path().join("root.usda");
+    std::fs::copy(folder.join("root.usda"), &copy).expect("copied");
+    std::fs::copy(folder.join("part.usdc"), alone.path().join("part.usdc")).expect("copied");
+    let scene = gaurast_scene::open(&copy).expect("a good file");
+    let warnings = scene.metadata().warnings.join("\n");
+    for part in [
+        "prim /world/group is incomplete: nested/group.usda: ",
+        "prim /world/second is incomplete: package.usdz: ",
+        "sublayer below.usda is not composed: ",
+    ] {
+        assert!(warnings.contains(part), "{part:?} is not told: {warnings}");
+    }
+}
+
+#[gaurast_runner::test]
+fn layers_that_compose_themselves_are_refused_or_named() {
+    let splat = "def ParticleField3DGaussianSplat \"s\" { point3f[] positions = [(1, 2, 3)]\n float3[] scales = [(1, 1, 1)]\n \
+         quatf[] orientations = [(1, 0, 0, 0)]\n float[] opacities = [1] }\n";
+    let itself = format!("#usda 1.0\n{splat} def \"a\" (references = </a>) {{ }}\n");
+    let (_, reason) = refusal("a.usda", itself.as_bytes());
+    assert!(reason.to_string().contains("composed of too many prims, or of itself"), "{reason}");
+    let mut doubling = format!("#usda 1.0\n{splat} def \"p0\" {{ {splat} }}\n");
+    for i in 1..40 {
+        let below = i - 1;
+        doubling += &format!(
+            "def \"p{i}\" {{ def \"a\" (references = </p{below}>) {{ }} def \"b\" (references = </p{below}>) {{ }} }}\n"
+        );
+    }
+    let (_, reason) = refusal("a.usda", doubling.as_bytes());
+    assert!(reason.to_string().contains("composed of too many prims"), "{reason}");
+    for (arc, told) in [
+        ("references = @../b.usda@", "../b.usda: "),
+        ("references = </none>", "there is no /none in its own layer"),
+        ("payload = @/etc/b.usda@</b>", "/etc/b.usda: "),
+    ] {
+        let file = format!("#usda 1.0\n{splat} def \"a\" ({arc}) {{ }}\n");
+        let scene = read("a.usda", file.as_bytes()).expect("a good file");
+        let warnings = scene.metadata().warnings.join("\n");
+        assert!(warnings.contains(told) && warnings.contains("prim /a is incomplete"), "{arc}: {warnings}");
+    }
+}
+
+#[gaurast_runner::test]
+fn surflets_are_flat_gaussians() {
+    for (name, file) in names(SURFLETS) {
+        let scene = unturned(name, file);
+        assert_eq!((scene.len(), scene.geometry()), (COUNT, Geometry::Surfel), "{name}");
+        assert_eq!(scene.shapes()[0].scale, [0.5, 0.25, 0.0], "{name}");
+    }
+    let [text, _] = SURFLETS;
+    let text = std::str::from_utf8(text).expect("text");
+    let ellipsoids = text.replace("KernelGaussianSurfletAPI", "KernelGaussianEllipsoidAPI");
+    assert_eq!(unturned("a.usda", ellipsoids.as_bytes()).geometry(), Geometry::Volume);
+    let constant = text.replace("KernelGaussianSurfletAPI", "KernelConstantSurfletAPI");
+    let (_, reason) = refusal("a.usda", constant.as_bytes());
+    assert!(reason.to_string().contains("no prim that is drawn"), "{reason}");
+}
+
 #[gaurast_runner::test]
 fn transforms_are_those_that_openusd_computes() {
-    #[derive(serde::Deserialize)]
-    struct Expected {
-        positions: Vec<[f64; 3]>,
-        volumes: Vec<f64>,
-    }
     let expected: Expected = serde_json::from_str(include_str!("usd/stage.json")).expect("the script's file");
     for (name, file) in names(STAGE) {
         let scene = unturned(name, file);
-        assert_eq!(scene.len(), expected.positions.len(), "{name}");
-        for (i, (position, volume)) in expected.positions.iter().zip(&expected.volumes).enumerate() {
-            for (found, expected) in scene.positions()[i].iter().zip(position) {
-                assert!((f64::from(*found) - expected).abs() < 1e-5, "{name}, Gaussian {i}: {found}, not {expected}");
-            }
-            let found: f64 = scene.shapes()[i].scale.iter().map(|scale| f64::from(*scale)).product();
-            assert!((found / volume - 1.0).abs() < 1e-5, "{name}, Gaussian {i}: volume {found}, not {volume}");
-        }
-        // The first value of those that vary with time.
-        assert_eq!(scene.shapes()[8].opacity, 0.5);
+        expected.check(name, &scene);
+        // The first value of those that vary with time is that of three Gaussians.
+        assert_eq!(scene.shapes().iter().filter(|shape| shape.opacity == 0.5).count(), 6);
         // The parts differ in the order of sorting.
         assert_eq!(scene.metadata().order, None);
         let told: Vec<&str> =
             scene.metadata().warnings.iter().chain(&scene.metadata().notes).map(String::as_str).collect();
         let told = told.join("\n");
-        for part in ["/world/cube", "ignored: 4", "1 Cube, 1 Mesh", "vary with time", "a unit is 0.01 m"] {
+        for part in ["ignored: 4", "1 Cube, 1 Mesh", "vary with time", "a unit is 0.01 m"] {
             assert!(told.contains(part), "{name}: {part:?} is not told: {told}");
         }
     }
@@ -134,11 +223,13 @@ fn malformed_files_are_refused_with_their_place() {
     assert!(matches!(refusal("a.usdc", b"PXR-USDC\0\x63\0\0\0\0\0\0\0\0\0\0").1, Reason::Version { found: 99, .. }));
     assert!(matches!(refusal("a.usd", b"neither").1, Reason::Magic { .. }));
     // Cut anywhere, or with any byte changed, a file is read or refused.
-    for len in 0..binary.len() {
-        let _ = read("a.usdc", &binary[..len]);
-        let mut damaged = binary.to_vec();
-        damaged[len] ^= 1 << (len % 8);
-        let _ = read("a.usdc", &damaged);
+    for binary in [binary, COMPOSED] {
+        for len in 0..binary.len() {
+            let _ = read("a.usdc", &binary[..len]);
+            let mut damaged = binary.to_vec();
+            damaged[len] ^= 1 << (len % 8);
+            let _ = read("a.usdc", &damaged);
+        }
     }
     for len in 0..text.len() {
         let _ = read("a.usda", &text.as_bytes()[..len]);

@@ -4,10 +4,11 @@
 //! and its set of fields. Tables are compressed by LZ4; integers among them by their differences first.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use half::f16;
 
-use super::layer::{Array, Layer, MAX_DEPTH, Prim, Specifier, Value};
+use super::layer::{Array, Layer, MAX_DEPTH, Prim, Specifier, Target, Value, Variant};
 use crate::error::{Fault, Place, Reason};
 
 /// The first bytes.
@@ -35,9 +36,17 @@ mod kind {
     pub const TOKEN: u8 = 11;
     pub const ASSET: u8 = 12;
     pub const MATRIX4: u8 = 15;
+    pub const TOKEN_LIST: u8 = 32;
+    pub const STRING_LIST: u8 = 33;
+    pub const PATH_LIST: u8 = 34;
+    pub const REFERENCE_LIST: u8 = 35;
     pub const TOKENS: u8 = 41;
     pub const SPECIFIER: u8 = 42;
+    pub const SELECTIONS: u8 = 45;
     pub const TIME_SAMPLES: u8 = 46;
+    pub const PAYLOAD: u8 = 47;
+    pub const STRINGS: u8 = 50;
+    pub const PAYLOAD_LIST: u8 = 55;
 }
 
 /// Numbers of specs' types.
@@ -45,10 +54,13 @@ mod spec {
     pub const ATTRIBUTE: u32 = 1;
     pub const PRIM: u32 = 6;
     pub const LAYER: u32 = 7;
+    pub const VARIANT: u32 = 10;
 }
 
-/// Fields of a prim that compose others into it.
-const COMPOSITION: [&str; 5] = ["references", "payload", "inheritPaths", "specializes", "variantSetNames"];
+/// The lists of an edited list, in the order in which they are stored, by the bits of those that are there, and true of those
+/// whose items are composed.
+const LISTS: [(u8, bool); 6] =
+    [(1 << 1, true), (1 << 2, true), (1 << 5, true), (1 << 6, true), (1 << 3, false), (1 << 4, false)];
 
 /// Reads the layer `bytes`.
 pub(super) fn layer(bytes: &[u8]) -> Result<Layer, Fault> {
@@ -350,7 +362,8 @@ impl<'a> File<'a> {
         let (count, encoded) = (at.u64()?, at.u64()?);
         let [indices, tokens, jumps] = [at.integers(encoded)?, at.integers(encoded)?, at.integers(encoded)?];
         let count = usize::try_from(count).unwrap_or(usize::MAX);
-        if count > indices.len() {
+        // The empty path is not in the tree.
+        if count > indices.len() + 1 {
             let (found, expected) = (encoded, count as u64);
             return Err(start.fault(Reason::Count { found, expected }));
         }
@@ -426,13 +439,14 @@ impl<'a> File<'a> {
                         layer.fields.insert(self.token(field.token).to_owned(), self.value(field.value)?);
                     }
                 }
-                // Prims in variants are below paths that are none.
-                spec::PRIM if parent.is_some() || path.depth == 1 => {
+                spec::PRIM | spec::VARIANT if parent.is_some() || path.depth == 1 => {
                     let above = parent.map_or("", |parent| layer.prims[parent].path.as_str());
-                    let path = format!("{above}/{}", self.token(path.token));
+                    let element = self.token(path.token);
+                    let variant = variant(element).filter(|_| kind == spec::VARIANT);
+                    let slash = if variant.is_some() { "" } else { "/" };
+                    let prim = Prim::new(parent, format!("{above}{slash}{element}"), Specifier::Over);
                     prims[index] = Some(layer.prims.len());
-                    let prim = self.prim(Prim::new(parent, path, Specifier::Over), set)?;
-                    layer.prims.push(prim);
+                    layer.prims.push(self.prim(Prim { variant, ..prim }, set)?);
                 }
                 spec::ATTRIBUTE => {
                     let Some(parent) = parent else { continue };
@@ -443,7 +457,7 @@ impl<'a> File<'a> {
                         if name == "default" || name == "timeSamples" {
                             let attribute = prim.attributes.entry(self.token(path.token).to_owned());
                             let value = self.value(field.value)?;
-                            attribute.or_insert(value);
+                            attribute.or_insert_with(|| Rc::new(value));
                         }
                     }
                 }
@@ -463,8 +477,7 @@ impl<'a> File<'a> {
                     prim.specifier = specifier.unwrap_or(Specifier::Over);
                 }
                 "typeName" => prim.kind = self.value(field.value)?.text().unwrap_or_default().to_owned(),
-                "active" => prim.is_active = self.value(field.value)? != Value::Bool(false),
-                _ => prim.is_composed |= COMPOSITION.contains(&name),
+                name => prim.take_field(name, self.value(field.value)?),
             }
         }
         Ok(prim)
@@ -495,6 +508,29 @@ impl<'a> File<'a> {
             (kind::BOOL, false) => Ok(Value::Bool(payload != 0)),
             (kind::SPECIFIER, false) => Ok(Value::Other),
             (kind::TIME_SAMPLES, false) => self.first_sample(at),
+            (kind::STRINGS, false) => {
+                let count = at.u64()?;
+                let texts = (0..count).map(|_| self.string(&mut at)).collect::<Result<_, _>>()?;
+                Ok(Value::Texts(texts))
+            }
+            (kind::SELECTIONS, false) => {
+                let count = at.u64()?;
+                let pairs = (0..count).map(|_| Ok((self.string(&mut at)?, self.string(&mut at)?)));
+                pairs.collect::<Result<_, Fault>>().map(Value::Selections)
+            }
+            (kind::TOKEN_LIST, false) => {
+                self.list(at, |file, at| at.u32().map(|token| file.token(token).to_owned())).map(Value::Texts)
+            }
+            (kind::STRING_LIST, false) => self.list(at, Self::string).map(Value::Texts),
+            (kind::PATH_LIST, false) => {
+                let target = |file: &Self, at: &mut Cursor<'a>| {
+                    Ok(Target { path: file.path_text(at.u32()?), ..Target::default() })
+                };
+                self.list(at, target).map(Value::Targets)
+            }
+            (kind::REFERENCE_LIST, false) => self.list(at, Self::reference).map(Value::Targets),
+            (kind::PAYLOAD_LIST, false) => self.list(at, Self::payload).map(Value::Targets),
+            (kind::PAYLOAD, false) => Ok(Value::Targets(vec![self.payload(&mut at)?])),
             _ => match Numbers::of(kind) {
                 None => Ok(Value::Other),
                 Some(numbers) if is_array => {
@@ -512,6 +548,68 @@ impl<'a> File<'a> {
                 }
             },
         }
+    }
+
+    /// The string with the index at `at`.
+    fn string(&self, at: &mut Cursor<'a>) -> Result<String, Fault> {
+        let index = at.u32()?;
+        Ok(self.strings.get(index as usize).map_or("", |token| self.token(*token)).to_owned())
+    }
+
+    /// The text of the path with index `index`; empty if there is none.
+    fn path_text(&self, index: u32) -> String {
+        let mut elements = Vec::new();
+        let mut next = Some(index as usize);
+        while let Some(path) = next.and_then(|index| self.paths.get(index).copied().flatten()) {
+            // The root has no name.
+            if path.parent.is_some() {
+                elements.push(self.token(path.token));
+            }
+            next = path.parent;
+        }
+        elements.iter().rev().fold(String::new(), |text, element| {
+            let slash = if variant(element).is_some() { "" } else { "/" };
+            text + slash + element
+        })
+    }
+
+    /// The items of an edited list that are not deleted from it.
+    fn list<T>(
+        &self,
+        mut at: Cursor<'a>,
+        item: impl Fn(&Self, &mut Cursor<'a>) -> Result<T, Fault>,
+    ) -> Result<Vec<T>, Fault> {
+        let [bits] = at.word()?;
+        let mut items = Vec::new();
+        for (_, is_composed) in LISTS.into_iter().filter(|(bit, _)| bits & bit != 0) {
+            for _ in 0..at.u64()? {
+                let item = item(self, &mut at)?;
+                if is_composed {
+                    items.push(item);
+                }
+            }
+        }
+        Ok(items)
+    }
+
+    fn reference(&self, at: &mut Cursor<'a>) -> Result<Target, Fault> {
+        let target = Target { asset: self.string(at)?, path: self.path_text(at.u32()?) };
+        // The offset and the scale of its time, and a dictionary of the names and the places of values.
+        at.take(16)?;
+        for _ in 0..at.u64()? {
+            self.string(at)?;
+            at.jump()?;
+            at.u64()?;
+        }
+        Ok(target)
+    }
+
+    fn payload(&self, at: &mut Cursor<'a>) -> Result<Target, Fault> {
+        let target = Target { asset: self.string(at)?, path: self.path_text(at.u32()?) };
+        if self.version >= 8 {
+            at.take(16)?;
+        }
+        Ok(target)
     }
 
     fn tokens_at(&self, mut at: Cursor<'_>, count: u64) -> Result<Value, Fault> {
@@ -583,6 +681,12 @@ impl<'a> File<'a> {
             _ => Err(start.malformed("the compression of an array is unknown")),
         }
     }
+}
+
+/// The variant that an element of a path is, as in `{lod=high}`.
+fn variant(element: &str) -> Option<Variant> {
+    let (set, name) = element.strip_prefix('{')?.strip_suffix('}')?.split_once('=')?;
+    Some(Variant { set: set.to_owned(), name: name.to_owned() })
 }
 
 /// The numbers of type `kind` that a representation's payload holds itself: one of at most four bytes, or small integers.

@@ -3,12 +3,30 @@
 use super::layer::{Array, Prim, Value};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::{MAX_SH_DEGREE, SH_C0, sh_coefficients};
-use crate::metadata::SortOrder;
+use crate::metadata::{Geometry, SortOrder};
 use crate::scene::Scene;
 use crate::shape::GaussianShape;
 
 /// The type's name.
 pub(super) const TYPE: &str = "ParticleField3DGaussianSplat";
+
+/// The type of fields of particles whose kernel is a schema of its own.
+pub(super) const FIELD: &str = "ParticleField";
+
+/// The kernels of such fields that are Gaussians: volumes, and discs across their third axis.
+const ELLIPSOID: &str = "ParticleFieldKernelGaussianEllipsoidAPI";
+const SURFLET: &str = "ParticleFieldKernelGaussianSurfletAPI";
+
+/// The shape of the Gaussians that `prim` has; None if it has none.
+pub(super) fn geometry(prim: &Prim) -> Option<Geometry> {
+    let has = |schema: &str| prim.schemas.iter().any(|applied| applied == schema);
+    match prim.kind.as_str() {
+        TYPE => Some(Geometry::Volume),
+        FIELD if has(SURFLET) => Some(Geometry::Surfel),
+        FIELD if has(ELLIPSOID) => Some(Geometry::Volume),
+        _ => None,
+    }
+}
 
 const COEFFICIENTS: &str = "radiance:sphericalHarmonicsCoefficients";
 const DEGREE: &str = "radiance:sphericalHarmonicsDegree";
@@ -16,8 +34,8 @@ const DEGREE: &str = "radiance:sphericalHarmonicsDegree";
 /// The degree of harmonics of a prim that names none.
 const DEFAULT_DEGREE: f64 = 3.0;
 
-/// The Gaussians of `prim`.
-pub(super) fn scene(prim: &Prim) -> Result<Scene, Fault> {
+/// The Gaussians of `prim`, of this shape.
+pub(super) fn scene(prim: &Prim, geometry: Geometry) -> Result<Scene, Fault> {
     let positions = required(prim, "positions", 3)?;
     let count = positions.values.len() / 3;
     let of_each = |name: &str, width: usize| {
@@ -32,8 +50,9 @@ pub(super) fn scene(prim: &Prim) -> Result<Scene, Fault> {
     let degree = colors.degree;
     let vector = |array: &Array, i: usize| std::array::from_fn(|axis| array.values[3 * i + axis]);
     let mut scene = Scene::try_generate(degree, count, |i, sh| {
+        let [x, y, z] = vector(scales, i).map(f32::abs);
         let shape = GaussianShape {
-            scale: vector(scales, i).map(f32::abs),
+            scale: [x, y, if geometry == Geometry::Surfel { 0.0 } else { z }],
             rotation: std::array::from_fn(|c| rotations.values[4 * i + c]),
             opacity: opacities.values[i].clamp(0.0, 1.0),
         };
@@ -47,11 +66,14 @@ pub(super) fn scene(prim: &Prim) -> Result<Scene, Fault> {
     if scales.values.iter().any(|scale| *scale < 0.0) {
         metadata.note("scales are negative, and their magnitudes are taken");
     }
+    if geometry == Geometry::Surfel {
+        metadata.geometry = Some(geometry);
+    }
     if prim.is_animated {
         metadata.warn("values that vary with time are ignored but for the first ones");
     }
     metadata.notes.extend(colors.note);
-    let token = |name: &str| prim.attributes.get(name).and_then(Value::text);
+    let token = |name: &str| prim.value(name).and_then(Value::text);
     metadata.order = match token("sortingModeHint") {
         None => None,
         Some("zDepth") => Some(SortOrder::Depth),
@@ -78,7 +100,7 @@ fn place(prim: &Prim, name: &str) -> Place {
 fn array<'a>(prim: &'a Prim, name: &str, width: usize) -> Result<Option<&'a Array>, Fault> {
     let half = format!("{name}h");
     for name in [name, &half] {
-        match prim.attributes.get(name) {
+        match prim.value(name) {
             None => {}
             Some(Value::Array(array)) if array.values.is_empty() => {}
             Some(Value::Array(array)) if array.width == width => return Ok(Some(array)),
@@ -121,7 +143,7 @@ enum Kind {
 impl<'a> Colors<'a> {
     fn of(prim: &'a Prim, count: usize) -> Result<Self, Fault> {
         if let Some(coefficients) = array(prim, COEFFICIENTS, 3)? {
-            let degree = prim.attributes.get(DEGREE).map_or(Some(DEFAULT_DEGREE), Value::number);
+            let degree = prim.value(DEGREE).map_or(Some(DEFAULT_DEGREE), Value::number);
             let degree = degree.filter(|degree| *degree >= 0.0 && libm::trunc(*degree) == *degree);
             let degree = degree.ok_or_else(|| {
                 Reason::Unsupported("it is no whole number from 0 on".to_owned()).at(place(prim, DEGREE))

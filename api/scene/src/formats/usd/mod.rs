@@ -1,10 +1,10 @@
 //! USD with prims of type `ParticleField3DGaussianSplat` (OpenUSD 26.03): as text (`.usda`), binary (`.usdc`), in an archive
 //! (`.usdz`), and as `.usd`, which is any of them.
 //!
-//! One layer is read, the first one of an archive. What it composes from other layers, and its variants, are not followed; a
-//! warning names the prims.
+//! Layers that are composed into the file's are looked for in its folder, or in the archive whose first layer it is.
 
 mod binary;
+mod composition;
 mod gaussians;
 mod layer;
 mod stage;
@@ -15,6 +15,7 @@ use super::archive::Archive;
 use super::input::{Format, Input, Origin};
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
+use composition::NamedLayer;
 use layer::Layer;
 
 /// The format as text.
@@ -65,13 +66,34 @@ usd_format!(Usdz, "USD archive", ["usdz"], None);
 /// Reads the scene of the layer or archive `bytes`.
 fn load(bytes: &[u8], origin: Origin<'_>) -> Result<Scene, Fault> {
     if !bytes.starts_with(ZIP_MAGIC) {
-        return stage::scene(&layer(bytes)?, origin);
+        let root = NamedLayer { name: String::new(), layer: layer(bytes)? };
+        let beside = |name: &str| match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
+            Some((archive, entry)) => named(name, &Archive::new(&origin.companion(archive)?)?.read(entry)?),
+            None => named(name, &origin.companion(name)?),
+        };
+        return stage::scene(&composition::compose(root, &beside)?, origin);
     }
     let archive = Archive::new(bytes)?;
     let name = archive.first();
     let bytes = archive.read(&name)?;
     let within = |fault: Fault| fault.reason.at(Place::Part(format!("entry {name:?}, {}", fault.place)));
-    layer(&bytes).and_then(|layer| stage::scene(&layer, origin)).map_err(within)
+    layer(&bytes)
+        .and_then(|layer| {
+            let root = NamedLayer { name: name.clone(), layer };
+            composition::compose(root, &|name| named(name, &archive.read(name)?))
+        })
+        .and_then(|stage| stage::scene(&stage, origin))
+        .map_err(within)
+}
+
+/// The layer of the file `name` with the contents `bytes`, or the first one if it is an archive.
+fn named(name: &str, bytes: &[u8]) -> Result<NamedLayer, Fault> {
+    if !bytes.starts_with(ZIP_MAGIC) {
+        return Ok(NamedLayer { name: name.to_owned(), layer: layer(bytes)? });
+    }
+    let archive = Archive::new(bytes)?;
+    let first = archive.first();
+    Ok(NamedLayer { name: format!("{name}[{first}]"), layer: layer(&archive.read(&first)?)? })
 }
 
 /// The layer `bytes`.

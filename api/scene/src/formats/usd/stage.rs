@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DAffine3;
 
+use super::composition::Stage;
 use super::gaussians;
 use super::layer::{Layer, Prim, Specifier, Value};
 use super::xform::Local;
@@ -24,8 +25,9 @@ struct Inherited {
     is_drawn: bool,
 }
 
-/// The scene of `layer`.
-pub(super) fn scene(layer: &Layer, origin: Origin<'_>) -> Result<Scene, Fault> {
+/// The scene of a composed stage.
+pub(super) fn scene(stage: &Stage, origin: Origin<'_>) -> Result<Scene, Fault> {
+    let Stage { layer, problems } = stage;
     let stated = axes(layer)?;
     let given = origin.options.axes.map(|axes| FileAxes { axes, reason: AxesReason::Given, of_cameras: false });
     let taken = given.unwrap_or(stated);
@@ -33,22 +35,19 @@ pub(super) fn scene(layer: &Layer, origin: Origin<'_>) -> Result<Scene, Fault> {
     let mut scene = Scene::default();
     let mut inherited: Vec<Inherited> = Vec::with_capacity(layer.prims.len());
     let mut ignored: BTreeMap<&str, usize> = BTreeMap::new();
-    let (mut hidden, mut composed) = (0, Vec::new());
+    let mut hidden = 0;
     for prim in &layer.prims {
         let above = prim.parent.map_or(Inherited { map: DAffine3::IDENTITY, is_drawn: true }, |i| inherited[i]);
         let is_drawn = above.is_drawn && is_drawn(prim);
         let local = Local::of(prim)?;
         let map = if local.is_reset { local.map } else { above.map * local.map };
         inherited.push(Inherited { map, is_drawn });
-        if prim.is_composed {
-            composed.push(prim.path.as_str());
-        }
-        if prim.kind != gaussians::TYPE {
+        let Some(geometry) = gaussians::geometry(prim) else {
             if !prim.kind.is_empty() && !matches!(prim.kind.as_str(), "Xform" | "Scope") {
                 *ignored.entry(&prim.kind).or_default() += 1;
             }
             continue;
-        }
+        };
         if !is_drawn {
             hidden += 1;
             continue;
@@ -58,7 +57,7 @@ pub(super) fn scene(layer: &Layer, origin: Origin<'_>) -> Result<Scene, Fault> {
             let text = "its transform cannot be inverted";
             return Err(Reason::Unsupported(text.to_owned()).at(Place::Part(format!("prim {}", prim.path))));
         }
-        let mut part = gaussians::scene(prim)?;
+        let mut part = gaussians::scene(prim, geometry)?;
         part.apply(&Motion::new(map.matrix3, map.translation, part.sh_degree()));
         scene.try_join(part)?;
     }
@@ -68,15 +67,7 @@ pub(super) fn scene(layer: &Layer, origin: Origin<'_>) -> Result<Scene, Fault> {
     }
     let metadata = scene.metadata_mut();
     metadata.axes = Some(taken);
-    if !composed.is_empty() {
-        let paths = composed.join(", ");
-        metadata.warn(format!(
-            "references, payloads, inherits, specializes and variants are not followed, and these prims have some: {paths}"
-        ));
-    }
-    if layer.fields.contains_key("subLayers") {
-        metadata.warn("sublayers are not followed");
-    }
+    problems.iter().for_each(|problem| metadata.warn(problem.as_str()));
     if hidden > 0 {
         metadata.note(format!("prims that are inactive, invisible, or for proxies or guides are ignored: {hidden}"));
     }
@@ -107,8 +98,8 @@ fn axes(layer: &Layer) -> Result<FileAxes, Fault> {
 
 /// True if `prim` is drawn, as far as it says itself.
 fn is_drawn(prim: &Prim) -> bool {
-    let token = |name: &str| prim.attributes.get(name).and_then(Value::text);
-    prim.is_active
+    let token = |name: &str| prim.value(name).and_then(Value::text);
+    prim.is_active != Some(false)
         && prim.specifier == Specifier::Def
         && token("visibility") != Some("invisible")
         && !matches!(token("purpose"), Some("proxy" | "guide"))

@@ -1,6 +1,9 @@
 //! The text encoding of a layer (`.usda`).
 
-use super::layer::{Array, Layer, MAX_DEPTH, Prim, Specifier, Value};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use super::layer::{Array, Layer, MAX_DEPTH, Prim, Specifier, Target, Value, Variant};
 use crate::error::{Fault, Place, Reason};
 
 /// The first bytes.
@@ -10,8 +13,13 @@ pub(super) const MAGIC: &[u8] = b"#usda";
 const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "prepend", "append", "add", "delete", "reorder"];
 
-/// Fields of a prim that compose others into it.
-const COMPOSITION: [&str; 5] = ["references", "payload", "inherits", "specializes", "variantSets"];
+/// A brace that is open.
+enum Open {
+    /// That of the prim with this index.
+    Prim(usize),
+    /// That of a set of variants of a prim.
+    Variants { prim: usize, set: String },
+}
 
 /// Reads the layer `bytes`.
 pub(super) fn layer(bytes: &[u8]) -> Result<Layer, Fault> {
@@ -23,8 +31,7 @@ pub(super) fn layer(bytes: &[u8]) -> Result<Layer, Fault> {
             layer.fields.insert(name.to_owned(), value);
         })?;
     }
-    // The prims whose braces are open.
-    let mut open: Vec<usize> = Vec::new();
+    let mut open: Vec<Open> = Vec::new();
     loop {
         parser.skip_space();
         match parser.peek() {
@@ -32,7 +39,14 @@ pub(super) fn layer(bytes: &[u8]) -> Result<Layer, Fault> {
             None => return Err(Reason::Truncated.at(Place::Line(parser.line()))),
             Some(b'}') if open.pop().is_some() => parser.at += 1,
             Some(b';') => parser.at += 1,
-            Some(_) => parser.item(&mut layer, &mut open)?,
+            Some(_) => match open.last() {
+                Some(Open::Variants { prim, set }) => {
+                    let (prim, set) = (*prim, set.clone());
+                    parser.variant(prim, set, &mut layer, &mut open)?;
+                }
+                Some(Open::Prim(prim)) => parser.item(Some(*prim), &mut layer, &mut open)?,
+                None => parser.item(None, &mut layer, &mut open)?,
+            },
         }
     }
 }
@@ -144,8 +158,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Skips a path in angle brackets, or an asset's in signs `@`.
-    fn skip_path(&mut self) -> Result<(), Fault> {
+    /// A path in angle brackets, or an asset's in signs `@`.
+    fn path(&mut self) -> Result<&'a str, Fault> {
         let (end, start): (&[u8], usize) = match self.bytes.get(self.at..).unwrap_or_default() {
             [b'@', b'@', b'@', ..] => (b"@@@", 3),
             [b'@', ..] => (b"@", 1),
@@ -155,7 +169,38 @@ impl<'a> Parser<'a> {
         let len = rest.windows(end.len()).position(|window| window == end);
         let len = len.ok_or_else(|| self.wrong("this path does not end"))?;
         self.at += start + len + end.len();
-        Ok(())
+        Ok(std::str::from_utf8(&rest[..len]).unwrap_or_default())
+    }
+
+    /// The path of an asset, of a prim, or of a prim in an asset. The offset of its time is skipped.
+    fn target(&mut self) -> Result<Target, Fault> {
+        let mut target = Target::default();
+        if self.next_is(b'@') {
+            self.path()?.clone_into(&mut target.asset);
+        }
+        if self.next_is(b'<') {
+            self.path()?.clone_into(&mut target.path);
+        }
+        if self.next_is(b'(') {
+            self.skip_brackets()?;
+        }
+        Ok(target)
+    }
+
+    /// Names of variants by their sets: a dictionary of strings.
+    fn selections(&mut self) -> Result<BTreeMap<String, String>, Fault> {
+        let mut selections = BTreeMap::new();
+        self.expect(b'{')?;
+        while !self.accept(b'}') {
+            self.name("a type")?;
+            self.skip_space();
+            let is_quoted = self.peek().is_some_and(|byte| b"\"'".contains(&byte));
+            let set = if is_quoted { self.text()? } else { self.name("a set of variants")?.to_owned() };
+            self.expect(b'=')?;
+            selections.insert(set, self.text()?);
+            while self.accept(b';') || self.accept(b',') {}
+        }
+        Ok(selections)
     }
 
     /// Skips a bracket and everything up to the one that closes it.
@@ -174,7 +219,7 @@ impl<'a> Parser<'a> {
                     continue;
                 }
                 Some(b'@' | b'<') => {
-                    self.skip_path()?;
+                    self.path()?;
                     continue;
                 }
                 Some(b'(' | b'[' | b'{') => depth += 1,
@@ -205,35 +250,39 @@ impl<'a> Parser<'a> {
                 }
                 _ => {
                     let mut name = self.name("a field")?;
+                    // What is deleted from lists is in other layers.
+                    let is_deleted = name == "delete";
                     while MODIFIERS.contains(&name) {
                         name = self.name("a field")?;
                     }
                     let name = if name == "doc" { "documentation" } else { name };
                     self.expect(b'=')?;
-                    let value = self.value()?;
-                    each(name, value);
+                    let value = if name == "variants" { Value::Selections(self.selections()?) } else { self.value()? };
+                    if !is_deleted {
+                        each(name, value);
+                    }
                 }
             }
         }
     }
 
-    /// Reads an item of the layer, or of the prim that is open: a prim up to its brace, a property, or variants.
-    fn item(&mut self, layer: &mut Layer, open: &mut Vec<usize>) -> Result<(), Fault> {
+    /// Reads an item of the layer, or of the prim `above`: a prim or a set of variants up to its brace, or a property.
+    fn item(&mut self, above: Option<usize>, layer: &mut Layer, open: &mut Vec<Open>) -> Result<(), Fault> {
         let word = self.name("a prim or a property")?;
         if let Some(specifier) = Specifier::named(word) {
-            return self.prim(specifier, layer, open);
+            let kind = self.word().to_owned();
+            let name = self.text()?;
+            let path = above.map_or("", |above| layer.prims[above].path.as_str());
+            let prim = Prim { kind, ..Prim::new(above, format!("{path}/{name}"), specifier) };
+            return self.prim(prim, layer, open);
         }
-        let prim = open.last().map(|prim| &mut layer.prims[*prim]);
-        if word == "variantSet" {
-            self.text()?;
+        if let ("variantSet", Some(prim)) = (word, above) {
+            let set = self.text()?;
             self.expect(b'=')?;
-            self.next_is(b'{');
-            self.skip_brackets()?;
-            if let Some(prim) = prim {
-                prim.is_composed = true;
-            }
-            return Ok(());
+            self.expect(b'{')?;
+            return self.open(Open::Variants { prim, set }, open);
         }
+        let prim = above.map(|prim| &mut layer.prims[prim]);
         let mut word = word;
         while MODIFIERS.contains(&word) {
             word = self.name("a property")?;
@@ -258,37 +307,41 @@ impl<'a> Parser<'a> {
         let (Some(value), Some(prim)) = (value, prim) else { return Ok(()) };
         match property.rsplit_once('.') {
             None if word != "rel" && !is_order => {
-                prim.attributes.insert(property.to_owned(), value);
+                prim.attributes.insert(property.to_owned(), Rc::new(value));
             }
             Some((name, "timeSamples")) => {
                 prim.is_animated = true;
-                prim.attributes.entry(name.to_owned()).or_insert(value);
+                prim.attributes.entry(name.to_owned()).or_insert_with(|| Rc::new(value));
             }
             _ => {}
         }
         Ok(())
     }
 
-    /// Reads a prim of `specifier` up to its brace.
-    fn prim(&mut self, specifier: Specifier, layer: &mut Layer, open: &mut Vec<usize>) -> Result<(), Fault> {
-        let kind = self.word();
+    /// Reads a variant of a set of the prim `above` up to its brace.
+    fn variant(&mut self, above: usize, set: String, layer: &mut Layer, open: &mut Vec<Open>) -> Result<(), Fault> {
         let name = self.text()?;
-        let parent = open.last().copied();
+        let path = format!("{}{{{set}={name}}}", layer.prims[above].path);
+        let variant = Some(Variant { set, name });
+        self.prim(Prim { variant, ..Prim::new(Some(above), path, Specifier::Over) }, layer, open)
+    }
+
+    /// Reads the fields of `prim`, and its brace.
+    fn prim(&mut self, mut prim: Prim, layer: &mut Layer, open: &mut Vec<Open>) -> Result<(), Fault> {
+        if self.next_is(b'(') {
+            self.fields(|name, value| prim.take_field(name, value))?;
+        }
+        self.expect(b'{')?;
+        self.open(Open::Prim(layer.prims.len()), open)?;
+        layer.prims.push(prim);
+        Ok(())
+    }
+
+    fn open(&self, brace: Open, open: &mut Vec<Open>) -> Result<(), Fault> {
         if open.len() >= MAX_DEPTH {
             return Err(self.wrong("prims are nested too deeply"));
         }
-        let above = parent.map_or("", |parent| layer.prims[parent].path.as_str());
-        let mut prim = Prim::new(parent, format!("{above}/{name}"), specifier);
-        prim.kind = kind.to_owned();
-        if self.next_is(b'(') {
-            self.fields(|name, value| match name {
-                "active" => prim.is_active = !matches!(value.number(), Some(0.0)) && value != Value::Bool(false),
-                name => prim.is_composed |= COMPOSITION.contains(&name),
-            })?;
-        }
-        self.expect(b'{')?;
-        open.push(layer.prims.len());
-        layer.prims.push(prim);
+        open.push(brace);
         Ok(())
     }
 
@@ -296,17 +349,7 @@ impl<'a> Parser<'a> {
         self.skip_space();
         match self.peek() {
             Some(b'"' | b'\'') => self.text().map(Value::Text),
-            Some(b'@' | b'<') => {
-                self.skip_path()?;
-                // The prim of another layer, and the offset of its time.
-                if self.next_is(b'<') {
-                    self.skip_path()?;
-                }
-                if self.next_is(b'(') {
-                    self.skip_brackets()?;
-                }
-                Ok(Value::Other)
-            }
+            Some(b'@' | b'<') => Ok(Value::Targets(vec![self.target()?])),
             Some(b'(') => self.tuple(),
             Some(b'[') => self.list(),
             Some(b'{') => self.first_sample(),
@@ -369,7 +412,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A list of texts, or an array of numbers, vectors or quaternions.
+    /// A list of texts or of targets, or an array of numbers, vectors or quaternions.
     fn list(&mut self) -> Result<Value, Fault> {
         let start = self.at;
         self.expect(b'[')?;
@@ -382,6 +425,17 @@ impl<'a> Parser<'a> {
                     self.accept(b',');
                 }
                 Ok(Value::Texts(texts))
+            }
+            Some(b'@' | b'<') => {
+                let mut targets = Vec::new();
+                while !self.accept(b']') {
+                    if !self.next_is(b'@') && !self.next_is(b'<') {
+                        return Err(self.wrong("a path is expected here"));
+                    }
+                    targets.push(self.target()?);
+                    self.accept(b',');
+                }
+                Ok(Value::Targets(targets))
             }
             Some(byte) if byte.is_ascii_digit() || b"(-+.]in".contains(&byte) => self.array().map(Value::Array),
             _ => {

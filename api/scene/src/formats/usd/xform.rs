@@ -26,7 +26,7 @@ impl Local {
     /// The transform of `prim`.
     pub(super) fn of(prim: &Prim) -> Result<Self, Fault> {
         let mut local = Self { map: DAffine3::IDENTITY, is_reset: false };
-        let order = match prim.attributes.get("xformOpOrder") {
+        let order = match prim.value("xformOpOrder") {
             None => return Ok(local),
             Some(Value::Texts(order)) => order.as_slice(),
             // An empty array has no type.
@@ -39,7 +39,7 @@ impl Local {
                 continue;
             }
             let name = entry.strip_prefix(INVERT).unwrap_or(entry);
-            let Some(Value::Numbers(numbers)) = prim.attributes.get(name) else {
+            let Some(Value::Numbers(numbers)) = prim.value(name) else {
                 return Err(wrong(prim, entry, "it is missing, or no number, vector, quaternion or matrix"));
             };
             let Some(map) = operation(name, numbers) else {
