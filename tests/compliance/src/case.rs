@@ -1,8 +1,11 @@
 //! Cases: a scene's file, a camera, the clause that says what is drawn, and how far a picture may be from that.
 
+use std::io::Cursor;
+use std::path::Path;
+
 use gaurast_oracle::oracle::{OracleCutOff, OracleOrder, OracleState};
 use gaurast_scene::camera::{DEFAULT_NEAR, Model};
-use gaurast_scene::{Camera, SortOrder};
+use gaurast_scene::{Camera, Scene, SceneError, SortOrder};
 
 use crate::gaussian::Gaussian;
 use crate::gltf_file::Gltf;
@@ -165,6 +168,16 @@ impl Source {
             Self::Usd(usd) => usd.bytes(),
             Self::Ply(gaussians) => ply(gaussians),
         }
+    }
+
+    /// The scene as it is read from the file.
+    ///
+    /// # Errors
+    /// If the file is not read.
+    pub fn scene(&self, camera: &Camera) -> Result<Scene, SceneError> {
+        let bytes = self.bytes(camera);
+        let name = format!("scene.{}", self.extension());
+        gaurast_scene::read(Path::new(&name), &mut Cursor::new(&bytes), bytes.len() as u64)
     }
 
     /// The file name's extension.

@@ -1,14 +1,11 @@
 //! The picture of a case by the oracle, and how far others may be from it.
 
-use std::io::Cursor;
-use std::path::Path;
-
 use gaurast_oracle::oracle::{OracleCamera, OracleState, Reference, render_bounded};
 use gaurast_oracle::scenes::SceneBuffers;
 use gaurast_scene::{Camera, Scene, SceneError};
 use thiserror::Error;
 
-use crate::case::{Case, Freedom, Source};
+use crate::case::{Case, Freedom};
 
 /// The error of a renderer in binary32 that is granted on top of what the text leaves open, on colours from 0 to 1.
 const BINARY32: f64 = 1e-4;
@@ -69,7 +66,7 @@ impl Expected {
     /// # Errors
     /// If the case's file is not read, or its picture tells nothing.
     pub fn of(case: &Case) -> Result<Self, ExpectedError> {
-        let scene = read(&case.source, &case.camera)?;
+        let scene = case.source.scene(&case.camera)?;
         let state = case.pipeline.state(scene.metadata().order, case.is_compensated);
         let reference = draw(case, &scene, &state)?;
         if !reference.alternatives.is_empty() {
@@ -104,7 +101,7 @@ impl Expected {
         let mut expected = Self { pixels, tolerance, derivation, mistaken: None };
         if let Some(mistake) = &case.mistake {
             let other = match &mistake.source {
-                Some(source) => read(source, &case.camera)?,
+                Some(source) => source.scene(&case.camera)?,
                 None => scene,
             };
             let changed = mistake.change.map_or(state, |change| change(state));
@@ -117,13 +114,6 @@ impl Expected {
         }
         Ok(expected)
     }
-}
-
-/// The scene of a file.
-fn read(source: &Source, camera: &Camera) -> Result<Scene, SceneError> {
-    let bytes = source.bytes(camera);
-    let name = format!("scene.{}", source.extension());
-    gaurast_scene::read(Path::new(&name), &mut Cursor::new(&bytes), bytes.len() as u64)
 }
 
 fn draw(case: &Case, scene: &Scene, state: &OracleState) -> Result<Reference, ExpectedError> {

@@ -9,6 +9,7 @@
 //! `glslangValidator`, whose version is thus a part of the commands.
 
 mod blits;
+mod compliance;
 mod counters;
 mod files;
 mod operations;
@@ -211,6 +212,13 @@ pub fn all() -> Vec<Case> {
     for view in renders::ALL {
         let make = |device: &Device| renders::bytes(&device.options, view).map_err(|error| Failure(error.to_string()));
         cases.push(Case { chapter: "renders", name: view.name.to_owned(), make: Box::new(make) });
+    }
+    for case in gaurast_compliance::cases() {
+        let name = case.name.clone();
+        let make = move |device: &Device| {
+            compliance::bytes(&device.options, &case).map_err(|error| Failure(error.to_string()))
+        };
+        cases.push(Case { chapter: "compliance", name, make: Box::new(make) });
     }
     let is_supported = |case: &gaurast_conformance::Case| !NOT_SUPPORTED.iter().any(|part| case.name.starts_with(part));
     let is_listed = |case: &gaurast_conformance::Case| !OF_COMMANDS.contains(&case.chapter) && case.draw().is_some();
