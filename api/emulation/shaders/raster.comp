@@ -19,21 +19,21 @@ const uint INVOCATIONS = 64u;
 // Gaussians that are looked at together.
 const uint BATCH = 128u;
 const uint ROWS = 4u;
-const uint NOBODY = 0xffffffffu;
 
 // Of the Gaussians of a batch: what gives the exponent at a pixel; its lowest value that reaches the floor; opacity; colour; tiles of the
 // cut-off; index.
 shared vec4 lines[BATCH];
 // Of a surfel: u and v at the tile's middle times w, w there; their growth; limit; the mean's distance.
-shared vec4 planes[2u * BATCH];
+shared vec4 planes[IS_SURFEL ? 2u * BATCH : 1u];
 shared vec3 scalars[BATCH];
 shared vec3 colors[BATCH];
-shared uvec2 cuts[BATCH];
+shared uvec2 cuts[HAS_CUT_TILES ? BATCH : 1u];
 // In a panorama, the places in x at which the copy counts.
-shared vec2 counting[BATCH];
+shared vec2 counting[HAS_ANGLES ? BATCH : 1u];
 shared uint members[BATCH];
-// Of a batch of which only some reach the tile, a bit for each that does.
-shared uint reaching[BATCH / 32u];
+// Where the pairs did not fit: Gaussians that reach the tile, and, of those that are looked at, a bit for each that does.
+shared uint waiting[BATCH + INVOCATIONS];
+shared uint reaching[INVOCATIONS / 32u];
 shared uint unfinished, steep;
 
 // Of the invocation's pixels: what has accumulated in batches before and in this one, what is left, and whether a pixel goes on and
@@ -126,6 +126,41 @@ void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
     }
 }
 
+// Looks at a Gaussian, of as many as there are invocations, and has it wait if it reaches the tile. Returns the number of those that do,
+// which follow the ones that were found before in their order.
+uint gather(uint candidate, uint end_, uint found, uvec2 tile, uint copies_) {
+    uint l = gl_LocalInvocationIndex, member = 0u;
+    if (l < INVOCATIONS / 32u) {
+        reaching[l] = 0u;
+    }
+    barrier();
+    bool reaches = false;
+    if (candidate < end_) {
+        uint copy = candidate % copies_, index = push.set.values.at[candidate / copies_];
+        Reach reach = reach_of(push.set.records.at[index], copy);
+        uvec2 row = tiles_of_row(reach, tile.y, push.set.tiles.x);
+        bool is_row = tile.y >= (reach.tiles_y & 0xffffu) && tile.y <= reach.tiles_y >> 16;
+        reaches = is_row && tile.x >= row.x && tile.x < row.y;
+        member = index | copy << COPY_SHIFT;
+    }
+    if (reaches) {
+        atomicOr(reaching[l >> 5], 1u << (l & 31u));
+    }
+    barrier();
+    uint before = found, all = 0u;
+    for (uint k = 0u; k < INVOCATIONS / 32u; k++) {
+        uint own = bitCount(reaching[k]);
+        before += k < l >> 5 ? own : 0u;
+        all += own;
+    }
+    before += bitCount(reaching[l >> 5] & ((1u << (l & 31u)) - 1u));
+    if (reaches) {
+        waiting[before] = member;
+    }
+    barrier();
+    return all;
+}
+
 void main() {
     uint l = gl_LocalInvocationIndex;
     uvec2 tile = gl_WorkGroupID.xy, size = push.set.area_size;
@@ -151,7 +186,7 @@ void main() {
     if (range.x == range.y) {
         return;
     }
-    Words values = push.set.pair_values, sorted = push.set.values;
+    Words values = push.set.pair_values;
     uint from = push.side == 0u ? 0u : push.set.pair_capacity;
     floor_ = push.set.alpha_floor;
     ceiling = push.set.alpha_ceiling;
@@ -165,55 +200,31 @@ void main() {
     for (uint j = 0u; j < ROWS; j++) {
         total[j] = vec3(0.0);
     }
-    for (uint first = range.x; first < range.y; first += BATCH) {
+    // Batches are the same in both cases, so that sums are.
+    uint next = range.x, found = 0u;
+    while (true) {
+        if (is_overflow) {
+            // The next Gaussians that reach the tile.
+            while (found < BATCH && next < range.y) {
+                found += gather(next + l, range.y, found, tile, copies_);
+                next += INVOCATIONS;
+            }
+        }
+        uint count = min(BATCH, is_overflow ? found : range.y - next);
+        if (count == 0u) {
+            break;
+        }
         if (l == 0u) {
             unfinished = 0u;
             steep = 0u;
-        }
-        if (l < BATCH / 32u) {
-            reaching[l] = 0u;
         }
         barrier();
         if (any(goes_on)) {
             atomicOr(unfinished, 1u);
         }
-        uint count = min(BATCH, range.y - first);
-        if (is_overflow) {
-            // Those that reach the tile move together, in their order.
-            uint index[BATCH / INVOCATIONS];
-            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
-                uint m = j * INVOCATIONS + l;
-                index[j] = NOBODY;
-                if (m < count) {
-                    uint place = (first + m) / copies_, copy = (first + m) % copies_, candidate = sorted.at[place];
-                    Reach reach = reach_of(push.set.records.at[candidate], copy);
-                    candidate |= copy << COPY_SHIFT;
-                    bool is_row = tile.y >= (reach.tiles_y & 0xffffu) && tile.y <= reach.tiles_y >> 16;
-                    uvec2 row = tiles_of_row(reach, tile.y, push.set.tiles.x);
-                    if (is_row && tile.x >= row.x && tile.x < row.y) {
-                        index[j] = candidate;
-                        atomicOr(reaching[m >> 5], 1u << (m & 31u));
-                    }
-                }
-            }
-            barrier();
-            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
-                uint m = j * INVOCATIONS + l, slot = bitCount(reaching[m >> 5] & ((1u << (m & 31u)) - 1u));
-                for (uint k = 0u; k < m >> 5; k++) {
-                    slot += bitCount(reaching[k]);
-                }
-                if (index[j] != NOBODY) {
-                    admit(slot, index[j], middle, least, ellipse);
-                }
-            }
-            count = 0u;
-            for (uint k = 0u; k < BATCH / 32u; k++) {
-                count += bitCount(reaching[k]);
-            }
-        } else {
-            for (uint m = l; m < count; m += INVOCATIONS) {
-                admit(m, values.at[from + first + m], middle, least, ellipse);
-            }
+        for (uint m = l; m < count; m += INVOCATIONS) {
+            uint member = is_overflow ? waiting[m] : values.at[from + next + m];
+            admit(m, member, middle, least, ellipse);
         }
         barrier();
         if (unfinished == 0u) {
@@ -289,6 +300,16 @@ void main() {
             total[j] += sum[j];
         }
         barrier();
+        if (is_overflow) {
+            // What is left, less than the number of invocations, is the beginning of the next batch.
+            uint rest = count + l < found ? waiting[count + l] : 0u;
+            barrier();
+            waiting[l] = rest;
+            found -= count;
+            barrier();
+        } else {
+            next += count;
+        }
     }
     Pixels image = push.set.image;
     if (any(is_reached)) {
