@@ -14,13 +14,17 @@ void main() {
     uint at = push.set.before_each.at[i] + push.set.sums.at[i / BLOCK], index = push.set.values.at[i];
     Words keys = push.set.pair_keys, values = push.set.pair_values;
     uint capacity = push.set.pair_capacity, across = push.set.tiles.x;
-    Reach reach = reach_of(index);
-    for (uint y = reach.tiles_y & 0xffffu; y <= reach.tiles_y >> 16; y++) {
-        uvec2 row = tiles_of_row(reach, y, across);
-        for (uint x = row.x; x < row.y && at < capacity; x++) {
-            keys.at[at] = y * across + x;
-            values.at[at] = index;
-            at++;
+    Record r = push.set.records.at[index];
+    uint count = copies();
+    for (uint copy = 0u; copy < count; copy++) {
+        Reach reach = reach_of(r, copy);
+        for (uint y = reach.tiles_y & 0xffffu; y <= reach.tiles_y >> 16; y++) {
+            uvec2 row = tiles_of_row(reach, y, across);
+            for (uint x = row.x; x < row.y && at < capacity; x++) {
+                keys.at[at] = y * across + x;
+                values.at[at] = index | copy << COPY_SHIFT;
+                at++;
+            }
         }
     }
 }

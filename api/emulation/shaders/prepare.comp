@@ -6,6 +6,7 @@
 #include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
+#include "angles.glsl"
 layout(local_size_x = 256) in;
 shared uint before[256];
 
@@ -57,7 +58,7 @@ bool is_finite(float x) {
 }
 
 bool is_valid(Camera camera) {
-    bool valid = camera.model == 0 || camera.model == 1;
+    bool valid = camera.model >= PINHOLE && camera.model <= (push.set.is_surfel != 0u ? ORTHOGRAPHIC : EQUIRECTANGULAR);
     for (int i = 0; i < 3; i++) {
         valid = valid && (camera.eye[i].y >> 20 & 0x7ffu) != 0x7ffu;
         for (int j = 0; j < 3; j++) {
@@ -69,7 +70,7 @@ bool is_valid(Camera camera) {
         valid = valid && is_finite(camera.focal_length[i]) && camera.focal_length[i] > 0.0;
     }
     valid = valid && is_finite(camera.near_plane) && camera.far_plane > camera.near_plane;
-    return valid && (camera.model == 1 || camera.near_plane > 0.0);
+    return valid && (camera.model == ORTHOGRAPHIC || camera.near_plane > 0.0);
 }
 
 void derive() {
@@ -77,6 +78,8 @@ void derive() {
     for (int i = 0; i < 3; i++) {
         push.set.derived.of.eye[i] = in_three(camera.eye[i]);
     }
+    vec2 turn = mul(PI, 2.0 * camera.focal_length.x);
+    push.set.derived.of.period = camera.model == EQUIRECTANGULAR ? turn : vec2(0.0);
     // The slopes' limits: to the viewport's edges and 0.15 of its size beyond.
     for (int i = 0; i < 2; i++) {
         float size = push.set.viewport[2 + i];

@@ -7,8 +7,11 @@
 #include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
+#include "angles.glsl"
+#include "cameras.glsl"
 #include "harmonics.glsl"
 #include "tiles.glsl"
+#include "surfel.glsl"
 layout(local_size_x = 256) in;
 
 bool is_finite(float x) {
@@ -60,9 +63,10 @@ void main() {
     for (uint which = 0u; which < 8u; which++) {
         bool is_used = which < MATRIX || (which == FACTOR ? HAS_FACTOR : HAS_MATRIX);
         bool is_three = which == POSITION || which == SCALE, is_one = which == OPACITY || which == FACTOR;
+        uint wanted = is_one ? 1u : IS_SURFEL && which == SCALE ? 2u : is_three ? 3u : 4u;
         values[which] = vec4(0.0);
         if (is_used) {
-            values[which] = read_attribute(draw, which, vertex, instance, d.first_instance, is_three ? 3u : is_one ? 1u : 4u);
+            values[which] = read_attribute(draw, which, vertex, instance, d.first_instance, wanted);
         }
     }
     vec3 position = values[POSITION].xyz, scale = values[SCALE].xyz;
@@ -105,17 +109,22 @@ void main() {
         vec3 row = camera.rotation[r].xyz;
         t[r] = add(add(mul(e[0], row.x), mul(e[1], row.y)), mul(e[2], row.z));
     }
-    float depth = t[2].x;
+    bool is_orthographic = camera.model == ORTHOGRAPHIC, has_angles = HAS_ANGLES && camera.model >= FISHEYE;
+    // What is straight behind a fisheye has no pixel.
+    if (has_angles && camera.model == FISHEYE && t[0].x == 0.0 && t[1].x == 0.0 && !(t[2].x > 0.0)) {
+        return;
+    }
+    vec2 depth_pair = has_angles ? root(dot3(t[0], t[1], t[2], t[0], t[1], t[2])) : t[2];
+    float depth = depth_pair.x;
     if (!(depth > camera.near_plane && depth < camera.far_plane)) {
         return;
     }
 
     // Step 3: mean and covariance.
-    bool is_orthographic = camera.model == 1;
-    vec2 u = is_orthographic ? t[0] : div(t[0], t[2]), v = is_orthographic ? t[1] : div(t[1], t[2]);
+    vec2 u, v, distance_ = is_orthographic || has_angles ? pair(1.0) : t[2];
+    pixel_of(camera.model, t, u, v);
     vec2 mean_x = add(add(mul(u, camera.focal_length.x), pair(camera.principal_point.x)), pair(push.set.viewport.x));
     vec2 mean_y = add(add(mul(v, camera.focal_length.y), pair(camera.principal_point.y)), pair(push.set.viewport.y));
-    vec2 distance_ = is_orthographic ? pair(1.0) : t[2];
     if (is_orthographic) {
         u = pair(0.0);
         v = pair(0.0);
@@ -124,6 +133,10 @@ void main() {
         u = u.x < -push.set.derived.of.limits[1].x ? -push.set.derived.of.limits[1] : u;
         v = v.x > push.set.derived.of.limits[2].x ? push.set.derived.of.limits[2] : v;
         v = v.x < -push.set.derived.of.limits[3].x ? -push.set.derived.of.limits[3] : v;
+    }
+    vec2 derivative[6];
+    if (has_angles) {
+        derivative_of(camera.model, t, derivative);
     }
     // R(q) = 1 + (2 / |q|^2) (...): without a root.
     vec2 q[4];
@@ -141,7 +154,12 @@ void main() {
     for (int r = 0; r < 2; r++) {
         vec2 slope = r == 0 ? u : v, factor = div(pair(camera.focal_length[r]), distance_), b[3];
         for (int c = 0; c < 3; c++) {
-            b[c] = mul(factor, sub(pair(camera.rotation[r][c]), mul(slope, camera.rotation[2][c])));
+            if (has_angles) {
+                vec2 along = add(mul(derivative[r * 3], camera.rotation[0][c]), mul(derivative[r * 3 + 1], camera.rotation[1][c]));
+                b[c] = mul(add(along, mul(derivative[r * 3 + 2], camera.rotation[2][c])), camera.focal_length[r]);
+            } else {
+                b[c] = mul(factor, sub(pair(camera.rotation[r][c]), mul(slope, camera.rotation[2][c])));
+            }
         }
         if (HAS_MATRIX) {
             vec2 w[3];
@@ -155,14 +173,83 @@ void main() {
         }
     }
 
-    // Step 4: the low-pass, determinants and compensation.
     vec2 a0 = dot3(m[0], m[1], m[2], m[0], m[1], m[2]), b = dot3(m[0], m[1], m[2], m[3], m[4], m[5]);
-    vec2 c0 = dot3(m[3], m[4], m[5], m[3], m[4], m[5]), low_pass = pair(push.set.low_pass);
-    vec2 a = add(a0, low_pass), c = add(c0, low_pass);
+    vec2 c0 = dot3(m[3], m[4], m[5], m[3], m[4], m[5]);
     vec2 n0 = cross2(m[1], m[5], m[2], m[4]), n1 = cross2(m[2], m[3], m[0], m[5]), n2 = cross2(m[0], m[4], m[1], m[3]);
     vec2 area = dot3(n0, n1, n2, n0, n1, n2);
+    if (IS_UNSCENTED) {
+        // Columns of the axes' standard deviations, in the camera's axes.
+        vec2 axes[9];
+        for (int row = 0; row < 3; row++) {
+            vec2 w[3];
+            for (int c = 0; c < 3; c++) {
+                w[c] = pair(camera.rotation[row][c]);
+            }
+            if (HAS_MATRIX) {
+                vec3 turned = camera.rotation[row].xyz;
+                for (int c = 0; c < 3; c++) {
+                    vec2 first = add(two_product(turned.x, values[MATRIX][c]), two_product(turned.y, values[MATRIX + 1u][c]));
+                    w[c] = add(first, two_product(turned.z, values[MATRIX + 2u][c]));
+                }
+            }
+            for (int c = 0; c < 3; c++) {
+                axes[row * 3 + c] = mul(dot3(w[0], w[1], w[2], turn[c], turn[3 + c], turn[6 + c]), scale[c]);
+            }
+        }
+        // Pixels of the sigma points from that of the middle, which is the first.
+        const vec2 root_3 = vec2(1.7320507764816284, 3.1087250107475484e-08);
+        vec2 us[7], vs[7], middle_u, middle_v, sum_u = vec2(0.0), sum_v = vec2(0.0);
+        pixel_of(camera.model, t, middle_u, middle_v);
+        bool all_are_seen = true;
+        us[0] = vec2(0.0);
+        vs[0] = vec2(0.0);
+        for (int point = 1; point < 7; point++) {
+            int axis = (point - 1) / 2;
+            vec2 place[3], own_u, own_v;
+            for (int row = 0; row < 3; row++) {
+                vec2 away = mul(root_3, axes[row * 3 + axis]);
+                place[row] = add(t[row], (point & 1) == 1 ? away : -away);
+            }
+            all_are_seen = all_are_seen && is_seen(camera.model, camera.near_plane, t, place);
+            pixel_of(camera.model, place, own_u, own_v);
+            own_u = sub(own_u, middle_u);
+            if (HAS_ANGLES && camera.model == EQUIRECTANGULAR) {
+                own_u = own_u.x > HALF_PI.x * 2.0 ? sub(own_u, 2.0 * PI) : own_u.x < -HALF_PI.x * 2.0 ? add(own_u, 2.0 * PI) : own_u;
+            }
+            us[point] = own_u;
+            vs[point] = sub(own_v, middle_v);
+            sum_u = add(sum_u, us[point]);
+            sum_v = add(sum_v, vs[point]);
+        }
+        if (all_are_seen) {
+            // In pixels, from the mean. The middle's weight is 2, and the others' is 1/6.
+            const vec2 sixth = vec2(0.1666666716337204, -4.967053879312289e-09);
+            vec2 mean_u = mul(sum_u, sixth), mean_v = mul(sum_v, sixth);
+            a0 = vec2(0.0);
+            b = vec2(0.0);
+            c0 = vec2(0.0);
+            area = vec2(0.0);
+            for (int point = 0; point < 7; point++) {
+                vec2 weight = point == 0 ? pair(2.0) : sixth;
+                us[point] = mul(sub(us[point], mean_u), camera.focal_length.x);
+                vs[point] = mul(sub(vs[point], mean_v), camera.focal_length.y);
+                a0 = add(a0, mul(weight, mul(us[point], us[point])));
+                b = add(b, mul(weight, mul(us[point], vs[point])));
+                c0 = add(c0, mul(weight, mul(vs[point], vs[point])));
+                for (int other = 0; other < point; other++) {
+                    vec2 product = cross2(us[point], vs[other], vs[point], us[other]);
+                    area = add(area, mul(mul(weight, other == 0 ? pair(2.0) : sixth), mul(product, product)));
+                }
+            }
+            mean_x = add(mean_x, mul(mean_u, camera.focal_length.x));
+            mean_y = add(mean_y, mul(mean_v, camera.focal_length.y));
+        }
+    }
+
+    // Step 4: the low-pass, determinants and compensation.
+    vec2 low_pass = pair(push.set.low_pass), a = add(a0, low_pass), c = add(c0, low_pass);
     vec2 det = add(area, add(mul(low_pass, add(a0, c0)), mul(low_pass, low_pass)));
-    if (!(det.x > 0.0) || !is_finite(det.x)) {
+    if (!IS_SURFEL && (!(det.x > 0.0) || !is_finite(det.x))) {
         return;
     }
     // The inverse of a matrix but for its determinant, which also says whether it is singular.
@@ -214,14 +301,98 @@ void main() {
         reach = min(reach, deviations * deviations * 1.001 + 2e-3);
     }
     float half_width = sqrt(reach * a.x) * 1.0001 + 0.01, half_height = sqrt(reach * c.x) * 1.0001 + 0.01;
-    float x = mean_x.x - float(push.set.area_origin.x), y = mean_y.x - float(push.set.area_origin.y);
-    float left = floor(x - half_width - 0.5), right = ceil(x + half_width + 0.5);
-    float top = floor(y - half_height - 0.5), bottom = ceil(y + half_height + 0.5);
-    if (!(right >= 0.0 && bottom >= 0.0 && left < float(push.set.area_size.x) && top < float(push.set.area_size.y))) {
+    Surfel surfel;
+    if (IS_SURFEL) {
+        // The axes, in the camera's axes.
+        vec2 axes[6];
+        for (int row = 0; row < 3; row++) {
+            vec3 w = camera.rotation[row].xyz;
+            for (int axis = 0; axis < 2; axis++) {
+                vec2 along = add(add(mul(turn[axis], w.x), mul(turn[3 + axis], w.y)), mul(turn[6 + axis], w.z));
+                axes[row * 2 + axis] = mul(along, scale[axis]);
+            }
+        }
+        vec2 a0 = axes[0], a1 = axes[2], a2 = axes[4], b0 = axes[1], b1 = axes[3], b2 = axes[5];
+        vec2 n0 = cross2(a1, b2, a2, b1), n1 = cross2(a2, b0, a0, b2), n2 = cross2(a0, b1, a1, b0);
+        vec2 w = n2, slope_x = div(t[0], t[2]), slope_y = div(t[1], t[2]);
+        surfel.ux = b1;
+        surfel.uy = -b0;
+        surfel.vx = -a1;
+        surfel.vy = a0;
+        surfel.wx = vec2(0.0);
+        surfel.wy = vec2(0.0);
+        if (!is_orthographic) {
+            w = add(add(mul(n0, slope_x), mul(n1, slope_y)), n2);
+            surfel.ux = cross2(b1, t[2], b2, t[1]);
+            surfel.uy = cross2(b2, t[0], b0, t[2]);
+            surfel.vx = cross2(t[1], a2, t[2], a1);
+            surfel.vy = cross2(t[2], a0, t[0], a2);
+            surfel.wx = n0;
+            surfel.wy = n1;
+        }
+        vec2 by_x = mul(w, camera.focal_length.x), by_y = mul(w, camera.focal_length.y);
+        surfel.ux = div(surfel.ux, by_x);
+        surfel.uy = div(surfel.uy, by_y);
+        surfel.vx = div(surfel.vx, by_x);
+        surfel.vy = div(surfel.vy, by_y);
+        surfel.wx = div(surfel.wx, by_x);
+        surfel.wy = div(surfel.wy, by_y);
+        surfel.limit = is_orthographic ? 3.4e38 : div(t[2], pair(camera.near_plane)).x;
+        // Seen from its edge there is the filter alone.
+        if (w.x == 0.0 || !is_finite(surfel.ux.x + surfel.uy.x + surfel.vx.x + surfel.vy.x + surfel.wx.x + surfel.wy.x)) {
+            surfel = Surfel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0.0);
+        }
+        // The box of the disc, from the mean, and that of the filter. A disc that is not wholly in front may be anywhere.
+        vec2 sides = vec2(0.0), middles = vec2(0.0);
+        float nearest = 1.0;
+        vec2 across = vec2(sub(a0, mul(slope_x, a2)).x, sub(b0, mul(slope_x, b2)).x);
+        vec2 down = vec2(sub(a1, mul(slope_y, a2)).x, sub(b1, mul(slope_y, b2)).x);
+        if (is_orthographic) {
+            across = vec2(a0.x, b0.x);
+            down = vec2(a1.x, b1.x);
+        } else {
+            vec2 forth = vec2(a2.x, b2.x) / t[2].x;
+            across /= t[2].x;
+            down /= t[2].x;
+            nearest = 1.0 - reach * dot(forth, forth);
+            middles = reach * vec2(dot(across, forth), dot(down, forth)) / nearest;
+        }
+        sides = sqrt(middles * middles + reach * vec2(dot(across, across), dot(down, down)) / nearest);
+        vec2 halves = camera.focal_length * (abs(middles) + sides) * 1.001 + 0.01;
+        if (!(nearest > 1e-3) || !is_finite(halves.x) || !is_finite(halves.y)) {
+            halves = vec2(1e6);
+        }
+        float filtered = sqrt(reach * push.set.low_pass) * 1.001 + 0.01;
+        half_width = max(halves.x, filtered);
+        half_height = max(halves.y, filtered);
+    }
+    vec2 mean = vec2(mean_x.x, mean_y.x), place = place_of_copy(mean, 0u);
+    uvec2 tiles = push.set.tiles;
+    float top = floor(place.y - half_height - 0.5), bottom = ceil(place.y + half_height + 0.5);
+    if (!(bottom >= 0.0 && top < float(push.set.area_size.y))) {
         return;
     }
-    uvec2 first_tile = uvec2(max(vec2(left, top), vec2(0.0))) / TILE;
-    uvec2 last_tile = min(uvec2(min(vec2(right, bottom), vec2(65536.0))) / TILE, push.set.tiles - 1u);
+    uint first_row = uint(max(top, 0.0)) / TILE, last_row = min(uint(min(bottom, 65536.0)) / TILE, tiles.y - 1u);
+    Record r;
+    r.mean_x = mean_x;
+    r.mean_y = mean_y;
+    r.tiles_y = first_row | last_row << 16;
+    r.slope = b.x / c.x;
+    r.curve = reach * (det.x / c.x);
+    r.half_height = half_height;
+    r.half_width = half_width;
+    r.reach = b.x / sqrt(a.x) * sqrt(reach);
+    uint reached = 0u;
+    for (uint copy = 0u; copy < (HAS_ANGLES ? copies() : 1u); copy++) {
+        Reach ellipse = reach_of(r, copy);
+        for (uint row = first_row; row <= last_row; row++) {
+            uvec2 columns_ = tiles_of_row(ellipse, row, tiles.x);
+            reached += columns_.y - columns_.x;
+        }
+    }
+    if (reached == 0u) {
+        return;
+    }
 
     // Step 5: the colour.
     vec3 direction = vec3(e[0].x, e[1].x, e[2].x);
@@ -267,31 +438,24 @@ void main() {
     color = clamp(color, vec3(0.0), vec3(3.4028235e38));
 
     // Tiles of a cut-off, from the viewport's corner.
-    uvec2 cut_x = uvec2(0u), cut_y = uvec2(0u);
+    float cut_radius = 0.0;
+    uint cut_y = 0u;
     if (HAS_CUT_TILES) {
-        vec2 from = vec2(sub(mean_x, pair(push.set.viewport.x)).x, sub(mean_y, pair(push.set.viewport.y)).x), first, end;
+        vec2 radius;
         if (push.set.cut_off == TILE_SQUARE) {
             vec2 half_difference = mul(sub(a, c), 0.5);
             vec2 spread = add(mul(half_difference, half_difference), mul(b, b));
             spread = spread.x < 0.1 ? vec2(0.1, -1.4901161e-9) : spread;
-            vec2 radius = vec2(ceil(mul(root(add(mul(add(a, c), 0.5), root(spread))), deviations).x));
-            first = floor((from - 0.5 - radius) / 16.0);
-            end = floor((from - 0.5 + radius + 15.0) / 16.0);
+            radius = vec2(ceil(mul(root(add(mul(add(a, c), 0.5), root(spread))), deviations).x));
         } else {
-            vec2 radius = vec2(ceil(mul(root(a), deviations).x), ceil(mul(root(c), deviations).x));
-            first = floor((from - radius) / 16.0);
-            end = ceil((from + radius) / 16.0);
+            radius = vec2(ceil(mul(root(a), deviations).x), ceil(mul(root(c), deviations).x));
         }
-        uvec2 firsts = uvec2(clamp(first, vec2(0.0), vec2(65535.0))), ends = uvec2(clamp(end, vec2(0.0), vec2(65535.0)));
-        cut_x = uvec2(firsts.x, ends.x);
-        cut_y = uvec2(firsts.y, ends.y);
+        cut_radius = radius.x;
+        cut_y = cut_tiles(sub(mean_y, pair(push.set.viewport.y)).x, radius.y);
     }
 
     // The factor of the inverse covariance; sqrt(log2(e) / 2).
     vec2 width = root(a), scale_2 = vec2(0.8493217825889587, 1.7699059995379685e-08);
-    Record r;
-    r.mean_x = mean_x;
-    r.mean_y = mean_y;
     r.f0 = div(scale_2, width);
     r.f2 = div(mul(scale_2, width), root(det));
     r.f1 = -div(mul(r.f2, b), a);
@@ -299,27 +463,14 @@ void main() {
     r.red = color.x;
     r.green = color.y;
     r.blue = color.z;
-    r.tiles_x = first_tile.x | last_tile.x << 16;
-    r.tiles_y = first_tile.y | last_tile.y << 16;
-    r.slope = b.x / c.x;
-    r.curve = reach * (det.x / c.x);
-    r.half_height = half_height;
-    r.half_width = half_width;
-    r.reach = b.x / sqrt(a.x) * sqrt(reach);
-    r.cut_x = cut_x.x | cut_x.y << 16;
-    r.cut_y = cut_y.x | cut_y.y << 16;
-    r.unused = 0.0;
-    push.set.records.at[i] = r;
-
-    // The number of its tiles.
-    vec2 mean = vec2(mean_x.x, mean_y.x), origin = vec2(push.set.area_origin);
-    float margin = margin_of(mean, origin, half_width, half_height);
-    Reach ellipse = Reach(x, y, margin, r.slope, r.curve, half_height, r.reach, r.tiles_x, r.tiles_y);
-    uint reached = 0u, across = push.set.tiles.x;
-    for (uint row = first_tile.y; row <= last_tile.y; row++) {
-        uvec2 tiles = tiles_of_row(ellipse, row, across);
-        reached += tiles.y - tiles.x;
+    r.cut_y = cut_y;
+    r.cut_radius = cut_radius;
+    r.unused0 = 0.0;
+    r.unused1 = 0.0;
+    if (IS_SURFEL) {
+        set_surfel(r, surfel);
     }
+    push.set.records.at[i] = r;
     push.set.reached.at[i] = reached;
 
     // The key, as an unsigned number in the same order.

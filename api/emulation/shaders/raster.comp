@@ -7,25 +7,33 @@
 #include "set.glsl"
 #include "pair.glsl"
 #include "tiles.glsl"
+#include "surfel.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
 // A cut-off by tiles of the viewport.
 layout(constant_id = 0) const bool HAS_CUT_TILES = false;
+// The camera may be a panorama.
+layout(constant_id = 1) const bool HAS_ANGLES = false;
+layout(constant_id = 2) const bool IS_SURFEL = false;
 
 const uint INVOCATIONS = 64u;
 // Gaussians that are looked at together.
 const uint BATCH = 128u;
 const uint ROWS = 4u;
-const uint NOBODY = 0xffffffffu;
 
 // Of the Gaussians of a batch: what gives the exponent at a pixel; its lowest value that reaches the floor; opacity; colour; tiles of the
 // cut-off; index.
 shared vec4 lines[BATCH];
+// Of a surfel: u and v at the tile's middle times w, w there; their growth; limit; the mean's distance.
+shared vec4 planes[IS_SURFEL ? 2u * BATCH : 1u];
 shared vec3 scalars[BATCH];
 shared vec3 colors[BATCH];
-shared uvec2 cuts[BATCH];
+shared uvec2 cuts[HAS_CUT_TILES ? BATCH : 1u];
+// In a panorama, the places in x at which the copy counts.
+shared vec2 counting[HAS_ANGLES ? BATCH : 1u];
 shared uint members[BATCH];
-// Of a batch of which only some reach the tile, a bit for each that does.
-shared uint reaching[BATCH / 32u];
+// Where the pairs did not fit: Gaussians that reach the tile, and, of those that are looked at, a bit for each that does.
+shared uint waiting[BATCH + INVOCATIONS];
+shared uint reaching[INVOCATIONS / 32u];
 shared uint unfinished, steep;
 
 // Of the invocation's pixels: what has accumulated in batches before and in this one, what is left, and whether a pixel goes on and
@@ -33,6 +41,7 @@ shared uint unfinished, steep;
 vec3 total[ROWS], sum[ROWS];
 vec4 transmittance;
 bvec4 goes_on, is_reached;
+float center_x;
 uint cut_column;
 uvec4 cut_rows;
 // Of the set.
@@ -49,6 +58,9 @@ void accumulate(uint k, vec4 exponent, vec4 alpha) {
         bvec4 is_row = bvec4(uvec4(greaterThanEqual(cut_rows, uvec4(y & 0xffffu))) & uvec4(lessThan(cut_rows, uvec4(y >> 16))));
         is_in = bvec4(uvec4(is_in) & uvec4(is_row) & uint(is_column));
     }
+    if (HAS_ANGLES) {
+        is_in = bvec4(uvec4(is_in) & uint(center_x >= counting[k].x && center_x < counting[k].y));
+    }
     precise vec4 next = transmittance * (1.0 - alpha);
     bvec4 ends = bvec4(uvec4(is_in) & uvec4(lessThan(next, vec4(end))));
     is_in = bvec4(uvec4(is_in) & uvec4(not(ends)));
@@ -61,21 +73,92 @@ void accumulate(uint k, vec4 exponent, vec4 alpha) {
     }
 }
 
+// The Gaussian of a member of the batch, with the mean of its copy.
+Record record_of(uint member) {
+    Record r = push.set.records.at[HAS_ANGLES ? member & MEMBER : member];
+    if (HAS_ANGLES) {
+        r.mean_x = add(r.mean_x, mul(push.set.derived.of.period, periods(member >> COPY_SHIFT)));
+    }
+    return r;
+}
+
+// The exponent of alpha, in units of log2, where a ray meets a surfel's plane at u / w and v / w, and as far from its mean.
+vec4 surfel_exponent(vec4 u, vec4 v, vec4 w, float limit, vec4 square) {
+    float low_pass = push.set.low_pass;
+    bvec4 is_met = bvec4(uvec4(greaterThan(w, vec4(0.0))) & uvec4(lessThan(w, vec4(limit))));
+    vec4 inverse = 1.0 / w, disc = (u * inverse) * (u * inverse) + (v * inverse) * (v * inverse);
+    vec4 filtered = low_pass > 0.0 ? square / low_pass : vec4(3.4e38);
+    return -0.7213475204 * min(mix(vec4(3.4e38), disc, is_met), filtered);
+}
+
 // Puts a Gaussian into the batch.
-void admit(uint slot, uint index, vec2 middle, float least, float ellipse) {
-    Record r = push.set.records.at[index];
+void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
+    Record r = record_of(member);
     vec2 x = add(two_sum(middle.x, -r.mean_x.x), pair(-r.mean_x.y)), y = add(two_sum(middle.y, -r.mean_y.x), pair(-r.mean_y.y));
-    lines[slot] = vec4(mul(r.f0, x).x, add(mul(r.f1, x), mul(r.f2, y)).x, r.f0.x, r.f1.x);
-    scalars[slot] = vec3(r.f2.x, max(least - log2(r.opacity) - 0.1, -ellipse), r.opacity);
+    float lowest = max(least - log2(r.opacity) - 0.1, -ellipse);
+    bool is_steep = max(abs(r.f0.x), max(abs(r.f1.x), abs(r.f2.x))) > 3.0;
+    if (IS_SURFEL) {
+        Surfel s = surfel_of(r);
+        vec2 w = add(pair(1.0), add(mul(s.wx, x), mul(s.wy, y)));
+        lines[slot] = vec4(add(mul(s.ux, x), mul(s.uy, y)).x, s.ux.x, s.uy.x, add(mul(s.vx, x), mul(s.vy, y)).x);
+        planes[2u * slot] = vec4(s.vx.x, s.vy.x, w.x, s.wx.x);
+        planes[2u * slot + 1u] = vec4(s.wy.x, s.limit, x.x, y.x);
+        bool turns = 32.0 * (abs(s.wx.x) + abs(s.wy.x)) > w.x;
+        is_steep = turns || max(abs(s.ux.x) + abs(s.uy.x), abs(s.vx.x) + abs(s.vy.x)) > 2.0 * w.x;
+        is_steep = (is_steep && s.limit > 0.0) || (push.set.low_pass > 0.0 && push.set.low_pass < 0.1);
+        scalars[slot] = vec3(0.0, lowest, r.opacity);
+    } else {
+        lines[slot] = vec4(mul(r.f0, x).x, add(mul(r.f1, x), mul(r.f2, y)).x, r.f0.x, r.f1.x);
+        scalars[slot] = vec3(r.f2.x, lowest, r.opacity);
+    }
     colors[slot] = vec3(r.red, r.green, r.blue);
-    members[slot] = index;
+    members[slot] = member;
     if (HAS_CUT_TILES) {
-        cuts[slot] = uvec2(r.cut_x, r.cut_y);
+        cuts[slot] = uvec2(cut_tiles(sub(r.mean_x, pair(push.set.viewport.x)).x, r.cut_radius), r.cut_y);
+    }
+    if (HAS_ANGLES) {
+        float period = push.set.derived.of.period.x;
+        counting[slot] = r.mean_x.x + (period == 0.0 ? vec2(-3.4e38, 3.4e38) : vec2(-0.5, 0.5) * period);
     }
     // Steep exponents and large opacities need pairs at every pixel.
-    if (max(abs(r.f0.x), max(abs(r.f1.x), abs(r.f2.x))) > 3.0 || r.opacity > 16.0) {
+    if (is_steep || r.opacity > 16.0) {
         atomicOr(steep, 1u);
     }
+}
+
+// Looks at a Gaussian, of as many as there are invocations, and has it wait if it reaches the tile. Returns the number of those that do,
+// which follow the ones that were found before in their order.
+uint gather(uint candidate, uint end_, uint found, uvec2 tile, uint copies_) {
+    uint l = gl_LocalInvocationIndex, member = 0u;
+    if (l < INVOCATIONS / 32u) {
+        reaching[l] = 0u;
+    }
+    barrier();
+    bool reaches = false;
+    if (candidate < end_) {
+        uint copy = candidate % copies_, index = push.set.values.at[candidate / copies_];
+        Reach reach = reach_of(push.set.records.at[index], copy);
+        uvec2 row = tiles_of_row(reach, tile.y, push.set.tiles.x);
+        bool is_row = tile.y >= (reach.tiles_y & 0xffffu) && tile.y <= reach.tiles_y >> 16;
+        reaches = is_row && tile.x >= row.x && tile.x < row.y;
+        member = index | copy << COPY_SHIFT;
+    }
+    if (reaches) {
+        atomicOr(reaching[l >> 5], 1u << (l & 31u));
+    }
+    barrier();
+    uint before = found, all = 0u;
+    for (uint k = 0u; k < INVOCATIONS / 32u; k++) {
+        uint own = bitCount(reaching[k]);
+        before += k < l >> 5 ? own : 0u;
+        all += own;
+    }
+    before += bitCount(reaching[l >> 5] & ((1u << (l & 31u)) - 1u));
+    if (reaches) {
+        waiting[before] = member;
+    }
+    barrier();
+    return all;
 }
 
 void main() {
@@ -86,6 +169,7 @@ void main() {
     vec4 viewport = push.set.viewport;
     vec2 center = vec2(ivec2(at) + origin) + 0.5, middle = vec2(ivec2(tile * TILE) + origin) + 8.0;
     float dx = float(at.x & 15u) - 7.5, dy = float(at.y & 15u) - 7.5;
+    center_x = center.x;
     vec4 down = vec4(0.0, 1.0, 2.0, 3.0), rows = center.y + down;
     bool is_column = at.x < size.x && center.x >= viewport.x && center.x < viewport.x + viewport.z;
     goes_on = bvec4(uvec4(lessThan(uvec4(at.y) + uvec4(down), uvec4(size.y))) & uvec4(greaterThanEqual(rows, vec4(viewport.y)))
@@ -96,12 +180,13 @@ void main() {
     }
 
     // Where the pairs did not fit, every Gaussian that is seen is looked at.
+    uint copies_ = HAS_ANGLES ? copies() : 1u;
     bool is_overflow = push.set.counters.at[PAIRS] != push.set.counters.at[STORED];
-    uvec2 range = is_overflow ? uvec2(0u, push.set.counters.at[SEEN]) : push.set.ranges.at[tile.y * push.set.tiles.x + tile.x];
+    uvec2 range = is_overflow ? uvec2(0u, push.set.counters.at[SEEN] * copies_) : push.set.ranges.at[tile.y * push.set.tiles.x + tile.x];
     if (range.x == range.y) {
         return;
     }
-    Words values = push.set.pair_values, sorted = push.set.values;
+    Words values = push.set.pair_values;
     uint from = push.side == 0u ? 0u : push.set.pair_capacity;
     floor_ = push.set.alpha_floor;
     ceiling = push.set.alpha_ceiling;
@@ -115,54 +200,31 @@ void main() {
     for (uint j = 0u; j < ROWS; j++) {
         total[j] = vec3(0.0);
     }
-    for (uint first = range.x; first < range.y; first += BATCH) {
+    // Batches are the same in both cases, so that sums are.
+    uint next = range.x, found = 0u;
+    while (true) {
+        if (is_overflow) {
+            // The next Gaussians that reach the tile.
+            while (found < BATCH && next < range.y) {
+                found += gather(next + l, range.y, found, tile, copies_);
+                next += INVOCATIONS;
+            }
+        }
+        uint count = min(BATCH, is_overflow ? found : range.y - next);
+        if (count == 0u) {
+            break;
+        }
         if (l == 0u) {
             unfinished = 0u;
             steep = 0u;
-        }
-        if (l < BATCH / 32u) {
-            reaching[l] = 0u;
         }
         barrier();
         if (any(goes_on)) {
             atomicOr(unfinished, 1u);
         }
-        uint count = min(BATCH, range.y - first);
-        if (is_overflow) {
-            // Those that reach the tile move together, in their order.
-            uint index[BATCH / INVOCATIONS];
-            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
-                uint m = j * INVOCATIONS + l;
-                index[j] = NOBODY;
-                if (m < count) {
-                    uint candidate = sorted.at[first + m];
-                    Reach reach = reach_of(candidate);
-                    bool is_row = tile.y >= (reach.tiles_y & 0xffffu) && tile.y <= reach.tiles_y >> 16;
-                    uvec2 row = tiles_of_row(reach, tile.y, push.set.tiles.x);
-                    if (is_row && tile.x >= row.x && tile.x < row.y) {
-                        index[j] = candidate;
-                        atomicOr(reaching[m >> 5], 1u << (m & 31u));
-                    }
-                }
-            }
-            barrier();
-            for (uint j = 0u; j < BATCH / INVOCATIONS; j++) {
-                uint m = j * INVOCATIONS + l, slot = bitCount(reaching[m >> 5] & ((1u << (m & 31u)) - 1u));
-                for (uint k = 0u; k < m >> 5; k++) {
-                    slot += bitCount(reaching[k]);
-                }
-                if (index[j] != NOBODY) {
-                    admit(slot, index[j], middle, least, ellipse);
-                }
-            }
-            count = 0u;
-            for (uint k = 0u; k < BATCH / 32u; k++) {
-                count += bitCount(reaching[k]);
-            }
-        } else {
-            for (uint m = l; m < count; m += INVOCATIONS) {
-                admit(m, values.at[from + first + m], middle, least, ellipse);
-            }
+        for (uint m = l; m < count; m += INVOCATIONS) {
+            uint member = is_overflow ? waiting[m] : values.at[from + next + m];
+            admit(m, member, middle, least, ellipse);
         }
         barrier();
         if (unfinished == 0u) {
@@ -180,11 +242,18 @@ void main() {
             while (k < end_of_flat) {
                 vec4 line = lines[k];
                 vec2 scalar = scalars[k].xy;
-                precise float p = line.x + line.z * dx;
-                precise float square = p * p, along = line.w * dx;
-                precise vec4 q = (line.y + scalar.x * (dy + down)) + along;
-                precise vec4 both = square + q * q;
-                exponent = -both;
+                if (IS_SURFEL) {
+                    vec4 plane = planes[2u * k], more = planes[2u * k + 1u], row = dy + down;
+                    vec4 u = (line.x + line.z * row) + line.y * dx, v = (line.w + plane.y * row) + plane.x * dx;
+                    vec4 w = (plane.z + more.x * row) + plane.w * dx, away = more.w + row;
+                    exponent = surfel_exponent(u, v, w, more.y, (more.z + dx) * (more.z + dx) + away * away);
+                } else {
+                    precise float p = line.x + line.z * dx;
+                    precise float square = p * p, along = line.w * dx;
+                    precise vec4 q = (line.y + scalar.x * (dy + down)) + along;
+                    precise vec4 both = square + q * q;
+                    exponent = -both;
+                }
                 is_next = subgroupAny(any(bvec4(uvec4(greaterThanEqual(exponent, vec4(scalar.y))) & uvec4(goes_on))));
                 if (is_next) {
                     break;
@@ -200,15 +269,28 @@ void main() {
             }
         }
         for (k = steep == 0u ? count : 0u; k < count; k++) {
-            Record r = push.set.records.at[members[k]];
+            Record r = record_of(members[k]);
             vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
-            vec2 p = mul(r.f0, x), square = mul(p, p), along = mul(r.f1, x);
-            vec4 exponent, rest;
-            for (uint j = 0u; j < ROWS; j++) {
-                vec2 y = add(two_sum(rows[j], -r.mean_y.x), pair(-r.mean_y.y)), q = add(along, mul(r.f2, y));
-                vec2 both = -add(square, mul(q, q));
-                exponent[j] = both.x;
-                rest[j] = both.y;
+            vec4 exponent, rest = vec4(0.0);
+            if (IS_SURFEL) {
+                Surfel s = surfel_of(r);
+                vec4 u, v, w, square;
+                for (uint j = 0u; j < ROWS; j++) {
+                    vec2 y = add(two_sum(rows[j], -r.mean_y.x), pair(-r.mean_y.y));
+                    u[j] = add(mul(s.ux, x), mul(s.uy, y)).x;
+                    v[j] = add(mul(s.vx, x), mul(s.vy, y)).x;
+                    w[j] = add(pair(1.0), add(mul(s.wx, x), mul(s.wy, y))).x;
+                    square[j] = add(mul(x, x), mul(y, y)).x;
+                }
+                exponent = surfel_exponent(u, v, w, s.limit, square);
+            } else {
+                vec2 p = mul(r.f0, x), square = mul(p, p), along = mul(r.f1, x);
+                for (uint j = 0u; j < ROWS; j++) {
+                    vec2 y = add(two_sum(rows[j], -r.mean_y.x), pair(-r.mean_y.y)), q = add(along, mul(r.f2, y));
+                    vec2 both = -add(square, mul(q, q));
+                    exponent[j] = both.x;
+                    rest[j] = both.y;
+                }
             }
             vec4 whole = floor(exponent + 0.5);
             precise vec4 part = (exponent - whole) + rest;
@@ -218,6 +300,16 @@ void main() {
             total[j] += sum[j];
         }
         barrier();
+        if (is_overflow) {
+            // What is left, less than the number of invocations, is the beginning of the next batch.
+            uint rest = count + l < found ? waiting[count + l] : 0u;
+            barrier();
+            waiting[l] = rest;
+            found -= count;
+            barrier();
+        } else {
+            next += count;
+        }
     }
     Pixels image = push.set.image;
     if (any(is_reached)) {

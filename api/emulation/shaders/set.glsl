@@ -8,12 +8,13 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { ve
 // The Gaussian as it is seen: lengths in pixels, the mean from the origin of the framebuffer.
 struct Record {
     vec2 mean_x, mean_y;             // pairs
-    vec2 f0, f1, f2;                 // pairs: alpha is opacity 2^-((f0 dx)^2 + (f1 dx + f2 dy)^2)
+    vec2 f0, f1, f2;                 // pairs: alpha is opacity 2^-((f0 dx)^2 + (f1 dx + f2 dy)^2); of a surfel: see surfel.glsl
     float opacity, red, green, blue;
-    uint tiles_x, tiles_y;           // first | last << 16
+    uint tiles_y;                    // first | last << 16
     float slope, curve, half_height, reach, half_width; // the ellipse by rows: see tiles.glsl
-    uint cut_x, cut_y;               // tiles of the cut-off, from the viewport's corner: first | end << 16
-    float unused;
+    uint cut_y;                      // tiles of the cut-off, from the viewport's corner: first | end << 16
+    float cut_radius;                // in x
+    float unused0, unused1;
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Records { Record at[]; };
 
@@ -32,6 +33,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Cameras { C
 struct Derived {
     vec3 eye[3];
     vec2 limits[4];
+    vec2 period;                 // of a panorama's picture in pixels; otherwise 0
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer DerivedCamera { Derived of; };
 
@@ -91,7 +93,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     uint order, compensated, cut_off, harmonics_step;
     float low_pass, alpha_floor, alpha_ceiling, transmittance_floor;
     float compensation_floor, cut_off_deviations;
-    uint unused0, unused1;
+    uint is_surfel, unused1;
     Attribute attributes[33];
 };
 
@@ -102,6 +104,8 @@ layout(push_constant) uniform Push {
     uint plane;                  // the view's first pixel
 } push;
 
+// Models of cameras.
+const int PINHOLE = 0, ORTHOGRAPHIC = 1, FISHEYE = 2, EQUIRECTANGULAR = 3;
 // Orders.
 const uint VIEW_DEPTH = 0u, RADIAL_DISTANCE = 1u, PRIMITIVE = 2u;
 // Cut-offs.

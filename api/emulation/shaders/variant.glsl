@@ -10,3 +10,7 @@ layout(constant_id = 4) const bool ARE_HARMONICS_EVEN = false;
 layout(constant_id = 5) const bool HAS_CUT_TILES = false;
 // Of the attributes.
 layout(constant_id = 6) const uint DEGREE = 3u;
+// Cameras may be fisheyes or panoramas.
+layout(constant_id = 7) const bool HAS_ANGLES = false;
+layout(constant_id = 8) const bool IS_UNSCENTED = false;
+layout(constant_id = 9) const bool IS_SURFEL = false;

@@ -56,11 +56,15 @@ pub(crate) struct Variant {
     pub(crate) are_harmonics_even: bool,
     pub(crate) has_cut_tiles: bool,
     pub(crate) degree: u32,
+    /// Cameras may be fisheyes or panoramas.
+    pub(crate) has_angles: bool,
+    pub(crate) is_unscented: bool,
+    pub(crate) is_surfel: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 7] {
+    fn of_projection(&self) -> [u32; 10] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -69,12 +73,15 @@ impl Variant {
             u32::from(self.are_harmonics_even),
             u32::from(self.has_cut_tiles),
             self.degree,
+            u32::from(self.has_angles),
+            u32::from(self.is_unscented),
+            u32::from(self.is_surfel),
         ]
     }
 
     /// The specialization constants of the rasterizer.
-    fn of_rasterizer(&self) -> [u32; 1] {
-        [u32::from(self.has_cut_tiles)]
+    fn of_rasterizer(&self) -> [u32; 3] {
+        [u32::from(self.has_cut_tiles), u32::from(self.has_angles), u32::from(self.is_surfel)]
     }
 }
 

@@ -14,7 +14,7 @@ use gaurast::vk::{
 use gaurast_layer_interface::{find, slice};
 
 use crate::formats;
-use crate::kernels::{self, CAMERA, Kernels, Specialized, Variant};
+use crate::kernels::{self, CAMERA, Kernels, Variant};
 use crate::next::Next;
 use crate::report::tell;
 
@@ -56,8 +56,8 @@ pub(crate) struct Pipeline {
     pub(crate) cut_off: u32,
     pub(crate) cut_off_deviations: f32,
     pub(crate) compensation_floor: f32,
-    /// The kernels for what the pipeline fixes.
-    pub(crate) specialized: Specialized,
+    /// What the pipeline fixes of the kernels.
+    pub(crate) variant: Variant,
     /// Bytes from a harmonic's attribute to the next one's.
     pub(crate) harmonics_step: u32,
     pub(crate) attributes: [Attribute; 33],
@@ -114,8 +114,6 @@ fn refusal(state: &State<'_>, has_fragment_stage: bool, tests_depth: bool) -> Op
         (has_fragment_stage, "resolveFragmentShader"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
-        (state.linearization == Linearization::UNSCENTED, "unscentedProjection"),
-        (state.geometry == Geometry::GAUSSIAN_2D, "gaussian2D"),
         (tests_depth, "gaussianDepthStencil"),
         (state.flags.intersects(Flags::LOG_SCALE | Flags::LOGIT_OPACITY), "attributeActivation"),
     ];
@@ -218,6 +216,7 @@ impl Attributes {
             });
             own.list[place] = Attribute { source: source as u32, offset: attribute.offset, format };
             let wanted = match place {
+                1 if state.geometry == Geometry::GAUSSIAN_2D => 2,
                 2 | 4..7 => 4,
                 3 | 7 => 1,
                 _ => 3,
@@ -274,7 +273,7 @@ pub(crate) unsafe fn create(
         let view_mask = context.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
         let footprint = find::<Footprint<'_>>(info.p_next);
         let cut_off = footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned());
-        let specialized = context.kernels.specialized(Variant {
+        let variant = Variant {
             has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
             has_factor: state.attribute_locations.model_opacity != UNUSED,
             harmonics_in_buffer: state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER),
@@ -282,7 +281,13 @@ pub(crate) unsafe fn create(
             are_harmonics_even: attributes.harmonics_step.is_some(),
             has_cut_tiles: cut_off >= 2,
             degree: state.spherical_harmonics_degree,
-        })?;
+            // What a buffer holds is not known here, and what a command gives, later.
+            has_angles: state.camera_source == CameraSource::UNIFORM_BUFFER,
+            is_unscented: state.linearization == Linearization::UNSCENTED,
+            is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
+        };
+        // They are compiled now, rather than with the first draw.
+        context.kernels.specialized(variant)?;
         let raw = graphics(context, info, &dynamic, view_mask, allocator)?;
         let mut own = Pipeline {
             next: Arc::clone(context.next),
@@ -291,7 +296,7 @@ pub(crate) unsafe fn create(
             cut_off,
             cut_off_deviations: footprint.map_or(0.0, |footprint| footprint.cut_off_deviations),
             compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
-            specialized,
+            variant,
             harmonics_step: attributes.harmonics_step.unwrap_or(0),
             attributes: attributes.list,
             sources: attributes.sources,

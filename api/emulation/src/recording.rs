@@ -379,7 +379,10 @@ impl Recording {
                 let places = Places::of(&extent);
                 match emulation.scratch(self.family, &mut self.scratch, places.end) {
                     Ok(scratch) => {
-                        self.times.extend(work.record(next, kernels, self.commands, &scratch, &extent));
+                        match work.record(next, kernels, self.commands, &scratch, &extent) {
+                            Ok(times) => self.times.extend(times),
+                            Err(error) => failure = Some(error),
+                        }
                         address = work.pixels_at(&scratch, &places);
                         if !self.kept.iter().any(|kept| Arc::ptr_eq(kept, &scratch)) {
                             self.kept.push(scratch);

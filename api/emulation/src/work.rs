@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::kernels::{Kernel, Kernels, PUSHED};
+use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
 use crate::next::Next;
 use crate::pipeline::{Attribute, Pipeline};
 use crate::scratch::{Extent, Memory, Places};
 use crate::times::Times;
 
+/// The last model of cameras whose pixels are no angles.
+const ORTHOGRAPHIC: i32 = 1;
 /// Width and height of a tile.
 const TILE: u32 = 16;
 
@@ -106,7 +108,8 @@ struct Parameters {
     transmittance_floor: f32,
     compensation_floor: f32,
     cut_off_deviations: f32,
-    unused: [u32; 2],
+    is_surfel: u32,
+    unused1: u32,
     attributes: [Attribute; 33],
     padding: u32,
 }
@@ -257,6 +260,15 @@ impl Work {
         }
     }
 
+    /// The kernels that the set needs.
+    fn variant(&self) -> Variant {
+        let has_angles = match &self.cameras {
+            Cameras::Command(cameras) => cameras.iter().any(|camera| camera.model > ORTHOGRAPHIC),
+            Cameras::Buffer(..) => true,
+        };
+        Variant { has_angles, ..self.pipeline.variant }
+    }
+
     /// The sizes of the set's scratch. `pairs` is the most of them that any set has had.
     pub(crate) fn extent(&self, pairs: u64) -> Extent {
         let [across, down] = self.tiles().map(u64::from);
@@ -323,7 +335,8 @@ impl Work {
             transmittance_floor: self.values.transmittance_floor,
             compensation_floor: pipeline.compensation_floor,
             cut_off_deviations: pipeline.cut_off_deviations,
-            unused: [0; 2],
+            is_surfel: u32::from(pipeline.variant.is_surfel),
+            unused1: 0,
             attributes: pipeline.attributes,
             padding: 0,
         }
@@ -340,13 +353,14 @@ impl Work {
         commands: vk::CommandBuffer,
         scratch: &Memory,
         extent: &Extent,
-    ) -> Option<Times> {
+    ) -> Result<Option<Times>, vk::Result> {
+        let specialized = kernels.specialized(self.variant())?;
         let places = Places::of(extent);
         let parameters = self.parameters(scratch, &places, extent, kernels.feedback.address);
         // SAFETY: the caller's promise, for all below.
         unsafe {
             let times = Times::begin(next, commands);
-            let mut run = Run { next, kernels, commands, scratch, extent, places, times };
+            let mut run = Run { next, kernels, commands, scratch, extent, places, specialized, times };
             run.barrier();
             run.write(places.parameters, bytemuck::bytes_of(&parameters));
             run.write(places.draws, bytemuck::cast_slice(&self.draws));
@@ -364,7 +378,7 @@ impl Work {
                 self.record_view(&mut run, view);
             }
             run.barrier();
-            run.times
+            Ok(run.times)
         }
     }
 
@@ -394,7 +408,7 @@ impl Work {
         let tiles = across * down;
         let plane = view * self.area.size[0] * self.area.size[1];
         let pushed = Pushed { set: run.scratch.address + run.places.parameters, view, side: 0, plane, unused: 0 };
-        let (places, specialized) = (run.places, self.pipeline.specialized);
+        let (places, specialized) = (run.places, run.specialized);
         let by_depth = Sort {
             keys: run.scratch.address + places.keys,
             values: run.scratch.address + places.values,
@@ -450,6 +464,7 @@ struct Run<'a> {
     scratch: &'a Memory,
     extent: &'a Extent,
     places: Places,
+    specialized: Specialized,
     times: Option<Times>,
 }
 
