@@ -29,6 +29,7 @@ need make make
 need yosys yosys
 need xvfb Xvfb
 need qemu-user qemu-x86_64
+if ! python3 -c 'import numpy' 2>/dev/null && ! /usr/bin/python3 -c 'import numpy' 2>/dev/null; then missing+=(python3-numpy); fi
 if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
 if ! python3 -c 'import ensurepip' >/dev/null 2>&1; then missing+=(python3-venv); fi
 if [ ${#missing[@]} -gt 0 ]; then
