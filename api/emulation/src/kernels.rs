@@ -46,7 +46,7 @@ impl Kernel {
     ];
 }
 
-/// What a pipeline of Gaussians fixes of the kernels, as `shaders/variant.glsl` has it.
+/// The constants that a pipeline of Gaussians fixes in the kernels, as `shaders/variant.glsl` has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Variant {
     pub(crate) has_matrix: bool,

@@ -20,7 +20,7 @@ struct Input {
     divisors: Vec<vk::VertexInputBindingDivisorDescriptionKHR>,
 }
 
-/// What the part of pre-rasterization shaders has.
+/// The state of the part of pre-rasterization shaders.
 struct PreRasterization {
     state: Option<State<'static>>,
     footprint: Option<Footprint<'static>>,
@@ -31,13 +31,13 @@ struct PreRasterization {
     view_mask: u32,
 }
 
-/// What the part of the fragment shader has.
+/// The state of the part of the fragment shader.
 struct Fragment {
     has_stage: bool,
     depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'static>>,
 }
 
-/// What the fragment output interface has.
+/// The state of the fragment output interface.
 struct Output {
     blend: Option<vk::PipelineColorBlendStateCreateInfo<'static>>,
     attachments: Vec<vk::PipelineColorBlendAttachmentState>,

@@ -56,7 +56,7 @@ pub(crate) struct Pipeline {
     pub(crate) cut_off: u32,
     pub(crate) cut_off_deviations: f32,
     pub(crate) compensation_floor: f32,
-    /// What the pipeline fixes of the kernels.
+    /// The constants that the pipeline fixes in the kernels.
     pub(crate) variant: Variant,
     /// Bytes from a harmonic's attribute to the next one's.
     pub(crate) harmonics_step: u32,

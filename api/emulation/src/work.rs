@@ -166,7 +166,7 @@ pub(crate) enum Cameras {
     Buffer(vk::DescriptorSet, Vec<u32>),
 }
 
-/// What a set has made of its area, as `shaders/shown.glsl` has it.
+/// The result of a set in its area, as `shaders/shown.glsl` has it.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Picture {
@@ -248,7 +248,7 @@ impl Work {
         self.image_bytes() + 4 * self.all_tiles()
     }
 
-    /// What the set makes, for the shaders that show it.
+    /// The set's result, for the shaders that show it.
     pub(crate) fn picture(&self, address: u64) -> Picture {
         Picture { image: address, shown: address + self.image_bytes(), origin: self.area.origin, size: self.area.size }
     }

@@ -262,14 +262,12 @@ def exr(path):
 SCENES = {"skull": "skull.ply", "playbot": "playbot-125k.ply", "plant": "plant.splat"}
 
 
-@pytest.mark.parametrize("name", list(SCENES))
-@pytest.mark.parametrize("view", [0, 2])
-@pytest.mark.parametrize("mode", ["classic", "antialiased"])
-def test_what_gsplats_cuda_drew(test_data, name, view, mode):
-    folder = test_data / "reference/gpu"
-    drawn = exr(folder / {"classic": "gsplat", "antialiased": "gsplat_compensated"}[mode] / f"{name}-{view}.exr")
+def drawn_by_cuda(test_data, folder, name, view, **settings):
+    """What gsplat's CUDA code drew of a view, by channel, and what `rasterization` draws of it with these settings."""
+    references = test_data / "reference/gpu"
+    drawn = exr(references / folder / f"{name}-{view}.exr")
     scene = gaurast.open(test_data / "splats" / SCENES[name])
-    camera = next(camera for camera in gaurast.cameras(folder / "cameras.json") if camera.name == f"{name}-{view}")
+    camera = next(camera for camera in gaurast.cameras(references / "cameras.json") if camera.name == f"{name}-{view}")
     picture, alpha, _ = gaurast.rasterization(
         *scene.arrays,
         camera.viewmat[None],
@@ -278,35 +276,30 @@ def test_what_gsplats_cuda_drew(test_data, name, view, mode):
         camera.height,
         near_plane=0.2,
         sh_degree=scene.sh_degree,
-        rasterize_mode=mode,
-        render_mode="RGB+ED",
+        **settings,
     )
+    return drawn, picture[0], alpha[0]
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+@pytest.mark.parametrize("view", [0, 2])
+@pytest.mark.parametrize("mode", ["classic", "antialiased"])
+def test_what_gsplats_cuda_drew(test_data, name, view, mode):
+    folder = {"classic": "gsplat", "antialiased": "gsplat_compensated"}[mode]
+    drawn, picture, alpha = drawn_by_cuda(test_data, folder, name, view, rasterize_mode=mode, render_mode="RGB+ED")
     reference = np.stack([drawn[channel] for channel in "RGB"], axis=-1)
-    assert np.abs(picture[0, ..., :3] - reference).max() < 1.0 / 255.0
-    assert np.abs(alpha[0, ..., 0] - drawn["A"]).max() < 1.0 / 255.0
+    assert np.abs(picture[..., :3] - reference).max() < 1.0 / 255.0
+    assert np.abs(alpha[..., 0] - drawn["A"]).max() < 1.0 / 255.0
     # There are no depths of the compensated mode.
     if mode == "classic":
-        errors = np.abs(picture[0, ..., 3] - drawn["Z"]) / np.maximum(drawn["Z"], 1.0)
+        errors = np.abs(picture[..., 3] - drawn["Z"]) / np.maximum(drawn["Z"], 1.0)
         assert errors[drawn["A"] > 0.5].max() < 1e-3
 
 
 @pytest.mark.parametrize("name", list(SCENES))
 @pytest.mark.parametrize("view", [0, 2])
 def test_what_gsplats_cuda_drew_by_a_fisheye(test_data, name, view):
-    folder = test_data / "reference/gpu"
-    drawn = exr(folder / "gsplat_fisheye" / f"{name}-{view}.exr")
-    scene = gaurast.open(test_data / "splats" / SCENES[name])
-    camera = next(camera for camera in gaurast.cameras(folder / "cameras.json") if camera.name == f"{name}-{view}")
-    picture, _, _ = gaurast.rasterization(
-        *scene.arrays,
-        camera.viewmat[None],
-        camera.K[None],
-        camera.width,
-        camera.height,
-        near_plane=0.2,
-        sh_degree=scene.sh_degree,
-        camera_model="fisheye",
-    )
+    drawn, picture, _ = drawn_by_cuda(test_data, "gsplat_fisheye", name, view, camera_model="fisheye")
     reference = np.stack([drawn[channel] for channel in "RGB"], axis=-1)
-    errors = np.abs(picture[0, ..., :3] - reference)
+    errors = np.abs(picture[..., :3] - reference)
     assert 10.0 * np.log10(1.0 / np.mean(errors**2)) > 80.0

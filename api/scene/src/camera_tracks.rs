@@ -42,12 +42,12 @@ pub fn parse(text: &str, size: [u32; 2]) -> Result<Vec<Keyframe>, serde_json::Er
 struct Track {
     /// LichtFeld Studio's.
     keyframes: Option<Vec<LichtFeldKeyframe>>,
-    /// Those of SuperSplat's document.
+    /// The tracks of SuperSplat's document.
     #[serde(default)]
     pose_sets: Vec<PoseSet>,
     #[serde(default)]
     timeline: Timeline,
-    /// Those of the settings of SuperSplat's viewer.
+    /// The tracks of the settings of SuperSplat's viewer.
     #[serde(default, rename = "animTracks")]
     animation_tracks: Vec<AnimationTrack>,
     #[serde(default)]

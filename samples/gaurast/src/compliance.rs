@@ -43,7 +43,7 @@ pub enum Error {
     Stdout(std::io::Error),
 }
 
-/// How binding a case is.
+/// The force of a case's clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Level {
@@ -91,7 +91,7 @@ struct Mistake {
     difference: f64,
 }
 
-/// What became of a case.
+/// The outcome of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Verdict {

@@ -12,7 +12,7 @@ use crate::gltf_file::Gltf;
 use crate::ply_file::ply;
 use crate::usd_file::Usd;
 
-/// How binding a case is.
+/// The force of a case's clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// The text has a rule, which admits one picture to within the tolerance.
@@ -43,9 +43,9 @@ pub enum Pipeline {
     Gsplat,
     /// gsplat up to 1.5.
     Gsplat15,
-    /// What `KHR_gaussian_splatting` says.
+    /// The rules of `KHR_gaussian_splatting`.
     Gltf,
-    /// What OpenUSD says.
+    /// The rules of OpenUSD.
     Usd,
 }
 
@@ -202,7 +202,7 @@ impl Source {
 /// A misreading, whose picture is apart from the right one.
 #[derive(Clone, Debug)]
 pub struct Mistake {
-    /// What is read wrong.
+    /// The property that is read wrong.
     pub what: &'static str,
     /// The file that, read right, gives the picture.
     pub source: Option<Source>,
@@ -219,11 +219,11 @@ pub struct Case {
     pub scene: String,
     /// The renderer that the picture is of.
     pub pipeline: Pipeline,
-    /// How binding it is.
+    /// The force of its clause.
     pub level: Level,
     /// The place in the text.
     pub clause: &'static str,
-    /// What the picture shows.
+    /// The property that the picture shows.
     pub shows: &'static str,
     /// The scene.
     pub source: Source,
@@ -231,7 +231,7 @@ pub struct Case {
     pub camera: Camera,
     /// True if the opacity makes up for the low-pass filter.
     pub is_compensated: bool,
-    /// What the text leaves open, and the case, too.
+    /// The choices that both the text and the case leave open.
     pub freedoms: Vec<Freedom>,
     /// A misreading.
     pub mistake: Option<Mistake>,

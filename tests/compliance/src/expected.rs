@@ -54,7 +54,7 @@ pub struct Expected {
     pub pixels: Vec<[f64; 4]>,
     /// The greatest difference of a picture of floats.
     pub tolerance: f64,
-    /// How the tolerance came about.
+    /// The derivation of the tolerance.
     pub derivation: String,
     /// The difference of the misreading's picture, if the case has one.
     pub mistaken: Option<f64>,

@@ -490,7 +490,7 @@ fn composition() -> Vec<Case> {
     ]
 }
 
-/// What the text assumes, or leaves open.
+/// The assumptions of the text, and the choices that it leaves open.
 fn open() -> Vec<Case> {
     let large = || Gaussian::new([0.9; 3]).scaled(0.45, 0.35, 0.4).opaque(0.98);
     let small = || Gaussian::new(RED).scaled(0.02, 0.02, 0.02);

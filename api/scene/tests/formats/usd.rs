@@ -49,7 +49,7 @@ fn both_encodings_and_precisions_have_the_written_values() {
     }
 }
 
-/// What OpenUSD computes of a stage.
+/// The values that OpenUSD computes of a stage.
 #[derive(serde::Deserialize)]
 struct Expected {
     positions: Vec<[f64; 3]>,

@@ -15,9 +15,9 @@ const MODIFIERS: [&str; 9] =
 
 /// A brace that is open.
 enum Open {
-    /// That of the prim with this index.
+    /// The block of the prim with this index.
     Prim(usize),
-    /// That of a set of variants of a prim.
+    /// The block of a set of variants of a prim.
     Variants { prim: usize, set: String },
 }
 
