@@ -11,7 +11,7 @@ use crate::proc_addr;
 /// Puts the extension over the Vulkan loader's entry: the devices of its instances have `VK_GAURAST_gaussian_primitive_topology`,
 /// as with the layer, without a manifest. A process has one such entry; later calls give the first one's.
 ///
-/// `below` is an entry of the Vulkan loader, such as [`ash::Entry::load`] gives: handles that are not the loader's cannot be told
+/// `below` is an entry of the Vulkan loader, such as `ash::Entry::load` gives: handles that are not the loader's cannot be told
 /// apart.
 pub fn entry(below: ash::Entry) -> ash::Entry {
     BELOW.get_or_init(|| below);
