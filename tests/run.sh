@@ -25,8 +25,10 @@ need spirv-tools spirv-val
 need valgrind valgrind
 need asciidoctor asciidoctor
 need verilator verilator
+need iverilog iverilog
 need make make
 need yosys yosys
+need opensta sta
 need xvfb Xvfb
 need qemu-user qemu-x86_64
 if ! python3 -c 'import numpy' 2>/dev/null && ! /usr/bin/python3 -c 'import numpy' 2>/dev/null; then missing+=(python3-numpy); fi

@@ -8,7 +8,7 @@ mod tiles;
 
 use std::path::Path;
 use timing_studies::number::Format;
-use timing_studies::rtl::ModuleBench;
+use timing_studies::rtl::{ModuleBench, Simulator};
 use timing_studies::rtl_cycles::{Cycles, Setting, calibrated_sharing, mean_error};
 
 fn main() -> std::io::Result<()> {
@@ -30,7 +30,7 @@ fn main() -> std::io::Result<()> {
         .collect();
     let mut masked = Vec::new();
     for (name, format) in [("fp32", Format::SINGLE), ("fp16", Format::HALF)] {
-        let bench = ModuleBench::build(Path::new(folder), format, &[])?;
+        let bench = ModuleBench::build(Simulator::Verilator, Path::new(folder), format, &[])?;
         for setting in Setting::ALL {
             let mut sources = vec![(
                 "generated".to_owned(),

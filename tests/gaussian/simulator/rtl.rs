@@ -2,17 +2,18 @@
 //! stepped model's.
 
 use super::tiles::{self, View};
-use gaurast_runner::{Case, Need, Variant, data, is_long};
+use gaurast_runner::{Case, Missing, Need, Variant, data, ignore, is_long};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::timing::config::Config;
 use simdevice::timing::work::Mode;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::{Once, OnceLock};
 use timing_studies::exponential::{Exponential, exp2};
 use timing_studies::module::{Drawn, Groups, List, Module};
 use timing_studies::number::Format;
-use timing_studies::rtl::{self, LATENCY, Latencies, ModuleBench, UnitBench};
+use timing_studies::rtl::{self, LATENCY, Latencies, ModuleBench, Simulator, UnitBench};
 use timing_studies::rtl_cycles::{Cycles, Setting};
 
 const FORMATS: [(&str, Format); 2] = [("fp32", Format::SINGLE), ("fp16", Format::HALF)];
@@ -27,7 +28,7 @@ fn format(case: &Case) -> Format {
 }
 
 /// A folder that keeps Verilator's build between test runs. Its files are written once, before two builds read them.
-fn folder() -> PathBuf {
+pub(super) fn folder() -> PathBuf {
     static FILES: Once = Once::new();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rtl");
     FILES.call_once(|| rtl::write(&folder).expect("files"));
@@ -63,7 +64,7 @@ impl Design {
     fn bench(&self) -> &ModuleBench {
         self.bench.get_or_init(|| {
             let parameters: Vec<_> = self.parameters.iter().map(ToString::to_string).collect();
-            ModuleBench::build(&folder(), self.format, &parameters).expect("a bench")
+            ModuleBench::build(Simulator::Verilator, &folder(), self.format, &parameters).expect("a bench")
         })
     }
 
@@ -216,13 +217,89 @@ fn the_presets_have_the_latencies_of_the_module() {
     }
 }
 
+#[gaurast_runner::test(each = formats(), needs = [Need::Program("iverilog"), Need::Program("vvp")])]
+fn a_second_simulator_draws_the_same(case: &Case) {
+    let design = design(case);
+    let bench = ModuleBench::build(Simulator::Icarus, &folder(), design.format, &[]).expect("a bench");
+    // It takes a second for some twenty cycles.
+    let longest = if is_long() { 40 } else { 2 };
+    for setting in Setting::ALL {
+        let kinds = tiles::KINDS.len() + 1;
+        let mut lists = tiles::generated(design.format, setting.groups, setting.masked, kinds, setting.seed);
+        if !is_long() {
+            lists.drain(1..kinds - 1);
+        }
+        for list in &mut lists {
+            list.primitives.truncate(longest);
+        }
+        compare(&bench, &design.module(setting), &lists);
+    }
+}
+
+#[gaurast_runner::test(each = designs(), needs = [Need::Program("verilator")])]
+fn verilator_has_nothing_to_warn_of(case: &Case) {
+    let design = design(case);
+    let mut command = Command::new("verilator");
+    command
+        .current_dir(folder())
+        .args(["--lint-only", "-Wall", "--top-module", "raster_module"])
+        .arg(format!("-GEXPONENT={}", design.format.exponent))
+        .arg(format!("-GMANTISSA={}", design.format.mantissa))
+        .args(design.parameters)
+        .args(rtl::sources());
+    let output = command.output().expect("verilator");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+    let files = rtl::files();
+    let waives = |text: &str| text.contains("lint_off") || text.contains("-Wno");
+    let waivers: Vec<_> = files.iter().filter(|(_, text)| waives(text)).map(|(name, _)| name).collect();
+    assert!(waivers.is_empty(), "{waivers:?}");
+}
+
+#[gaurast_runner::test(needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++"), Need::Program("iverilog"), Need::Program("yosys")])]
+fn the_commands_of_the_readme_run() {
+    let folder = folder().join("readme");
+    rtl::write(&folder).expect("files");
+    let files = rtl::files();
+    let readme = &files.iter().find(|(name, _)| *name == "README.md").expect("a README").1;
+    let commands: Vec<_> = readme.lines().filter_map(|line| line.strip_prefix("    ")).collect();
+    // The module's program and the table of areas take minutes.
+    let (long, short): (Vec<_>, Vec<_>) = commands.into_iter().partition(|command| {
+        command.starts_with("bash area.sh") || command.contains("raster_module $SOURCES bench.cpp")
+    });
+    assert_eq!(long.len(), 2);
+    let script = if is_long() { [short, long].concat() } else { short }.join("\n");
+    let output = Command::new("bash").args(["-euc", &script]).current_dir(&folder).output().expect("bash");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{script}\n{said}");
+}
+
+#[gaurast_runner::test(needs = [Need::Program("yosys"), Need::Program("sta")])]
+fn a_cell_library_gives_areas_and_times() {
+    if std::env::var_os("GAURAST_LIBERTY").is_none() {
+        ignore(Missing::Capability, "GAURAST_LIBERTY names no cell library");
+    }
+    let folder = folder().join("silicon");
+    rtl::write(&folder).expect("files");
+    let mut command = Command::new("bash");
+    command.arg("silicon.sh").args((!is_long()).then_some("quick"));
+    let output = command.current_dir(&folder).output().expect("bash");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let table = String::from_utf8_lossy(&output.stdout);
+    let rows: Vec<Vec<f64>> = (table.lines().skip(2))
+        .map(|row| row.split('|').filter_map(|cell| cell.trim().parse().ok()).collect())
+        .collect();
+    assert_eq!(rows.len(), if is_long() { 18 } else { 1 });
+    assert!(rows.iter().all(|row| row.len() == 3 && row.iter().all(|number| *number > 0.0)), "{table}");
+}
+
 #[gaurast_runner::test(needs = [Need::Program("yosys")])]
 fn yosys_reads_the_module() {
     let folder = folder().join("yosys");
     rtl::write(&folder).expect("files");
     let script = format!("read_verilog -sv -I. {}; hierarchy -check -top raster_module", rtl::sources().join(" "));
-    let output =
-        std::process::Command::new("yosys").current_dir(&folder).args(["-q", "-p", &script]).output().expect("yosys");
+    let output = Command::new("yosys").current_dir(&folder).args(["-q", "-p", &script]).output().expect("yosys");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
 }

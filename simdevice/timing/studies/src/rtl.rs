@@ -1,15 +1,16 @@
-//! The rasterizer module in SystemVerilog: its files, and the bench that runs it under Verilator.
+//! The rasterizer module in SystemVerilog: its files, and the benches that run it under Verilator and Icarus Verilog.
 
 use crate::exponential::{Exponential, table_module};
 use crate::module::{Groups, List, Module};
 use crate::number::Format;
 use std::io::{Error, Result};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use timing::work::{Mode, TILE_GROUPS, TILE_PIXELS};
 
 /// Files of the hardware, in an order in which tools may read them.
 const HARDWARE: &[(&str, &str)] = &[
+    ("unit_latencies.svh", include_str!("../rtl/unit_latencies.svh")),
     ("latencies.svh", include_str!("../rtl/latencies.svh")),
     ("delay.sv", include_str!("../rtl/delay.sv")),
     ("fp_round.sv", include_str!("../rtl/fp_round.sv")),
@@ -23,12 +24,17 @@ const HARDWARE: &[(&str, &str)] = &[
     ("raster_module.sv", include_str!("../rtl/raster_module.sv")),
 ];
 
-/// Files of the benches.
+/// Files of the benches, of the proof and of the measurements.
 const BENCHES: &[(&str, &str)] = &[
     ("bench.cpp", include_str!("../rtl/bench.cpp")),
+    ("bench.sv", include_str!("../rtl/bench.sv")),
     ("units.sv", include_str!("../rtl/units.sv")),
     ("units.cpp", include_str!("../rtl/units.cpp")),
     ("area.sh", include_str!("../rtl/area.sh")),
+    ("properties.svh", include_str!("../rtl/properties.svh")),
+    ("formal.sv", include_str!("../rtl/formal.sv")),
+    ("prove.sh", include_str!("../rtl/prove.sh")),
+    ("silicon.sh", include_str!("../rtl/silicon.sh")),
     ("README.md", include_str!("../rtl/README.md")),
 ];
 
@@ -106,7 +112,6 @@ pub fn write(folder: &Path) -> Result<()> {
 
 /// Compiles a top module and its bench with Verilator. Returns the program's path.
 fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Result<PathBuf> {
-    write(folder)?;
     // Each design has a folder of its own, so that none replaces another's program.
     let letters = |text: &String| text.replace(|c: char| !c.is_alphanumeric(), "");
     let designs: String = parameters.iter().map(letters).collect();
@@ -114,7 +119,7 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     let mut command = Command::new("verilator");
     command
         .current_dir(folder)
-        .args(["--cc", "--exe", "--build", "-O3", "-Wno-WIDTH", "--Mdir", &objects])
+        .args(["--cc", "--exe", "--build", "-O3", "--Mdir", &objects])
         .args(["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"])
         .args(["--top-module", top])
         .arg(format!("-GEXPONENT={}", format.exponent))
@@ -134,6 +139,27 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     Ok(folder.join(objects).join(format!("V{top}")))
 }
 
+/// Compiles the rasterizer module and its bench with Icarus Verilog. Returns the program's path.
+fn build_icarus(folder: &Path, format: Format, parameters: &[String]) -> Result<PathBuf> {
+    let program = folder.join(format!("bench{}.vvp", format.bits()));
+    let output = Command::new("iverilog")
+        .current_dir(folder)
+        .args(["-g2012", "-I.", "-s", "bench"])
+        .arg(format!("-Pbench.EXPONENT={}", format.exponent))
+        .arg(format!("-Pbench.MANTISSA={}", format.mantissa))
+        .args(parameters)
+        .arg("-o")
+        .arg(&program)
+        .args(sources())
+        .arg("bench.sv")
+        .output()?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(Error::other(format!("iverilog: {said}")));
+    }
+    Ok(program)
+}
+
 /// Runs a bench on input words. Returns its output words.
 fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
     let folder = program.parent().unwrap_or(Path::new("."));
@@ -141,7 +167,13 @@ fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
     let [input, output] = ["in", "out"].map(|name| folder.join(format!("{name}-{unique}")));
     let bytes: Vec<_> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
     std::fs::write(&input, bytes)?;
-    let status = Command::new(program).args([&input, &output]).status();
+    let status = if program.extension().is_some_and(|extension| extension == "vvp") {
+        let arguments = [("+in=", &input), ("+out=", &output)];
+        let arguments = arguments.map(|(name, path)| format!("{name}{}", path.display()));
+        Command::new("vvp").arg("-N").arg(program).args(arguments).stdout(Stdio::null()).status()
+    } else {
+        Command::new(program).args([&input, &output]).status()
+    };
     let bytes = std::fs::read(&output);
     let _ = std::fs::remove_file(&input);
     let _ = std::fs::remove_file(&output);
@@ -162,6 +194,7 @@ impl UnitBench {
     /// # Errors
     /// Returns an error if Verilator is missing or fails.
     pub fn build(folder: &Path, format: Format) -> Result<Self> {
+        write(folder)?;
         build(folder, "units", format, &[]).map(Self)
     }
 
@@ -177,7 +210,16 @@ impl UnitBench {
     }
 }
 
-/// A program that runs a rasterizer module under Verilator.
+/// A simulator of SystemVerilog.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simulator {
+    /// Verilator, which compiles to C++.
+    Verilator,
+    /// Icarus Verilog, which interprets events.
+    Icarus,
+}
+
+/// A program that runs a rasterizer module in a simulator.
 #[derive(Debug)]
 pub struct ModuleBench {
     program: PathBuf,
@@ -199,13 +241,25 @@ pub struct Rasterized {
 }
 
 impl ModuleBench {
-    /// Compiles a module for a format in a folder, which keeps the compiled program. `parameters` are Verilator's
-    /// arguments.
+    /// Writes all files to a folder, and compiles them as [`ModuleBench::compile`] does.
     ///
     /// # Errors
-    /// Returns an error if Verilator is missing or fails.
-    pub fn build(folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
-        let program = build(folder, "raster_module", format, parameters)?;
+    /// Returns an error if a file can't be written, or if the simulator is missing or fails.
+    pub fn build(simulator: Simulator, folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
+        write(folder)?;
+        Self::compile(simulator, folder, format, parameters)
+    }
+
+    /// Compiles a module for a format from the files of a folder, which keeps the compiled program. `parameters` are the
+    /// simulator's arguments.
+    ///
+    /// # Errors
+    /// Returns an error if the simulator is missing or fails.
+    pub fn compile(simulator: Simulator, folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
+        let program = match simulator {
+            Simulator::Verilator => build(folder, "raster_module", format, parameters)?,
+            Simulator::Icarus => build_icarus(folder, format, parameters)?,
+        };
         Ok(Self { program, format })
     }
 

@@ -1,0 +1,141 @@
+//! Wrong rasterizer modules: each is a module's file with one change, and must be told from the right one by the pixels that it
+//! draws or by the properties of the controller.
+
+use super::rtl::folder;
+use super::tiles;
+use gaurast_runner::{Case, Need, Variant, is_long};
+use std::path::Path;
+use std::process::Command;
+use timing_studies::number::Format;
+use timing_studies::rtl::{self, LATENCY, ModuleBench, Simulator};
+use timing_studies::rtl_cycles::Setting;
+
+/// A change of a file.
+struct Mutant {
+    name: &'static str,
+    file: &'static str,
+    right: &'static str,
+    wrong: &'static str,
+}
+
+const fn mutant(name: &'static str, file: &'static str, right: &'static str, wrong: &'static str) -> Mutant {
+    Mutant { name, file, right, wrong }
+}
+
+const MUTANTS: &[Mutant] = &[
+    mutant("ties away from even", "fp_round.sv", "(|significand[EXTRA-2:0] || significand[EXTRA])", "1'b1"),
+    mutant("no carry of the rounding", "fp_round.sv", "assign carry = rounded[MANTISSA+1];", "assign carry = 1'b0;"),
+    mutant("no sticky bit of the sum", "fp_add.sv", "{aligned[WIDTH-1:1], aligned[0] | lost}", "aligned"),
+    mutant("the sign of a cancellation", "fp_add.sv", "zero && vanished2 ? 1'b0 : sign2", "sign2"),
+    mutant("the product's exponent", "fp_mul.sv", "{{(EXPONENT+1){1'b0}}, high}", "{(EXPONENT+2){1'b0}}"),
+    mutant("no remainder of the quotient", "fp_div.sv", "rest[STAGES*(SIZE+1)+:SIZE+1] != 0}", "1'b0}"),
+    mutant("the exponential's slope", "fp_exp2.sv", "slope2 <= slope + bend;", "slope2 <= slope;"),
+    mutant("no ceiling of alpha", "pe.sv", "power > alpha_ceiling ? alpha_ceiling : power", "power"),
+    mutant("the floor of alpha is exclusive", "pe.sv", ".in(!a1[BITS-1])", ".in(!a1[BITS-1] && a1 != 0)"),
+    mutant("red and blue", "pe.sv", "assign next_color = {a7, a2, a8};", "assign next_color = {a8, a2, a7};"),
+    mutant(
+        "coverage without its third weight",
+        "pe.sv",
+        "!u[BITS-1] && !v[BITS-1] && !a7[BITS-1]",
+        "!u[BITS-1] && !v[BITS-1]",
+    ),
+    mutant(
+        "finished pixels blend",
+        "pixel_buffer.sv",
+        "write && !finished[write_at] && reaches && open",
+        "write && reaches && open",
+    ),
+    mutant(
+        "pixels keep the last tile's colour",
+        "pixel_buffer.sv",
+        "colored[half*16+:16] <= 16'b0;",
+        "colored[half*16+:16] <= colored[half*16+:16];",
+    ),
+    mutant("the depth test", "raster_module.sv", "covered && nearer", "covered"),
+    mutant(
+        "transmittance is read too early",
+        "raster_module.sv",
+        "i < CARRIED - 1; i = i + 1)\n            if (mode",
+        "i < CARRIED - 2; i = i + 1)\n            if (mode",
+    ),
+    mutant(
+        "the last primitive is left out",
+        "raster_module.sv",
+        "assign is_last_primitive = {1'b0, current} + 1'b1 == batch_count[using];",
+        "assign is_last_primitive = {1'b0, current} + 2'd2 >= batch_count[using];",
+    ),
+    mutant("a list that ends early is fetched on", "raster_module.sv", "if (drop_list) listed <= 1'b0;", ""),
+    mutant(
+        "tiles leave while pixels are in flight",
+        "raster_module.sv",
+        "pixels[leave_tile] == 2 && !in_flight_of_leaving",
+        "pixels[leave_tile] == 2",
+    ),
+    mutant(
+        "the mode changes under pixels",
+        "raster_module.sv",
+        "batch_mode[using] != mode && !in_flight)",
+        "batch_mode[using] != mode)",
+    ),
+    mutant("both halves are one", "raster_module.sv", "filling <= !filling;", "filling <= filling;"),
+    mutant("groups of a block", "raster_module.sv", "{group[3:2], 2'(p / 4)}", "{group[1:0], 2'(p / 4)}"),
+    mutant("a mask's last group", "raster_module.sv", "(pending & (pending - 1)) == 0", "pending == 16'h8000"),
+    mutant("a request in a half in use", "raster_module.sv", "!fetching && !ready[filling] &&", "!fetching &&"),
+    mutant(
+        "a primitive's numbers begin a beat late",
+        "primitive_buffer.sv",
+        "rows[{half, place}] <= with_data[32+:9*BITS];",
+        "rows[{half, place}] <= with_data[48+:9*BITS];",
+    ),
+];
+
+/// The mutants that are tried: a sample or, in a long run, all.
+fn tried() -> Vec<Variant> {
+    let step = if is_long() { 1 } else { 12 };
+    MUTANTS.iter().step_by(step).map(|mutant| Variant::new(mutant.name)).collect()
+}
+
+/// True if the module of a folder draws generated tiles as the model does.
+fn draws_right(folder: &Path) -> bool {
+    let format = Format::HALF;
+    let Ok(bench) = ModuleBench::compile(Simulator::Verilator, folder, format, &[]) else {
+        return false;
+    };
+    Setting::ALL.into_iter().all(|setting| {
+        let module = setting.module(format);
+        let lists =
+            tiles::generated(format, setting.groups, setting.masked, 2 * (tiles::KINDS.len() + 1), setting.seed);
+        bench.run(&lists, &module, LATENCY).is_ok_and(|rasterized| {
+            let expected: Vec<_> = lists.iter().map(|list| module.draw(list).pixels).collect();
+            rasterized.pixels == expected
+        })
+    })
+}
+
+/// True if yosys proves the properties of the controller of a folder.
+fn satisfies_properties(folder: &Path) -> bool {
+    let output = Command::new("bash").args(["prove.sh", "12"]).current_dir(folder).output().expect("bash");
+    output.status.success()
+}
+
+#[gaurast_runner::test(each = tried(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++"), Need::Program("yosys")])]
+fn a_wrong_module_is_told_from_the_right_one(case: &Case) {
+    let mutant = MUTANTS.iter().find(|mutant| mutant.name == case.variant()).expect("a mutant");
+    let folder = folder().join("mutants").join(mutant.name.replace(' ', "-").replace('\'', ""));
+    rtl::write(&folder).expect("files");
+    let path = folder.join(mutant.file);
+    let text = std::fs::read_to_string(&path).expect("a file");
+    assert_eq!(text.matches(mutant.right).count(), 1, "{}", mutant.right);
+    std::fs::write(&path, text.replace(mutant.right, mutant.wrong)).expect("a file");
+    assert!(!draws_right(&folder) || !satisfies_properties(&folder), "it is not told from the right module");
+}
+
+#[gaurast_runner::test(needs = [Need::Program("yosys")])]
+fn the_controller_satisfies_its_properties() {
+    let folder = folder().join("proof");
+    rtl::write(&folder).expect("files");
+    let cycles = if is_long() { "20" } else { "12" };
+    let output = Command::new("bash").args(["prove.sh", cycles]).current_dir(&folder).output().expect("bash");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
