@@ -20,6 +20,7 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("angles", &["camera.fisheye", "camera.panorama"], 20),
     ("sigma points", &["unscented.pinhole"], 20),
     ("surfels", &["surfel"], 50),
+    ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];
 
 fn parts() -> Vec<Variant> {
@@ -49,7 +50,7 @@ fn lavapipe_draws_gaussians(case: &Case) {
 }
 
 /// Pairs that do not fit are looked for by every tile: the pictures are as right.
-#[gaurast_runner::test(needs = [Need::Lavapipe], each = ["commands", "views"].map(Variant::new).to_vec())]
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = ["commands", "views", "footprints", "areas"].map(Variant::new).to_vec())]
 fn pairs_that_do_not_fit_are_drawn(case: &Case) {
     with_emulation(case, &[("GAURAST_EMULATION_PAIRS", "10")], || holds(case));
 }

@@ -134,6 +134,8 @@ uint gather(uint candidate, uint end_, uint found, uvec2 tile, uint copies_) {
         reaching[l] = 0u;
     }
     barrier();
+    // Nothing writes them, but lavapipe 22.3 confuses what it keeps of loads before a loop: they are loaded anew.
+    memoryBarrierBuffer();
     bool reaches = false;
     if (candidate < end_) {
         uint copy = candidate % copies_, index = push.set.values.at[candidate / copies_];
