@@ -20,6 +20,8 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("angles", &["camera.fisheye", "camera.panorama"], 20),
     ("sigma points", &["unscented.pinhole"], 20),
     ("surfels", &["surfel"], 50),
+    ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
+    ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
     ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];
 
