@@ -20,6 +20,9 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("angles", &["camera.fisheye", "camera.panorama"], 20),
     ("sigma points", &["unscented.pinhole"], 20),
     ("surfels", &["surfel"], 50),
+    ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
+    ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
+    ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];
 
 fn parts() -> Vec<Variant> {
@@ -49,7 +52,7 @@ fn lavapipe_draws_gaussians(case: &Case) {
 }
 
 /// Pairs that do not fit are looked for by every tile: the pictures are as right.
-#[gaurast_runner::test(needs = [Need::Lavapipe], each = ["commands", "views"].map(Variant::new).to_vec())]
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = ["commands", "views", "footprints", "areas"].map(Variant::new).to_vec())]
 fn pairs_that_do_not_fit_are_drawn(case: &Case) {
     with_emulation(case, &[("GAURAST_EMULATION_PAIRS", "10")], || holds(case));
 }

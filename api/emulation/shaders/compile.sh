@@ -13,3 +13,5 @@ done
 # Passes with views need a capability.
 compile -DVIEWS -o "$folder/tiles_views.vert.spv" tiles.vert
 compile -DVIEWS -o "$folder/fetch_views.frag.spv" fetch.frag
+compile -DVIEWS -o "$folder/fetch_tested_views.frag.spv" fetch_tested.frag
+compile -DSTENCILS -o "$folder/samples_stencils.comp.spv" samples.comp

@@ -45,6 +45,31 @@ uint index_at(Draw d, uint place) {
     return d.index_bytes == 1u ? byte_at(at) : d.index_bytes == 2u ? half_at(at) : any_word_at(at);
 }
 
+// The depth of a centre as the attachment holds it: in steps, if it has steps.
+float held_depth(Camera camera, float z) {
+    float c0 = camera.depth_coefficients.x, c1 = camera.depth_coefficients.y;
+    float rough = camera.model == ORTHOGRAPHIC ? c0 + c1 * z : c0 + c1 / z;
+    vec2 d;
+    if (abs(rough) < 4.0) {
+        d = add(pair(c0), camera.model == ORTHOGRAPHIC ? two_product(c1, z) : div(pair(c1), pair(z)));
+    } else {
+        d = pair(rough > 0.0 ? 4.0 : -4.0);
+    }
+    if (push.set.is_negative_one_to_one != 0u) {
+        d = add(0.5 * d, pair(0.5));
+    }
+    d = sub(d, pair(1.0)).x >= 0.0 ? pair(1.0) : d.x <= 0.0 ? pair(0.0) : d;
+    float nearest = push.set.depth_range.x;
+    d = add(pair(nearest), mul(d, two_sum(push.set.depth_range.y, -nearest)));
+    if (push.set.depth_steps == 0u) {
+        return d.x;
+    }
+    d = mul(d, float(push.set.depth_steps));
+    precise float whole = roundEven(d.x);
+    precise float rest = (d.x - whole) + d.y;
+    return rest > 0.5 ? whole + 1.0 : rest < -0.5 ? whole - 1.0 : whole;
+}
+
 void main() {
     uint i = group() * 256u + gl_LocalInvocationIndex;
     if (i >= push.set.counters.at[GAUSSIANS]) {
@@ -472,6 +497,9 @@ void main() {
     }
     push.set.records.at[i] = r;
     push.set.reached.at[i] = reached;
+    if (HAS_DEPTHS) {
+        push.set.depths.at[i] = vec2(held_depth(camera, depth), depth);
+    }
 
     // The key, as an unsigned number in the same order.
     float by = depth;

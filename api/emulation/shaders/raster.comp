@@ -14,6 +14,8 @@ layout(constant_id = 0) const bool HAS_CUT_TILES = false;
 // The camera may be a panorama.
 layout(constant_id = 1) const bool HAS_ANGLES = false;
 layout(constant_id = 2) const bool IS_SURFEL = false;
+// The median depth is kept, and depths are compared with those that samples stored before: a layer of workgroups for each sample.
+layout(constant_id = 3) const bool HAS_TESTS = false;
 
 const uint INVOCATIONS = 64u;
 // Gaussians that are looked at together.
@@ -31,6 +33,7 @@ shared uvec2 cuts[HAS_CUT_TILES ? BATCH : 1u];
 // In a panorama, the places in x at which the copy counts.
 shared vec2 counting[HAS_ANGLES ? BATCH : 1u];
 shared uint members[BATCH];
+shared vec2 depths[HAS_TESTS ? BATCH : 1u];
 // Where the pairs did not fit: Gaussians that reach the tile, and, of those that are looked at, a bit for each that does.
 shared uint waiting[BATCH + INVOCATIONS];
 shared uint reaching[INVOCATIONS / 32u];
@@ -46,6 +49,22 @@ uint cut_column;
 uvec4 cut_rows;
 // Of the set.
 float floor_, ceiling, end;
+// Of the invocation's samples: what they stored, whether their stencil tests passed, whether anything reached them, and the median depth.
+vec4 stored, median;
+bvec4 has_passed_stencil, is_touched;
+
+// Reports how depths compare with those that are stored.
+bvec4 compare(float depth) {
+    uint op = push.set.depth_compare;
+    uvec4 is_less = uvec4(lessThan(vec4(depth), stored)), is_greater = uvec4(greaterThan(vec4(depth), stored));
+    uvec4 is_equal = uvec4(equal(vec4(depth), stored));
+    return bvec4((is_less & (op & 1u)) | (is_equal & (op >> 1 & 1u)) | (is_greater & (op >> 2 & 1u)));
+}
+
+// What a sample that is reached, or not, without a contribution has in place of alpha.
+float outcome(uint j) {
+    return !HAS_TESTS || !is_touched[j] ? NOT_REACHED : has_passed_stencil[j] ? REACHED : REACHED_IN_VAIN;
+}
 
 // Accumulates the Gaussian of a place in the batch, with the exponents and alphas that it has at the pixels.
 void accumulate(uint k, vec4 exponent, vec4 alpha) {
@@ -61,11 +80,19 @@ void accumulate(uint k, vec4 exponent, vec4 alpha) {
     if (HAS_ANGLES) {
         is_in = bvec4(uvec4(is_in) & uint(center_x >= counting[k].x && center_x < counting[k].y));
     }
+    if (HAS_TESTS) {
+        is_touched = bvec4(uvec4(is_touched) | uvec4(is_in));
+        is_in = bvec4(uvec4(is_in) & uvec4(compare(depths[k].x)) & uvec4(has_passed_stencil));
+        goes_on = bvec4(uvec4(goes_on) & (uvec4(has_passed_stencil) | uvec4(not(is_touched))));
+    }
     precise vec4 next = transmittance * (1.0 - alpha);
     bvec4 ends = bvec4(uvec4(is_in) & uvec4(lessThan(next, vec4(end))));
     is_in = bvec4(uvec4(is_in) & uvec4(not(ends)));
     goes_on = bvec4(uvec4(goes_on) & uvec4(not(ends)));
     is_reached = bvec4(uvec4(is_reached) | uvec4(is_in));
+    if (HAS_TESTS) {
+        median = mix(median, vec4(depths[k].x), bvec4(uvec4(is_in) & uvec4(greaterThanEqual(transmittance, vec4(0.5)))));
+    }
     vec4 weight = mix(vec4(0.0), transmittance * alpha, is_in);
     transmittance = mix(transmittance, next, is_in);
     for (uint j = 0u; j < ROWS; j++) {
@@ -113,6 +140,9 @@ void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
     }
     colors[slot] = vec3(r.red, r.green, r.blue);
     members[slot] = member;
+    if (HAS_TESTS) {
+        depths[slot] = push.set.depths.at[HAS_ANGLES ? member & MEMBER : member];
+    }
     if (HAS_CUT_TILES) {
         cuts[slot] = uvec2(cut_tiles(sub(r.mean_x, pair(push.set.viewport.x)).x, r.cut_radius), r.cut_y);
     }
@@ -134,6 +164,8 @@ uint gather(uint candidate, uint end_, uint found, uvec2 tile, uint copies_) {
         reaching[l] = 0u;
     }
     barrier();
+    // Nothing writes them, but lavapipe 22.3 confuses what it keeps of loads before a loop: they are loaded anew.
+    memoryBarrierBuffer();
     bool reaches = false;
     if (candidate < end_) {
         uint copy = candidate % copies_, index = push.set.values.at[candidate / copies_];
@@ -174,6 +206,21 @@ void main() {
     bool is_column = at.x < size.x && center.x >= viewport.x && center.x < viewport.x + viewport.z;
     goes_on = bvec4(uvec4(lessThan(uvec4(at.y) + uvec4(down), uvec4(size.y))) & uvec4(greaterThanEqual(rows, vec4(viewport.y)))
                     & uvec4(lessThan(rows, vec4(viewport.y + viewport.w))) & uint(is_column));
+    uint plane = push.plane + (HAS_TESTS ? gl_WorkGroupID.z * size.x * size.y : 0u);
+    if (HAS_TESTS) {
+        stored = vec4(0.0);
+        median = vec4(0.0);
+        is_touched = bvec4(false);
+        for (uint j = 0u; j < ROWS; j++) {
+            uvec2 before = uvec2(0u, OUT_OF_BOUNDS);
+            if (goes_on[j]) {
+                before = push.set.stored.at[plane + (at.y + j) * size.x + at.x];
+            }
+            stored[j] = uintBitsToFloat(before.x);
+            has_passed_stencil[j] = before.y == GOES_ON;
+            goes_on[j] = goes_on[j] && before.y != OUT_OF_BOUNDS;
+        }
+    }
     if (HAS_CUT_TILES) {
         cut_column = uint(floor(max(center.x - viewport.x, 0.0) / 16.0));
         cut_rows = uvec4(floor(max(rows - viewport.y, vec4(0.0)) / 16.0));
@@ -312,13 +359,17 @@ void main() {
         }
     }
     Pixels image = push.set.image;
-    if (any(is_reached)) {
+    if (any(is_reached) || (HAS_TESTS && any(is_touched))) {
         push.set.shown.at[(push.view * push.set.tiles.y + tile.y) * push.set.tiles.x + tile.x] = 1u;
     }
     for (uint j = 0u; j < ROWS; j++) {
         if (at.x < size.x && at.y + j < size.y) {
-            vec4 value = is_reached[j] ? vec4(total[j], 1.0 - transmittance[j]) : vec4(0.0, 0.0, 0.0, -1.0);
-            image.at[push.plane + (at.y + j) * size.x + at.x] = value;
+            uint pixel = plane + (at.y + j) * size.x + at.x;
+            image.at[pixel] = is_reached[j] ? vec4(total[j], 1.0 - transmittance[j]) : vec4(0.0, 0.0, 0.0, outcome(j));
+            if (HAS_TESTS) {
+                uint steps = push.set.depth_steps;
+                push.set.medians.at[pixel] = steps == 0u ? median[j] : div(pair(median[j]), pair(float(steps))).x;
+            }
         }
     }
 }

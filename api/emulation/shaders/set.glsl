@@ -1,9 +1,12 @@
 // A sorted set of Gaussians, as src/set.rs writes it. Every array is reached by its address.
 
 #include "counters.glsl"
+#include "outcomes.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Couples { uvec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { vec4 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Depths { vec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Floats { float at[]; };
 
 // The Gaussian as it is seen: lengths in pixels, the mean from the origin of the framebuffer.
 struct Record {
@@ -83,7 +86,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     Sources sources;
     Cameras cameras;
     DerivedCamera derived;
-    uvec2 unused2;
+    Depths depths;               // of each Gaussian: as the attachment holds it, in steps if it has steps; and the depth variable
+    Couples stored;              // of each sample: what it stored before, as `depths` has it, and the outcome of its own tests
+    Floats medians;              // of each sample: the median depth
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative
@@ -93,7 +98,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     uint order, compensated, cut_off, harmonics_step;
     float low_pass, alpha_floor, alpha_ceiling, transmittance_floor;
     float compensation_floor, cut_off_deviations;
-    uint is_surfel, unused1;
+    uint is_surfel, depth_compare;
+    vec2 depth_range;            // of the viewport
+    uint depth_steps;            // 2^n - 1 of an attachment of n bits; 0 of one of floats
+    uint is_negative_one_to_one;
     Attribute attributes[33];
 };
 
@@ -110,6 +118,9 @@ const int PINHOLE = 0, ORTHOGRAPHIC = 1, FISHEYE = 2, EQUIRECTANGULAR = 3;
 const uint VIEW_DEPTH = 0u, RADIAL_DISTANCE = 1u, PRIMITIVE = 2u;
 // Cut-offs.
 const uint NO_CUT_OFF = 0u, ELLIPSE = 1u, TILE_SQUARE = 2u, TILE_RECTANGLE = 3u;
+
+// Outcomes of the tests of a sample that no Gaussian takes part in: beyond the bounds, stencil failed, or neither.
+const uint OUT_OF_BOUNDS = 0u, STENCIL_FAILED = 1u, GOES_ON = 2u;
 
 // Width and height of a tile.
 const uint TILE = 16u;

@@ -14,3 +14,5 @@ layout(constant_id = 6) const uint DEGREE = 3u;
 layout(constant_id = 7) const bool HAS_ANGLES = false;
 layout(constant_id = 8) const bool IS_UNSCENTED = false;
 layout(constant_id = 9) const bool IS_SURFEL = false;
+// Depths are tested, or a resolve shader reads them.
+layout(constant_id = 10) const bool HAS_DEPTHS = false;

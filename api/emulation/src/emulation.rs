@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockRea
 
 use ash::vk;
 
+use crate::attachments::{Image, View};
 use crate::kernels::Kernels;
 use crate::library::Library;
 use crate::next::Next;
@@ -24,6 +25,11 @@ pub(crate) struct Pool {
 pub(crate) struct Objects {
     /// Sizes.
     pub(crate) buffers: HashMap<vk::Buffer, u64>,
+    /// Images of depths or stencils, and their views.
+    pub(crate) images: HashMap<vk::Image, Image>,
+    pub(crate) views: HashMap<vk::ImageView, Arc<View>>,
+    /// Attachments.
+    pub(crate) framebuffers: HashMap<vk::Framebuffer, Vec<vk::ImageView>>,
     pub(crate) pools: HashMap<vk::CommandPool, Pool>,
     pub(crate) render_passes: HashMap<vk::RenderPass, Arc<RenderPass>>,
     pub(crate) pipelines: HashMap<vk::Pipeline, Arc<Pipeline>>,

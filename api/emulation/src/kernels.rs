@@ -31,10 +31,11 @@ pub(crate) enum Kernel {
     CountPairs,
     Emit,
     Ranges,
+    Tests,
 }
 
 impl Kernel {
-    const ALL: [(Self, &'static [u8]); 8] = [
+    const ALL: [(Self, &'static [u8]); 9] = [
         (Self::Prepare, spirv!("prepare.comp")),
         (Self::Histogram, spirv!("histogram.comp")),
         (Self::ScanDigits, spirv!("scan_digits.comp")),
@@ -43,6 +44,7 @@ impl Kernel {
         (Self::CountPairs, spirv!("count_pairs.comp")),
         (Self::Emit, spirv!("emit.comp")),
         (Self::Ranges, spirv!("ranges.comp")),
+        (Self::Tests, spirv!("tests.comp")),
     ];
 }
 
@@ -60,11 +62,13 @@ pub(crate) struct Variant {
     pub(crate) has_angles: bool,
     pub(crate) is_unscented: bool,
     pub(crate) is_surfel: bool,
+    /// Depths or stencils are tested.
+    pub(crate) has_tests: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 10] {
+    fn of_projection(&self) -> [u32; 11] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -76,12 +80,13 @@ impl Variant {
             u32::from(self.has_angles),
             u32::from(self.is_unscented),
             u32::from(self.is_surfel),
+            u32::from(self.has_tests),
         ]
     }
 
     /// The specialization constants of the rasterizer.
-    fn of_rasterizer(&self) -> [u32; 3] {
-        [u32::from(self.has_cut_tiles), u32::from(self.has_angles), u32::from(self.is_surfel)]
+    fn of_rasterizer(&self) -> [u32; 4] {
+        [self.has_cut_tiles, self.has_angles, self.is_surfel, self.has_tests].map(u32::from)
     }
 }
 
@@ -90,6 +95,39 @@ impl Variant {
 pub(crate) struct Specialized {
     pub(crate) project: vk::Pipeline,
     pub(crate) raster: vk::Pipeline,
+}
+
+/// The kernels that copy attachments with several samples.
+pub(crate) struct Samples {
+    pub(crate) set_layout: vk::DescriptorSetLayout,
+    pub(crate) layout: vk::PipelineLayout,
+    pub(crate) depths: vk::Pipeline,
+    pub(crate) stencils: vk::Pipeline,
+}
+
+impl Samples {
+    /// # Safety
+    /// The device lives.
+    unsafe fn new(next: &Arc<Next>) -> Result<Self, vk::Result> {
+        let bindings = [vk::DescriptorSetLayoutBinding::default()
+            .descriptor_type(vk::DescriptorType::SAMPLED_IMAGE)
+            .descriptor_count(1)
+            .stage_flags(vk::ShaderStageFlags::COMPUTE)];
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the caller's promise.
+        unsafe {
+            let set_layout = next.create_descriptor_set_layout(&info, None)?;
+            let layout = layout(next, &[set_layout], vk::ShaderStageFlags::COMPUTE)?;
+            let create = |words: &[u8]| {
+                let module = module(next, words)?;
+                let pipeline = compute(next, module, layout, &[]);
+                next.destroy_shader_module(module, None);
+                pipeline
+            };
+            let (depths, stencils) = (spirv!("samples.comp"), spirv!("samples_stencils.comp"));
+            Ok(Self { set_layout, layout, depths: create(depths)?, stencils: create(stencils)? })
+        }
+    }
 }
 
 /// Bytes of push constants of kernels, and of the fragment shader that fetches.
@@ -109,6 +147,10 @@ pub(crate) struct Kernels {
     /// For passes with views.
     pub(crate) vertex_views: vk::ShaderModule,
     pub(crate) fetch_views: vk::ShaderModule,
+    /// For sets whose depths or stencils are tested.
+    pub(crate) fetch_tested: vk::ShaderModule,
+    pub(crate) fetch_tested_views: vk::ShaderModule,
+    pub(crate) samples: Samples,
     /// The most pairs of a set so far, which the device writes.
     pub(crate) feedback: Memory,
 }
@@ -130,6 +172,9 @@ impl Kernels {
                 // A device without views has no such passes.
                 vertex_views: module(next, spirv!("tiles_views.vert")).unwrap_or_default(),
                 fetch_views: module(next, spirv!("fetch_views.frag"))?,
+                fetch_tested: module(next, spirv!("fetch_tested.frag"))?,
+                fetch_tested_views: module(next, spirv!("fetch_tested_views.frag"))?,
+                samples: Samples::new(next)?,
                 feedback,
             };
             for (_, words) in Kernel::ALL {
@@ -182,12 +227,17 @@ impl Drop for Kernels {
             for pipeline in self.pipelines.drain(..).chain(specialized) {
                 self.next.destroy_pipeline(pipeline, None);
             }
-            for module in [self.vertex, self.fetch, self.vertex_views, self.fetch_views] {
+            let modules = [self.vertex, self.fetch, self.vertex_views, self.fetch_views];
+            for module in modules.into_iter().chain([self.fetch_tested, self.fetch_tested_views]) {
                 self.next.destroy_shader_module(module, None);
             }
-            for layout in [self.layout, self.fetch_layout] {
+            for pipeline in [self.samples.depths, self.samples.stencils] {
+                self.next.destroy_pipeline(pipeline, None);
+            }
+            for layout in [self.layout, self.fetch_layout, self.samples.layout] {
                 self.next.destroy_pipeline_layout(layout, None);
             }
+            self.next.destroy_descriptor_set_layout(self.samples.set_layout, None);
         }
     }
 }

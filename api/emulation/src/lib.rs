@@ -24,6 +24,7 @@
 //! | `instance`, `device` | what lives, by the loader's key |
 //! | `support` | the features and properties that devices get |
 //! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
+//! | `attachments`, `depth_stencil` | what is known of depth and stencil attachments, and the tests of Gaussians against them |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `set`, `work` | a sorted set that is recorded, and its dispatches |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
@@ -33,7 +34,9 @@
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid usage, so
 //! that what pointers name is there, and what is changed keeps it where it is passed on.
 
+mod attachments;
 mod below;
+mod depth_stencil;
 mod device;
 mod emulation;
 mod entry;

@@ -1,10 +1,12 @@
 //! The render pass instance that a command buffer is in, which can be broken: ended, and begun again with all that it has stored.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use ash::vk;
 use gaurast_layer_interface::{find, slice};
 
+use crate::attachments::{self, DepthStencil, View};
 use crate::next::Next;
 use crate::render_pass::RenderPass;
 use crate::work::barrier;
@@ -110,6 +112,8 @@ pub(crate) struct Object {
     framebuffer: vk::Framebuffer,
     /// Of an imageless framebuffer.
     views: Vec<vk::ImageView>,
+    /// Of the framebuffer, imageless or not.
+    attachments: Vec<vk::ImageView>,
     area: vk::Rect2D,
     subpass: u32,
     contents: vk::SubpassContents,
@@ -121,16 +125,19 @@ impl Object {
     pub(crate) unsafe fn new(
         known: Arc<RenderPass>,
         info: &vk::RenderPassBeginInfo<'_>,
+        attachments: Vec<vk::ImageView>,
         contents: vk::SubpassContents,
     ) -> Self {
         // SAFETY: the caller's promise.
         unsafe {
             let views = find::<vk::RenderPassAttachmentBeginInfo<'_>>(info.p_next);
             let views = views.map(|views| slice(views.p_attachments, views.attachment_count).to_vec());
+            let views = views.unwrap_or_default();
             Self {
                 known,
                 framebuffer: info.framebuffer,
-                views: views.unwrap_or_default(),
+                attachments: if views.is_empty() { attachments } else { views.clone() },
+                views,
                 area: info.render_area,
                 subpass: 0,
                 contents,
@@ -150,6 +157,42 @@ impl Pass {
         match self {
             Self::Rendering(rendering) => Some(rendering.area),
             Self::Object(object) => Some(object.area),
+            Self::Inherited => None,
+        }
+    }
+
+    /// The depth and stencil attachment as it is where the instance is interrupted.
+    pub(crate) fn depth_stencil(&self, views: &HashMap<vk::ImageView, Arc<View>>) -> Option<DepthStencil> {
+        match self {
+            Self::Rendering(rendering) => {
+                let named = |attachment: &Option<vk::RenderingAttachmentInfo<'static>>| {
+                    attachment.filter(|attachment| attachment.image_view != vk::ImageView::null())
+                };
+                let (depth, stencil) = (named(&rendering.depth), named(&rendering.stencil));
+                let one = depth.or(stencil)?;
+                let view = Arc::clone(views.get(&one.image_view)?);
+                let mut aspects = vk::ImageAspectFlags::empty();
+                if depth.is_some() {
+                    aspects |= vk::ImageAspectFlags::DEPTH;
+                }
+                if stencil.is_some() {
+                    aspects |= vk::ImageAspectFlags::STENCIL;
+                }
+                let layouts = match (depth, stencil) {
+                    (Some(depth), Some(stencil)) if depth.image_layout != stencil.image_layout => vec![
+                        (vk::ImageAspectFlags::DEPTH, depth.image_layout),
+                        (vk::ImageAspectFlags::STENCIL, stencil.image_layout),
+                    ],
+                    _ => vec![(attachments::aspects(view.image.format), one.image_layout)],
+                };
+                Some(DepthStencil { view, aspects, layouts })
+            }
+            Self::Object(object) => {
+                let (index, layout) = (*object.known.depth_stencil.get(object.subpass as usize)?)?;
+                let view = Arc::clone(views.get(object.attachments.get(index as usize)?)?);
+                let aspects = attachments::aspects(view.image.format);
+                Some(DepthStencil { view, aspects, layouts: vec![(aspects, layout)] })
+            }
             Self::Inherited => None,
         }
     }

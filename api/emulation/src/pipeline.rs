@@ -13,6 +13,7 @@ use gaurast::vk::{
 };
 use gaurast_layer_interface::{find, slice};
 
+use crate::depth_stencil::{self, TestState};
 use crate::formats;
 use crate::kernels::{self, CAMERA, Kernels, Variant};
 use crate::next::Next;
@@ -67,6 +68,11 @@ pub(crate) struct Pipeline {
     pub(crate) viewport: Option<vk::Viewport>,
     pub(crate) scissor: Option<vk::Rect2D>,
     pub(crate) view_mask: u32,
+    /// Depth and stencil tests, if something may be tested.
+    pub(crate) tests: Option<TestState>,
+    pub(crate) is_negative_one_to_one: bool,
+    /// Rasterization samples.
+    pub(crate) samples: u32,
     pub(crate) camera_buffer: Option<CameraBuffer>,
 }
 
@@ -108,13 +114,12 @@ pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a
 }
 
 /// A reason to refuse a pipeline.
-fn refusal(state: &State<'_>, has_fragment_stage: bool, tests_depth: bool) -> Option<&'static str> {
+fn refusal(state: &State<'_>, has_fragment_stage: bool) -> Option<&'static str> {
     let refusals = [
         (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
         (has_fragment_stage, "resolveFragmentShader"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
-        (tests_depth, "gaussianDepthStencil"),
         (state.flags.intersects(Flags::LOG_SCALE | Flags::LOGIT_OPACITY), "attributeActivation"),
     ];
     refusals.iter().find(|(is_used, _)| *is_used).map(|(_, feature)| *feature)
@@ -242,11 +247,7 @@ pub(crate) unsafe fn create(
     unsafe {
         let stages = slice(info.p_stages, info.stage_count);
         let has_fragment_stage = stages.iter().any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
-        let depth = info.p_depth_stencil_state.as_ref();
-        let tests_depth = depth.is_some_and(|depth| {
-            depth.depth_test_enable != 0 || depth.depth_bounds_test_enable != 0 || depth.stencil_test_enable != 0
-        });
-        if let Some(feature) = refusal(state, has_fragment_stage, tests_depth) {
+        if let Some(feature) = refusal(state, has_fragment_stage) {
             tell(&format!("a pipeline needs {feature}, which is not emulated"));
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
@@ -269,6 +270,10 @@ pub(crate) unsafe fn create(
             is_dynamic(vk::DynamicState::VIEWPORT, vk::DynamicState::VIEWPORT_WITH_COUNT),
             is_dynamic(vk::DynamicState::SCISSOR, vk::DynamicState::SCISSOR_WITH_COUNT),
         );
+        let tests = info.p_depth_stencil_state.as_ref().map(TestState::of_pipeline).unwrap_or_default();
+        let tests = Some(tests).filter(|tests| tests.may_be_any(&dynamic));
+        let clip =
+            viewports.and_then(|state| find::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next));
         let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
         let view_mask = context.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
         let footprint = find::<Footprint<'_>>(info.p_next);
@@ -285,10 +290,11 @@ pub(crate) unsafe fn create(
             has_angles: state.camera_source == CameraSource::UNIFORM_BUFFER,
             is_unscented: state.linearization == Linearization::UNSCENTED,
             is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
+            has_tests: tests.is_some_and(|tests| tests.is_any()),
         };
         // They are compiled now, rather than with the first draw.
         context.kernels.specialized(variant)?;
-        let raw = graphics(context, info, &dynamic, view_mask, allocator)?;
+        let raw = graphics(context, info, &dynamic, tests.is_some(), view_mask, allocator)?;
         let mut own = Pipeline {
             next: Arc::clone(context.next),
             raw,
@@ -304,6 +310,9 @@ pub(crate) unsafe fn create(
             scissor: scissor.filter(|_| !scissor_is_dynamic),
             dynamic,
             view_mask,
+            tests,
+            is_negative_one_to_one: clip.is_some_and(|clip| clip.negative_one_to_one != vk::FALSE),
+            samples: info.p_multisample_state.as_ref().map_or(1, |state| state.rasterization_samples.as_raw().max(1)),
             camera_buffer: None,
         };
         if state.camera_source == CameraSource::UNIFORM_BUFFER {
@@ -327,13 +336,16 @@ unsafe fn graphics(
     context: &Context<'_>,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     dynamic: &[vk::DynamicState],
+    may_be_tested: bool,
     view_mask: u32,
     allocator: Option<&vk::AllocationCallbacks<'_>>,
 ) -> Result<vk::Pipeline, vk::Result> {
-    let (vertex, fetch) = if view_mask == 0 {
-        (context.kernels.vertex, context.kernels.fetch)
-    } else {
-        (context.kernels.vertex_views, context.kernels.fetch_views)
+    let kernels = context.kernels;
+    let (vertex, fetch) = match (view_mask == 0, may_be_tested) {
+        (true, false) => (kernels.vertex, kernels.fetch),
+        (true, true) => (kernels.vertex, kernels.fetch_tested),
+        (false, false) => (kernels.vertex_views, kernels.fetch_views),
+        (false, true) => (kernels.vertex_views, kernels.fetch_tested_views),
     };
     let stage = |stage: vk::ShaderStageFlags, module: vk::ShaderModule| {
         vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
@@ -343,9 +355,12 @@ unsafe fn graphics(
     let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
     let viewports = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-    let depth = vk::PipelineDepthStencilStateCreateInfo::default();
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default().depth_compare_op(vk::CompareOp::ALWAYS);
     let mut states: Vec<vk::DynamicState> = dynamic.iter().copied().filter(|state| SHOWN.contains(state)).collect();
     states.extend([vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
+    if may_be_tested {
+        states.extend(depth_stencil::SHOWN);
+    }
     let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
     // SAFETY: the caller's promise.
     unsafe {

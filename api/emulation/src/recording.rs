@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
 
+use crate::depth_stencil::TestState;
 use crate::emulation::Emulation;
 use crate::formats;
 use crate::next::Next;
@@ -120,6 +121,10 @@ pub(crate) struct Recording {
     pub(crate) harmonics: Option<HarmonicsBuffer>,
     pub(crate) cameras: Vec<Camera>,
     pub(crate) values: DynamicValues,
+    /// Depth and stencil tests, as commands have set them.
+    pub(crate) tests: TestState,
+    /// Attachments may have changed since the recording began.
+    pub(crate) has_drawn: bool,
     pub(crate) viewport: Option<vk::Viewport>,
     pub(crate) scissor: Option<vk::Rect2D>,
     /// Vulkan's dynamic states, by their values as `VkDynamicState`.
@@ -153,6 +158,8 @@ impl Recording {
             harmonics: None,
             cameras: Vec::new(),
             values: DynamicValues::default(),
+            tests: TestState::default(),
+            has_drawn: false,
             viewport: None,
             scissor: None,
             states: BTreeMap::new(),
@@ -214,6 +221,7 @@ impl Recording {
         }
         Some(SetState {
             values: self.values.of(pipeline)?,
+            tests: pipeline.tests.map(|own| own.with_dynamic(&self.tests, &pipeline.dynamic)).filter(TestState::is_any),
             pipeline: Arc::clone(pipeline),
             cameras,
             viewport: pipeline.viewport.or(self.viewport)?,
@@ -330,6 +338,13 @@ impl Recording {
     /// # Safety
     /// See [`Self::activate_queries`].
     unsafe fn defer(&mut self, emulation: &Emulation, mut work: Work) -> Result<(), vk::Result> {
+        if work.tests.is_some() && self.has_drawn {
+            tell(
+                "in a secondary command buffer nothing may be drawn before Gaussians whose depths or stencils are tested",
+            );
+            return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+        }
+        self.has_drawn = true;
         let pixels = Arc::new(Memory::new(&emulation.next, work.pixel_bytes(), false)?);
         let address = pixels.address;
         self.kept.push(Arc::clone(&pixels));
@@ -374,12 +389,14 @@ impl Recording {
             }
             pass.interrupt(next, self.commands);
             let mut failure = None;
+            let attachment = pass.depth_stencil(&emulation.objects().views);
             for work in works {
+                let attachment = attachment.as_ref().filter(|_| work.tests.is_some());
                 let extent = work.extent(most_pairs);
                 let places = Places::of(&extent);
                 match emulation.scratch(self.family, &mut self.scratch, places.end) {
                     Ok(scratch) => {
-                        match work.record(next, kernels, self.commands, &scratch, &extent) {
+                        match work.record(next, kernels, self.commands, &scratch, &extent, attachment) {
                             Ok(times) => self.times.extend(times),
                             Err(error) => failure = Some(error),
                         }
@@ -441,7 +458,7 @@ impl Recording {
             min_depth: 0.0,
             max_depth: 1.0,
         };
-        let picture = work.picture(pixels);
+        let mut picture = work.picture(pixels);
         let [across, down] = work.tiles();
         let graphics = vk::PipelineBindPoint::GRAPHICS;
         let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
@@ -451,8 +468,16 @@ impl Recording {
             next.cmd_bind_pipeline(commands, graphics, work.pipeline.raw);
             next.cmd_set_viewport(commands, 0, &[viewport]);
             next.cmd_set_scissor(commands, 0, &[area]);
-            next.cmd_push_constants(commands, kernels.fetch_layout, stages, 0, bytemuck::bytes_of(&picture));
-            next.cmd_draw(commands, 6 * across * down, 1, 0, 0);
+            for outcome in work.outcomes() {
+                if work.pipeline.tests.is_some() {
+                    outcome.set(next, commands, &work.tests.unwrap_or_default());
+                }
+                for sample in 0..work.samples() {
+                    picture.show(sample, *outcome);
+                    next.cmd_push_constants(commands, kernels.fetch_layout, stages, 0, bytemuck::bytes_of(&picture));
+                    next.cmd_draw(commands, 6 * across * down, 1, 0, 0);
+                }
+            }
             for repeat in self.states.values() {
                 repeat(next, commands);
             }

@@ -14,6 +14,8 @@ pub(crate) struct RenderPass {
     pub(crate) again: vk::RenderPass,
     /// The view mask of each subpass.
     pub(crate) view_masks: Vec<u32>,
+    /// The depth and stencil attachment of each subpass, and the layout that the instance leaves it in.
+    pub(crate) depth_stencil: Vec<Option<(u32, vk::ImageLayout)>>,
 }
 
 impl Drop for RenderPass {
@@ -72,6 +74,11 @@ macro_rules! creation {
                         preserved(info.attachment_count, &used)
                     })
                     .collect();
+                let depth_stencil = subpasses.iter().map(|subpass| {
+                    let index = subpass.p_depth_stencil_attachment.as_ref()?.attachment;
+                    Some((index, attachments.get(index as usize)?.final_layout))
+                });
+                let depth_stencil: Vec<Option<(u32, vk::ImageLayout)>> = depth_stencil.collect();
                 let is_one = subpasses.len() == 1;
                 let mut subpasses = subpasses.to_vec();
                 for (subpass, kept) in subpasses.iter_mut().zip(&kept) {
@@ -93,7 +100,7 @@ macro_rules! creation {
                 info.p_attachments = again.as_ptr();
                 let view_masks: Vec<u32> = masks(&info, subpasses.len());
                 match next.$call(&info, None) {
-                    Ok(again) => Ok((created, RenderPass { next: Arc::clone(next), again, view_masks })),
+                    Ok(again) => Ok((created, RenderPass { next: Arc::clone(next), again, view_masks, depth_stencil })),
                     Err(error) => {
                         next.destroy_render_pass(created, allocator);
                         Err(error)

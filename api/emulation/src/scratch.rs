@@ -109,6 +109,8 @@ pub(crate) struct Extent {
     pub(crate) sources: u64,
     pub(crate) cameras: u64,
     pub(crate) pixels: u64,
+    /// Samples that are tested.
+    pub(crate) tested: u64,
 }
 
 /// Offsets into scratch.
@@ -131,6 +133,10 @@ pub(crate) struct Places {
     pub(crate) ranges: u64,
     pub(crate) records: u64,
     pub(crate) pixels: u64,
+    pub(crate) depths: u64,
+    pub(crate) copied_depths: u64,
+    pub(crate) copied_stencils: u64,
+    pub(crate) stored: u64,
     /// The size of all.
     pub(crate) end: u64,
 }
@@ -168,6 +174,10 @@ impl Places {
         places.ranges = take(8 * extent.tiles);
         places.records = take(RECORD * n);
         places.pixels = take(extent.pixels);
+        places.depths = take(if extent.tested == 0 { 0 } else { 8 * n });
+        places.copied_depths = take(4 * extent.tested);
+        places.copied_stencils = take(4 * extent.tested);
+        places.stored = take(8 * extent.tested);
         places.end = end;
         places
     }

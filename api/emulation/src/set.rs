@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::depth_stencil::TestState;
 use crate::pipeline::{self, Pipeline};
 use crate::support::MAX_GAUSSIANS;
 use crate::work::{Area, Camera, Cameras, Draw, DrawSource, Values, Work};
@@ -70,6 +71,8 @@ pub(crate) struct SetState {
     pub(crate) pipeline: Arc<Pipeline>,
     pub(crate) values: Values,
     pub(crate) cameras: Cameras,
+    /// Depth and stencil tests, if something is tested.
+    pub(crate) tests: Option<TestState>,
     pub(crate) viewport: vk::Viewport,
     pub(crate) scissor: vk::Rect2D,
 }
@@ -78,6 +81,11 @@ impl SetState {
     /// Reports whether a draw with another state belongs to the set.
     pub(crate) fn is_shared_with(&self, other: &Self) -> bool {
         let viewport = |v: &vk::Viewport| [v.x, v.y, v.width, v.height].map(f32::to_bits);
+        let depths = |v: &vk::Viewport| [v.min_depth, v.max_depth].map(f32::to_bits);
+        let are_tests_same = match (&self.tests, &other.tests) {
+            (Some(own), Some(others)) => own.is_same(others) && depths(&self.viewport) == depths(&other.viewport),
+            (own, others) => own.is_none() && others.is_none(),
+        };
         let cameras = match (&self.cameras, &other.cameras) {
             (Cameras::Command(own), Cameras::Command(others)) => own == others,
             // What is bound is that of the first draw.
@@ -86,6 +94,7 @@ impl SetState {
         Arc::ptr_eq(&self.pipeline, &other.pipeline)
             && self.values == other.values
             && cameras
+            && are_tests_same
             && viewport(&self.viewport) == viewport(&other.viewport)
             && self.scissor == other.scissor
     }
@@ -137,6 +146,8 @@ impl Set {
             pipeline: state.pipeline,
             values: state.values,
             cameras: state.cameras,
+            tests: state.tests,
+            depth_range: [v.min_depth, v.max_depth],
             viewport,
             area: Area { origin: [area.offset.x, area.offset.y], size: [area.extent.width, area.extent.height] },
             draws: self.draws,

@@ -67,6 +67,7 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .uniform_buffer_camera(true)
         .merged_draws(true)
         .gaussian_instancing(true)
+        .gaussian_depth_stencil(true)
         .gaussian_multisample(true)
         .gaussian_approximation(true)
         .spherical_harmonics_buffer(true)

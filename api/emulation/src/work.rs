@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::attachments::{self, DepthStencil};
+use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
 use crate::next::Next;
 use crate::pipeline::{Attribute, Pipeline};
@@ -87,7 +89,9 @@ struct Parameters {
     sources: u64,
     cameras: u64,
     derived: u64,
-    unused2: u64,
+    depths: u64,
+    stored: u64,
+    medians: u64,
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -109,7 +113,10 @@ struct Parameters {
     compensation_floor: f32,
     cut_off_deviations: f32,
     is_surfel: u32,
-    unused1: u32,
+    depth_compare: u32,
+    depth_range: [f32; 2],
+    depth_steps: u32,
+    is_negative_one_to_one: u32,
     attributes: [Attribute; 33],
     padding: u32,
 }
@@ -144,7 +151,39 @@ struct PushedDigit {
     unused: u32,
 }
 
+/// The push constants of the kernel of tests.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct PushedTests {
+    stored: u64,
+    depths: u64,
+    stencils: u64,
+    count: u32,
+    /// Bytes of a depth in what was copied; 0 without depths.
+    depth_bytes: u32,
+    depth_steps: u32,
+    /// Bytes of a stencil in what was copied; 0 without stencils.
+    stencil_bytes: u32,
+    /// The least and the most; the other way round where they are not tested.
+    bounds: [f32; 2],
+    /// The operation, the compare mask and the reference, from the lowest byte on.
+    stencil_compare: u32,
+    are_floats: u32,
+}
+
+/// The push constants of the kernels that copy samples.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct PushedSamples {
+    copied: u64,
+    area_origin: [i32; 2],
+    area_size: [u32; 2],
+    samples: u32,
+    unused: u32,
+}
+
 const _: () = assert!(size_of::<Pushed>() <= PUSHED as usize && size_of::<PushedDigit>() <= PUSHED as usize);
+const _: () = assert!(size_of::<PushedTests>() <= PUSHED as usize && size_of::<Picture>() <= PUSHED as usize);
 
 /// The numbers of a pipeline that may be dynamic, as they are at the set's first draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,6 +215,21 @@ pub(crate) struct Picture {
     shown: u64,
     origin: [i32; 2],
     size: [u32; 2],
+    /// The address of the samples' median depths.
+    medians: u64,
+    samples: u32,
+    /// What is shown.
+    sample: u32,
+    wanted: f32,
+    unused: u32,
+}
+
+impl Picture {
+    /// Chooses what is shown.
+    pub(crate) fn show(&mut self, sample: u32, outcome: Outcome) {
+        self.sample = sample;
+        self.wanted = outcome.number();
+    }
 }
 
 /// The part of the framebuffer that a set may reach.
@@ -191,6 +245,10 @@ pub(crate) struct Work {
     pub(crate) pipeline: Arc<Pipeline>,
     pub(crate) values: Values,
     pub(crate) cameras: Cameras,
+    /// Depth and stencil tests, if something is tested.
+    pub(crate) tests: Option<TestState>,
+    /// The least and the greatest depth of the viewport.
+    pub(crate) depth_range: [f32; 2],
     /// x, y, width and height; not negative.
     pub(crate) viewport: [f32; 4],
     pub(crate) area: Area,
@@ -232,9 +290,26 @@ impl Work {
         self.area.size.map(|size| size.div_ceil(TILE))
     }
 
-    /// Bytes of the pixels of all views.
-    fn image_bytes(&self) -> u64 {
-        16 * u64::from(self.area.size[0]) * u64::from(self.area.size[1]) * u64::from(self.pipeline.planes())
+    /// The samples of a pixel that the set tells apart: those that are tested.
+    pub(crate) fn samples(&self) -> u32 {
+        if self.tests.is_some() { self.pipeline.samples } else { 1 }
+    }
+
+    /// The outcomes of samples that are stored.
+    pub(crate) fn outcomes(&self) -> &'static [Outcome] {
+        let has_stencil = self.tests.is_some_and(|tests| tests.is_stencil_tested);
+        if has_stencil { &[Outcome::Passed, Outcome::Failed, Outcome::StencilFailed] } else { &[Outcome::Passed] }
+    }
+
+    /// The number of samples that are told apart, of all views.
+    fn all_samples(&self) -> u64 {
+        let pixels = u64::from(self.area.size[0]) * u64::from(self.area.size[1]);
+        pixels * u64::from(self.pipeline.planes()) * u64::from(self.samples())
+    }
+
+    /// Bytes of the median depths.
+    fn median_bytes(&self) -> u64 {
+        if self.pipeline.tests.is_some() { 4 * self.all_samples() } else { 0 }
     }
 
     /// The number of tiles of all views.
@@ -243,14 +318,29 @@ impl Work {
         u64::from(across) * u64::from(down) * u64::from(self.pipeline.planes())
     }
 
-    /// Bytes of what the set makes: pixels, and a word for each tile that says whether it is shown.
+    /// The place of the words of tiles in what the set makes: behind pixels and median depths.
+    fn shown_place(&self) -> u64 {
+        16 * self.all_samples() + self.median_bytes()
+    }
+
+    /// Bytes of what the set makes: pixels, median depths, and a word for each tile that says whether it is shown.
     pub(crate) fn pixel_bytes(&self) -> u64 {
-        self.image_bytes() + 4 * self.all_tiles()
+        self.shown_place() + 4 * self.all_tiles()
     }
 
     /// The set's result, for the shaders that show it.
     pub(crate) fn picture(&self, address: u64) -> Picture {
-        Picture { image: address, shown: address + self.image_bytes(), origin: self.area.origin, size: self.area.size }
+        Picture {
+            image: address,
+            shown: address + self.shown_place(),
+            origin: self.area.origin,
+            size: self.area.size,
+            medians: address + 16 * self.all_samples(),
+            samples: self.samples(),
+            sample: 0,
+            wanted: Outcome::Passed.number(),
+            unused: 0,
+        }
     }
 
     fn camera_count(&self) -> u32 {
@@ -266,7 +356,7 @@ impl Work {
             Cameras::Command(cameras) => cameras.iter().any(|camera| camera.model > ORTHOGRAPHIC),
             Cameras::Buffer(..) => true,
         };
-        Variant { has_angles, ..self.pipeline.variant }
+        Variant { has_angles, has_tests: self.tests.is_some(), ..self.pipeline.variant }
     }
 
     /// The sizes of the set's scratch. `pairs` is the most of them that any set has had.
@@ -284,6 +374,7 @@ impl Work {
             sources: size_of_val(self.sources.as_slice()).max(4) as u64,
             cameras: 128 * u64::from(self.camera_count().max(1)),
             pixels: if self.pixels.is_some() { 0 } else { self.pixel_bytes() },
+            tested: if self.tests.is_some() { self.all_samples() } else { 0 },
         }
     }
 
@@ -292,7 +383,15 @@ impl Work {
         self.pixels.as_ref().map_or(scratch.address + places.pixels, |memory| memory.address)
     }
 
-    fn parameters(&self, scratch: &Memory, places: &Places, extent: &Extent, feedback: u64) -> Parameters {
+    fn parameters(
+        &self,
+        scratch: &Memory,
+        places: &Places,
+        extent: &Extent,
+        feedback: u64,
+        attachment: Option<&DepthStencil>,
+    ) -> Parameters {
+        let depth_compare = self.tests.filter(|tests| tests.is_depth_tested && has_depths(attachment));
         let at = |place: u64| scratch.address + place;
         let (pipeline, picture) = (&self.pipeline, self.picture(self.pixels_at(scratch, places)));
         Parameters {
@@ -314,7 +413,9 @@ impl Work {
             sources: at(places.sources),
             cameras: at(places.cameras),
             derived: at(places.derived),
-            unused2: 0,
+            depths: at(places.depths),
+            stored: at(places.stored),
+            medians: picture.medians,
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -336,7 +437,13 @@ impl Work {
             compensation_floor: pipeline.compensation_floor,
             cut_off_deviations: pipeline.cut_off_deviations,
             is_surfel: u32::from(pipeline.variant.is_surfel),
-            unused1: 0,
+            depth_compare: depth_compare
+                .map_or(vk::CompareOp::ALWAYS, |tests| tests.depth_compare)
+                .as_raw()
+                .cast_unsigned(),
+            depth_range: self.depth_range,
+            depth_steps: depth_steps(attachment),
+            is_negative_one_to_one: u32::from(pipeline.is_negative_one_to_one),
             attributes: pipeline.attributes,
             padding: 0,
         }
@@ -353,10 +460,11 @@ impl Work {
         commands: vk::CommandBuffer,
         scratch: &Memory,
         extent: &Extent,
+        attachment: Option<&DepthStencil>,
     ) -> Result<Option<Times>, vk::Result> {
         let specialized = kernels.specialized(self.variant())?;
         let places = Places::of(extent);
-        let parameters = self.parameters(scratch, &places, extent, kernels.feedback.address);
+        let parameters = self.parameters(scratch, &places, extent, kernels.feedback.address, attachment);
         // SAFETY: the caller's promise, for all below.
         unsafe {
             let times = Times::begin(next, commands);
@@ -370,10 +478,14 @@ impl Work {
                 Cameras::Buffer(set, offsets) => self.copy_cameras(&run, *set, offsets),
             }
             let (shown, buffer) = match &self.pixels {
-                Some(memory) => (self.image_bytes(), memory.buffer),
-                None => (places.pixels + self.image_bytes(), scratch.buffer),
+                Some(memory) => (self.shown_place(), memory.buffer),
+                None => (places.pixels + self.shown_place(), scratch.buffer),
             };
             next.cmd_fill_buffer(commands, buffer, shown, 4 * self.all_tiles(), 0);
+            if let Some(tests) = &self.tests {
+                self.test(&run, tests, attachment)?;
+                run.end_stage("test");
+            }
             for view in self.pipeline.views() {
                 self.record_view(&mut run, view);
             }
@@ -401,12 +513,143 @@ impl Work {
         }
     }
 
+    /// Makes the tests that Gaussians take no part in, and keeps the depths of samples.
+    ///
+    /// # Safety
+    /// As [`Self::record`].
+    unsafe fn test(
+        &self,
+        run: &Run<'_>,
+        tests: &TestState,
+        attachment: Option<&DepthStencil>,
+    ) -> Result<(), vk::Result> {
+        let aspects = attachment.map_or(vk::ImageAspectFlags::empty(), |attachment| attachment.aspects);
+        let wanted = |is_tested: bool, aspect: vk::ImageAspectFlags| {
+            if is_tested { aspects & aspect } else { vk::ImageAspectFlags::empty() }
+        };
+        let depth = wanted(tests.is_depth_tested || tests.are_bounds_tested, vk::ImageAspectFlags::DEPTH);
+        let stencil = wanted(tests.is_stencil_tested, vk::ImageAspectFlags::STENCIL);
+        let has_samples = self.samples() > 1;
+        let depth_steps = depth_steps(attachment);
+        let at = |place: u64| run.scratch.address + place;
+        let state = &tests.stencil;
+        let pushed = PushedTests {
+            stored: at(run.places.stored),
+            depths: at(run.places.copied_depths),
+            stencils: at(run.places.copied_stencils),
+            count: self.all_samples() as u32,
+            depth_bytes: if depth.is_empty() {
+                0
+            } else if depth_steps == 0xFFFF && !has_samples {
+                2
+            } else {
+                4
+            },
+            depth_steps,
+            stencil_bytes: if stencil.is_empty() {
+                0
+            } else if has_samples {
+                4
+            } else {
+                1
+            },
+            bounds: if tests.are_bounds_tested && !depth.is_empty() { tests.bounds } else { [1.0, 0.0] },
+            stencil_compare: state.compare_op.as_raw().cast_unsigned()
+                | (state.compare_mask & 0xFF) << 8
+                | (state.reference & 0xFF) << 16,
+            are_floats: u32::from(has_samples),
+        };
+        // SAFETY: the caller's promise.
+        unsafe {
+            if let Some(attachment) = attachment.filter(|_| !(depth | stencil).is_empty()) {
+                run.transition(attachment, true);
+                for (aspect, place) in [(depth, run.places.copied_depths), (stencil, run.places.copied_stencils)] {
+                    if aspect.is_empty() {
+                        continue;
+                    }
+                    if has_samples {
+                        self.copy_samples(run, attachment, aspect, place)?;
+                    } else {
+                        self.copy_aspect(run, attachment, aspect, place);
+                    }
+                }
+                run.transition(attachment, false);
+            }
+            let groups = (self.all_samples() as u32).div_ceil(256);
+            let wide = groups.min(32768);
+            run.dispatch(run.kernels.pipeline(Kernel::Tests), &pushed, [wide, groups.div_ceil(wide)]);
+        }
+        Ok(())
+    }
+
+    /// Copies an aspect of the area, of one sample a pixel, to scratch.
+    ///
+    /// # Safety
+    /// As [`Self::record`].
+    unsafe fn copy_aspect(&self, run: &Run<'_>, attachment: &DepthStencil, aspect: vk::ImageAspectFlags, place: u64) {
+        let view = &attachment.view;
+        let [x, y] = self.area.origin;
+        let [width, height] = self.area.size;
+        let copy = vk::BufferImageCopy {
+            buffer_offset: place,
+            buffer_row_length: 0,
+            buffer_image_height: 0,
+            image_subresource: vk::ImageSubresourceLayers {
+                aspect_mask: aspect,
+                mip_level: view.level,
+                base_array_layer: view.layer,
+                layer_count: self.pipeline.planes().min(view.layers),
+            },
+            image_offset: vk::Offset3D { x, y, z: 0 },
+            image_extent: vk::Extent3D { width, height, depth: 1 },
+        };
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        // SAFETY: the caller's promise.
+        unsafe { run.next.cmd_copy_image_to_buffer(run.commands, view.handle, layout, run.scratch.buffer, &[copy]) };
+    }
+
+    /// Copies an aspect of the area, of several samples a pixel, to scratch.
+    ///
+    /// # Safety
+    /// As [`Self::record`].
+    unsafe fn copy_samples(
+        &self,
+        run: &Run<'_>,
+        attachment: &DepthStencil,
+        aspect: vk::ImageAspectFlags,
+        place: u64,
+    ) -> Result<(), vk::Result> {
+        let samples = &run.kernels.samples;
+        let reader = attachment.view.reader(run.next, samples.set_layout, aspect)?;
+        let kernel = if aspect == vk::ImageAspectFlags::DEPTH { samples.depths } else { samples.stencils };
+        let pushed = PushedSamples {
+            copied: run.scratch.address + place,
+            area_origin: self.area.origin,
+            area_size: self.area.size,
+            samples: self.samples(),
+            unused: 0,
+        };
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        let [across, down] = self.tiles();
+        let layers = self.pipeline.planes().min(attachment.view.layers);
+        // SAFETY: the caller's promise.
+        unsafe {
+            let (next, commands) = (run.next, run.commands);
+            next.cmd_bind_pipeline(commands, compute, kernel);
+            next.cmd_bind_descriptor_sets(commands, compute, samples.layout, 0, &[reader.set], &[]);
+            let stages = vk::ShaderStageFlags::COMPUTE;
+            next.cmd_push_constants(commands, samples.layout, stages, 0, bytemuck::bytes_of(&pushed));
+            next.cmd_dispatch(commands, across, down, layers);
+        }
+        Ok(())
+    }
+
     /// # Safety
     /// As [`Self::record`].
     unsafe fn record_view(&self, run: &mut Run<'_>, view: u32) {
         let [across, down] = self.tiles();
         let tiles = across * down;
-        let plane = view * self.area.size[0] * self.area.size[1];
+        let plane = view * self.samples() * self.area.size[0] * self.area.size[1];
         let pushed = Pushed { set: run.scratch.address + run.places.parameters, view, side: 0, plane, unused: 0 };
         let (places, specialized) = (run.places, run.specialized);
         let by_depth = Sort {
@@ -450,15 +693,26 @@ impl Work {
             let sorted = Pushed { side: digits & 1, ..pushed };
             run.indirect(run.kernels.pipeline(Kernel::Ranges), &sorted, Counter::ByPair);
             run.end_stage("ranges");
-            run.dispatch(specialized.raster, &sorted, [across, down]);
+            run.bind(specialized.raster, &sorted);
+            run.next.cmd_dispatch(run.commands, across, down, self.samples());
             run.end_stage("rasterize");
         }
     }
 }
 
+/// Reports whether there is an attachment of depths.
+fn has_depths(attachment: Option<&DepthStencil>) -> bool {
+    attachment.is_some_and(|attachment| attachment.aspects.contains(vk::ImageAspectFlags::DEPTH))
+}
+
+/// The greatest depth of an attachment in steps; 0 if depths are floats.
+fn depth_steps(attachment: Option<&DepthStencil>) -> u32 {
+    attachment.map_or(0, |attachment| (1 << attachments::depth_bits(attachment.view.image.format)) - 1)
+}
+
 /// The place in which dispatches are recorded.
 struct Run<'a> {
-    next: &'a Next,
+    next: &'a Arc<Next>,
     kernels: &'a Kernels,
     commands: vk::CommandBuffer,
     scratch: &'a Memory,
@@ -484,6 +738,39 @@ impl Run<'_> {
     unsafe fn barrier(&self) {
         // SAFETY: the caller's promise.
         unsafe { barrier(self.next, self.commands) };
+    }
+
+    /// Makes an attachment readable, or an attachment again.
+    unsafe fn transition(&self, attachment: &DepthStencil, is_to_be_read: bool) {
+        let view = &attachment.view;
+        let read = if view.image.samples > 1 { attachments::READ } else { vk::ImageLayout::TRANSFER_SRC_OPTIMAL };
+        let barriers: Vec<vk::ImageMemoryBarrier<'_>> = attachment
+            .layouts
+            .iter()
+            .map(|&(aspects, layout)| {
+                let (from, to) = if is_to_be_read { (layout, read) } else { (read, layout) };
+                let range = vk::ImageSubresourceRange {
+                    aspect_mask: aspects,
+                    base_mip_level: view.level,
+                    level_count: 1,
+                    base_array_layer: view.layer,
+                    layer_count: view.layers,
+                };
+                vk::ImageMemoryBarrier::default()
+                    .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+                    .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+                    .old_layout(from)
+                    .new_layout(to)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .image(view.handle)
+                    .subresource_range(range)
+            })
+            .collect();
+        let all = vk::PipelineStageFlags::ALL_COMMANDS;
+        let flags = vk::DependencyFlags::empty();
+        // SAFETY: the caller's promise.
+        unsafe { self.next.cmd_pipeline_barrier(self.commands, all, all, flags, &[], &[], &barriers) };
     }
 
     /// Between kernels.

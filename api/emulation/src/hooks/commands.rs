@@ -242,9 +242,11 @@ unsafe fn note_begin(
     info: &vk::RenderPassBeginInfo<'_>,
     contents: vk::SubpassContents,
 ) {
-    let known = emulation.objects().render_passes.get(&info.render_pass).cloned();
+    let objects = emulation.objects();
+    let known = objects.render_passes.get(&info.render_pass).cloned();
+    let attachments = objects.framebuffers.get(&info.framebuffer).cloned().unwrap_or_default();
     // SAFETY: the caller's promise.
-    recording.pass = known.map(|known| Pass::Object(unsafe { Object::new(known, info, contents) }));
+    recording.pass = known.map(|known| Pass::Object(unsafe { Object::new(known, info, attachments, contents) }));
 }
 
 fn note_next(recording: &mut Recording, contents: vk::SubpassContents) {

@@ -26,6 +26,7 @@ unsafe fn draw<C: Iterator<Item = Call>>(
         } else {
             // SAFETY: as above.
             unsafe { recording.activate_queries(site.next) };
+            recording.has_drawn = true;
             pass_on(site.next);
         }
     };
@@ -219,6 +220,35 @@ pub(super) unsafe extern "system" fn cmd_draw_multi_indexed(
                     multi(commands, count, infos, instances, first_instance, stride, vertex_offset);
                 }
             },
+        );
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_clear_attachments(
+    commands: vk::CommandBuffer,
+    attachment_count: u32,
+    attachments: *const vk::ClearAttachment,
+    rectangle_count: u32,
+    rectangles: *const vk::ClearRect,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let clear = |next: &Next| {
+            (next.fp_v1_0().cmd_clear_attachments)(
+                commands,
+                attachment_count,
+                attachments,
+                rectangle_count,
+                rectangles,
+            );
+        };
+        record(
+            commands,
+            |site, recording| {
+                recording.has_drawn = true;
+                clear(site.next);
+            },
+            clear,
         );
     }
 }

@@ -1,5 +1,6 @@
 //! The commands that are intercepted, by chapter of Vulkan.
 
+mod attachments;
 mod command_buffers;
 mod commands;
 mod draws;

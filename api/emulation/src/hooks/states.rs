@@ -3,13 +3,15 @@
 use ash::vk;
 use gaurast_layer_interface::slice;
 
+use crate::depth_stencil::TestState;
 use crate::hooks::site::record;
 use crate::next::Next;
 use crate::recording::Recording;
 
-/// Hooks of commands whose parameters are plain values: name, the functions' version, state, parameters.
+/// Hooks of commands whose parameters are plain values: name, the functions' version, state, parameters, and what sets of Gaussians keep
+/// of them.
 macro_rules! values {
-    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+);)*) => {$(
+    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+), $keep:expr;)*) => {$(
         pub(super) unsafe extern "system" fn $name(commands: vk::CommandBuffer, $($parameter: $type),+) {
             // SAFETY: see the crate.
             unsafe {
@@ -17,6 +19,7 @@ macro_rules! values {
                     commands,
                     |site, recording| {
                         (site.next.$functions().$name)(commands, $($parameter),+);
+                        keep(&mut recording.tests, ($($parameter),+,), $keep);
                         repeat(recording, vk::DynamicState::$state, move |next, commands| {
                             (next.$functions().$name)(commands, $($parameter),+);
                         });
@@ -28,21 +31,30 @@ macro_rules! values {
     )*};
 }
 
+/// Keeps a state for sets of Gaussians.
+fn keep<P>(tests: &mut TestState, parameters: P, keep: impl FnOnce(&mut TestState, P)) {
+    keep(tests, parameters);
+}
+
 values! {
-    cmd_set_line_width, fp_v1_0, LINE_WIDTH, (width: f32);
-    cmd_set_depth_bias, fp_v1_0, DEPTH_BIAS, (constant: f32, clamp: f32, slope: f32);
-    cmd_set_depth_bounds, fp_v1_0, DEPTH_BOUNDS, (least: f32, most: f32);
-    cmd_set_cull_mode, fp_v1_3, CULL_MODE, (mode: vk::CullModeFlags);
-    cmd_set_front_face, fp_v1_3, FRONT_FACE, (face: vk::FrontFace);
-    cmd_set_primitive_topology, fp_v1_3, PRIMITIVE_TOPOLOGY, (topology: vk::PrimitiveTopology);
-    cmd_set_depth_test_enable, fp_v1_3, DEPTH_TEST_ENABLE, (enable: vk::Bool32);
-    cmd_set_depth_write_enable, fp_v1_3, DEPTH_WRITE_ENABLE, (enable: vk::Bool32);
-    cmd_set_depth_compare_op, fp_v1_3, DEPTH_COMPARE_OP, (op: vk::CompareOp);
-    cmd_set_depth_bounds_test_enable, fp_v1_3, DEPTH_BOUNDS_TEST_ENABLE, (enable: vk::Bool32);
-    cmd_set_stencil_test_enable, fp_v1_3, STENCIL_TEST_ENABLE, (enable: vk::Bool32);
-    cmd_set_rasterizer_discard_enable, fp_v1_3, RASTERIZER_DISCARD_ENABLE, (enable: vk::Bool32);
-    cmd_set_depth_bias_enable, fp_v1_3, DEPTH_BIAS_ENABLE, (enable: vk::Bool32);
-    cmd_set_primitive_restart_enable, fp_v1_3, PRIMITIVE_RESTART_ENABLE, (enable: vk::Bool32);
+    cmd_set_line_width, fp_v1_0, LINE_WIDTH, (width: f32), |_, _| {};
+    cmd_set_depth_bias, fp_v1_0, DEPTH_BIAS, (constant: f32, clamp: f32, slope: f32), |_, _| {};
+    cmd_set_depth_bounds, fp_v1_0, DEPTH_BOUNDS, (least: f32, most: f32), |tests, (least, most)| tests.bounds = [least, most];
+    cmd_set_cull_mode, fp_v1_3, CULL_MODE, (mode: vk::CullModeFlags), |_, _| {};
+    cmd_set_front_face, fp_v1_3, FRONT_FACE, (face: vk::FrontFace), |_, _| {};
+    cmd_set_primitive_topology, fp_v1_3, PRIMITIVE_TOPOLOGY, (topology: vk::PrimitiveTopology), |_, _| {};
+    cmd_set_depth_test_enable, fp_v1_3, DEPTH_TEST_ENABLE, (enable: vk::Bool32),
+        |tests, (enable,)| tests.is_depth_tested = enable != vk::FALSE;
+    cmd_set_depth_write_enable, fp_v1_3, DEPTH_WRITE_ENABLE, (enable: vk::Bool32),
+        |tests, (enable,)| tests.is_depth_written = enable != vk::FALSE;
+    cmd_set_depth_compare_op, fp_v1_3, DEPTH_COMPARE_OP, (op: vk::CompareOp), |tests, (op,)| tests.depth_compare = op;
+    cmd_set_depth_bounds_test_enable, fp_v1_3, DEPTH_BOUNDS_TEST_ENABLE, (enable: vk::Bool32),
+        |tests, (enable,)| tests.are_bounds_tested = enable != vk::FALSE;
+    cmd_set_stencil_test_enable, fp_v1_3, STENCIL_TEST_ENABLE, (enable: vk::Bool32),
+        |tests, (enable,)| tests.is_stencil_tested = enable != vk::FALSE;
+    cmd_set_rasterizer_discard_enable, fp_v1_3, RASTERIZER_DISCARD_ENABLE, (enable: vk::Bool32), |_, _| {};
+    cmd_set_depth_bias_enable, fp_v1_3, DEPTH_BIAS_ENABLE, (enable: vk::Bool32), |_, _| {};
+    cmd_set_primitive_restart_enable, fp_v1_3, PRIMITIVE_RESTART_ENABLE, (enable: vk::Bool32), |_, _| {};
 }
 
 /// Remembers a command that sets dynamic state; the last of each state counts.
@@ -56,7 +68,7 @@ fn repeat(
 
 /// Stencil states are of one face or of both: each face has its own.
 macro_rules! faces {
-    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+);)*) => {$(
+    ($($name:ident, $functions:ident, $state:ident, ($($parameter:ident: $type:ty),+), $keep:expr;)*) => {$(
         pub(super) unsafe extern "system" fn $name(
             commands: vk::CommandBuffer,
             faces: vk::StencilFaceFlags,
@@ -68,6 +80,9 @@ macro_rules! faces {
                     commands,
                     |site, recording| {
                         (site.next.$functions().$name)(commands, faces, $($parameter),+);
+                        if faces.contains(vk::StencilFaceFlags::FRONT) {
+                            keep(&mut recording.tests, ($($parameter),+,), $keep);
+                        }
                         for (face, place) in [(vk::StencilFaceFlags::FRONT, 0), (vk::StencilFaceFlags::BACK, 1)] {
                             if faces.contains(face) {
                                 let key = -2 * vk::DynamicState::$state.as_raw() - place;
@@ -85,11 +100,19 @@ macro_rules! faces {
 }
 
 faces! {
-    cmd_set_stencil_compare_mask, fp_v1_0, STENCIL_COMPARE_MASK, (mask: u32);
-    cmd_set_stencil_write_mask, fp_v1_0, STENCIL_WRITE_MASK, (mask: u32);
-    cmd_set_stencil_reference, fp_v1_0, STENCIL_REFERENCE, (reference: u32);
+    cmd_set_stencil_compare_mask, fp_v1_0, STENCIL_COMPARE_MASK, (mask: u32),
+        |tests, (mask,)| tests.stencil.compare_mask = mask;
+    cmd_set_stencil_write_mask, fp_v1_0, STENCIL_WRITE_MASK, (mask: u32),
+        |tests, (mask,)| tests.stencil.write_mask = mask;
+    cmd_set_stencil_reference, fp_v1_0, STENCIL_REFERENCE, (reference: u32),
+        |tests, (reference,)| tests.stencil.reference = reference;
     cmd_set_stencil_op, fp_v1_3, STENCIL_OP,
-        (fail: vk::StencilOp, pass: vk::StencilOp, depth_fail: vk::StencilOp, compare: vk::CompareOp);
+        (fail: vk::StencilOp, pass: vk::StencilOp, depth_fail: vk::StencilOp, compare: vk::CompareOp),
+        |tests, (fail, pass, depth_fail, compare)| {
+            let stencil = &mut tests.stencil;
+            (stencil.fail_op, stencil.pass_op, stencil.depth_fail_op) = (fail, pass, depth_fail);
+            stencil.compare_op = compare;
+        };
 }
 
 pub(super) unsafe extern "system" fn cmd_set_blend_constants(commands: vk::CommandBuffer, constants: *const [f32; 4]) {

@@ -2,6 +2,7 @@
 
 use std::ffi::CStr;
 
+use super::attachments::*;
 use super::command_buffers::*;
 use super::commands::*;
 use super::draws::*;
@@ -28,6 +29,12 @@ gaurast_layer_interface::hooks! {
     allocate_memory
     create_buffer
     destroy_buffer
+    create_image
+    destroy_image
+    create_image_view
+    destroy_image_view
+    create_framebuffer
+    destroy_framebuffer
     create_descriptor_set_layout
     destroy_descriptor_set_layout
     create_pipeline_layout
@@ -87,6 +94,7 @@ gaurast_layer_interface::hooks! {
     cmd_set_rasterizer_discard_enable
     cmd_set_depth_bias_enable
     cmd_set_primitive_restart_enable
+    cmd_clear_attachments
     cmd_draw
     cmd_draw_indexed
     cmd_draw_indirect

@@ -70,7 +70,12 @@ commands! {
         [c"vkUpdateDescriptorSetWithTemplate", c"vkUpdateDescriptorSetWithTemplateKHR"];
     queue_submit: ::ash::vk::PFN_vkQueueSubmit = [c"vkQueueSubmit"];
     queue_submit2: ::ash::vk::PFN_vkQueueSubmit2 = [c"vkQueueSubmit2", c"vkQueueSubmit2KHR"];
+    create_image: ::ash::vk::PFN_vkCreateImage = [c"vkCreateImage"];
+    destroy_image: ::ash::vk::PFN_vkDestroyImage = [c"vkDestroyImage"];
     create_image_view: ::ash::vk::PFN_vkCreateImageView = [c"vkCreateImageView"];
+    destroy_image_view: ::ash::vk::PFN_vkDestroyImageView = [c"vkDestroyImageView"];
+    create_framebuffer: ::ash::vk::PFN_vkCreateFramebuffer = [c"vkCreateFramebuffer"];
+    destroy_framebuffer: ::ash::vk::PFN_vkDestroyFramebuffer = [c"vkDestroyFramebuffer"];
     get_query_pool_results: ::ash::vk::PFN_vkGetQueryPoolResults = [c"vkGetQueryPoolResults"];
     create_query_pool: ::ash::vk::PFN_vkCreateQueryPool = [c"vkCreateQueryPool"];
     cmd_bind_pipeline: ::ash::vk::PFN_vkCmdBindPipeline = [c"vkCmdBindPipeline"];
