@@ -7,7 +7,7 @@ use core::marker::PhantomData;
 
 use ash::vk;
 
-use crate::ash_compat::{bool_setters, setters, tagged_structure, vk_enum, vk_flags};
+use crate::ash_compat::{bool_setters, extended_structure, setters, tagged_structure, vk_enum, vk_flags};
 
 /// A location that the pipeline does not use.
 #[doc(alias = "VK_GAUSSIAN_LOCATION_UNUSED_GAURAST")]
@@ -53,6 +53,11 @@ pub const STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST: vk::Struct
 #[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST")]
 pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_006);
+
+/// `VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST")]
+pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_007);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
@@ -237,6 +242,37 @@ vk_enum! {
 }
 
 vk_enum! {
+    /// The way in which an ideal place (u, v) becomes a distorted place (u', v'), with r = |(u,
+    /// v)|, the radial coefficients k1 to k6, the tangential part T(u, v) = (2 p1 u v + p2 (r^2 +
+    /// 2 u^2), p1 (r^2 + 2 v^2) + 2 p2 u v) and the thin prism's S(u, v) = (s1 r^2 + s2 r^4, s3
+    /// r^2 + s4 r^4).
+    #[doc(alias = "VkGaussianDistortionModelGAURAST")]
+    pub struct GaussianDistortionModelGAURAST {
+        /// (u, v) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + T(u, v) + S(u, v),
+        /// as OpenCV has it.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_RATIONAL_GAURAST")]
+        RATIONAL = 0,
+        /// (u, v) (1 + k1 r^2 + k2 r^4 + ... + k6 r^12) + T(u, v) + S(u, v): OpenCV's fisheye and
+        /// COLMAP's thin prism.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_GAURAST")]
+        POLYNOMIAL = 1,
+        /// (a, b) + T(a, b) + S(a, b) with (a, b) = (u, v) (1 + k1 r^2 + k2 r^4 + ... + k6 r^12): the
+        /// polynomial comes first, and the rest distorts its place, as in Aria's Fisheye624.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_FIRST_GAURAST")]
+        POLYNOMIAL_FIRST = 2,
+        /// (u, v) atan(2 r tan(omega / 2)) / (r omega) with omega = k1, as in Devernay and Faugeras,
+        /// "Straight lines have to be straight".
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_FIELD_OF_VIEW_GAURAST")]
+        FIELD_OF_VIEW = 3,
+        /// (u, v) 2 / (1 + sqrt(1 - 4 k r^2)) with k = k1: the inverse of (u, v) = (u', v') / (1 + k
+        /// |(u', v')|^2), as in Fitzgibbon, "Simultaneous linear estimation of multiple view geometry
+        /// and lens distortion".
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_DIVISION_GAURAST")]
+        DIVISION = 4,
+    }
+}
+
+vk_enum! {
     /// The shape outside which a Gaussian does not contribute, of k = `cutOffDeviations` standard
     /// deviations of its covariance S in the picture (the low-pass included), about its mean.
     /// Tiles are 16 x 16 pixels and begin at the upper left corner of the area that the viewport
@@ -354,6 +390,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_cut_off: vk::Bool32,
     /// A `compensationFloor` other than 0.
     pub opacity_compensation_floor: vk::Bool32,
+    /// [`GaussianCameraDistortionGAURAST`]: cameras whose lens distorts.
+    pub gaussian_distortion: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -361,8 +399,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
 tagged_structure!(
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST =
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST,
-    ExtendsPhysicalDeviceFeatures2,
-    ExtendsDeviceCreateInfo
+    vk::ExtendsPhysicalDeviceFeatures2,
+    vk::ExtendsDeviceCreateInfo
 );
 
 impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
@@ -397,6 +435,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             resolve_gaussian_indices: vk::Bool32::default(),
             gaussian_cut_off: vk::Bool32::default(),
             opacity_compensation_floor: vk::Bool32::default(),
+            gaussian_distortion: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -430,6 +469,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         resolve_gaussian_indices,
         gaussian_cut_off,
         opacity_compensation_floor,
+        gaussian_distortion,
     }
 }
 
@@ -468,7 +508,7 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'a> {
 tagged_structure!(
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST =
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST,
-    ExtendsPhysicalDeviceProperties2
+    vk::ExtendsPhysicalDeviceProperties2
 );
 
 impl Default for PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
@@ -691,7 +731,7 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
 
 tagged_structure!(
     PipelineGaussianStateCreateInfoGAURAST = STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl PipelineGaussianStateCreateInfoGAURAST<'_> {
@@ -753,7 +793,7 @@ pub struct PipelineGaussianApproximationStateCreateInfoGAURAST<'a> {
 tagged_structure!(
     PipelineGaussianApproximationStateCreateInfoGAURAST =
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl Default for PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
@@ -807,7 +847,7 @@ pub struct PipelineGaussianFootprintStateCreateInfoGAURAST<'a> {
 tagged_structure!(
     PipelineGaussianFootprintStateCreateInfoGAURAST =
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl Default for PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
@@ -877,6 +917,8 @@ pub struct GaussianCameraGAURAST<'a> {
 
 tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
 
+extended_structure!(GaussianCameraGAURAST, ExtendsGaussianCameraGAURAST);
+
 impl GaussianCameraGAURAST<'_> {
     setters! {
         eye: [f64; 3],
@@ -887,6 +929,70 @@ impl GaussianCameraGAURAST<'_> {
         depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
+    }
+}
+
+/// The distortion of a camera's lens.
+///
+/// Chain it to [`GaussianCameraGAURAST`] whose model is
+/// [`GaussianCameraModelGAURAST::PINHOLE`] or [`GaussianCameraModelGAURAST::FISHEYE`]. The
+/// camera's model gives an ideal place (u, v), which is the pixel without focal length and
+/// principal point; the distorted place (u', v') takes its place: the pixel is (fx u' + cx, fy
+/// v' + cy). Let r = |(u, v)|. The _fold_ is the least r at which the radial part of the
+/// distortion no longer grows. A Gaussian whose mean has an r at or beyond it is not drawn.
+///
+/// With coefficients that are all 0 there is no distortion, as without the structure.
+#[doc(alias = "VkGaussianCameraDistortionGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianCameraDistortionGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The way in which an ideal place becomes a distorted one.
+    pub model: GaussianDistortionModelGAURAST,
+    /// The radial coefficients k1 to k6. The first is the angle omega of
+    /// [`GaussianDistortionModelGAURAST::FIELD_OF_VIEW`] and the coefficient k of
+    /// [`GaussianDistortionModelGAURAST::DIVISION`], whose other coefficients are 0.
+    pub radial: [f32; 6],
+    /// The tangential coefficients p1 and p2, in OpenCV's order.
+    pub tangential: [f32; 2],
+    /// The coefficients of a thin prism s1 to s4, in OpenCV's order: the first two are of u', the
+    /// others of v'.
+    pub thin_prism: [f32; 4],
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    GaussianCameraDistortionGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST,
+    ExtendsGaussianCameraGAURAST
+);
+
+impl Default for GaussianCameraDistortionGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            model: GaussianDistortionModelGAURAST::default(),
+            radial: <[f32; 6]>::default(),
+            tangential: <[f32; 2]>::default(),
+            thin_prism: <[f32; 4]>::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl GaussianCameraDistortionGAURAST<'_> {
+    setters! {
+        model: GaussianDistortionModelGAURAST,
+        radial: [f32; 6],
+        tangential: [f32; 2],
+        thin_prism: [f32; 4],
     }
 }
 
@@ -1131,7 +1237,7 @@ pub struct DriverOptionsGAURAST<'a> {
     pub _marker: PhantomData<&'a ()>,
 }
 
-tagged_structure!(DriverOptionsGAURAST = STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST, ExtendsInstanceCreateInfo);
+tagged_structure!(DriverOptionsGAURAST = STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST, vk::ExtendsInstanceCreateInfo);
 
 impl Default for DriverOptionsGAURAST<'_> {
     #[inline]

@@ -124,6 +124,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, opacity_compensation_floor),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianDistortion)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_distortion),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -360,6 +364,19 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ("offsetof(VkGaussianCameraGAURAST, depthCoefficients)", offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients)),
     ("offsetof(VkGaussianCameraGAURAST, nearPlane)", offset_of!(GaussianCameraGAURAST<'_>, near_plane)),
     ("offsetof(VkGaussianCameraGAURAST, farPlane)", offset_of!(GaussianCameraGAURAST<'_>, far_plane)),
+    ("sizeof(VkGaussianCameraDistortionGAURAST)", size_of::<GaussianCameraDistortionGAURAST<'_>>()),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, sType)", offset_of!(GaussianCameraDistortionGAURAST<'_>, s_type)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, pNext)", offset_of!(GaussianCameraDistortionGAURAST<'_>, p_next)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, model)", offset_of!(GaussianCameraDistortionGAURAST<'_>, model)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, radial)", offset_of!(GaussianCameraDistortionGAURAST<'_>, radial)),
+    (
+        "offsetof(VkGaussianCameraDistortionGAURAST, tangential)",
+        offset_of!(GaussianCameraDistortionGAURAST<'_>, tangential),
+    ),
+    (
+        "offsetof(VkGaussianCameraDistortionGAURAST, thinPrism)",
+        offset_of!(GaussianCameraDistortionGAURAST<'_>, thin_prism),
+    ),
     ("sizeof(VkGaussianSphericalHarmonicsBufferGAURAST)", size_of::<GaussianSphericalHarmonicsBufferGAURAST<'_>>()),
     (
         "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, sType)",
@@ -447,6 +464,10 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
+    (
+        "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST",
+        STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST.as_raw() as i64,
+    ),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),
     (
@@ -497,6 +518,17 @@ pub const VALUES: &[(&str, i64)] = &[
     ("VK_GAUSSIAN_CAMERA_MODEL_ORTHOGRAPHIC_GAURAST", GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw() as i64),
     ("VK_GAUSSIAN_CAMERA_MODEL_FISHEYE_GAURAST", GaussianCameraModelGAURAST::FISHEYE.as_raw() as i64),
     ("VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST", GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_RATIONAL_GAURAST", GaussianDistortionModelGAURAST::RATIONAL.as_raw() as i64),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_GAURAST", GaussianDistortionModelGAURAST::POLYNOMIAL.as_raw() as i64),
+    (
+        "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_FIRST_GAURAST",
+        GaussianDistortionModelGAURAST::POLYNOMIAL_FIRST.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_DISTORTION_MODEL_FIELD_OF_VIEW_GAURAST",
+        GaussianDistortionModelGAURAST::FIELD_OF_VIEW.as_raw() as i64,
+    ),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_DIVISION_GAURAST", GaussianDistortionModelGAURAST::DIVISION.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_NONE_GAURAST", GaussianCutOffGAURAST::NONE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST", GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST", GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64),
