@@ -37,6 +37,8 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997004)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST ((VkStructureType)1000997005)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997006)
+#define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST ((VkStructureType)1000997007)
+#define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997008)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
 #define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
@@ -99,6 +101,15 @@ typedef enum VkGaussianCameraModelGAURAST {
     VK_GAUSSIAN_CAMERA_MODEL_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkGaussianCameraModelGAURAST;
 
+typedef enum VkGaussianDistortionModelGAURAST {
+    VK_GAUSSIAN_DISTORTION_MODEL_RATIONAL_GAURAST = 0,
+    VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_GAURAST = 1,
+    VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_FIRST_GAURAST = 2,
+    VK_GAUSSIAN_DISTORTION_MODEL_FIELD_OF_VIEW_GAURAST = 3,
+    VK_GAUSSIAN_DISTORTION_MODEL_DIVISION_GAURAST = 4,
+    VK_GAUSSIAN_DISTORTION_MODEL_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianDistortionModelGAURAST;
+
 typedef enum VkGaussianCutOffGAURAST {
     VK_GAUSSIAN_CUT_OFF_NONE_GAURAST = 0,
     VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST = 1,
@@ -144,6 +155,8 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           resolveGaussianIndices;
     VkBool32           gaussianCutOff;
     VkBool32           opacityCompensationFloor;
+    VkBool32           gaussianDistortion;
+    VkBool32           unscentedParameters;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -221,6 +234,16 @@ typedef struct VkPipelineGaussianFootprintStateCreateInfoGAURAST {
     float                      compensationFloor;
 } VkPipelineGaussianFootprintStateCreateInfoGAURAST;
 
+typedef struct VkPipelineGaussianUnscentedStateCreateInfoGAURAST {
+    VkStructureType    sType;
+    const void*        pNext;
+    float              alpha;
+    float              beta;
+    float              kappa;
+    float              pictureMargin;
+    VkBool32           allSigmaPoints;
+} VkPipelineGaussianUnscentedStateCreateInfoGAURAST;
+
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;
     const void*                     pNext;
@@ -233,6 +256,15 @@ typedef struct VkGaussianCameraGAURAST {
     float                           nearPlane;
     float                           farPlane;
 } VkGaussianCameraGAURAST;
+
+typedef struct VkGaussianCameraDistortionGAURAST {
+    VkStructureType                     sType;
+    const void*                         pNext;
+    VkGaussianDistortionModelGAURAST    model;
+    float                               radial[6];
+    float                               tangential[2];
+    float                               thinPrism[4];
+} VkGaussianCameraDistortionGAURAST;
 
 typedef struct VkGaussianSphericalHarmonicsBufferGAURAST {
     VkStructureType    sType;

@@ -116,7 +116,7 @@ pub(crate) use bool_setters;
 /// Makes a `repr(C)` structure that starts with `s_type` and `p_next` chainable with ash: gives it its structure type,
 /// the structures that it extends, and the thread safety of ash's own.
 macro_rules! tagged_structure {
-    ($name:ident = $s_type:expr $(, $extends:ident)*) => {
+    ($name:ident = $s_type:expr $(, $extends:path)*) => {
         // SAFETY: the structure is `repr(C)` and starts with `s_type` and `p_next`, as
         // `BaseOutStructure` does; `Default` and the setters keep `s_type` at this value.
         unsafe impl ash::vk::TaggedStructure for $name<'_> {
@@ -129,12 +129,43 @@ macro_rules! tagged_structure {
         unsafe impl Sync for $name<'_> {}
         $(
             // SAFETY: the extension lets the structure be chained there.
-            unsafe impl ash::vk::$extends for $name<'_> {}
+            unsafe impl $extends for $name<'_> {}
         )*
     };
 }
 
 pub(crate) use tagged_structure;
+
+/// Defines the trait of the structures that may be chained to one of this crate's own, and the method that chains them,
+/// as ash defines them for its own.
+macro_rules! extended_structure {
+    ($name:ident, $extends:ident) => {
+        #[doc = concat!("Structures that [`", stringify!($name), "`] may have in its chain.")]
+        ///
+        /// # Safety
+        /// The extension lets the structure be chained there.
+        pub unsafe trait $extends: ash::vk::TaggedStructure {}
+
+        impl<'a> $name<'a> {
+            /// Prepends a structure, with those that are chained to it, to the chain.
+            pub fn push_next<T: $extends>(mut self, next: &'a mut T) -> Self {
+                let first = core::ptr::from_mut(next).cast::<ash::vk::BaseOutStructure<'_>>();
+                let mut last = first;
+                // SAFETY: each structure of a chain begins as `BaseOutStructure` does, and the chain is borrowed.
+                unsafe {
+                    while !(*last).p_next.is_null() {
+                        last = (*last).p_next;
+                    }
+                    (*last).p_next = self.p_next.cast_mut().cast();
+                }
+                self.p_next = first.cast_const().cast();
+                self
+            }
+        }
+    };
+}
+
+pub(crate) use extended_structure;
 
 /// A loader of `device`'s functions, for [`DeviceFn::load`].
 ///

@@ -7,7 +7,7 @@ use core::marker::PhantomData;
 
 use ash::vk;
 
-use crate::ash_compat::{bool_setters, setters, tagged_structure, vk_enum, vk_flags};
+use crate::ash_compat::{bool_setters, extended_structure, setters, tagged_structure, vk_enum, vk_flags};
 
 /// A location that the pipeline does not use.
 #[doc(alias = "VK_GAUSSIAN_LOCATION_UNUSED_GAURAST")]
@@ -53,6 +53,16 @@ pub const STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST: vk::Struct
 #[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST")]
 pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_006);
+
+/// `VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST")]
+pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_007);
+
+/// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST")]
+pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_008);
 
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
@@ -141,8 +151,9 @@ vk_enum! {
         /// By the projection's Jacobian at the mean (EWA splatting, as in 3DGS).
         #[doc(alias = "VK_GAUSSIAN_LINEARIZATION_JACOBIAN_GAURAST")]
         JACOBIAN = 0,
-        /// By the unscented transform, from projected sigma points (alpha 1, beta 2, kappa 0, as in
-        /// 3DGUT); by the Jacobian where some point is not seen. Needs `unscentedProjection`.
+        /// By the unscented transform, from projected sigma points (alpha 1, beta 2, kappa 0, unless
+        /// [`PipelineGaussianUnscentedStateCreateInfoGAURAST`] has others); by the Jacobian where some
+        /// point is not seen. Needs `unscentedProjection`.
         #[doc(alias = "VK_GAUSSIAN_LINEARIZATION_UNSCENTED_GAURAST")]
         UNSCENTED = 1,
     }
@@ -233,6 +244,37 @@ vk_enum! {
         /// length in pixels per radian. Needs `equirectangularCamera`.
         #[doc(alias = "VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST")]
         EQUIRECTANGULAR = 3,
+    }
+}
+
+vk_enum! {
+    /// The way in which an ideal place (u, v) becomes a distorted place (u', v'), with r = |(u,
+    /// v)|, the radial coefficients k1 to k6, the tangential part T(u, v) = (2 p1 u v + p2 (r^2 +
+    /// 2 u^2), p1 (r^2 + 2 v^2) + 2 p2 u v) and the thin prism's S(u, v) = (s1 r^2 + s2 r^4, s3
+    /// r^2 + s4 r^4).
+    #[doc(alias = "VkGaussianDistortionModelGAURAST")]
+    pub struct GaussianDistortionModelGAURAST {
+        /// (u, v) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + T(u, v) + S(u, v),
+        /// as OpenCV has it.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_RATIONAL_GAURAST")]
+        RATIONAL = 0,
+        /// (u, v) (1 + k1 r^2 + k2 r^4 + ... + k6 r^12) + T(u, v) + S(u, v): OpenCV's fisheye and
+        /// COLMAP's thin prism.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_GAURAST")]
+        POLYNOMIAL = 1,
+        /// (a, b) + T(a, b) + S(a, b) with (a, b) = (u, v) (1 + k1 r^2 + k2 r^4 + ... + k6 r^12): the
+        /// polynomial comes first, and the rest distorts its place, as in Aria's Fisheye624.
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_FIRST_GAURAST")]
+        POLYNOMIAL_FIRST = 2,
+        /// (u, v) atan(2 r tan(omega / 2)) / (r omega) with omega = k1, as in Devernay and Faugeras,
+        /// "Straight lines have to be straight".
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_FIELD_OF_VIEW_GAURAST")]
+        FIELD_OF_VIEW = 3,
+        /// (u, v) 2 / (1 + sqrt(1 - 4 k r^2)) with k = k1: the inverse of (u, v) = (u', v') / (1 + k
+        /// |(u', v')|^2), as in Fitzgibbon, "Simultaneous linear estimation of multiple view geometry
+        /// and lens distortion".
+        #[doc(alias = "VK_GAUSSIAN_DISTORTION_MODEL_DIVISION_GAURAST")]
+        DIVISION = 4,
     }
 }
 
@@ -354,6 +396,11 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_cut_off: vk::Bool32,
     /// A `compensationFloor` other than 0.
     pub opacity_compensation_floor: vk::Bool32,
+    /// [`GaussianCameraDistortionGAURAST`]: cameras whose lens distorts.
+    pub gaussian_distortion: vk::Bool32,
+    /// [`PipelineGaussianUnscentedStateCreateInfoGAURAST`] with other values than those without
+    /// it.
+    pub unscented_parameters: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -361,8 +408,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
 tagged_structure!(
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST =
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST,
-    ExtendsPhysicalDeviceFeatures2,
-    ExtendsDeviceCreateInfo
+    vk::ExtendsPhysicalDeviceFeatures2,
+    vk::ExtendsDeviceCreateInfo
 );
 
 impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
@@ -397,6 +444,8 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             resolve_gaussian_indices: vk::Bool32::default(),
             gaussian_cut_off: vk::Bool32::default(),
             opacity_compensation_floor: vk::Bool32::default(),
+            gaussian_distortion: vk::Bool32::default(),
+            unscented_parameters: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -430,6 +479,8 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         resolve_gaussian_indices,
         gaussian_cut_off,
         opacity_compensation_floor,
+        gaussian_distortion,
+        unscented_parameters,
     }
 }
 
@@ -468,7 +519,7 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'a> {
 tagged_structure!(
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST =
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST,
-    ExtendsPhysicalDeviceProperties2
+    vk::ExtendsPhysicalDeviceProperties2
 );
 
 impl Default for PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
@@ -691,7 +742,7 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
 
 tagged_structure!(
     PipelineGaussianStateCreateInfoGAURAST = STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl PipelineGaussianStateCreateInfoGAURAST<'_> {
@@ -753,7 +804,7 @@ pub struct PipelineGaussianApproximationStateCreateInfoGAURAST<'a> {
 tagged_structure!(
     PipelineGaussianApproximationStateCreateInfoGAURAST =
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl Default for PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
@@ -807,7 +858,7 @@ pub struct PipelineGaussianFootprintStateCreateInfoGAURAST<'a> {
 tagged_structure!(
     PipelineGaussianFootprintStateCreateInfoGAURAST =
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
+    vk::ExtendsGraphicsPipelineCreateInfo
 );
 
 impl Default for PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
@@ -829,6 +880,56 @@ impl PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
         cut_off: GaussianCutOffGAURAST,
         cut_off_deviations: f32,
         compensation_floor: f32,
+    }
+}
+
+/// The sigma points of a pipeline's unscented transform, so that pictures are those of other
+/// renderers.
+///
+/// Chain it to `VkGraphicsPipelineCreateInfo`, beside
+/// [`PipelineGaussianStateCreateInfoGAURAST`] whose `linearization` is
+/// [`GaussianLinearizationGAURAST::UNSCENTED`]. Without it `alpha` is 1, `beta` 2, `kappa` 0,
+/// and `picture_margin` is infinite. Other values need `unscentedParameters`.
+#[doc(alias = "VkPipelineGaussianUnscentedStateCreateInfoGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct PipelineGaussianUnscentedStateCreateInfoGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The spread of the points about the mean; finite and greater than 0. 0.1 in gsplat.
+    pub alpha: f32,
+    /// The part of the mean's own weight that a distribution decides; finite. 2 for Gaussians.
+    pub beta: f32,
+    /// The second parameter of the spread; finite and greater than -3.
+    pub kappa: f32,
+    /// The part of the viewport's size by which sigma points that count may lie outside of it; at
+    /// least 0. If it is infinite, Gaussians are drawn wherever their points lie. 0.1 in gsplat.
+    pub picture_margin: f32,
+    /// True if a Gaussian is drawn only if all of its points count, false if one suffices.
+    pub all_sigma_points: vk::Bool32,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    PipelineGaussianUnscentedStateCreateInfoGAURAST =
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST,
+    vk::ExtendsGraphicsPipelineCreateInfo
+);
+
+impl PipelineGaussianUnscentedStateCreateInfoGAURAST<'_> {
+    bool_setters! {
+        all_sigma_points,
+    }
+    setters! {
+        alpha: f32,
+        beta: f32,
+        kappa: f32,
+        picture_margin: f32,
     }
 }
 
@@ -877,6 +978,8 @@ pub struct GaussianCameraGAURAST<'a> {
 
 tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
 
+extended_structure!(GaussianCameraGAURAST, ExtendsGaussianCameraGAURAST);
+
 impl GaussianCameraGAURAST<'_> {
     setters! {
         eye: [f64; 3],
@@ -887,6 +990,70 @@ impl GaussianCameraGAURAST<'_> {
         depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
+    }
+}
+
+/// The distortion of a camera's lens.
+///
+/// Chain it to [`GaussianCameraGAURAST`] whose model is
+/// [`GaussianCameraModelGAURAST::PINHOLE`] or [`GaussianCameraModelGAURAST::FISHEYE`]. The
+/// camera's model gives an ideal place (u, v), which is the pixel without focal length and
+/// principal point; the distorted place (u', v') takes its place: the pixel is (fx u' + cx, fy
+/// v' + cy). Let r = |(u, v)|. The _fold_ is the least r at which the radial part of the
+/// distortion no longer grows. A Gaussian whose mean has an r at or beyond it is not drawn.
+///
+/// With coefficients that are all 0 there is no distortion, as without the structure.
+#[doc(alias = "VkGaussianCameraDistortionGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianCameraDistortionGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The way in which an ideal place becomes a distorted one.
+    pub model: GaussianDistortionModelGAURAST,
+    /// The radial coefficients k1 to k6. The first is the angle omega of
+    /// [`GaussianDistortionModelGAURAST::FIELD_OF_VIEW`] and the coefficient k of
+    /// [`GaussianDistortionModelGAURAST::DIVISION`], whose other coefficients are 0.
+    pub radial: [f32; 6],
+    /// The tangential coefficients p1 and p2, in OpenCV's order.
+    pub tangential: [f32; 2],
+    /// The coefficients of a thin prism s1 to s4, in OpenCV's order: the first two are of u', the
+    /// others of v'.
+    pub thin_prism: [f32; 4],
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    GaussianCameraDistortionGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST,
+    ExtendsGaussianCameraGAURAST
+);
+
+impl Default for GaussianCameraDistortionGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            model: GaussianDistortionModelGAURAST::default(),
+            radial: <[f32; 6]>::default(),
+            tangential: <[f32; 2]>::default(),
+            thin_prism: <[f32; 4]>::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl GaussianCameraDistortionGAURAST<'_> {
+    setters! {
+        model: GaussianDistortionModelGAURAST,
+        radial: [f32; 6],
+        tangential: [f32; 2],
+        thin_prism: [f32; 4],
     }
 }
 
@@ -1131,7 +1298,7 @@ pub struct DriverOptionsGAURAST<'a> {
     pub _marker: PhantomData<&'a ()>,
 }
 
-tagged_structure!(DriverOptionsGAURAST = STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST, ExtendsInstanceCreateInfo);
+tagged_structure!(DriverOptionsGAURAST = STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST, vk::ExtendsInstanceCreateInfo);
 
 impl Default for DriverOptionsGAURAST<'_> {
     #[inline]

@@ -63,6 +63,18 @@ fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     assert_eq!(found.transmittance_floor, 1e-4);
 }
 
+#[gaurast_runner::test]
+fn a_distortion_chains_to_its_camera() {
+    let mut first = GaussianCameraDistortionGAURAST::default().radial([0.25; 6]);
+    let mut second = GaussianCameraDistortionGAURAST::default().tangential([0.5; 2]);
+    let camera = GaussianCameraGAURAST::default().push_next(&mut first).push_next(&mut second);
+    let found: &GaussianCameraDistortionGAURAST<'_> = next(camera.p_next);
+    assert_eq!(found.tangential, [0.5; 2]);
+    let found: &GaussianCameraDistortionGAURAST<'_> = next(found.p_next);
+    assert_eq!((found.radial, found.model), ([0.25; 6], GaussianDistortionModelGAURAST::RATIONAL));
+    assert!(found.p_next.is_null());
+}
+
 /// The calls of the recording function below: the command buffer and the eye of each camera.
 static CALLED: Mutex<Vec<(u64, [f64; 3])>> = Mutex::new(Vec::new());
 

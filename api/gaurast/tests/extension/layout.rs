@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[gaurast_runner::test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 120, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 128, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -46,6 +46,8 @@ fn features() {
         resolve_gaussian_indices: 108,
         gaussian_cut_off: 112,
         opacity_compensation_floor: 116,
+        gaussian_distortion: 120,
+        unscented_parameters: 124,
     });
 }
 
@@ -132,6 +134,15 @@ fn pipeline_state() {
         cut_off_deviations: 20,
         compensation_floor: 24,
     });
+    assert_layout!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, 40, 8, {
+        s_type: 0,
+        p_next: 8,
+        alpha: 16,
+        beta: 20,
+        kappa: 24,
+        picture_margin: 28,
+        all_sigma_points: 32,
+    });
     assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
         s_type: 0,
         p_next: 8,
@@ -167,6 +178,14 @@ fn camera() {
         near_plane: 104,
         far_plane: 108,
     });
+    assert_layout!(GaussianCameraDistortionGAURAST<'_>, 72, 8, {
+        s_type: 0,
+        p_next: 8,
+        model: 16,
+        radial: 20,
+        tangential: 44,
+        thin_prism: 52,
+    });
     assert_layout!(GaussianCameraDataGAURAST, 128, 8, {
         eye: 0,
         model: 24,
@@ -195,6 +214,9 @@ fn names_and_values() {
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
         STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST,
+        STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST,
     ];
     for (offset, structure_type) in structure_types.into_iter().enumerate() {
         assert_eq!(structure_type.as_raw(), first + offset as i32);
@@ -216,6 +238,11 @@ fn enum_values() {
     assert_eq!(GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw(), 1);
     assert_eq!(GaussianCameraModelGAURAST::FISHEYE.as_raw(), 2);
     assert_eq!(GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw(), 3);
+    assert_eq!(GaussianDistortionModelGAURAST::RATIONAL.as_raw(), 0);
+    assert_eq!(GaussianDistortionModelGAURAST::POLYNOMIAL.as_raw(), 1);
+    assert_eq!(GaussianDistortionModelGAURAST::POLYNOMIAL_FIRST.as_raw(), 2);
+    assert_eq!(GaussianDistortionModelGAURAST::FIELD_OF_VIEW.as_raw(), 3);
+    assert_eq!(GaussianDistortionModelGAURAST::DIVISION.as_raw(), 4);
 }
 
 #[gaurast_runner::test]

@@ -124,6 +124,14 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, opacity_compensation_floor),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianDistortion)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_distortion),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, unscentedParameters)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, unscented_parameters),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -349,6 +357,38 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, compensationFloor)",
         offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, compensation_floor),
     ),
+    (
+        "sizeof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST)",
+        size_of::<PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, sType)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, pNext)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, alpha)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, alpha),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, beta)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, beta),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, kappa)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, kappa),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, pictureMargin)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, picture_margin),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, allSigmaPoints)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, all_sigma_points),
+    ),
     ("sizeof(VkGaussianCameraGAURAST)", size_of::<GaussianCameraGAURAST<'_>>()),
     ("offsetof(VkGaussianCameraGAURAST, sType)", offset_of!(GaussianCameraGAURAST<'_>, s_type)),
     ("offsetof(VkGaussianCameraGAURAST, pNext)", offset_of!(GaussianCameraGAURAST<'_>, p_next)),
@@ -360,6 +400,19 @@ pub const LAYOUT: &[(&str, usize)] = &[
     ("offsetof(VkGaussianCameraGAURAST, depthCoefficients)", offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients)),
     ("offsetof(VkGaussianCameraGAURAST, nearPlane)", offset_of!(GaussianCameraGAURAST<'_>, near_plane)),
     ("offsetof(VkGaussianCameraGAURAST, farPlane)", offset_of!(GaussianCameraGAURAST<'_>, far_plane)),
+    ("sizeof(VkGaussianCameraDistortionGAURAST)", size_of::<GaussianCameraDistortionGAURAST<'_>>()),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, sType)", offset_of!(GaussianCameraDistortionGAURAST<'_>, s_type)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, pNext)", offset_of!(GaussianCameraDistortionGAURAST<'_>, p_next)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, model)", offset_of!(GaussianCameraDistortionGAURAST<'_>, model)),
+    ("offsetof(VkGaussianCameraDistortionGAURAST, radial)", offset_of!(GaussianCameraDistortionGAURAST<'_>, radial)),
+    (
+        "offsetof(VkGaussianCameraDistortionGAURAST, tangential)",
+        offset_of!(GaussianCameraDistortionGAURAST<'_>, tangential),
+    ),
+    (
+        "offsetof(VkGaussianCameraDistortionGAURAST, thinPrism)",
+        offset_of!(GaussianCameraDistortionGAURAST<'_>, thin_prism),
+    ),
     ("sizeof(VkGaussianSphericalHarmonicsBufferGAURAST)", size_of::<GaussianSphericalHarmonicsBufferGAURAST<'_>>()),
     (
         "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, sType)",
@@ -447,6 +500,14 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
+    (
+        "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST",
+        STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST",
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
+    ),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),
     (
@@ -497,6 +558,17 @@ pub const VALUES: &[(&str, i64)] = &[
     ("VK_GAUSSIAN_CAMERA_MODEL_ORTHOGRAPHIC_GAURAST", GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw() as i64),
     ("VK_GAUSSIAN_CAMERA_MODEL_FISHEYE_GAURAST", GaussianCameraModelGAURAST::FISHEYE.as_raw() as i64),
     ("VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST", GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_RATIONAL_GAURAST", GaussianDistortionModelGAURAST::RATIONAL.as_raw() as i64),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_GAURAST", GaussianDistortionModelGAURAST::POLYNOMIAL.as_raw() as i64),
+    (
+        "VK_GAUSSIAN_DISTORTION_MODEL_POLYNOMIAL_FIRST_GAURAST",
+        GaussianDistortionModelGAURAST::POLYNOMIAL_FIRST.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_DISTORTION_MODEL_FIELD_OF_VIEW_GAURAST",
+        GaussianDistortionModelGAURAST::FIELD_OF_VIEW.as_raw() as i64,
+    ),
+    ("VK_GAUSSIAN_DISTORTION_MODEL_DIVISION_GAURAST", GaussianDistortionModelGAURAST::DIVISION.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_NONE_GAURAST", GaussianCutOffGAURAST::NONE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST", GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST", GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64),

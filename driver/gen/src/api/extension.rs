@@ -30,6 +30,13 @@ pub(super) struct Extension {
     pub(super) commands: Vec<Command>,
 }
 
+impl Extension {
+    /// The structures that the `pNext` chain of the one of a name may contain.
+    pub(super) fn extending(&self, name: &str) -> impl Iterator<Item = &Structure> {
+        self.structures.iter().filter(move |other| other.extends.iter().any(|extended| extended == name))
+    }
+}
+
 /// A constant.
 #[derive(Debug)]
 pub(super) struct Constant {

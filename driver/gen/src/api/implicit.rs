@@ -48,7 +48,12 @@ fn of_structure<'a>(extension: &Extension, structure: &'a Structure) -> List<'a>
     let mut list = List { text: String::new(), of: &structure.name };
     if let Some(value) = &structure.structure_type {
         list.add("sType", "sType", &format!("`sType` must be `{value}`."));
-        if structure.extends.is_empty() {
+        let extending: Vec<String> =
+            extension.extending(&structure.name).map(|other| format!("`{}`", other.name)).collect();
+        if !extending.is_empty() {
+            let valid = extending.join(" or ");
+            list.add("pNext", "pNext", &format!("`pNext` must be `NULL` or a pointer to a valid {valid}."));
+        } else if structure.extends.is_empty() {
             list.add("pNext", "pNext", "`pNext` must be `NULL`.");
         }
     }

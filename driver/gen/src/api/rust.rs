@@ -59,7 +59,9 @@ pub(super) fn definitions(extensions: &[Extension], defaults: &BTreeSet<String>)
 
             use ash::vk;
 
-            use crate::ash_compat::{{bool_setters, setters, tagged_structure, vk_enum, vk_flags}};
+            use crate::ash_compat::{{
+                bool_setters, extended_structure, setters, tagged_structure, vk_enum, vk_flags
+            }};
 
             {code}"
         ),
@@ -182,8 +184,11 @@ fn add_structure(code: &mut String, comments: Comments<'_>, structure: &Structur
     );
     if let Some(structure_type) = &structure.structure_type {
         let extends = structure.extends.iter();
-        let extends: String = extends.map(|name| format!(", Extends{}", rust_name(name))).collect();
+        let extends: String = extends.map(|name| format!(", {}", extends_trait(name))).collect();
         let _ = writeln!(code, "tagged_structure!({name} = {}{extends});\n", rust_constant(structure_type));
+    }
+    if comments.extension.extending(&structure.name).next().is_some() {
+        let _ = writeln!(code, "extended_structure!({name}, {});\n", extends_trait(&structure.name));
     }
     if !defaults.contains(name) {
         let values: String = structure.members.iter().map(default_value).collect();
@@ -197,6 +202,12 @@ fn add_structure(code: &mut String, comments: Comments<'_>, structure: &Structur
         );
     }
     let _ = writeln!(code, "impl {name}{any} {{\n{}}}\n", setters(structure));
+}
+
+/// The path of the trait of the structures that extend the one of a C name.
+fn extends_trait(name: &str) -> String {
+    let module = if name.ends_with(TAG) { "" } else { "vk::" };
+    format!("{module}Extends{}", rust_name(name))
 }
 
 /// A member with its default.
