@@ -137,6 +137,8 @@ struct PhysicalDevice {
     max_size: u32,
     max_gaussians: u64,
     max_sh_degree: u32,
+    /// True if it draws lenses that distort.
+    distorts: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
@@ -235,6 +237,11 @@ impl Device {
 
     pub(super) fn max_sh_degree(&self) -> u32 {
         self.physical.max_sh_degree
+    }
+
+    /// Returns true if the device draws lenses that distort.
+    pub(super) fn distorts(&self) -> bool {
+        self.physical.distorts
     }
 
     /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
@@ -403,6 +410,7 @@ impl PhysicalDevice {
             max_size: max_size.into_iter().min().unwrap_or_default(),
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,
+            distorts: features.gaussian_distortion == vk::TRUE,
             // SAFETY: the handle is the instance's.
             memory: unsafe { instance.get_physical_device_memory_properties(handle) },
         }))

@@ -328,6 +328,10 @@ impl Renderer {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
         scene.settings.check(camera)?;
+        if !camera.distortion.is_none() && !self.device.distorts() {
+            let sentence = "the device draws ideal lenses alone, and the camera's distorts (--undistorted)";
+            return Err(RenderError::Combination(sentence));
+        }
         let tested = scene.mesh.is_some();
         if tested {
             scene.settings.check_mesh(camera)?;

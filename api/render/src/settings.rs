@@ -97,6 +97,7 @@ impl Settings {
                 matches!(camera.model, Model::Fisheye | Model::Equirectangular),
                 "meshes are drawn by pinhole and orthographic cameras alone",
             ),
+            (!camera.distortion.is_none(), "meshes are drawn by ideal lenses alone (--undistorted)"),
             (self.kept().is_some(), "depths are not kept of scenes with meshes"),
             (
                 camera.model == Model::Orthographic && camera.far.is_infinite(),
@@ -119,6 +120,7 @@ impl Settings {
         let surfels = self.geometry == Geometry::Surfel;
         let per_pixel = self.order == SortOrder::PerPixel;
         let panorama = camera.model == Model::Equirectangular;
+        let distorted = !camera.distortion.is_none();
         let refused = [
             (surfels && half, "flat Gaussians (2d) are not drawn in binary16 (fp16)"),
             (
@@ -129,6 +131,8 @@ impl Settings {
                 surfels && (panorama || camera.model == Model::Fisheye),
                 "flat Gaussians (2d) are drawn by pinhole and orthographic cameras alone",
             ),
+            (surfels && distorted, "flat Gaussians (2d) are drawn by ideal lenses alone (--undistorted)"),
+            (per_pixel && distorted, "the order per-pixel goes with ideal lenses alone (--undistorted)"),
             (half && per_pixel, "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel"),
             (half && panorama, "panoramas are not drawn in binary16 (fp16)"),
             (
