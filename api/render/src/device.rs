@@ -139,6 +139,8 @@ struct PhysicalDevice {
     max_sh_degree: u32,
     /// True if it draws lenses that distort.
     distorts: bool,
+    /// True if it has the unscented transform with any sigma points.
+    has_sigma_points: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
@@ -242,6 +244,11 @@ impl Device {
     /// Returns true if the device draws lenses that distort.
     pub(super) fn distorts(&self) -> bool {
         self.physical.distorts
+    }
+
+    /// Returns true if the device has the unscented transform with any sigma points.
+    pub(super) fn has_sigma_points(&self) -> bool {
+        self.physical.has_sigma_points
     }
 
     /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
@@ -411,6 +418,7 @@ impl PhysicalDevice {
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,
             distorts: features.gaussian_distortion == vk::TRUE,
+            has_sigma_points: [features.unscented_projection, features.unscented_parameters] == [vk::TRUE; 2],
             // SAFETY: the handle is the instance's.
             memory: unsafe { instance.get_physical_device_memory_properties(handle) },
         }))

@@ -172,6 +172,9 @@ impl Renderer {
         mut settings: Settings,
         over_mesh: bool,
     ) -> Result<GaussianPipeline, RenderError> {
+        if settings.sigma_points.is_some() && !self.device.has_sigma_points() {
+            return Err(RenderError::Combination("the device has no unscented transform with other sigma points"));
+        }
         settings.sh_degree = settings.sh_degree.min(stored_degree).min(self.device.max_sh_degree());
         GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over_mesh)
     }

@@ -5,7 +5,7 @@ use gaurast_scene::{Antialiasing, Camera, Geometry, MAX_SH_DEGREE, SortOrder};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{CutOff, Kept, Precision};
+use crate::modes::{CutOff, Kept, Precision, SigmaPoints};
 
 /// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +39,8 @@ pub struct Settings {
     pub cut_off_deviations: f32,
     /// The variance of the screen filter in px^2; `None` is 3DGS's 0.3, or 0.5 of flat Gaussians.
     pub low_pass_variance: Option<f32>,
+    /// Project covariances by the unscented transform with these sigma points, and not by the Jacobian.
+    pub sigma_points: Option<SigmaPoints>,
     /// Leave out Gaussians, and sort them, by the z of their centres, whatever `order` says: the renderer lists them for each
     /// frame. Else a fisheye and a panorama go by distance, and the near plane cuts each ray that meets a flat Gaussian.
     pub by_z: bool,
@@ -68,6 +70,7 @@ impl Default for Settings {
             cut_off: CutOff::None,
             cut_off_deviations: 3.0,
             low_pass_variance: None,
+            sigma_points: None,
             by_z: false,
             depth: false,
             linear_depth: false,
@@ -130,6 +133,10 @@ impl Settings {
             (
                 surfels && (panorama || camera.model == Model::Fisheye),
                 "flat Gaussians (2d) are drawn by pinhole and orthographic cameras alone",
+            ),
+            (
+                surfels && self.sigma_points.is_some(),
+                "flat Gaussians (2d) are not projected by the unscented transform",
             ),
             (surfels && distorted, "flat Gaussians (2d) are drawn by ideal lenses alone (--undistorted)"),
             (per_pixel && distorted, "the order per-pixel goes with ideal lenses alone (--undistorted)"),

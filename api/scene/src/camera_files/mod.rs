@@ -270,6 +270,9 @@ mod tests {
         let file = read_with(&distorted, true, None).expect("left out");
         assert_eq!(file.views[0].camera, *camera);
         assert_eq!(file.ignored, ["the lens's distortion (k1 = -0.05, p2 = 0.001) is left out"]);
+        let cropped = FISHEYE.replace("\"k1\"", "\"fisheye_crop_radius\": 90, \"k1\"");
+        let file = read_with(&cropped, false, None).expect("a camera");
+        assert!(file.ignored[0].contains("fisheye_crop_radius is ignored"), "{:?}", file.ignored);
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub(super) struct Transforms {
     /// The transform that was applied to the frames' poses before they were written.
     applied_transform: Option<[[f64; 4]; 3]>,
     applied_scale: Option<f64>,
+    fisheye_crop_radius: Option<f64>,
 }
 
 impl Transforms {
@@ -48,6 +49,9 @@ impl Transforms {
                 scale: dataparser.scale / self.applied_scale.unwrap_or(1.0),
             }
         });
+        if self.fisheye_crop_radius.is_some() {
+            ignored.push("fisheye_crop_radius is ignored: all that the lens sees is drawn".to_owned());
+        }
         let views: Vec<_> = (self.frames.unwrap_or_default().into_iter())
             .map(|mut frame| {
                 let given = frame.intrinsics.size(&self.intrinsics);
