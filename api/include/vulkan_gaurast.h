@@ -38,6 +38,7 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST ((VkStructureType)1000997005)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997006)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST ((VkStructureType)1000997007)
+#define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997008)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
 #define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
@@ -155,6 +156,7 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianCutOff;
     VkBool32           opacityCompensationFloor;
     VkBool32           gaussianDistortion;
+    VkBool32           unscentedParameters;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -231,6 +233,16 @@ typedef struct VkPipelineGaussianFootprintStateCreateInfoGAURAST {
     float                      cutOffDeviations;
     float                      compensationFloor;
 } VkPipelineGaussianFootprintStateCreateInfoGAURAST;
+
+typedef struct VkPipelineGaussianUnscentedStateCreateInfoGAURAST {
+    VkStructureType    sType;
+    const void*        pNext;
+    float              alpha;
+    float              beta;
+    float              kappa;
+    float              pictureMargin;
+    VkBool32           allSigmaPoints;
+} VkPipelineGaussianUnscentedStateCreateInfoGAURAST;
 
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;

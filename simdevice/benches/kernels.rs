@@ -134,6 +134,7 @@ fn begin(degree: u32) -> GaussianBegin {
             near_plane: 0.2,
             far_plane: f32::INFINITY,
             depth_coefficients: [0.0; 2],
+            distortion: None,
         },
         viewport: Viewport {
             x: 0.0,

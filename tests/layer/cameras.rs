@@ -1,7 +1,9 @@
 //! Mistakes in cameras that commands set.
 
 use ash::vk;
-use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use gaurast::vk::{
+    GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianDistortionModelGAURAST,
+};
 
 use crate::stage::{Mistake, camera, gaussian, mistake, recording};
 
@@ -16,7 +18,71 @@ fn set(name: &'static str, id: &'static str, cameras: fn() -> Vec<Camera>) -> Mi
     })
 }
 
+/// A camera through a lens.
+fn lens(
+    name: &'static str,
+    id: &'static str,
+    model: GaussianCameraModelGAURAST,
+    change: fn(GaussianCameraDistortionGAURAST<'static>) -> GaussianCameraDistortionGAURAST<'static>,
+) -> Mistake {
+    mistake(name, id, move |stage| {
+        recording(&stage.full, |commands| {
+            let mut lens = change(GaussianCameraDistortionGAURAST::default().radial([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]));
+            commands.camera(&camera().model(model).push_next(&mut lens));
+        })
+    })
+}
+
 pub fn mistakes() -> Vec<Mistake> {
+    let mut all = of_cameras();
+    all.extend(of_lenses());
+    all
+}
+
+fn of_lenses() -> Vec<Mistake> {
+    use GaussianCameraModelGAURAST as Camera;
+    use GaussianDistortionModelGAURAST as Model;
+    let model = "VUID-VkGaussianCameraDistortionGAURAST-model-90085";
+    let one = "VUID-VkGaussianCameraDistortionGAURAST-radial-90087";
+    let angle = "VUID-VkGaussianCameraDistortionGAURAST-radial-90088";
+    vec![
+        mistake(
+            "a lens that distorts without its feature",
+            "VUID-VkGaussianCameraDistortionGAURAST-gaussianDistortion-90084",
+            |stage| {
+                recording(&stage.bare, |commands| {
+                    let mut lens = GaussianCameraDistortionGAURAST::default().tangential([0.01, 0.0]);
+                    commands.camera(&camera().push_next(&mut lens));
+                })
+            },
+        ),
+        lens(
+            "a distortion whose model is none",
+            "VUID-VkGaussianCameraDistortionGAURAST-model-parameter",
+            Camera::PINHOLE,
+            |lens| lens.model(Model::from_raw(77)),
+        ),
+        lens("a parallel camera whose lens distorts", model, Camera::ORTHOGRAPHIC, |lens| lens),
+        lens("a panorama whose lens distorts", model, Camera::EQUIRECTANGULAR, |lens| lens),
+        lens(
+            "a distortion that is NaN",
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90086",
+            Camera::FISHEYE,
+            |lens| lens.thin_prism([0.0, f32::NAN, 0.0, 0.0]),
+        ),
+        lens("a division with tangential coefficients", one, Camera::PINHOLE, |lens| {
+            lens.model(Model::DIVISION).tangential([0.0, 0.1])
+        }),
+        lens("a field of view with two coefficients", one, Camera::PINHOLE, |lens| {
+            lens.model(Model::FIELD_OF_VIEW).radial([0.9, 0.1, 0.0, 0.0, 0.0, 0.0])
+        }),
+        lens("a field of view in degrees", angle, Camera::PINHOLE, |lens| {
+            lens.model(Model::FIELD_OF_VIEW).radial([55.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        }),
+    ]
+}
+
+fn of_cameras() -> Vec<Mistake> {
     let count = "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-90062";
     let model = "VUID-VkGaussianCameraGAURAST-model-parameter";
     let near = "VUID-VkGaussianCameraGAURAST-nearPlane-90069";

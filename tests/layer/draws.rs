@@ -1,7 +1,10 @@
 //! Mistakes in draws, as they are recorded.
 
 use ash::vk;
-use gaurast::vk::{GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianPrecisionGAURAST};
+use gaurast::vk::{
+    GaussianCameraDistortionGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST,
+};
 use gaurast_testkit::{Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Message, Pass, Target, opaque};
 
 use crate::stage::{IDENTITY, Mistake, SIZE, SPLAT, camera, drawing, instanced, mistake, recording, splats, with};
@@ -58,6 +61,12 @@ pub fn mistakes() -> Vec<Mistake> {
 
 fn cameras() -> Vec<Mistake> {
     let model = "VUID-vkCmdDraw-geometry-90071";
+    let lens = "VUID-vkCmdDraw-None-90089";
+    let through_a_lens = |commands: &Commands| {
+        let mut lens = GaussianCameraDistortionGAURAST::default().tangential([0.01, 0.0]);
+        commands.camera(&camera().push_next(&mut lens));
+        commands.draw(0..2);
+    };
     vec![
         draw("a draw without a camera", "GAURAST-Draw-no-camera", splats, |commands| {
             commands.draw(0..2);
@@ -79,6 +88,18 @@ fn cameras() -> Vec<Mistake> {
                 commands.camera(&camera().model(GaussianCameraModelGAURAST::EQUIRECTANGULAR));
                 commands.draw(0..2);
             },
+        ),
+        draw(
+            "2D Gaussians through a lens that distorts",
+            lens,
+            || with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+            through_a_lens,
+        ),
+        draw(
+            "the per-pixel order through a lens that distorts",
+            lens,
+            || with(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+            through_a_lens,
         ),
         mistake("two cameras for views 0 and 2", "VUID-vkCmdDraw-cameraCount-90063", |stage| in_views(&stage.full)),
         draw("a focal length in units of the picture", "GAURAST-Draw-focal-length", splats, |commands| {

@@ -8,7 +8,7 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource};
 
-use crate::pipelines::{allowing, footprint};
+use crate::pipelines::{allowing, footprint, sigma_points};
 use crate::stage::{
     Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, spirv, splats, with,
 };
@@ -95,6 +95,11 @@ fn of_states() -> Vec<Mistake> {
             "a floor of compensation without its feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
             || footprint(GaussianCutOffGAURAST::NONE, 0.0, 0.1),
+        ),
+        mistake(
+            "other sigma points without their feature",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedParameters-90090",
+            |stage| creation(&stage.resolving, &sigma_points(|points| points.alpha(0.1))),
         ),
         bare(
             "model matrices without their feature",

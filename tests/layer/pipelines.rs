@@ -5,7 +5,7 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
     GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
 
@@ -29,6 +29,16 @@ pub fn footprint(
         .cut_off_deviations(cut_off_deviations)
         .compensation_floor(compensation_floor);
     Graphics { footprint: Some(footprint), ..splats() }
+}
+
+/// A pipeline of the unscented transform with its sigma points.
+pub fn sigma_points(
+    change: fn(
+        PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>,
+    ) -> PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>,
+) -> Graphics<'static> {
+    let points = change(PipelineGaussianUnscentedStateCreateInfoGAURAST::default());
+    Graphics { unscented: Some(points), ..with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)) }
 }
 
 fn raster(change: impl Fn(Raster) -> Raster + 'static) -> impl Fn() -> Graphics<'static> + 'static {
@@ -159,6 +169,22 @@ fn numbers() -> Vec<Mistake> {
                 gaussian: with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)).gaussian,
                 ..footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0)
             },
+        ),
+        pipeline(
+            "sigma points at their mean",
+            "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-alpha-90091",
+            || sigma_points(|points| points.alpha(0.0)),
+        ),
+        pipeline("a beta that is NaN", "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-beta-90092", || {
+            sigma_points(|points| points.beta(f32::NAN))
+        }),
+        pipeline("a kappa of -3", "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-kappa-90093", || {
+            sigma_points(|points| points.kappa(-3.0))
+        }),
+        pipeline(
+            "a negative margin of the picture",
+            "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-pictureMargin-90094",
+            || sigma_points(|points| points.picture_margin(-0.1)),
         ),
         state("an alpha ceiling of 1 with a transmittance floor", "GAURAST-Pipeline-alpha-ceiling", |s| {
             s.alpha_ceiling(1.0)

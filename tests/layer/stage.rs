@@ -19,7 +19,7 @@ pub struct Stage {
     pub full: Gpu,
     /// Without the optional modes of the extension.
     pub bare: Gpu,
-    /// With fragment stages as the only optional feature.
+    /// With fragment stages and the unscented transform as the only optional features.
     pub resolving: Gpu,
     /// Without the topology.
     pub without: Gpu,
@@ -40,7 +40,12 @@ impl Stage {
         let stage = Self {
             full: open(None),
             bare: open(Some(Features::default().gaussian_primitive_topology(true))),
-            resolving: open(Some(Features::default().gaussian_primitive_topology(true).resolve_fragment_shader(true))),
+            resolving: open(Some(
+                Features::default()
+                    .gaussian_primitive_topology(true)
+                    .resolve_fragment_shader(true)
+                    .unscented_projection(true),
+            )),
             without: open(Some(Features::default())),
         };
         // That nothing is enabled was said.

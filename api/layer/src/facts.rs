@@ -53,7 +53,37 @@ pub(crate) type Features = Plain<gvk::PhysicalDeviceGaussianPrimitiveTopologyFea
 /// The Gaussian state of a pipeline.
 pub(crate) type GaussianState = Plain<gvk::PipelineGaussianStateCreateInfoGAURAST<'static>>;
 /// A camera.
-pub(crate) type Camera = Plain<gvk::GaussianCameraGAURAST<'static>>;
+#[derive(Clone, Copy)]
+pub(crate) struct Camera {
+    camera: Plain<gvk::GaussianCameraGAURAST<'static>>,
+    /// True if its lens distorts.
+    pub(crate) distorts: bool,
+}
+
+impl Camera {
+    /// A copy of a camera, and of what its lens does.
+    pub(crate) fn of(
+        camera: &gvk::GaussianCameraGAURAST<'_>,
+        lens: Option<&gvk::GaussianCameraDistortionGAURAST<'_>>,
+    ) -> Self {
+        let distorts = lens.is_some_and(|lens| coefficients(lens).any(|coefficient| coefficient != 0.0));
+        Self { camera: Plain::<gvk::GaussianCameraGAURAST<'static>>::of(camera), distorts }
+    }
+}
+
+impl std::ops::Deref for Camera {
+    type Target = gvk::GaussianCameraGAURAST<'static>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.camera
+    }
+}
+
+/// All coefficients of a lens: radial ones, tangential ones, those of its thin prism.
+pub(crate) fn coefficients(lens: &gvk::GaussianCameraDistortionGAURAST<'_>) -> impl Iterator<Item = f32> {
+    lens.radial.into_iter().chain(lens.tangential).chain(lens.thin_prism)
+}
+
 /// Harmonics in a buffer.
 pub(crate) type Harmonics = Plain<gvk::GaussianSphericalHarmonicsBufferGAURAST<'static>>;
 

@@ -7,7 +7,7 @@ use ash::vk;
 use gaurast::vk::{
     GaussianCutOffGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 
 use crate::facts::GaussianState;
@@ -29,6 +29,33 @@ pub(crate) struct Footprint {
     pub(crate) compensation_floor: f32,
 }
 
+/// The state of sigma points.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct SigmaPoints {
+    pub(crate) alpha: f32,
+    pub(crate) beta: f32,
+    pub(crate) kappa: f32,
+    pub(crate) picture_margin: f32,
+    pub(crate) all: bool,
+}
+
+impl SigmaPoints {
+    fn of(state: &PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>) -> Self {
+        Self {
+            alpha: state.alpha,
+            beta: state.beta,
+            kappa: state.kappa,
+            picture_margin: state.picture_margin,
+            all: state.all_sigma_points != 0,
+        }
+    }
+
+    /// Reports whether they are those of pipelines without the structure.
+    pub(crate) fn are_default(&self) -> bool {
+        *self == Self::of(&PipelineGaussianUnscentedStateCreateInfoGAURAST::default())
+    }
+}
+
 /// The parameters of a graphics pipeline's creation.
 pub(crate) struct Request {
     pub(crate) draws_gaussians: bool,
@@ -36,6 +63,7 @@ pub(crate) struct Request {
     pub(crate) gaussian: Option<GaussianState>,
     pub(crate) approximation: Option<[f32; 2]>,
     pub(crate) footprint: Option<Footprint>,
+    pub(crate) sigma_points: Option<SigmaPoints>,
     pub(crate) stages: Vec<Stage>,
     /// By binding and by location; `None` where the vertex input is dynamic.
     pub(crate) vertex_input: Option<(BTreeMap<u32, VertexBinding>, BTreeMap<u32, Attribute>)>,
@@ -77,6 +105,7 @@ impl Request {
             let blend = info.p_color_blend_state.as_ref();
             let approximation = find::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(info.p_next);
             let footprint = find::<PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(info.p_next);
+            let sigma_points = find::<PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>>(info.p_next);
             let gaussian = find::<PipelineGaussianStateCreateInfoGAURAST<'_>>(info.p_next);
             let stages = slice(info.p_stages, info.stage_count);
             let is_dynamic = |state: &vk::DynamicState| dynamic.contains(state);
@@ -95,6 +124,7 @@ impl Request {
                     cut_off_deviations: state.cut_off_deviations,
                     compensation_floor: state.compensation_floor,
                 }),
+                sigma_points: sigma_points.map(SigmaPoints::of),
                 stages: stages.iter().map(|stage| read_stage(stage, objects)).collect(),
                 vertex_input: (!is_dynamic(&vk::DynamicState::VERTEX_INPUT_EXT))
                     .then(|| read_vertex_input(info.p_vertex_input_state.as_ref())),

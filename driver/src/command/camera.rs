@@ -3,13 +3,18 @@
 use super::Command;
 use super::buffer::Recorder;
 use crate::abi::error::Error;
+use crate::abi::valid;
 use crate::physical_device::limits;
-use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use gaurast::vk::{
+    GaussianCameraDataGAURAST, GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianDistortionModelGAURAST,
+};
 use simdevice::BufferRange;
-use simdevice::state::gaussian::{Camera, CameraModel};
+use simdevice::state::gaussian::{Camera, CameraModel, Distortion, DistortionModel};
+use std::f32::consts::PI;
 use std::fmt::Debug;
 
-/// Converts a camera for the device.
+/// Converts a camera for the device, with an ideal lens.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for a model that the device does not have, [`Error::InvalidUsage`] for values that no
@@ -37,11 +42,78 @@ fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
         near_plane: camera.near_plane,
         far_plane: camera.far_plane,
         depth_coefficients: camera.depth_coefficients,
+        distortion: None,
     })
 }
 
+/// Converts a camera of a model with its distortion, if its chain has one that distorts.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for a distortion that no camera, or none of this model, has.
+///
+/// # Safety
+/// The camera's chain is valid.
+unsafe fn distortion(camera: &GaussianCameraGAURAST<'_>, model: CameraModel) -> Result<Option<Distortion>, Error> {
+    // SAFETY: the caller's promise.
+    match unsafe { valid::find_in_chain::<GaussianCameraDistortionGAURAST<'_>>(camera.p_next) } {
+        None => Ok(None),
+        Some(chained) => convert_distortion(chained, model),
+    }
+}
+
+fn convert_distortion(
+    chained: &GaussianCameraDistortionGAURAST<'_>,
+    model: CameraModel,
+) -> Result<Option<Distortion>, Error> {
+    let &GaussianCameraDistortionGAURAST { radial, tangential, thin_prism, .. } = chained;
+    let distortion_model = match chained.model {
+        GaussianDistortionModelGAURAST::RATIONAL => DistortionModel::Rational,
+        GaussianDistortionModelGAURAST::POLYNOMIAL => DistortionModel::Polynomial,
+        GaussianDistortionModelGAURAST::POLYNOMIAL_FIRST => DistortionModel::PolynomialFirst,
+        GaussianDistortionModelGAURAST::FIELD_OF_VIEW => DistortionModel::FieldOfView,
+        GaussianDistortionModelGAURAST::DIVISION => DistortionModel::Division,
+        other => {
+            return Err(Error::usage(
+                "VUID-VkGaussianCameraDistortionGAURAST-model-parameter",
+                format!("{other:?} is not a VkGaussianDistortionModelGAURAST"),
+            ));
+        }
+    };
+    if !matches!(model, CameraModel::Pinhole | CameraModel::Fisheye) {
+        return Err(Error::usage(
+            "VUID-VkGaussianCameraDistortionGAURAST-model-90085",
+            format!("a lens that distorts is that of a PINHOLE or a FISHEYE, but the camera's model is {model:?}"),
+        ));
+    }
+    let first = radial[0];
+    let others = || radial[1..].iter().chain(&tangential).chain(&thin_prism);
+    if !first.is_finite() || !others().all(|coefficient| coefficient.is_finite()) {
+        return Err(Error::usage(
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90086",
+            format!("coefficients must be finite, but are {radial:?}, {tangential:?} and {thin_prism:?}"),
+        ));
+    }
+    let has_others = others().any(|coefficient| *coefficient != 0.0);
+    if has_others && matches!(distortion_model, DistortionModel::FieldOfView | DistortionModel::Division) {
+        return Err(Error::usage(
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90087",
+            format!("all coefficients of {distortion_model:?} but the first radial one must be 0"),
+        ));
+    }
+    if distortion_model == DistortionModel::FieldOfView && !(0.0..PI).contains(&first) {
+        return Err(Error::usage(
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90088",
+            format!("the angle of FIELD_OF_VIEW must be at least 0 and less than pi, but is {first}"),
+        ));
+    }
+    let distorts = first != 0.0 || has_others;
+    Ok(distorts.then_some(Distortion { model: distortion_model, radial, tangential, thin_prism }))
+}
+
+/// # Safety
+/// The cameras' chains are valid.
 #[doc(alias = "vkCmdSetGaussianCamerasGAURAST")]
-pub(crate) fn cmd_set_gaussian_cameras(
+pub(crate) unsafe fn cmd_set_gaussian_cameras(
     recorder: &mut Recorder,
     cameras: &[GaussianCameraGAURAST<'_>],
 ) -> Result<(), Error> {
@@ -55,7 +127,13 @@ pub(crate) fn cmd_set_gaussian_cameras(
             ),
         ));
     }
-    let cameras = cameras.iter().map(camera).collect::<Result<_, _>>()?;
+    let with_lens = |given: &GaussianCameraGAURAST<'_>| {
+        let ideal = camera(given)?;
+        // SAFETY: the caller's promise.
+        let distortion = unsafe { distortion(given, ideal.model) }?;
+        Ok(Camera { distortion, ..ideal })
+    };
+    let cameras = cameras.iter().map(with_lens).collect::<Result<_, Error>>()?;
     recorder.push(Command::SetCameras(cameras));
     Ok(())
 }
@@ -202,6 +280,48 @@ mod tests {
             let number = number as usize;
             assert_eq!(read(&range(end), number).unwrap(), camera(&set).unwrap());
             assert!(read(&range(end - 1), number).is_err());
+        }
+    }
+
+    #[test]
+    fn a_distortion_is_taken_as_it_is_and_zeros_are_none() {
+        let given = GaussianCameraDistortionGAURAST::default()
+            .model(GaussianDistortionModelGAURAST::POLYNOMIAL)
+            .radial([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+            .tangential([0.7, 0.8])
+            .thin_prism([0.9, 1.0, 1.1, 1.2]);
+        let taken = convert_distortion(&given, CameraModel::Fisheye).unwrap().unwrap();
+        let expected = Distortion {
+            model: DistortionModel::Polynomial,
+            radial: given.radial,
+            tangential: given.tangential,
+            thin_prism: given.thin_prism,
+        };
+        assert_eq!(taken, expected);
+        let zeros = GaussianCameraDistortionGAURAST::default().model(GaussianDistortionModelGAURAST::FIELD_OF_VIEW);
+        assert_eq!(convert_distortion(&zeros, CameraModel::Pinhole).unwrap(), None);
+    }
+
+    #[test]
+    fn what_no_lens_does_is_refused() {
+        let of = |model| GaussianCameraDistortionGAURAST::default().model(model);
+        let first = |k| [k, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let bad = [
+            of(GaussianDistortionModelGAURAST::from_raw(9)),
+            of(GaussianDistortionModelGAURAST::RATIONAL).radial(first(f32::NAN)),
+            of(GaussianDistortionModelGAURAST::POLYNOMIAL).thin_prism([0.0, 0.0, 0.0, f32::INFINITY]),
+            of(GaussianDistortionModelGAURAST::DIVISION).tangential([0.0, 0.1]),
+            of(GaussianDistortionModelGAURAST::FIELD_OF_VIEW).radial([1.0, 0.1, 0.0, 0.0, 0.0, 0.0]),
+            of(GaussianDistortionModelGAURAST::FIELD_OF_VIEW).radial(first(PI)),
+            of(GaussianDistortionModelGAURAST::FIELD_OF_VIEW).radial(first(-0.1)),
+        ];
+        for bad in bad {
+            assert!(convert_distortion(&bad, CameraModel::Pinhole).is_err(), "{bad:?}");
+        }
+        let good = of(GaussianDistortionModelGAURAST::DIVISION).radial(first(-0.2));
+        assert!(convert_distortion(&good, CameraModel::Pinhole).is_ok());
+        for model in [CameraModel::Orthographic, CameraModel::Equirectangular] {
+            assert!(convert_distortion(&good, model).is_err());
         }
     }
 

@@ -199,6 +199,19 @@ unsafe fn read_rasterization(
                     }
                 )
             });
+        own.unscented = valid::find_in_chain::<gvk::PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>>(info.p_next)
+            .map(|state| {
+                unchained!(
+                    state,
+                    gvk::PipelineGaussianUnscentedStateCreateInfoGAURAST {
+                        alpha,
+                        beta,
+                        kappa,
+                        picture_margin,
+                        all_sigma_points,
+                    }
+                )
+            });
         if tessellates && let Some(state) = valid::optional(info.p_tessellation_state) {
             own.patch_control_points = state.patch_control_points;
             let origin = valid::find_in_chain::<vk::PipelineTessellationDomainOriginStateCreateInfo<'_>>(state.p_next);

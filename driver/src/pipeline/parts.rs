@@ -7,7 +7,7 @@ use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use std::sync::Arc;
 
@@ -113,6 +113,8 @@ pub(crate) struct PreRasterizationState {
     pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
     /// The extension's structure of footprints.
     pub(crate) footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
+    /// The extension's structure of sigma points.
+    pub(crate) unscented: Option<PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>>,
 }
 
 /// The fragment stage, and the depth and stencil tests.

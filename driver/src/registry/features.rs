@@ -350,6 +350,8 @@ features! {
         resolveGaussianIndices => resolve_gaussian_indices: true;
         gaussianCutOff => gaussian_cut_off: true;
         opacityCompensationFloor => opacity_compensation_floor: true;
+        gaussianDistortion => gaussian_distortion: true;
+        unscentedParameters => unscented_parameters: true;
     }
     structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
         performanceCounterQueryPools => performance_counter_query_pools: true;

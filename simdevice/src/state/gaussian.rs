@@ -16,6 +16,35 @@ pub enum CameraModel {
     Equirectangular,
 }
 
+/// The map from an ideal place (u, v) in the picture to the distorted one that a lens gives. See the extension for each
+/// formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DistortionModel {
+    /// The place times a quotient of cubic polynomials in the square of the radius.
+    Rational,
+    /// The place times a polynomial in the square of the radius.
+    Polynomial,
+    /// The same polynomial first. The tangential part and the thin prism distort its place.
+    PolynomialFirst,
+    /// An angle of the radius. The first radial coefficient is omega, the others are 0.
+    FieldOfView,
+    /// The inverse of a division by a polynomial. The first radial coefficient is k, the others are 0.
+    Division,
+}
+
+/// The distortion of a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distortion {
+    /// The formula.
+    pub model: DistortionModel,
+    /// The radial coefficients k1 to k6.
+    pub radial: [f32; 6],
+    /// The tangential coefficients p1 and p2.
+    pub tangential: [f32; 2],
+    /// The coefficients of a thin prism, s1 to s4.
+    pub thin_prism: [f32; 4],
+}
+
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -37,6 +66,9 @@ pub struct Camera {
     /// The coefficients c0 and c1 of the fragment depth `c0 + c1 / z`, or `c0 + c1 z` for an orthographic camera, where
     /// z is the depth variable.
     pub depth_coefficients: [f32; 2],
+    /// The distortion of the lens of a pinhole or a fisheye, if some coefficient is not 0. It is for volumes only, and not
+    /// for the per-pixel order.
+    pub distortion: Option<Distortion>,
 }
 
 impl Default for Camera {
@@ -51,6 +83,7 @@ impl Default for Camera {
             near_plane: 0.2,
             far_plane: f32::INFINITY,
             depth_coefficients: [0.0; 2],
+            distortion: None,
         }
     }
 }
@@ -100,6 +133,29 @@ pub enum GaussianLinearization {
     Unscented,
 }
 
+/// The sigma points of the unscented transform, by its usual parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnscentedTransform {
+    /// The spread of the points about the mean.
+    pub alpha: f32,
+    /// The knowledge of the distribution, which changes the weight of the mean's point. 2 is a Gaussian's.
+    pub beta: f32,
+    /// The second parameter of the spread. It is greater than -3.
+    pub kappa: f32,
+    /// The part of the picture's size by which points that count may lie outside of it. If it is infinite, Gaussians are
+    /// drawn wherever their points lie.
+    pub picture_margin: f32,
+    /// True if all points must lie there for a Gaussian to be drawn, false if one must.
+    pub needs_all: bool,
+}
+
+impl Default for UnscentedTransform {
+    /// Points at sqrt(3) standard deviations, whose weights are not negative.
+    fn default() -> Self {
+        Self { alpha: 1.0, beta: 2.0, kappa: 0.0, picture_margin: f32::INFINITY, needs_all: false }
+    }
+}
+
 /// Errors that are permitted in exchange for speed. A stage that gains nothing from them is exact. By default none are
 /// permitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -146,6 +202,8 @@ pub struct GaussianState {
     pub sh_degree: u32,
     /// The method that projects covariances.
     pub linearization: GaussianLinearization,
+    /// The points of the unscented transform.
+    pub unscented: UnscentedTransform,
     /// The rasterizer's arithmetic.
     pub precision: GaussianPrecision,
     /// The shape of the Gaussians.
@@ -187,6 +245,7 @@ impl Default for GaussianState {
         Self {
             sh_degree: 0,
             linearization: GaussianLinearization::Jacobian,
+            unscented: UnscentedTransform::default(),
             precision: GaussianPrecision::Float32,
             geometry: GaussianGeometry::Volume,
             order: GaussianOrder::ViewDepth,

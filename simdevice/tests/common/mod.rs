@@ -131,6 +131,7 @@ pub fn begin(blend: BlendState) -> GaussianBegin {
             near_plane: 0.2,
             far_plane: f32::INFINITY,
             depth_coefficients: [0.0; 2],
+            distortion: None,
         },
         viewport: Viewport {
             x: 0.0,

@@ -17,8 +17,8 @@ use simdevice::program::interface::{
 };
 use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{
-    Camera, CameraModel, GaussianApproximation, GaussianCutOff, GaussianFootprint, GaussianGeometry,
-    GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
+    Camera, CameraModel, Distortion, DistortionModel, GaussianApproximation, GaussianCutOff, GaussianFootprint,
+    GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState, UnscentedTransform,
 };
 use simdevice::state::{BlendState, CompareOp, DepthStencil, DepthTest, Rect, StencilFace, StencilOp, Viewport};
 use simdevice::stats::counters::{Counter, Unit};
@@ -185,6 +185,7 @@ fn state(rng: &mut ChaCha8Rng, depth: Option<Format>) -> GaussianState {
     GaussianState {
         sh_degree: rng.random_range(0..=4),
         linearization: if is_unscented { GaussianLinearization::Unscented } else { GaussianLinearization::Jacobian },
+        unscented: if rng.random() { UnscentedTransform::default() } else { near_points(rng) },
         precision: if is_half { GaussianPrecision::Float16 } else { GaussianPrecision::Float32 },
         geometry,
         order,
@@ -207,6 +208,17 @@ fn state(rng: &mut ChaCha8Rng, depth: Option<Format>) -> GaussianState {
         depth_stencil: depth.map_or_else(DepthStencil::default, |format| tests(rng, format)),
         blend: vec![blend],
         ..GaussianState::default()
+    }
+}
+
+/// The sigma points of an unscented transform that lie near the mean.
+fn near_points(rng: &mut ChaCha8Rng) -> UnscentedTransform {
+    UnscentedTransform {
+        alpha: rng.random_range(0.1..1.5),
+        beta: rng.random_range(0.0..2.0),
+        kappa: rng.random_range(-1.0..1.0),
+        picture_margin: *[f32::INFINITY, 0.0, 0.1].choose(rng).unwrap(),
+        needs_all: rng.random_bool(0.2),
     }
 }
 
@@ -233,6 +245,31 @@ fn tests(rng: &mut ChaCha8Rng, format: Format) -> DepthStencil {
     }
 }
 
+/// A lens that distorts a little, and may fold in the picture.
+fn lens(rng: &mut ChaCha8Rng) -> Distortion {
+    let models = [
+        DistortionModel::Rational,
+        DistortionModel::Polynomial,
+        DistortionModel::PolynomialFirst,
+        DistortionModel::FieldOfView,
+        DistortionModel::Division,
+    ];
+    let model = *models.choose(rng).unwrap();
+    let first = rng.random_range(0.05..0.6);
+    let mut few = |size: f32| rng.random_range(-size..size);
+    match model {
+        DistortionModel::FieldOfView | DistortionModel::Division => {
+            Distortion { model, radial: [first, 0.0, 0.0, 0.0, 0.0, 0.0], tangential: [0.0; 2], thin_prism: [0.0; 4] }
+        }
+        _ => Distortion {
+            model,
+            radial: [few(0.3), few(0.1), few(0.02), few(0.1), few(0.02), 0.0],
+            tangential: [few(0.01), few(0.01)],
+            thin_prism: [few(0.01), few(0.01), few(0.01), few(0.01)],
+        },
+    }
+}
+
 /// A camera among the Gaussians.
 fn camera(rng: &mut ChaCha8Rng, state: &GaussianState) -> Camera {
     let is_flat = state.geometry == GaussianGeometry::Surfel;
@@ -248,6 +285,10 @@ fn camera(rng: &mut ChaCha8Rng, state: &GaussianState) -> Camera {
     let [w, x, y, z] = [1.0, rng.random_range(-0.3..0.3f32), rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3)];
     let s = 2.0 / (w * w + x * x + y * y + z * z);
     let is_parallel = model == CameraModel::Orthographic;
+    let may_distort = matches!(model, CameraModel::Pinhole | CameraModel::Fisheye)
+        && !is_flat
+        && state.order != GaussianOrder::PerPixel;
+    let distortion = (may_distort && rng.random()).then(|| lens(rng));
     Camera {
         model,
         rotation: [
@@ -267,6 +308,7 @@ fn camera(rng: &mut ChaCha8Rng, state: &GaussianState) -> Camera {
         near_plane: if is_parallel { -1.0 } else { 0.2 },
         far_plane: *[f32::INFINITY, 7.0].choose(rng).unwrap(),
         depth_coefficients: if is_parallel { [0.1, 0.1] } else { [1.02, -0.2] },
+        distortion,
     }
 }
 

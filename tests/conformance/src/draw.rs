@@ -2,8 +2,9 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance, Rules};
 use gaurast_oracle::scenes::{self, SceneBuffers};
@@ -13,6 +14,12 @@ pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 /// The pixels that Gaussians may reach.
 pub type Footprint = PipelineGaussianFootprintStateCreateInfoGAURAST<'static>;
+
+/// The sigma points of the unscented transform.
+pub type Unscented = PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>;
+
+/// The distortion of a camera's lens.
+pub type Distortion = GaussianCameraDistortionGAURAST<'static>;
 
 /// A camera.
 pub type Camera = GaussianCameraGAURAST<'static>;
@@ -35,10 +42,14 @@ pub struct Draw {
     pub approximation: Option<[f32; 2]>,
     /// The footprint, if the structure is chained.
     pub footprint: Option<Footprint>,
+    /// The sigma points, if the structure is chained.
+    pub unscented: Option<Unscented>,
     /// The inputs that a resolve shader shows as colours, if there is one.
     pub shown: Option<Shown>,
     /// The camera.
     pub camera: Camera,
+    /// The distortion of its lens, if the structure is chained.
+    pub distortion: Option<Distortion>,
     /// True if the camera comes from a uniform buffer.
     pub camera_in_buffer: bool,
     /// Model matrices with opacity factors, and their input rate.
@@ -231,8 +242,10 @@ impl Draw {
             state: State::default(),
             approximation: None,
             footprint: None,
+            unscented: None,
             shown: None,
             camera: scenes::camera(SIZE[0], SIZE[1]).to_vulkan(),
+            distortion: None,
             camera_in_buffer: false,
             instances: None,
             indices: Vec::new(),
@@ -273,6 +286,13 @@ impl Draw {
     #[must_use]
     pub fn seen_by(mut self, camera: Camera) -> Self {
         self.camera = camera;
+        self
+    }
+
+    /// The same through a lens that distorts.
+    #[must_use]
+    pub fn through(mut self, lens: Distortion) -> Self {
+        self.distortion = Some(lens);
         self
     }
 

@@ -14,7 +14,7 @@ use crate::draw::Draw;
 pub type Feature = (&'static str, fn(&Features<'_>) -> vk::Bool32);
 
 /// All features of the extension, in the order of the structure.
-pub const FEATURES: [Feature; 26] = [
+pub const FEATURES: [Feature; 28] = [
     ("gaussianPrimitiveTopology", |has| has.gaussian_primitive_topology),
     ("vertexShaderProjection", |has| has.vertex_shader_projection),
     ("resolveFragmentShader", |has| has.resolve_fragment_shader),
@@ -41,6 +41,8 @@ pub const FEATURES: [Feature; 26] = [
     ("resolveGaussianIndices", |has| has.resolve_gaussian_indices),
     ("gaussianCutOff", |has| has.gaussian_cut_off),
     ("opacityCompensationFloor", |has| has.opacity_compensation_floor),
+    ("gaussianDistortion", |has| has.gaussian_distortion),
+    ("unscentedParameters", |has| has.unscented_parameters),
 ];
 
 /// The names of the features that a draw needs.
@@ -69,6 +71,8 @@ pub fn needs(draw: &Draw) -> Vec<&'static str> {
         (draw.approximation.is_some_and(|numbers| numbers != [0.0; 2]), "gaussianApproximation"),
         (footprint.cut_off != CutOff::NONE, "gaussianCutOff"),
         (footprint.compensation_floor != 0.0, "opacityCompensationFloor"),
+        (draw.distortion.is_some(), "gaussianDistortion"),
+        (draw.unscented.is_some(), "unscentedParameters"),
         (draw.shown.is_some(), "resolveFragmentShader"),
         (draw.shown.is_some(), "resolveGaussianIndices"),
         (is_activated, "attributeActivation"),

@@ -148,7 +148,9 @@ impl Covered {
 
 /// The state of a draw.
 pub(crate) fn oracle_state(draw: &Draw) -> OracleState {
-    let state = OracleState::from(&draw.state).with_footprint(&draw.footprint.unwrap_or_default());
+    let state = OracleState::from(&draw.state)
+        .with_footprint(&draw.footprint.unwrap_or_default())
+        .with_unscented(&draw.unscented.unwrap_or_default());
     OracleState { rules: draw.rules, ..state }
 }
 
@@ -160,7 +162,7 @@ pub(crate) fn oracle_camera(draw: &Draw) -> OracleCamera {
     for (principal, corner) in camera.principal.iter_mut().zip(covered.corner) {
         *principal += corner;
     }
-    camera
+    camera.with_distortion(draw.distortion.as_ref())
 }
 
 fn tests(draw: &Draw) -> OracleTests {

@@ -33,7 +33,7 @@ pub struct Mistake {
 }
 
 /// All mistakes.
-pub const MISTAKES: [Mistake; 37] = [
+pub const MISTAKES: [Mistake; 41] = [
     Mistake {
         name: "pixel_centres",
         text: "Pixel centres are at corners",
@@ -124,7 +124,31 @@ pub const MISTAKES: [Mistake; 37] = [
         name: "mean_unweighted",
         text: "The mean has no weight in the unscented covariance",
         chapter: "unscented",
-        make: |draw| draw.rules.unscented_beta = 0.0,
+        make: |draw| draw.rules.unscented_beta = Some(0.0),
+    },
+    Mistake {
+        name: "default_sigma_points",
+        text: "Sigma points are always the default's",
+        chapter: "unscented",
+        make: |draw| draw.unscented = None,
+    },
+    Mistake {
+        name: "no_distortion",
+        text: "No lens distorts",
+        chapter: "distortion",
+        make: |draw| draw.distortion = None,
+    },
+    Mistake {
+        name: "no_fold",
+        text: "Lenses show what lies beyond their fold",
+        chapter: "distortion",
+        make: |draw| draw.rules.lenses_fold = false,
+    },
+    Mistake {
+        name: "jacobian_is_ideal",
+        text: "The Jacobian is that of the ideal lens",
+        chapter: "distortion",
+        make: |draw| draw.rules.jacobian_is_distorted = false,
     },
     Mistake {
         name: "ties_reversed",

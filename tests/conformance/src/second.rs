@@ -32,6 +32,8 @@ impl Implementation for Second {
             (state.linearization != Linearization::JACOBIAN, "unscentedProjection"),
             (state.geometry != Geometry::GAUSSIAN_3D, "gaussian2D"),
             (draw.camera_in_buffer, "uniformBufferCamera"),
+            (draw.distortion.is_some(), "gaussianDistortion"),
+            (draw.unscented.is_some(), "unscentedParameters"),
             (draw.instances.is_some(), "gaussianInstancing"),
             (draw.approximation.is_some(), "gaussianApproximation"),
             (draw.footprint.is_some(), "gaussianCutOff"),

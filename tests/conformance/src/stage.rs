@@ -96,6 +96,15 @@ impl<'a> Stage<'a> {
         commands.indices(&self.indices, 0, vk::IndexType::UINT32);
         match &self.camera {
             Some(camera) => commands.bind_set(&camera.set, &[]),
+            None => self.set_camera(commands),
+        }
+    }
+
+    /// Sets the camera with its lens.
+    fn set_camera(&self, commands: &Commands) {
+        let mut distortion = self.draw.distortion.unwrap_or_default();
+        match self.draw.distortion {
+            Some(_) => commands.camera(&self.draw.camera.push_next(&mut distortion)),
             None => commands.camera(&self.draw.camera),
         }
     }
@@ -230,6 +239,7 @@ fn pipeline(
         state,
         approximation,
         footprint: draw.footprint,
+        unscented: draw.unscented,
         resolve,
         set,
         stored_degree: draw.scene.degree,

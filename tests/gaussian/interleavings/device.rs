@@ -352,6 +352,7 @@ fn gaussians(interleaving: &Interleaving, resources: &Resources, scene: usize, t
             near_plane: camera.near,
             far_plane: camera.far,
             depth_coefficients: interleaving.depth_coefficients,
+            distortion: None,
         },
         viewport: Viewport { x: 0.0, y: 0.0, width: SIZE as f32, height: SIZE as f32, min_depth: 0.0, max_depth: 1.0 },
         scissor: WHOLE,

@@ -13,7 +13,8 @@ use simdevice::packet::{
     Rendering, ResolveImage, StoreOp, SubresourceLayers, SubresourceRange,
 };
 use simdevice::state::gaussian::{
-    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
+    Camera, CameraModel, Distortion, DistortionModel, GaussianGeometry, GaussianLinearization, GaussianOrder,
+    GaussianPrecision, GaussianState,
 };
 use simdevice::state::{Rect, ResolveMode, Viewport};
 use simdevice::stats::query::{QueryKind, QueryPool};
@@ -419,6 +420,18 @@ fn begin(bytes: &mut Bytes<'_>) -> Packet {
             near_plane: or(bytes, 0.2),
             far_plane: or(bytes, f32::INFINITY),
             depth_coefficients: [0; 2].map(|_| or(bytes, 0.5)),
+            distortion: bytes.one(&[false, false, true]).then(|| Distortion {
+                model: bytes.one(&[
+                    DistortionModel::Rational,
+                    DistortionModel::Polynomial,
+                    DistortionModel::PolynomialFirst,
+                    DistortionModel::FieldOfView,
+                    DistortionModel::Division,
+                ]),
+                radial: [0.1, -0.05, 0.01, 0.0, 0.0, 0.0f32].map(|k| or(bytes, k)),
+                tangential: [0; 2].map(|_| or(bytes, 0.001)),
+                thin_prism: [0; 4].map(|_| or(bytes, 0.0)),
+            }),
         },
         viewport: Viewport {
             x: or(bytes, 0.0),

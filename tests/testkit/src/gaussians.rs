@@ -4,7 +4,7 @@ use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
@@ -107,6 +107,8 @@ pub struct GaussianOptions<'a> {
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
     /// The pixels that Gaussians may reach.
     pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
+    /// The sigma points of the unscented transform.
+    pub unscented: Option<PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>>,
     /// The resolve shader.
     pub resolve: Option<Shader>,
     /// The descriptor set.
@@ -155,6 +157,7 @@ impl GaussianOptions<'_> {
             state: PipelineGaussianStateCreateInfoGAURAST::default(),
             approximation: None,
             footprint: None,
+            unscented: None,
             resolve: None,
             set: None,
             stored_degree: degree,
@@ -209,6 +212,7 @@ impl GaussianOptions<'_> {
             gaussian: Some(state),
             approximation: self.approximation,
             footprint: self.footprint,
+            unscented: self.unscented,
             ..Graphics::default()
         }
     }

@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 
 use crate::descriptors::{Binding, Bindings, Sets, write};
@@ -113,6 +113,8 @@ pub struct Graphics<'a> {
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
     /// The pixels that Gaussians may reach.
     pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
+    /// The sigma points of the unscented transform.
+    pub unscented: Option<PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>>,
 }
 
 impl Default for Graphics<'_> {
@@ -153,6 +155,7 @@ impl Default for Graphics<'_> {
             gaussian: None,
             approximation: None,
             footprint: None,
+            unscented: None,
         }
     }
 }
@@ -279,6 +282,7 @@ impl Graphics<'_> {
         let mut gaussian = self.gaussian.unwrap_or_default();
         let mut approximation = self.approximation.unwrap_or_default();
         let mut footprint = self.footprint.unwrap_or_default();
+        let mut unscented = self.unscented.unwrap_or_default();
         let mut parts = vk::GraphicsPipelineLibraryCreateInfoEXT::default().flags(self.parts.unwrap_or_default());
         let mut libraries = vk::PipelineLibraryCreateInfoKHR::default().libraries(&self.libraries);
         let mut info = vk::GraphicsPipelineCreateInfo::default().flags(self.flags).dynamic_state(&dynamic);
@@ -321,6 +325,9 @@ impl Graphics<'_> {
         }
         if self.footprint.is_some() {
             info = info.push_next(&mut footprint);
+        }
+        if self.unscented.is_some() {
+            info = info.push_next(&mut unscented);
         }
         let cache = vk::PipelineCache::null();
         // SAFETY: see the crate.

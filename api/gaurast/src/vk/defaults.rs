@@ -81,6 +81,23 @@ impl Default for PipelineGaussianStateCreateInfoGAURAST<'_> {
     }
 }
 
+/// The sigma points of pipelines without the structure.
+impl Default for PipelineGaussianUnscentedStateCreateInfoGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: Self::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            alpha: 1.0,
+            beta: 2.0,
+            kappa: 0.0,
+            picture_margin: f32::INFINITY,
+            all_sigma_points: ash::vk::FALSE,
+            _marker: PhantomData,
+        }
+    }
+}
+
 /// A camera that stands at the origin, looks along +z unrotated, has the depth 1 - 0.2 / z, and still needs a focal
 /// length and a principal point. [`from_view_projection`](GaussianCameraGAURAST::from_view_projection) and its
 /// siblings build others.

@@ -59,6 +59,11 @@ pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST: 
 pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_007);
 
+/// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST")]
+pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_008);
+
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
 pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_000);
@@ -146,8 +151,9 @@ vk_enum! {
         /// By the projection's Jacobian at the mean (EWA splatting, as in 3DGS).
         #[doc(alias = "VK_GAUSSIAN_LINEARIZATION_JACOBIAN_GAURAST")]
         JACOBIAN = 0,
-        /// By the unscented transform, from projected sigma points (alpha 1, beta 2, kappa 0, as in
-        /// 3DGUT); by the Jacobian where some point is not seen. Needs `unscentedProjection`.
+        /// By the unscented transform, from projected sigma points (alpha 1, beta 2, kappa 0, unless
+        /// [`PipelineGaussianUnscentedStateCreateInfoGAURAST`] has others); by the Jacobian where some
+        /// point is not seen. Needs `unscentedProjection`.
         #[doc(alias = "VK_GAUSSIAN_LINEARIZATION_UNSCENTED_GAURAST")]
         UNSCENTED = 1,
     }
@@ -392,6 +398,9 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub opacity_compensation_floor: vk::Bool32,
     /// [`GaussianCameraDistortionGAURAST`]: cameras whose lens distorts.
     pub gaussian_distortion: vk::Bool32,
+    /// [`PipelineGaussianUnscentedStateCreateInfoGAURAST`] with other values than those without
+    /// it.
+    pub unscented_parameters: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -436,6 +445,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             gaussian_cut_off: vk::Bool32::default(),
             opacity_compensation_floor: vk::Bool32::default(),
             gaussian_distortion: vk::Bool32::default(),
+            unscented_parameters: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -470,6 +480,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_cut_off,
         opacity_compensation_floor,
         gaussian_distortion,
+        unscented_parameters,
     }
 }
 
@@ -869,6 +880,56 @@ impl PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
         cut_off: GaussianCutOffGAURAST,
         cut_off_deviations: f32,
         compensation_floor: f32,
+    }
+}
+
+/// The sigma points of a pipeline's unscented transform, so that pictures are those of other
+/// renderers.
+///
+/// Chain it to `VkGraphicsPipelineCreateInfo`, beside
+/// [`PipelineGaussianStateCreateInfoGAURAST`] whose `linearization` is
+/// [`GaussianLinearizationGAURAST::UNSCENTED`]. Without it `alpha` is 1, `beta` 2, `kappa` 0,
+/// and `picture_margin` is infinite. Other values need `unscentedParameters`.
+#[doc(alias = "VkPipelineGaussianUnscentedStateCreateInfoGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct PipelineGaussianUnscentedStateCreateInfoGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The spread of the points about the mean; finite and greater than 0. 0.1 in gsplat.
+    pub alpha: f32,
+    /// The part of the mean's own weight that a distribution decides; finite. 2 for Gaussians.
+    pub beta: f32,
+    /// The second parameter of the spread; finite and greater than -3.
+    pub kappa: f32,
+    /// The part of the viewport's size by which sigma points that count may lie outside of it; at
+    /// least 0. If it is infinite, Gaussians are drawn wherever their points lie. 0.1 in gsplat.
+    pub picture_margin: f32,
+    /// True if a Gaussian is drawn only if all of its points count, false if one suffices.
+    pub all_sigma_points: vk::Bool32,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    PipelineGaussianUnscentedStateCreateInfoGAURAST =
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST,
+    vk::ExtendsGraphicsPipelineCreateInfo
+);
+
+impl PipelineGaussianUnscentedStateCreateInfoGAURAST<'_> {
+    bool_setters! {
+        all_sigma_points,
+    }
+    setters! {
+        alpha: f32,
+        beta: f32,
+        kappa: f32,
+        picture_margin: f32,
     }
 }
 

@@ -47,6 +47,7 @@ fn features() {
         gaussian_cut_off: 112,
         opacity_compensation_floor: 116,
         gaussian_distortion: 120,
+        unscented_parameters: 124,
     });
 }
 
@@ -133,6 +134,15 @@ fn pipeline_state() {
         cut_off_deviations: 20,
         compensation_floor: 24,
     });
+    assert_layout!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, 40, 8, {
+        s_type: 0,
+        p_next: 8,
+        alpha: 16,
+        beta: 20,
+        kappa: 24,
+        picture_margin: 28,
+        all_sigma_points: 32,
+    });
     assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
         s_type: 0,
         p_next: 8,
@@ -206,6 +216,7 @@ fn names_and_values() {
         STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST,
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST,
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST,
     ];
     for (offset, structure_type) in structure_types.into_iter().enumerate() {
         assert_eq!(structure_type.as_raw(), first + offset as i32);

@@ -128,6 +128,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_distortion),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, unscentedParameters)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, unscented_parameters),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -353,6 +357,38 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, compensationFloor)",
         offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, compensation_floor),
     ),
+    (
+        "sizeof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST)",
+        size_of::<PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, sType)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, pNext)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, alpha)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, alpha),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, beta)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, beta),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, kappa)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, kappa),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, pictureMargin)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, picture_margin),
+    ),
+    (
+        "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, allSigmaPoints)",
+        offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, all_sigma_points),
+    ),
     ("sizeof(VkGaussianCameraGAURAST)", size_of::<GaussianCameraGAURAST<'_>>()),
     ("offsetof(VkGaussianCameraGAURAST, sType)", offset_of!(GaussianCameraGAURAST<'_>, s_type)),
     ("offsetof(VkGaussianCameraGAURAST, pNext)", offset_of!(GaussianCameraGAURAST<'_>, p_next)),
@@ -467,6 +503,10 @@ pub const VALUES: &[(&str, i64)] = &[
     (
         "VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST",
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST",
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),

@@ -369,7 +369,8 @@ records! {
     cmd_set_gaussian_cameras(count: u32, cameras: *const gvk::GaussianCameraGAURAST<'_>) with own |state, faults| {
         // What is wrongly many is not looked at.
         let cameras = slice(cameras, if count > own.facts.max_views { 0 } else { count });
-        let right = rules::camera::check_command(cameras, count, &own.facts, faults);
+        let lenses: Vec<_> = cameras.iter().map(|camera| rules::camera::lens(camera)).collect();
+        let right = rules::camera::check_command(cameras, &lenses, count, &own.facts, faults);
         state.0.cameras = right.map(Arc::new).or(state.0.cameras.take());
     }
     cmd_begin_gaussian_set() with own |state, faults| {

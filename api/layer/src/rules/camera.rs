@@ -1,14 +1,29 @@
 //! Cameras.
 
 use ash::vk::TaggedStructure;
-use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST as Model};
+use gaurast::vk::{
+    GaussianCameraDistortionGAURAST as Distortion, GaussianCameraGAURAST, GaussianCameraModelGAURAST as Model,
+    GaussianDistortionModelGAURAST as DistortionModel,
+};
+use gaurast_layer_interface::find;
 
-use crate::facts::{Camera, Facts};
+use crate::facts::{Camera, Facts, coefficients};
 use crate::report::Faults;
+
+/// The distortion in a camera's chain, if the structure is one.
+///
+/// # Safety
+/// The camera's chain is valid, if its type is right.
+pub(crate) unsafe fn lens<'a>(camera: &GaussianCameraGAURAST<'a>) -> Option<&'a Distortion<'a>> {
+    let is_camera = camera.s_type == GaussianCameraGAURAST::STRUCTURE_TYPE;
+    // SAFETY: the caller's promise.
+    if is_camera { unsafe { find(camera.p_next) } } else { None }
+}
 
 /// Checks the cameras of `vkCmdSetGaussianCamerasGAURAST`; gives those that are right.
 pub(crate) fn check_command(
     cameras: &[GaussianCameraGAURAST<'_>],
+    lenses: &[Option<&Distortion<'_>>],
     count: u32,
     facts: &Facts,
     faults: &mut Faults,
@@ -24,10 +39,13 @@ pub(crate) fn check_command(
             )
         },
     );
-    for (index, camera) in cameras.iter().enumerate() {
+    for (index, (camera, lens)) in cameras.iter().zip(lenses).enumerate() {
         let name = format!("pCameras[{index}]");
         if camera.s_type == GaussianCameraGAURAST::STRUCTURE_TYPE {
             check(camera, &name, facts, faults);
+            if let Some(lens) = lens {
+                check_lens(lens, camera.model, &name, facts, faults);
+            }
         } else {
             faults.error(
                 "VUID-VkGaussianCameraGAURAST-sType-sType",
@@ -40,7 +58,8 @@ pub(crate) fn check_command(
         }
     }
     let is_right = faults.0[before..].iter().all(|fault| !fault.is_error);
-    (is_right && !cameras.is_empty()).then(|| cameras.iter().map(Camera::of).collect())
+    (is_right && !cameras.is_empty())
+        .then(|| cameras.iter().zip(lenses).map(|(camera, lens)| Camera::of(camera, *lens)).collect())
 }
 
 /// Checks a camera's values.
@@ -79,6 +98,48 @@ pub(crate) fn check(camera: &GaussianCameraGAURAST<'_>, name: &str, facts: &Fact
     if finite(&c.rotation) {
         check_rotation(&c.rotation, name, faults);
     }
+}
+
+/// Checks the distortion of a camera's lens.
+fn check_lens(lens: &Distortion<'_>, model: Model, name: &str, facts: &Facts, faults: &mut Faults) {
+    let known = [
+        DistortionModel::RATIONAL,
+        DistortionModel::POLYNOMIAL,
+        DistortionModel::POLYNOMIAL_FIRST,
+        DistortionModel::FIELD_OF_VIEW,
+        DistortionModel::DIVISION,
+    ];
+    if !known.contains(&lens.model) {
+        return faults.error(
+            "VUID-VkGaussianCameraDistortionGAURAST-model-parameter",
+            format!("{name}'s distortion has the model {}, which is none", lens.model.as_raw()),
+        );
+    }
+    let is_on = facts.features.gaussian_distortion != 0;
+    faults.require(is_on, "VUID-VkGaussianCameraDistortionGAURAST-gaussianDistortion-90084", || {
+        format!("{name} has a distortion, but the feature gaussianDistortion is not enabled")
+    });
+    let may_distort = model == Model::PINHOLE || model == Model::FISHEYE;
+    faults.require(may_distort, "VUID-VkGaussianCameraDistortionGAURAST-model-90085", || {
+        format!("{name} has a distortion, but its model is {model:?}, not PINHOLE or FISHEYE")
+    });
+    let is_finite = coefficients(lens).all(f32::is_finite);
+    faults.require(is_finite, "VUID-VkGaussianCameraDistortionGAURAST-radial-90086", || {
+        let Distortion { radial, tangential, thin_prism, .. } = lens;
+        format!("{name}'s distortion is {radial:?}, {tangential:?}, {thin_prism:?}, but must be finite")
+    });
+    let has_one = matches!(lens.model, DistortionModel::FIELD_OF_VIEW | DistortionModel::DIVISION);
+    let is_one = coefficients(lens).skip(1).all(|coefficient| coefficient == 0.0);
+    faults.require(!has_one || is_one, "VUID-VkGaussianCameraDistortionGAURAST-radial-90087", || {
+        format!("{name}'s distortion is a {:?}, of which all coefficients but radial[0] must be 0", lens.model)
+    });
+    let angle = lens.radial[0];
+    let is_angle = (0.0..std::f32::consts::PI).contains(&angle);
+    faults.require(
+        lens.model != DistortionModel::FIELD_OF_VIEW || is_angle,
+        "VUID-VkGaussianCameraDistortionGAURAST-radial-90088",
+        || format!("{name}'s distortion has the angle {angle}, but it must be at least 0 and less than pi"),
+    );
 }
 
 fn check_model(model: Model, name: &str, facts: &Facts, faults: &mut Faults) {

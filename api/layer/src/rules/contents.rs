@@ -119,7 +119,7 @@ fn camera_of(bytes: &[u8]) -> Camera {
         .depth_coefficients(pair(24))
         .near_plane(float(26))
         .far_plane(float(27));
-    Camera::of(&camera)
+    Camera::of(&camera, None)
 }
 
 /// The call with the parameters of an indirect one.
@@ -466,6 +466,8 @@ impl Counts {
         match place(camera, g, scale, state.low_pass_variance, draw.viewport) {
             Place::Behind => &mut self.behind,
             Place::Beyond => &mut self.beyond,
+            // A lens may show what lies outside of an ideal picture.
+            Place::Outside if camera.distorts => &mut self.drawn,
             Place::Outside => &mut self.outside,
             Place::Inside => &mut self.drawn,
         }

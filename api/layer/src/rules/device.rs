@@ -34,6 +34,11 @@ pub(crate) fn named(features: &Features) -> [(&'static str, bool); 23] {
         ("attributeActivation", f.attribute_activation),
         ("sphericalHarmonicsBuffer", f.spherical_harmonics_buffer),
         ("gaussianDynamicState", f.gaussian_dynamic_state),
+        ("resolveGaussianIndices", f.resolve_gaussian_indices),
+        ("gaussianCutOff", f.gaussian_cut_off),
+        ("opacityCompensationFloor", f.opacity_compensation_floor),
+        ("gaussianDistortion", f.gaussian_distortion),
+        ("unscentedParameters", f.unscented_parameters),
     ]
     .map(|(name, is_on)| (name, is_on != 0))
 }

@@ -168,6 +168,10 @@ pub(crate) fn check_model(camera: &Camera, gaussian: &GaussianState, faults: &mu
     } else if gaussian.precision == Precision::FLOAT16 && model == Model::EQUIRECTANGULAR {
         faults.error(id, "precision is FLOAT16, but the camera is EQUIRECTANGULAR");
     }
+    let may_distort = !is_flat && gaussian.order != GaussianOrderGAURAST::PER_PIXEL;
+    faults.require(!camera.distorts || may_distort, "VUID-vkCmdDraw-None-90089", || {
+        "the camera's lens distorts, but geometry is GAUSSIAN_2D or order is PER_PIXEL".to_owned()
+    });
 }
 
 /// Warns of a camera whose numbers are not pixels.

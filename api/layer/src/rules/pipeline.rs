@@ -4,13 +4,14 @@ use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
     GaussianCameraSourceGAURAST as CameraSource, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
 use crate::facts::{Facts, GaussianState};
 use crate::formats::{Format, is_integer};
 use crate::report::Faults;
-use crate::request::{Footprint, Request};
+use crate::request::{Footprint, Request, SigmaPoints};
 use crate::rules::{shaders, state};
 use crate::spirv::{INPUT, Interface, OUTPUT};
 
@@ -58,6 +59,12 @@ pub(crate) fn check(request: &Request, facts: &Facts, faults: &mut Faults) {
     check_gates(request, facts, faults);
     if let Some(footprint) = &request.footprint {
         check_footprint(&gaussian, footprint, facts, faults);
+    }
+    if let Some(points) = &request.sigma_points
+        && state::is_fixed(&gaussian)
+        && gaussian.linearization == Linearization::UNSCENTED
+    {
+        check_sigma_points(points, facts, faults);
     }
     if state::is_fixed(&gaussian) {
         let before = faults.0.len();
@@ -237,6 +244,29 @@ fn check_footprint(gaussian: &GaussianState, footprint: &Footprint, facts: &Fact
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075";
     let has_floor = facts.features.opacity_compensation_floor != 0;
     faults.require(floor == 0.0 || has_floor, id, || state::absent(id));
+}
+
+/// Checks the state of sigma points.
+fn check_sigma_points(points: &SigmaPoints, facts: &Facts, faults: &mut Faults) {
+    let &SigmaPoints { alpha, beta, kappa, picture_margin: margin, .. } = points;
+    faults.require(
+        alpha.is_finite() && alpha > 0.0,
+        "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-alpha-90091",
+        || format!("alpha is {alpha}, but must be finite and greater than 0"),
+    );
+    faults.require(beta.is_finite(), "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-beta-90092", || {
+        format!("beta is {beta}, but must be finite")
+    });
+    faults.require(
+        kappa.is_finite() && kappa > -3.0,
+        "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-kappa-90093",
+        || format!("kappa is {kappa}, but must be finite and greater than -3"),
+    );
+    faults.require(margin >= 0.0, "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-pictureMargin-90094", || {
+        format!("pictureMargin is {margin}, but must be at least 0")
+    });
+    let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedParameters-90090";
+    faults.require(points.are_default() || facts.features.unscented_parameters != 0, id, || state::absent(id));
 }
 
 fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {

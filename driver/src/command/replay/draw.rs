@@ -47,6 +47,11 @@ pub(crate) enum DrawError {
          (VUID-vkCmdDraw-geometry-90071)"
     )]
     ModeOfCameraModel(CameraModel),
+    /// The pipeline's modes don't support a camera whose lens distorts.
+    #[error(
+        "the pipeline's geometry and order do not go with a camera whose lens distorts (VUID-vkCmdDraw-None-90089)"
+    )]
+    ModeOfDistortion,
     /// No uniform buffer is bound for the camera.
     #[error("no uniform buffer is bound at set {set}, binding {binding}, where the camera should be")]
     CameraBuffer {

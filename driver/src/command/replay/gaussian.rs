@@ -18,7 +18,9 @@ use simdevice::packet::{
     PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
-use simdevice::state::gaussian::{Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState};
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
+};
 use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
@@ -45,7 +47,8 @@ impl Begin {
 /// # Errors
 /// [`DrawError`] where bound state that the set needs is missing.
 pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Begin, DrawError> {
-    let [camera, further_cameras @ ..] = &*enabled_cameras(state, gaussian)? else {
+    let cameras = enabled_cameras(state, gaussian)?;
+    let [camera, further_cameras @ ..] = &*cameras else {
         return Err(DrawError::Camera);
     };
     let resolve = |stage: &ResolveStage| {
@@ -58,9 +61,13 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Begin,
             alpha_to_one: stage.alpha_to_one,
         })
     };
+    let fixed = fixed_state(state, gaussian)?;
+    if fixed.order == GaussianOrder::PerPixel && cameras.iter().any(|camera| camera.distortion.is_some()) {
+        return Err(DrawError::ModeOfDistortion);
+    }
     Ok(Begin {
         set: GaussianBegin {
-            state: fixed_state(state, gaussian)?,
+            state: fixed,
             camera: *camera,
             further_cameras: further_cameras.to_vec(),
             viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
@@ -177,10 +184,17 @@ fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), Draw
             state.geometry == GaussianGeometry::Volume && state.precision == GaussianPrecision::Float32
         }
     };
-    match is_supported {
-        true => Ok(()),
-        false => Err(DrawError::ModeOfCameraModel(camera.model)),
+    if !is_supported {
+        return Err(DrawError::ModeOfCameraModel(camera.model));
     }
+    if camera.distortion.is_some() {
+        let required = gaussian.dynamic_rules.require_distortion();
+        required.map_err(|error| DrawError::CameraModel(error.to_string()))?;
+        if state.geometry != GaussianGeometry::Volume {
+            return Err(DrawError::ModeOfDistortion);
+        }
+    }
+    Ok(())
 }
 
 /// The cameras that a draw is given.

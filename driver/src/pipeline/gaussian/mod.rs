@@ -22,7 +22,8 @@ use gaurast::vk::{
 };
 use simdevice::packet::Activations;
 use simdevice::state::gaussian::{
-    GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
+    GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision,
+    GaussianState, UnscentedTransform,
 };
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -136,6 +137,7 @@ impl GaussianPipeline {
         numbers(gaussian)?;
         let approximation = approximation(graphics)?;
         let footprint = footprint(graphics, enabled)?;
+        let unscented = unscented(graphics, gaussian, enabled)?;
         fixed_state(graphics, enabled)?;
         let mut fragments = FixedFunctionState::of_gaussians(graphics)?;
         let taken = graphics.dynamic.iter().copied();
@@ -144,7 +146,7 @@ impl GaussianPipeline {
             let is_ignored = vk::DynamicState::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE == state;
             is_taken_by_gaussians(state) && !(is_shaded(gaussian) && is_ignored)
         });
-        let state = GaussianState { approximation, footprint, ..state(gaussian, fragments.draw_state())? };
+        let state = GaussianState { approximation, footprint, unscented, ..state(gaussian, fragments.draw_state())? };
         require_modes(enabled, &state)?;
         fragments.gaussian = Some(Box::new(state.clone()));
         Ok(Self {
@@ -276,6 +278,7 @@ fn state(gaussian: &PipelineGaussianStateCreateInfoGAURAST, fragments: DrawState
         transmittance_floor: gaussian.transmittance_floor,
         approximation: GaussianApproximation::default(),
         footprint: GaussianFootprint::default(),
+        unscented: UnscentedTransform::default(),
         sample_mask: fragments.sample_mask,
         depth_stencil: fragments.depth_stencil,
         negative_one_to_one: fragments.negative_one_to_one,

@@ -17,6 +17,7 @@ use gaurast::vk::{
 };
 use simdevice::state::gaussian::{
     CameraModel, GaussianApproximation, GaussianCutOff, GaussianFootprint, GaussianOrder, GaussianState,
+    UnscentedTransform,
 };
 use std::ops::Range;
 use std::sync::Arc;
@@ -137,6 +138,11 @@ pub(super) const COMPENSATION_FLOOR: Feature = Feature {
     is_enabled: |features| features.opacity_compensation_floor,
     name: "opacityCompensationFloor",
     vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
+};
+pub(super) const UNSCENTED_PARAMETERS: Feature = Feature {
+    is_enabled: |features| features.unscented_parameters,
+    name: "unscentedParameters",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedParameters-90090",
 };
 pub(super) const DYNAMIC_STATE: Feature = Feature {
     is_enabled: |features| features.gaussian_dynamic_state,
@@ -315,6 +321,17 @@ impl DynamicRules {
         self.enabled.require(is_enabled, || Error::FeatureNotEnabled {
             vuid: "VUID-VkGaussianCameraGAURAST-model-90079",
             message: format!("the camera's model is {model:?}, but the feature {name} is not enabled"),
+        })
+    }
+
+    /// Requires the feature of cameras whose lens distorts.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the feature that is not enabled.
+    pub(crate) fn require_distortion(&self) -> Result<(), Error> {
+        self.enabled.require(self.enabled.features().gaussian_distortion, || Error::FeatureNotEnabled {
+            vuid: "VUID-VkGaussianCameraDistortionGAURAST-gaussianDistortion-90084",
+            message: "the camera's lens distorts, but the feature gaussianDistortion is not enabled".to_owned(),
         })
     }
 
@@ -625,6 +642,35 @@ pub(super) fn footprint(graphics: &GraphicsState, enabled: &Enabled) -> Result<G
         deviations: given.cut_off_deviations,
         compensation_floor: given.compensation_floor,
     })
+}
+
+/// Validates and converts the chain's structure of sigma points, if it has one. It is ignored where no Gaussian is projected
+/// by the unscented transform.
+pub(super) fn unscented(
+    graphics: &GraphicsState,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    enabled: &Enabled,
+) -> Result<UnscentedTransform, Error> {
+    let is_used = gaussian.linearization == GaussianLinearizationGAURAST::UNSCENTED && !is_shaded(gaussian);
+    let Some(given) = graphics.pre_rasterization.unscented.filter(|_| is_used) else {
+        return Ok(UnscentedTransform::default());
+    };
+    values::ALPHA.check(given.alpha, "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-alpha-90091")?;
+    values::BETA.check(given.beta, "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-beta-90092")?;
+    values::KAPPA.check(given.kappa, "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-kappa-90093")?;
+    values::PICTURE_MARGIN
+        .check(given.picture_margin, "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-pictureMargin-90094")?;
+    let transform = UnscentedTransform {
+        alpha: given.alpha,
+        beta: given.beta,
+        kappa: given.kappa,
+        picture_margin: given.picture_margin,
+        needs_all: given.all_sigma_points != vk::FALSE,
+    };
+    if transform != UnscentedTransform::default() {
+        require(enabled, &UNSCENTED_PARAMETERS, "sigma points are not the default's")?;
+    }
+    Ok(transform)
 }
 
 /// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.

@@ -77,6 +77,14 @@ pub(super) const COMPENSATION_FLOOR: Rule = Rule {
     must_be: "at least 0 and at most 1",
 };
 
+pub(super) const ALPHA: Rule =
+    Rule { name: "alpha", holds: |value| value > 0.0 && value.is_finite(), must_be: "finite and greater than 0" };
+pub(super) const BETA: Rule = Rule { name: "beta", holds: f32::is_finite, must_be: "finite" };
+pub(super) const KAPPA: Rule =
+    Rule { name: "kappa", holds: |value| value > -3.0 && value.is_finite(), must_be: "finite and greater than -3" };
+pub(super) const PICTURE_MARGIN: Rule =
+    Rule { name: "pictureMargin", holds: |value| value >= 0.0, must_be: "at least 0; it may be infinite" };
+
 impl Rule {
     /// Refuses a value that breaks the rule.
     ///

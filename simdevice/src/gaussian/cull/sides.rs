@@ -4,6 +4,7 @@
 use crate::gaussian::linear_algebra::length;
 use crate::gaussian::splats::binary16::{LEAST_HALF_FACTOR, binary16_headroom};
 use crate::gaussian::view::constants::ViewConstants;
+use crate::gaussian::view::distortion::Lens;
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
 
@@ -57,8 +58,12 @@ pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> Sides {
         Some(ScreenExtent::exact(log2_range, projection.low_pass))
     };
     let none = Sides { planes: Vec::new(), small: None };
+    if let Some(lens) = &projection.lens {
+        return Sides { planes: fold_planes(projection, lens), ..none };
+    }
     let Some(extent) = extent else { return none };
     let is_linear = match projection.model {
+        CameraModel::Pinhole if projection.unscented && !projection.sigma_points.are_default => return none,
         CameraModel::Pinhole => !projection.unscented,
         CameraModel::Orthographic => true,
         CameraModel::Fisheye | CameraModel::Equirectangular => return none,
@@ -77,6 +82,21 @@ pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> Sides {
     let sides = ends.iter().map(|side| side.unscented(projection, &extent));
     let small = Points::new(projection, &extent).small(projection);
     Sides { planes: sides.collect(), small: Some(small) }
+}
+
+/// The planes outside of which a pinhole's lens has folded, so that means there are not drawn, whatever the extent of their
+/// Gaussians.
+fn fold_planes(projection: &ViewConstants, lens: &Lens) -> Vec<Plane> {
+    let fold = lens.fold();
+    if projection.model != CameraModel::Pinhole || fold == f64::INFINITY {
+        return Vec::new();
+    }
+    let ends = [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)];
+    let plane = |(axis, sign)| Plane {
+        normal: add(row(projection, axis), sign, row(projection, 2), fold * (1.0 + MARGIN)),
+        ..Plane::default()
+    };
+    ends.map(plane).to_vec()
 }
 
 impl ScreenExtent {

@@ -25,7 +25,7 @@ pub(crate) fn to_screen<S: Simd>(view: &ViewConstants, simd: S, group: &GroupAtt
         place(view, simd, scratch);
     }
     let unscented = view.unscented;
-    let is_pinhole = view.model == CameraModel::Pinhole && !by_matrices && !unscented;
+    let is_pinhole = view.model == CameraModel::Pinhole && view.lens.is_none() && !by_matrices && !unscented;
     if !is_pinhole {
         linearize_group(view, by_matrices, scratch);
     }
@@ -145,7 +145,7 @@ pub(crate) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
     }
 }
 
-/// Computes depths, means and Jacobians of the kept Gaussians, for all modes but a pinhole without models.
+/// Computes depths, means and Jacobians of the kept Gaussians, for all modes but an ideal pinhole without models.
 pub(crate) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
     let [x, y, z] = &*scratch.camera;
     let models = scratch.models.as_deref().filter(|_| by_matrices);
@@ -153,7 +153,7 @@ pub(crate) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: 
     for at in 0..scratch.lanes.len().min(GROUP) {
         let t = [x[at], y[at], z[at]];
         scratch.depth[at] = camera::depth(view.model, t);
-        let Linearization { place, jacobian } = camera::linearize(view.model, view.slopes(), t);
+        let Linearization { place, jacobian } = camera::linearize(view.model, view.lens.as_ref(), view.slopes(), t);
         for (axis, row) in jacobian.iter().enumerate() {
             scratch.screen.mean[axis][at] = place[axis] * view.focal[axis] + view.center[axis];
             let j = row.map(|element| element * view.focal[axis]);

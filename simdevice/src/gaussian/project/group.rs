@@ -34,6 +34,7 @@ pub(crate) fn project<S: Simd>(
 ) {
     // In simple modes lanes that were culled are projected, too: that is cheap, and the results are not used.
     let is_plain = view.model == CameraModel::Pinhole
+        && view.lens.is_none()
         && view.geometry == GaussianGeometry::Volume
         && view.precision == GaussianPrecision::Float32
         && group.matrices.is_none()

@@ -101,7 +101,8 @@ pub(crate) fn shape<S: Simd>(
     store(determinant, &mut screen.determinant);
     if view.compensated {
         let mut ratio = area2 / determinant;
-        if view.compensation_floor > 0.0 {
+        // With a negative weight, a covariance may have a negative determinant.
+        if view.compensation_floor > 0.0 || view.sigma_points.center < 0.0 {
             ratio = ratio.max(number(view.compensation_floor));
         }
         o *= ratio.sqrt();

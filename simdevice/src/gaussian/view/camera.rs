@@ -1,5 +1,6 @@
 //! Camera models: the projection of a point to the picture, the projection's Jacobian, and the depth variable.
 
+use super::distortion::{Distorted, Lens};
 use crate::state::gaussian::{Camera, CameraModel};
 use isa::float;
 
@@ -18,9 +19,20 @@ pub(crate) struct Linearization {
     pub(crate) jacobian: [[f64; 3]; 2],
 }
 
-/// Linearizes the projection of a point `t` in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
-/// least and the greatest of `slopes`. Points that have no position give NaN.
-pub(crate) fn linearize(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> Linearization {
+/// Linearizes the projection of a point `t` in camera axes through a lens that may distort. A pinhole's Jacobian is taken at
+/// a slope that is clamped to the least and the greatest of `slopes`. Points that have no position give NaN.
+pub(crate) fn linearize(model: CameraModel, lens: Option<&Lens>, slopes: [[f64; 2]; 2], t: [f64; 3]) -> Linearization {
+    let ideal = ideal(model, slopes, t);
+    lens.map_or(ideal, |lens| {
+        let Distorted { place, derivative } = lens.distort(ideal.place);
+        let [along_u, along_v] = ideal.jacobian;
+        let jacobian = derivative.map(|[by_u, by_v]| [0, 1, 2].map(|axis| by_u * along_u[axis] + by_v * along_v[axis]));
+        Linearization { place, jacobian }
+    })
+}
+
+/// The same through an ideal lens.
+fn ideal(model: CameraModel, slopes: [[f64; 2]; 2], t: [f64; 3]) -> Linearization {
     match model {
         CameraModel::Pinhole => pinhole(slopes, t),
         CameraModel::Orthographic => {
@@ -89,6 +101,7 @@ pub(crate) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state::gaussian::{Distortion, DistortionModel};
     use proptest::prelude::*;
 
     /// Bounds beyond every slope in these tests.
@@ -105,7 +118,7 @@ mod tests {
             let moved = |by: f64| {
                 let mut t = t;
                 t[axis] += by;
-                linearize(model, SLOPES, t).place
+                linearize(model, None, SLOPES, t).place
             };
             let (ahead, behind) = (moved(step), moved(-step));
             for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
@@ -125,7 +138,7 @@ mod tests {
                     CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
                     _ => [x, y, z],
                 };
-                let Linearization { jacobian: rows, .. } = linearize(model, SLOPES, t);
+                let Linearization { jacobian: rows, .. } = linearize(model, None, SLOPES, t);
                 for (row, expected) in rows.iter().zip(jacobian(model, t)) {
                     for (a, b) in row.iter().zip(expected) {
                         prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
@@ -136,18 +149,37 @@ mod tests {
     }
 
     #[gaurast_runner::test]
+    fn a_lens_distorts_the_place_and_the_jacobian() {
+        let (model, radial) = (DistortionModel::Polynomial, [0.1, -0.02, 0.0, 0.0, 0.0, 0.0]);
+        let lens = Lens::new(&Distortion { model, radial, tangential: [0.01, -0.02], thin_prism: [0.0; 4] });
+        let place = |t| linearize(CameraModel::Fisheye, Some(&lens), SLOPES, t).place;
+        let (t, step) = ([0.4, -0.7, 1.1], 1e-6);
+        let Linearization { jacobian, .. } = linearize(CameraModel::Fisheye, Some(&lens), SLOPES, t);
+        for axis in 0..3 {
+            let [ahead, behind] = [step, -step].map(|by| {
+                let mut moved = t;
+                moved[axis] += by;
+                place(moved)
+            });
+            for row in 0..2 {
+                assert!((jacobian[row][axis] - (ahead[row] - behind[row]) / (2.0 * step)).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[gaurast_runner::test]
     fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
-        let at_axis = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
-        assert_eq!(at_axis, linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0]));
-        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
+        let at_axis = linearize(CameraModel::Fisheye, None, SLOPES, [0.0, 0.0, 4.0]);
+        assert_eq!(at_axis, linearize(CameraModel::Pinhole, None, SLOPES, [0.0, 0.0, 4.0]));
+        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, None, SLOPES, [1e-9, 0.0, 4.0]);
         assert!((rows[1][1] - 0.25).abs() < 1e-12);
-        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
+        let Linearization { jacobian: rows, .. } = linearize(CameraModel::Fisheye, None, SLOPES, [0.0, 0.0, -4.0]);
         assert!(rows[0][0].is_nan());
     }
 
     #[gaurast_runner::test]
     fn a_panorama_sees_all_directions() {
-        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).place;
+        let place = |t| linearize(CameraModel::Equirectangular, None, SLOPES, t).place;
         let right = std::f64::consts::FRAC_PI_2;
         assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
         assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
@@ -156,7 +188,8 @@ mod tests {
         assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
         // At a pole, and a little away from it, a point moves no faster than the stated limit.
         for x in [0.0, 1e-9] {
-            let Linearization { jacobian: rows, .. } = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
+            let Linearization { jacobian: rows, .. } =
+                linearize(CameraModel::Equirectangular, None, SLOPES, [0.0, 2.0, x]);
             assert_eq!(rows[0], [512.0, 0.0, 0.0]);
             assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
         }

@@ -101,6 +101,7 @@ mod tests {
             near_plane: 0.5,
             far_plane: 100.0,
             depth_coefficients: coefficients,
+            distortion: None,
         };
         let viewport = Viewport { x: 0.0, y: 0.0, width: 8.0, height: 8.0, min_depth: range[0], max_depth: range[1] };
         CenterDepth::new(&camera, &viewport, false, format)

@@ -3,6 +3,8 @@
 use super::camera::period;
 use super::center_depth::CenterDepth;
 use super::cut_off::{TileCutOff, list_cut_off};
+use super::distortion::Lens;
+use super::sigma_points::SigmaPoints;
 use super::visible::Visible;
 use crate::state::Viewport;
 use crate::state::gaussian::{
@@ -17,8 +19,11 @@ const LEAST_LOG2_ALPHA: f64 = -150.0;
 #[derive(Clone, Debug)]
 pub(crate) struct ViewConstants {
     pub(crate) model: CameraModel,
+    /// The lens, if it distorts.
+    pub(crate) lens: Option<Lens>,
     /// True if covariances come from the unscented transform.
     pub(crate) unscented: bool,
+    pub(crate) sigma_points: SigmaPoints,
     pub(crate) order: GaussianOrder,
     pub(crate) geometry: GaussianGeometry,
     pub(crate) precision: GaussianPrecision,
@@ -65,9 +70,16 @@ impl ViewConstants {
         let principal = camera.principal_point.map(f64::from);
         let size = [viewport.width, viewport.height].map(f64::from);
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
+        let slope_min = [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis]));
+        let slope_max = [0, 1].map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]);
+        let lens = camera.distortion.as_ref().map(Lens::new);
+        let wider = lens.as_ref().map(|lens| widening(lens, slope_min, slope_max));
+        let widened = |slope: [f64; 2]| wider.map_or(slope, |factor| slope.map(|slope| slope * factor));
         Self {
             model: camera.model,
+            lens,
             unscented: state.linearization == GaussianLinearization::Unscented,
+            sigma_points: SigmaPoints::new(&state.unscented, camera, viewport),
             order: state.order,
             geometry: state.geometry,
             precision: state.precision,
@@ -77,8 +89,8 @@ impl ViewConstants {
             center: [principal[0] + f64::from(viewport.x), principal[1] + f64::from(viewport.y)],
             // Discs are not drawn by panoramas.
             period: period(camera).filter(|_| state.geometry == GaussianGeometry::Volume),
-            slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
-            slope_max: [0, 1].map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
+            slope_min: widened(slope_min),
+            slope_max: widened(slope_max),
             near: camera.near_plane,
             far: camera.far_plane,
             low_pass: f64::from(state.low_pass_variance),
@@ -105,4 +117,11 @@ impl ViewConstants {
         let [first, last] = self.visible.pixels(axis);
         [first - 1.0, last + 2.0]
     }
+}
+
+/// The factor by which a lens that distorts widens the bounds of slopes, from the corner that is the farthest from the
+/// principal point.
+fn widening(lens: &Lens, least: [f64; 2], greatest: [f64; 2]) -> f64 {
+    let farthest = [0, 1].map(|axis| least[axis].abs().max(greatest[axis].abs()));
+    lens.widening(libm::hypot(farthest[0], farthest[1]))
 }

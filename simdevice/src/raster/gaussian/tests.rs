@@ -114,6 +114,7 @@ fn draw_with_depth(
             near_plane: 0.2,
             far_plane: f32::INFINITY,
             depth_coefficients: depth.map_or([0.0; 2], |(_, coefficients)| coefficients),
+            distortion: None,
         },
         viewport: Viewport { x: 0.0, y: 0.0, width: 96.0, height: 64.0, min_depth: 0.0, max_depth: 1.0 },
         scissor: bounds,

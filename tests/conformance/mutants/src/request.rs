@@ -5,6 +5,7 @@ use ash::vk::TaggedStructure;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
     PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as Unscented,
 };
 
 use gaurast_layer_interface::slice;
@@ -28,6 +29,7 @@ pub(crate) struct Request {
     pub(crate) gaussian: Option<State<'static>>,
     pub(crate) approximation: Option<Approximation<'static>>,
     pub(crate) footprint: Option<Footprint<'static>>,
+    pub(crate) unscented: Option<Unscented<'static>>,
     rendering: Option<vk::PipelineRenderingCreateInfo<'static>>,
     pub(crate) parts: Option<vk::GraphicsPipelineLibraryCreateInfoEXT<'static>>,
     pub(crate) libraries: Option<vk::PipelineLibraryCreateInfoKHR<'static>>,
@@ -89,6 +91,7 @@ impl Request {
                     State::STRUCTURE_TYPE => self.gaussian = copy(structure.cast()),
                     Approximation::STRUCTURE_TYPE => self.approximation = copy(structure.cast()),
                     Footprint::STRUCTURE_TYPE => self.footprint = copy(structure.cast()),
+                    Unscented::STRUCTURE_TYPE => self.unscented = copy(structure.cast()),
                     vk::PipelineRenderingCreateInfo::STRUCTURE_TYPE => self.rendering = copy(structure.cast()),
                     vk::GraphicsPipelineLibraryCreateInfoEXT::STRUCTURE_TYPE => self.parts = copy(structure.cast()),
                     vk::PipelineLibraryCreateInfoKHR::STRUCTURE_TYPE => self.libraries = copy(structure.cast()),
@@ -149,7 +152,7 @@ impl Request {
                 })*
             };
         }
-        chain!(gaussian, approximation, footprint, rendering, parts, libraries);
+        chain!(gaussian, approximation, footprint, unscented, rendering, parts, libraries);
         *info
     }
 }

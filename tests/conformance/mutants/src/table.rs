@@ -164,6 +164,11 @@ mutants! {
     }
     "unscented": {
         LINEARIZATION = "The unscented transform is the Jacobian",
+        SIGMA_ALPHA = "The sigma points' alpha is 1",
+        SIGMA_BETA = "The sigma points' beta is 2",
+        SIGMA_KAPPA = "The sigma points' kappa is 0",
+        SIGMA_MARGIN = "Gaussians are drawn wherever their sigma points lie",
+        SIGMA_ALL = "One sigma point in the picture is enough",
     }
     "harmonics": {
         DEGREE = "The harmonics' last degree is left out",
@@ -197,6 +202,18 @@ mutants! {
         CAMERA_FAR_PLANE = "The far plane is infinitely far",
         CAMERA_SET_ONCE = "The camera is the one that was set first",
         CAMERA_LOST = "A camera is lost when another pipeline is bound",
+    }
+    "distortion": {
+        DISTORTION_IGNORED = "No lens distorts",
+        DISTORTION_MODEL = "All lenses are rational",
+        DISTORTION_FIRST = "A polynomial is not applied first",
+        DISTORTION_RADIAL = "Radial coefficients are 0",
+        DISTORTION_RADIAL_HIGH = "Radial coefficients from the third on are 0",
+        DISTORTION_TANGENTIAL = "Tangential coefficients are 0",
+        DISTORTION_TANGENTIAL_SWAPPED = "Tangential coefficients are swapped",
+        DISTORTION_THIN_PRISM = "Coefficients of the thin prism are 0",
+        DISTORTION_THIN_PRISM_ORDER = "Coefficients of the thin prism are those of u and v in turn",
+        DISTORTION_OF_FIRST_VIEW = "All views see through the lens of the first",
     }
     "numerics": {
         CAMERA_EYE_BINARY32 = "The camera's eye is rounded to binary32",

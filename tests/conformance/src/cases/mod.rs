@@ -4,6 +4,7 @@ mod activation;
 mod attachments;
 mod chapter;
 mod descriptors;
+mod distortion;
 mod draws;
 mod dynamic_state;
 mod footprint;
@@ -30,11 +31,12 @@ pub use chapter::{Case, Subject};
 type Write = fn(&mut Chapter<'_>);
 
 /// The chapters in their order.
-const CHAPTERS: [(&str, Write); 32] = [
+const CHAPTERS: [(&str, Write); 33] = [
     ("topology", input::topology),
     ("attributes", input::attributes),
     ("instances", input::instances),
     ("camera", modes::camera),
+    ("distortion", distortion::distortion),
     ("order", modes::order),
     ("surfel", modes::surfel),
     ("unscented", modes::unscented),

@@ -13,7 +13,7 @@ use super::chapter::Chapter;
 use super::scenes::{
     Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels, pinholes, strange,
 };
-use crate::draw::{Draw, State};
+use crate::draw::{Draw, State, Unscented};
 use crate::program::Program;
 
 pub(super) const ORDERS: [(&str, Order); 4] = [
@@ -192,6 +192,45 @@ pub(super) fn unscented(chapter: &mut Chapter<'_>) {
             }
         }
     }
+    sigma_points(chapter);
+}
+
+/// Other sigma points than the default's.
+fn sigma_points(chapter: &mut Chapter<'_>) {
+    let near = Unscented::default().alpha(0.1);
+    let points = [
+        ("alpha_0.1", near),
+        ("alpha_0.5", Unscented::default().alpha(0.5)),
+        ("beta_0", near.beta(0.0)),
+        ("kappa_1.5", Unscented::default().kappa(1.5)),
+        ("kappa_-1", Unscented::default().kappa(-1.0)),
+        ("margin_0.1", near.picture_margin(0.1)),
+        ("margin_0", near.picture_margin(0.0)),
+        ("all_points", Unscented::default().picture_margin(0.05).all_sigma_points(true)),
+        ("default", Unscented::default()),
+    ];
+    let cameras = [
+        ("pinhole", front()),
+        ("pinhole_wide", front().focal_length([22.0, 25.0]).eye([0.0, 0.0, 4.0])),
+        ("fisheye", front().model(Model::FISHEYE).focal_length([60.0, 55.0])),
+    ];
+    for (name, unscented) in points {
+        for (camera_name, camera) in cameras {
+            chapter.add(format!("points.{name}.{camera_name}"), move || Draw {
+                unscented: Some(unscented),
+                ..Draw::new(dense(206, 1))
+                    .in_state(|state| state.linearization(Linearization::UNSCENTED))
+                    .seen_by(camera)
+            });
+        }
+    }
+    // With a negative weight the opacity's root may be of a negative number, which counts as 0.
+    chapter.add("points.alpha_0.1.compensated", move || Draw {
+        unscented: Some(near),
+        ..Draw::new(dense(207, 1)).in_state(|state| {
+            state.linearization(Linearization::UNSCENTED).antialiasing(Antialiasing::OPACITY_COMPENSATED)
+        })
+    });
 }
 
 pub(super) fn state(chapter: &mut Chapter<'_>) {

@@ -1,12 +1,13 @@
 //! The inputs of a draw after conversion to binary32: Gaussians, camera and state.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianCutOffGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 
-use super::{Rules, spherical_harmonics};
+use super::{OracleLens, Rules, spherical_harmonics};
 
 /// The Gaussians of a draw, in primitive order (by draw, instance, position in the draw).
 ///
@@ -162,6 +163,29 @@ pub struct OracleCamera {
     pub near: f32,
     /// Gaussians are drawn where `z < far`.
     pub far: f32,
+    /// The lens, if it distorts.
+    pub lens: Option<OracleLens>,
+}
+
+/// The sigma points of the unscented transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OracleSigmaPoints {
+    /// The first parameter of their spread.
+    pub alpha: f32,
+    /// The parameter of the weight of the mean's point.
+    pub beta: f32,
+    /// The second parameter of their spread.
+    pub kappa: f32,
+    /// The part of the viewport's size by which points that count may lie outside; infinite if none is left out.
+    pub picture_margin: f32,
+    /// True if all points must count, false if one must.
+    pub all: bool,
+}
+
+impl Default for OracleSigmaPoints {
+    fn default() -> Self {
+        Self { alpha: 1.0, beta: 2.0, kappa: 0.0, picture_margin: f32::INFINITY, all: false }
+    }
 }
 
 /// The pipeline's Gaussian state. The defaults are the extension's, which are those of 3DGS.
@@ -179,6 +203,8 @@ pub struct OracleState {
     pub opacity_compensated: bool,
     /// True if Gaussians are projected by the unscented transform.
     pub unscented: bool,
+    /// The points of the unscented transform.
+    pub sigma_points: OracleSigmaPoints,
     /// The shape of Gaussians.
     pub geometry: OracleGeometry,
     /// The order of Gaussians.
@@ -210,6 +236,19 @@ impl OracleState {
         }
     }
 
+    /// The same with a pipeline's structure of sigma points.
+    #[must_use]
+    pub fn with_unscented(self, unscented: &PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>) -> Self {
+        let sigma_points = OracleSigmaPoints {
+            alpha: unscented.alpha,
+            beta: unscented.beta,
+            kappa: unscented.kappa,
+            picture_margin: unscented.picture_margin,
+            all: unscented.all_sigma_points != 0,
+        };
+        Self { sigma_points, ..self }
+    }
+
     /// The factor of the opacity, and the root of the determinant whose error it has, if opacity is compensated. `area` is the
     /// root of the determinant before the low-pass.
     pub(super) fn compensation(&self, area: f64, determinant: f64) -> Option<[f64; 2]> {
@@ -228,6 +267,7 @@ impl Default for OracleState {
             transmittance_floor: 1e-4,
             opacity_compensated: false,
             unscented: false,
+            sigma_points: OracleSigmaPoints::default(),
             geometry: OracleGeometry::Volume,
             order: OracleOrder::ViewDepth,
             cut_off: OracleCutOff::None,
@@ -259,10 +299,17 @@ impl OracleCamera {
             principal: camera.principal_point,
             near: camera.near_plane,
             far: camera.far_plane,
+            lens: None,
         })
     }
 
-    /// The camera as a draw takes it.
+    /// The same camera with the lens of a structure, if it distorts.
+    #[must_use]
+    pub fn with_distortion(self, distortion: Option<&GaussianCameraDistortionGAURAST<'_>>) -> Self {
+        Self { lens: distortion.and_then(OracleLens::new), ..self }
+    }
+
+    /// The camera as a draw takes it, without the structure of its lens.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
         let model = match self.model {
             OracleModel::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
@@ -290,6 +337,7 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             transmittance_floor: info.transmittance_floor,
             opacity_compensated: info.antialiasing == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
             unscented: info.linearization == GaussianLinearizationGAURAST::UNSCENTED,
+            sigma_points: OracleSigmaPoints::default(),
             geometry: match info.geometry {
                 GaussianGeometryGAURAST::GAUSSIAN_2D => OracleGeometry::Surfel,
                 _ => OracleGeometry::Volume,

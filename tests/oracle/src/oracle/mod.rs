@@ -8,6 +8,7 @@
 //! | before | attributes from logarithms and logits | [`activation`] |
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
+//! | 3 | the distortion of a lens | [`lens`] |
 //! | 1 to 5 | the same for outputs of a vertex shader | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6 | alpha at a pixel centre, and where it is cut off | [`splat`] |
@@ -38,12 +39,15 @@
 //! In the per-pixel order, neighbours whose depths along the ray may round either way are followed in both orders
 //! ([`rays`]).
 //!
-//! Three more decisions exist and are not followed both ways:
+//! A Gaussian whose mean is very near the fold of a lens, or behind a place that may be one, may be drawn or not ([`lens`]).
+//!
+//! Four more decisions exist and are not followed both ways:
 //! - The depth key is `t.z` rounded to binary32. If the binary64 value is within its own error of the midpoint of two
 //!   binary32 values, the key could be either. This happens to about one Gaussian in 10^8 and matters only if another
 //!   Gaussian has one of these two keys. Such Gaussians are counted ([`Reference::undecidable_keys`]).
 //! - A determinant may be zero in exact arithmetic and not in binary64, or the reverse. This needs `lowPass = 0` and a
 //!   Gaussian of no thickness.
+//! - A sigma point may be seen or not, or lie in the picture or not, within the rounding of binary64.
 //! - The clamps (ceiling of alpha, `u` and `v`, colour) are continuous: both sides give the same value to within the
 //!   error.
 
@@ -53,6 +57,7 @@ mod cut_off;
 pub mod error_model;
 mod inputs;
 mod instance;
+pub mod lens;
 pub mod own_axes;
 mod panorama;
 pub mod pixel;
@@ -76,8 +81,10 @@ mod tests;
 
 pub use binary16::render_binary16;
 pub use inputs::{
-    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene, OracleState,
+    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene,
+    OracleSigmaPoints, OracleState,
 };
+pub use lens::OracleLens;
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
 pub use rules::Rules;

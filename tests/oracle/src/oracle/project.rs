@@ -4,12 +4,12 @@ use super::error_model::{self, ErrorModel};
 use super::instance::Model;
 use super::own_axes::OwnAxes;
 use super::panorama;
-use super::projection::{depth_variable, mean_and_jacobian};
+use super::projection::{depth_variable, ideal_radius, mean_and_jacobian};
 use super::rules::ColorDirection;
 use super::spherical_harmonics;
 use super::splat::{Cholesky, Splat};
 use super::surfel::Surfel;
-use super::unscented;
+use super::unscented::{self, Deviation, Transformed};
 use super::vectors::{dot, length, multiply_row, subtract, transform};
 use super::{OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason};
 
@@ -46,6 +46,11 @@ pub fn project(
     };
 
     // Step 3. The mean and the Jacobian of the projection.
+    let radius = ideal_radius(camera, rules, t);
+    let fold = camera.lens.filter(|_| rules.lenses_fold).map(|lens| lens.fold());
+    if fold.is_some_and(|fold| radius >= fold.greatest) {
+        return Err(SkipReason::BeyondFold);
+    }
     let (mut mean, jacobian) = mean_and_jacobian(camera, rules, t);
     let scale = scales(scene, state, index).map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
@@ -56,7 +61,7 @@ pub fn project(
     });
 
     // The columns of M, or those of the unscented transform in their place.
-    let mut columns: Vec<[f64; 2]> = (0..3).map(|k| [m[0][k], m[1][k]]).collect();
+    let mut columns: Vec<Deviation> = (0..3).map(|k| Deviation { at: [m[0][k], m[1][k]], sign: 1.0 }).collect();
     let largest_scale = scale[0].max(scale[1]).max(scale[2]);
     let mut spread = jacobian.map(|row| {
         let row = model.row(multiply_row(row, &rotation));
@@ -67,21 +72,27 @@ pub fn project(
             let axis = [axes[k], axes[3 + k], axes[6 + k]].map(|c| c * scale[k]);
             transform(&rotation, model.vector(axis))
         });
-        if let Some((sigma_mean, deviations)) = unscented::transform(camera, rules, t, &axes) {
-            spread = [0, 1].map(|i| deviations.iter().map(|d| d[i].abs()).sum());
-            (mean, columns) = (sigma_mean, deviations);
+        match unscented::transform(camera, state, t, &axes) {
+            Transformed::Moments(sigma_mean, deviations) => {
+                spread = [0, 1].map(|i| deviations.iter().map(|d| d.at[i].abs()).sum());
+                (mean, columns) = (sigma_mean, deviations);
+            }
+            Transformed::Unseen => {}
+            Transformed::OutsidePicture => return Err(SkipReason::OutsidePicture),
         }
     }
 
     // Step 4. Covariance and determinant.
     let low_pass = f64::from(state.low_pass);
     let spread = spread.map(|spread| spread.hypot(low_pass.sqrt()));
-    let area = area(&columns);
-    let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
+    let before = determinant_of(&columns);
+    let area = before.max(0.0).sqrt();
+    let sum = |i: usize, j: usize| columns.iter().map(|c| c.sign * c.at[i] * c.at[j]).sum::<f64>();
     let (s_xx, s_xy, s_yy) = (sum(0, 0), sum(0, 1), sum(1, 1));
-    let determinant = area * area + low_pass * (s_xx + s_yy) + low_pass * low_pass;
+    let determinant = before + low_pass * (s_xx + s_yy) + low_pass * low_pass;
     let is_flat = state.geometry == OracleGeometry::Surfel;
-    let is_regular = determinant > 0.0 && determinant.is_finite() && model.is_regular();
+    let is_positive = determinant > 0.0 && s_xx + low_pass >= 0.0 && s_yy + low_pass >= 0.0;
+    let is_regular = is_positive && determinant.is_finite() && model.is_regular();
     if !is_flat && !is_regular {
         return Err(SkipReason::DegenerateCovariance);
     }
@@ -137,21 +148,22 @@ pub fn project(
             fixed: error_model::FIXED + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
         }),
         own_axes: OwnAxes::new(&axes, scale, offset),
+        may_be_folded: fold.is_some_and(|fold| radius >= fold.least),
         key_undecidable: state.order.has_keys() && key_is_undecidable(&rotation, offset, lost, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
 }
 
-/// The root of the determinant of a covariance that is a sum of squares of columns: that of the squares of their 2x2
-/// minors; of three columns, |m0 x m1|.
-fn area(columns: &[[f64; 2]]) -> f64 {
+/// The determinant of a covariance that is a sum of squares of columns: that of the squares of their 2x2 minors; of three
+/// columns, |m0 x m1|^2.
+fn determinant_of(columns: &[Deviation]) -> f64 {
     let mut sum = 0.0;
     for (index, a) in columns.iter().enumerate() {
         for b in &columns[..index] {
-            sum += (a[0] * b[1] - a[1] * b[0]).powi(2);
+            sum += a.sign * b.sign * (a.at[0] * b.at[1] - a.at[1] * b.at[0]).powi(2);
         }
     }
-    sum.sqrt()
+    sum
 }
 
 /// The three scales; the third is 0 for a disc.

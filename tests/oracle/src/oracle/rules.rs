@@ -11,8 +11,13 @@ pub struct Rules {
     pub slope_margin: f64,
     /// Step 3: true if a panorama goes on at its other edge.
     pub panorama_repeats: bool,
-    /// Step 3: the unscented transform's parameter beta, on which the mean's weight in the covariance depends.
-    pub unscented_beta: f64,
+    /// Step 3: the unscented transform's parameter beta, on which the mean's weight in the covariance depends, in place of the
+    /// state's.
+    pub unscented_beta: Option<f64>,
+    /// Step 3: true if nothing is drawn beyond the fold of a lens.
+    pub lenses_fold: bool,
+    /// Step 3: true if the Jacobian is that of the distorted place, false if it is that of the ideal one.
+    pub jacobian_is_distorted: bool,
     /// Step 5: the direction in which spherical harmonics are evaluated.
     pub color_direction: ColorDirection,
     /// Step 6: true if a ray meets a disc only beyond the near plane.
@@ -41,7 +46,9 @@ impl Default for Rules {
             key_rounding: KeyRounding::Binary32,
             slope_margin: 0.15,
             panorama_repeats: true,
-            unscented_beta: 2.0,
+            unscented_beta: None,
+            lenses_fold: true,
+            jacobian_is_distorted: true,
             color_direction: ColorDirection::FromEye,
             discs_begin_at_near: true,
             front_of_ties: FrontOfTies::First,

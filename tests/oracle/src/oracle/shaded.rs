@@ -83,6 +83,7 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         period: f64::INFINITY,
         surfel: None,
         own_axes: OwnAxes::NONE,
+        may_be_folded: false,
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color: outputs.color.map(f64::from),

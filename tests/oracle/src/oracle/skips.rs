@@ -16,6 +16,10 @@ pub enum SkipReason {
     Near,
     /// `z < far` does not hold.
     Far,
+    /// The mean lies beyond the fold of the lens.
+    BeyondFold,
+    /// Too few sigma points lie in the picture.
+    OutsidePicture,
     /// The determinant of the projected covariance is not positive and finite, or the model matrix is singular.
     DegenerateCovariance,
 }
@@ -30,6 +34,8 @@ pub struct SkipCounts {
     pub opacity_below_floor: usize,
     pub near: usize,
     pub far: usize,
+    pub beyond_fold: usize,
+    pub outside_picture: usize,
     pub degenerate_covariance: usize,
 }
 
@@ -43,6 +49,8 @@ impl SkipCounts {
             SkipReason::OpacityBelowFloor => &mut self.opacity_below_floor,
             SkipReason::Near => &mut self.near,
             SkipReason::Far => &mut self.far,
+            SkipReason::BeyondFold => &mut self.beyond_fold,
+            SkipReason::OutsidePicture => &mut self.outside_picture,
             SkipReason::DegenerateCovariance => &mut self.degenerate_covariance,
         } += 1;
     }
@@ -55,6 +63,8 @@ impl SkipCounts {
             + self.opacity_below_floor
             + self.near
             + self.far
+            + self.beyond_fold
+            + self.outside_picture
             + self.degenerate_covariance
     }
 }

@@ -40,6 +40,8 @@ pub struct Splat {
     pub own_axes: OwnAxes,
     /// True if the key is within its own error of the midpoint of two keys.
     pub key_undecidable: bool,
+    /// True if its mean may lie beyond the fold of the lens, so that it may be drawn or not.
+    pub may_be_folded: bool,
     /// The bound on the error of a binary32 implementation for this Gaussian.
     pub error: ErrorModel,
 }
@@ -121,6 +123,7 @@ impl Splat {
             error: relative,
         };
         let (is_cut, cut_undecidable) = is_cut(&place, state);
+        let cut_undecidable = cut_undecidable || self.may_be_folded;
         let whole = Alpha { is_cut, cut_undecidable, ..Alpha::NOTHING };
         let unclamped = self.opacity * (-0.5 * q).exp();
         let error = unclamped * relative;

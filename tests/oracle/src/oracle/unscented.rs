@@ -1,37 +1,59 @@
 //! The unscented transform.
 
-use super::projection::mean_and_jacobian;
+use super::projection::{ideal_radius, mean_and_jacobian};
 use super::vectors::{cross, dot, length};
-use super::{OracleCamera, OracleModel, Rules, panorama};
+use super::{OracleCamera, OracleModel, OracleState, Rules, panorama};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Number of dimensions of the space that is projected.
 const N: f64 = 3.0;
-/// The transform's parameters; the third, beta, is one of the [`Rules`].
-const ALPHA: f64 = 1.0;
-const KAPPA: f64 = 0.0;
 
-/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their
-/// squares.
-pub type Deviations = Vec<[f64; 2]>;
+/// A vector in the picture that counts in a covariance by its square, times a sign.
+#[derive(Clone, Copy, Debug)]
+pub struct Deviation {
+    /// The vector in pixels, times the root of its weight's magnitude.
+    pub at: [f64; 2],
+    /// 1, or -1 for a negative weight.
+    pub sign: f64,
+}
 
-/// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera
-/// axes, and its deviations. `None` if a sigma point is not visible together with the mean.
-pub fn transform(
-    camera: &OracleCamera,
-    rules: &Rules,
-    t: [f64; 3],
-    axes: &[[f64; 3]; 3],
-) -> Option<([f64; 2], Deviations)> {
-    let lambda = ALPHA * ALPHA * (N + KAPPA) - N;
+/// The picture of a Gaussian by its sigma points.
+#[derive(Clone, Debug)]
+pub enum Transformed {
+    /// The mean, and the points less their mean. The covariance is the sum of their squares.
+    Moments([f64; 2], Vec<Deviation>),
+    /// A sigma point is not visible together with the mean.
+    Unseen,
+    /// Too few points lie in the picture.
+    OutsidePicture,
+}
+
+/// Projects a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera axes, by its sigma points.
+pub fn transform(camera: &OracleCamera, state: &OracleState, t: [f64; 3], axes: &[[f64; 3]; 3]) -> Transformed {
+    let rules = &state.rules;
+    let [alpha, beta, kappa] =
+        [state.sigma_points.alpha, state.sigma_points.beta, state.sigma_points.kappa].map(f64::from);
+    let lambda = alpha * alpha * (N + kappa) - N;
     let mut points = vec![t];
     for axis in axes {
         for sign in [1.0, -1.0] {
             points.push(std::array::from_fn(|k| t[k] + sign * (N + lambda).sqrt() * axis[k]));
         }
     }
-    if !points[1..].iter().all(|&point| is_sigma_point_visible(camera, t, point)) {
-        return None;
+    let is_visible = |index: usize| index == 0 || is_sigma_point_visible(camera, rules, t, points[index]);
+    let all_visible = (0..points.len()).all(is_visible);
+    if state.sigma_points.picture_margin < f32::INFINITY {
+        let counts = |index: usize| {
+            is_visible(index) && is_in_picture(camera, state, mean_and_jacobian(camera, rules, points[index]).0)
+        };
+        let is_drawn =
+            if state.sigma_points.all { (0..points.len()).all(counts) } else { (0..points.len()).any(counts) };
+        if !is_drawn {
+            return Transformed::OutsidePicture;
+        }
+    }
+    if !all_visible {
+        return Transformed::Unseen;
     }
     let center = mean_and_jacobian(camera, rules, t).0;
     let period = panorama::period(camera, rules);
@@ -48,24 +70,41 @@ pub fn transform(
         if index == 0 { lambda / (N + lambda) } else { other }
     };
     let in_covariance = |index: usize| match index {
-        0 => lambda / (N + lambda) + 1.0 - ALPHA * ALPHA + rules.unscented_beta,
+        0 => lambda / (N + lambda) + 1.0 - alpha * alpha + rules.unscented_beta.unwrap_or(beta),
         _ => other,
     };
     let mean = [0, 1].map(|axis| {
         let places = places.iter().enumerate();
         places.map(|(index, place)| in_mean(index) * place[axis]).sum::<f64>()
     });
-    let deviations = places
-        .iter()
-        .enumerate()
-        .map(|(index, place)| [0, 1].map(|axis| in_covariance(index).sqrt() * (place[axis] - mean[axis])));
-    Some((mean, deviations.collect()))
+    let deviations = places.iter().enumerate().map(|(index, place)| {
+        let weight = in_covariance(index);
+        let root = weight.abs().sqrt();
+        Deviation { at: [0, 1].map(|axis| root * (place[axis] - mean[axis])), sign: weight.signum() }
+    });
+    Transformed::Moments(mean, deviations.collect())
+}
+
+/// True if a pixel lies in the viewport or its margin.
+fn is_in_picture(camera: &OracleCamera, state: &OracleState, pixel: [f64; 2]) -> bool {
+    let margin = f64::from(state.sigma_points.picture_margin);
+    let inside = |at: f64, size: u32| {
+        let size = f64::from(size);
+        -margin * size <= at && at < size + margin * size
+    };
+    inside(pixel[0], camera.width) && inside(pixel[1], camera.height)
 }
 
 /// True if a sigma point of a Gaussian at `t` is visible together with it. It must be beyond the near plane. For a
 /// fisheye it must be less than a right angle away, and the backward axis must be outside the cone of that angle about
 /// `t`. For a panorama the poles must be outside that cone.
-fn is_sigma_point_visible(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
+fn is_sigma_point_visible(camera: &OracleCamera, rules: &Rules, t: [f64; 3], point: [f64; 3]) -> bool {
+    if let Some(lens) = &camera.lens
+        && rules.lenses_fold
+        && ideal_radius(camera, rules, point) >= lens.fold().least
+    {
+        return false;
+    }
     let cosine = dot(t, point);
     let sine = length(cross(t, point));
     let apart = sine.atan2(cosine);

@@ -104,6 +104,7 @@ pub fn camera(width: u32, height: u32) -> OracleCamera {
         principal: [0.5 * width as f32, 0.5 * height as f32],
         near: 0.2,
         far: f32::INFINITY,
+        lens: None,
     }
 }
 

@@ -15,7 +15,9 @@ use crate::gaussian::view::visible::Visible;
 use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, ModelAttributes};
 use crate::runtime::SimdLevel;
 use crate::state::Viewport;
-use crate::state::gaussian::{Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState};
+use crate::state::gaussian::{
+    Camera, Distortion, DistortionModel, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
+};
 use crate::stats::optimizations::Optimizations;
 use devmem::{Allocation, BufferRange, dispatch};
 use rand::{Rng, SeedableRng};
@@ -119,6 +121,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     near_plane: 0.2,
                     far_plane: 50.0,
                     depth_coefficients: [0.0; 2],
+                    distortion: None,
                 };
                 let viewport = Viewport { x: 0.0, y: 0.0, width: SIZE, height: SIZE, min_depth: 0.0, max_depth: 1.0 };
                 let visible = Visible { left: 0, top: 0, right: 400, bottom: 400 };
@@ -166,5 +169,29 @@ fn what_is_outside_is_drawn_nowhere() {
                 "{geometry:?} {precision:?} {linearization:?} {model:?}: {drawn} drawn, {beside} and {beside_chunks} beside"
             );
         }
+    }
+}
+
+#[gaurast_runner::test]
+fn what_lies_beyond_a_pinhole_s_fold_is_outside() {
+    let radial = [-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let (model, tangential, thin_prism) = (DistortionModel::Polynomial, [0.0; 2], [0.0; 4]);
+    // The lens folds at a slope of 1.
+    let distortion = Some(Distortion { model, radial, tangential, thin_prism });
+    let camera = Camera { focal_length: [300.0; 2], principal_point: [200.0; 2], distortion, ..Camera::default() };
+    let viewport = Viewport { x: 0.0, y: 0.0, width: SIZE, height: SIZE, min_depth: 0.0, max_depth: 1.0 };
+    let visible = Visible { left: 0, top: 0, right: 400, bottom: 400 };
+    let state = GaussianState::default();
+    let constants = ViewConstants::new(&state, &camera, &viewport, visible, None, Optimizations::NONE);
+    let frustum = Frustum::new(&constants, 1.0);
+    let at = |x: f32, y: f32| {
+        let place = [x, y, 5.0];
+        frustum.excludes(&Bounds { low: place, high: place, scale: 100.0, opacity: 1.0 })
+    };
+    for [x, y] in [[4.99, 0.0], [-4.99, 4.99], [0.0, -4.99]] {
+        assert_eq!(at(x, y), None, "{x} {y}");
+    }
+    for [x, y] in [[5.01, 0.0], [-5.01, 0.0], [1.0, 5.01], [1.0, -5.01]] {
+        assert_eq!(at(x, y), Some(Outside::Beside), "{x} {y}");
     }
 }

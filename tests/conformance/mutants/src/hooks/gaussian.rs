@@ -1,9 +1,11 @@
 //! The extension's commands.
 
 use ash::vk;
+use ash::vk::TaggedStructure;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST as Camera, GaussianCameraModelGAURAST as Model,
-    GaussianOrderGAURAST, GaussianSphericalHarmonicsBufferGAURAST as Harmonics,
+    GaussianAntialiasingGAURAST, GaussianCameraDistortionGAURAST as Distortion, GaussianCameraGAURAST as Camera,
+    GaussianCameraModelGAURAST as Model, GaussianDistortionModelGAURAST as DistortionModel, GaussianOrderGAURAST,
+    GaussianSphericalHarmonicsBufferGAURAST as Harmonics,
 };
 
 use crate::next::next;
@@ -37,6 +39,35 @@ fn changed(mut camera: Camera<'_>) -> Camera<'_> {
     camera
 }
 
+/// A copy of a camera's distortion with the active mutant's change; `None` if it has none, or none any more.
+///
+/// # Safety
+/// The camera's chain is valid.
+unsafe fn distortion(camera: &Camera<'_>) -> Option<Distortion<'static>> {
+    let chained = camera.p_next.cast::<vk::BaseInStructure<'_>>();
+    // SAFETY: the caller's promise. No other structure extends a camera.
+    let given = unsafe {
+        let is_distortion = chained.as_ref().is_some_and(|first| first.s_type == Distortion::STRUCTURE_TYPE);
+        is_distortion.then(|| *chained.cast::<Distortion<'static>>())?
+    };
+    if DISTORTION_IGNORED.strikes(true) {
+        return None;
+    }
+    let mut changed = Distortion { p_next: std::ptr::null(), ..given };
+    DISTORTION_MODEL.replaces(&mut changed.model, DistortionModel::RATIONAL);
+    if changed.model == DistortionModel::POLYNOMIAL_FIRST {
+        DISTORTION_FIRST.replaces(&mut changed.model, DistortionModel::POLYNOMIAL);
+    }
+    let [k1, k2, ..] = changed.radial;
+    DISTORTION_RADIAL.replaces(&mut changed.radial, [0.0; 6]);
+    DISTORTION_RADIAL_HIGH.replaces(&mut changed.radial, [k1, k2, 0.0, 0.0, 0.0, 0.0]);
+    DISTORTION_TANGENTIAL.replaces(&mut changed.tangential, [0.0; 2]);
+    DISTORTION_TANGENTIAL_SWAPPED.changes(&mut changed.tangential, |[p1, p2]| [p2, p1]);
+    DISTORTION_THIN_PRISM.replaces(&mut changed.thin_prism, [0.0; 4]);
+    DISTORTION_THIN_PRISM_ORDER.changes(&mut changed.thin_prism, |[s1, s2, s3, s4]| [s1, s3, s2, s4]);
+    Some(changed)
+}
+
 pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
     commands: vk::CommandBuffer,
     count: u32,
@@ -57,6 +88,14 @@ pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
         }
         if count > 2 && VIEWS_CAMERAS_PACKED.strikes(true) {
             cameras[2] = cameras[1];
+        }
+        let mut distortions: Vec<_> = cameras.iter().map(|camera| distortion(camera)).collect();
+        if DISTORTION_OF_FIRST_VIEW.strikes(distortions.len() > 1) {
+            let first = distortions[0];
+            distortions.fill(first);
+        }
+        for (camera, distortion) in cameras.iter_mut().zip(&distortions) {
+            camera.p_next = distortion.as_ref().map_or(std::ptr::null(), |chained| std::ptr::from_ref(chained).cast());
         }
         (next().cmd_set_gaussian_cameras)(commands, cameras.len() as u32, cameras.as_ptr());
     }

@@ -11,6 +11,7 @@ use gaurast::vk::{
     GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
     GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
     PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as Unscented,
 };
 
 use crate::mutant::Mutant;
@@ -45,6 +46,7 @@ fn change(request: &mut Request) {
         request.gaussian = Some(state);
     }
     change_approximations(request);
+    change_sigma_points(request);
     change_vertex_input(request);
     change_dynamic_states(request);
     change_tests(request);
@@ -138,6 +140,18 @@ fn change_approximations(request: &mut Request) {
             request.footprint = None;
         }
     }
+}
+
+fn change_sigma_points(request: &mut Request) {
+    let default = Unscented::default();
+    let Some(points) = &mut request.unscented else {
+        return;
+    };
+    SIGMA_ALPHA.replaces(&mut points.alpha, default.alpha);
+    SIGMA_BETA.replaces(&mut points.beta, default.beta);
+    SIGMA_KAPPA.replaces(&mut points.kappa, default.kappa);
+    SIGMA_MARGIN.replaces(&mut points.picture_margin, default.picture_margin);
+    SIGMA_ALL.replaces(&mut points.all_sigma_points, default.all_sigma_points);
 }
 
 /// The bytes of a vertex format; 0 of one that the mutants leave alone.
