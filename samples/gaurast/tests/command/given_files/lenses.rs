@@ -39,11 +39,11 @@ fn camera(line: &str, folder: &Path) -> Camera {
     camera_files::read(folder, &options).expect(line).views.remove(0).camera
 }
 
-/// Points whose places in the picture are apart, from the axis outwards, with those places.
+/// Points whose places in the picture are apart, near the axis and far from it, with those places.
 fn points(camera: &Camera) -> Vec<(DVec3, DVec2)> {
     let size = DVec2::new(camera.width.into(), camera.height.into());
     let mut points: Vec<(DVec3, DVec2)> = Vec::new();
-    for step in 0..400_u32 {
+    for step in (0..400_u32).map(|index| index * 173 % 400) {
         let (angle, turn) = (f64::from(step) * 0.0037, f64::from(step) * 2.4);
         let direction = DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos());
         // The file stores points in binary32.
