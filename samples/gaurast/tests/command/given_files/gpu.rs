@@ -151,15 +151,15 @@ fn flat_pictures_of_gsplat() {
 #[gaurast_runner::test(needs = NEEDS)]
 fn unscented_pictures_of_gsplat() {
     let options = &["--as", "gsplat-unscented", "--near", "0.2"];
-    Set { views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
+    Set { least: 59.9, most: 3_260, views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
 }
 
 #[gaurast_runner::test(needs = NEEDS)]
 fn distorted_pictures_of_gsplat() {
     let lens = Some(("FULL_OPENCV", "0.12 -0.05 0.002 -0.003 0.01 0 0 0"));
     Set {
-        least: 40.0,
-        most: 0,
+        least: 76.9,
+        most: 29,
         views: &["plant-0", "playbot-0"],
         lens,
         ..Set::new("gsplat_distorted", 4_096.0, GSPLAT)
@@ -171,8 +171,8 @@ fn distorted_pictures_of_gsplat() {
 fn distorted_fisheyes_of_gsplat() {
     let lens = Some(("OPENCV_FISHEYE", "0.05 -0.01 0.002 -0.0005"));
     Set {
-        least: 40.0,
-        most: 0,
+        least: 75.9,
+        most: 39,
         views: &["plant-0", "playbot-0"],
         lens,
         ..Set::new("gsplat_distorted_fisheye", 4_096.0, GSPLAT)
