@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
-use gaurast_scene::{GaussianShape, Scene};
+use gaurast_scene::{Distortion, GaussianShape, Scene};
 use gaurast_testkit::for_levels::levels;
 use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_binary16, render_bounded};
@@ -81,6 +81,7 @@ fn for_quads(stress: &Stress) -> Option<(Scene, Camera)> {
         eye: camera.eye,
         focal: camera.focal_length.map(f64::from),
         principal: camera.principal_point.map(f64::from),
+        distortion: Distortion::default(),
         width: stress.size[0],
         height: stress.size[1],
         near: DEFAULT_NEAR,

@@ -133,7 +133,6 @@ def test_a_fisheye_hides_what_is_before_the_near_plane(arrays):
     ("options", "name"),
     [
         ({"radius_clip": 1.0}, "radius_clip"),
-        ({"with_ut": True}, "with_ut"),
         ({"with_eval3d": True}, "with_eval3d"),
         ({"distributed": True}, "distributed"),
         ({"absgrad": True}, "gradients"),
@@ -141,7 +140,7 @@ def test_a_fisheye_hides_what_is_before_the_near_plane(arrays):
         ({"render_mode": "Ed"}, "render_mode"),
         ({"camera_model": "ftheta"}, "camera_model"),
         ({"tile_size": 8}, "tile_size"),
-        ({"radial_coeffs": np.zeros((1, 6))}, "radial_coeffs"),
+        ({"rays": np.zeros((1, 6))}, "rays"),
         ({"return_normals": True}, "return_normals"),
     ],
 )
@@ -150,6 +149,62 @@ def test_what_is_not_supported_is_one_sentence(arrays, options, name):
     with pytest.raises(NotImplementedError, match=name) as raised:
         call(scene, scene.colors, **options)
     assert "\n" not in str(raised.value)
+
+
+RADIAL = [0.12, -0.05, 0.01, 0.02, -0.01, 0.001]
+TANGENTIAL = [0.002, -0.003]
+THIN_PRISM = [0.004, -0.001, -0.002, 0.0005]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lenses_are_those_of_the_reference(arrays, seed):
+    scene = arrays(100 + seed, 120)
+    lens = (RADIAL, TANGENTIAL, THIN_PRISM) if seed % 2 else ([0.0] * 6, [0.0] * 2, [0.0] * 4)
+    names = ("radial_coeffs", "tangential_coeffs", "thin_prism_coeffs")
+    coefficients = {name: np.array([values], np.float32) for name, values in zip(names, lens)} if seed % 2 else {}
+    picture, _, _ = call(scene, scene.colors, with_ut=True, **coefficients)
+    reference, alphas, undecided = expected(scene, scene.colors, "RGB", lens=lens)
+    assert (alphas > 0.1).mean() > 0.05 and undecided.mean() < 0.005
+    assert np.abs(picture[0] - reference)[~undecided].max() < 1e-4
+
+
+def test_a_camera_with_a_lens_is_drawn_as_its_coefficients_are(arrays):
+    scene = arrays(9, 120)
+    K = scene.K[None]
+    lens = gaurast.Distortion("rational", RADIAL, TANGENTIAL, THIN_PRISM)
+    camera = gaurast.Camera.from_matrices(scene.viewmat, scene.K, *scene.size, near=0.01, distortion=lens)
+    own = gaurast.Scene.from_arrays(scene.means, scene.quats, scene.scales, scene.opacities, scene.harmonics)
+    ideal = gaurast.Camera.from_matrices(scene.viewmat, scene.K, *scene.size, near=0.01)
+    picture = np.asarray(gaurast.render(own, camera))
+    assert np.abs(picture - np.asarray(gaurast.render(own, ideal))).max() > 0.05
+    # The Jacobian and the unscented transform of small Gaussians agree.
+    unscented, _, _ = gaurast.rasterization(
+        scene.means, scene.quats, scene.scales, scene.opacities, scene.harmonics, scene.viewmat[None], K, *scene.size, sh_degree=3,
+        with_ut=True, radial_coeffs=[RADIAL], tangential_coeffs=[TANGENTIAL], thin_prism_coeffs=[THIN_PRISM],
+    )  # fmt: skip
+    assert np.abs(picture[..., :3] - unscented).mean() < 5e-3
+    # A fisheye folds at 1 / sqrt(3 * 2) radians, and shows nothing beyond.
+    fisheye = gaurast.Distortion("polynomial", (-2.0, 0, 0, 0, 0, 0))
+    camera = gaurast.Camera.from_matrices(
+        scene.viewmat, scene.K, *scene.size, model="fisheye", near=0.01, distortion=fisheye
+    )
+    assert 0.0 < np.asarray(gaurast.render(own, camera))[..., 3].sum() < picture[..., 3].sum()
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"radial_coeffs": np.zeros((1, 6))}, "radial_coeffs need with_ut=True"),
+        ({"radial_coeffs": np.zeros((1, 5)), "with_ut": True}, r"radial_coeffs has the shape \(1, 5\), not \(1, 6\)"),
+        ({"tangential_coeffs": np.zeros((1, 2)), "with_ut": True, "camera_model": "fisheye"}, "does not go with"),
+        ({"radial_coeffs": np.zeros((1, 6)), "with_ut": True, "camera_model": "ortho"}, "does not go with"),
+        ({"with_ut": True, "rasterize_mode": "antialiased"}, "with_ut=True goes with"),
+    ],
+)
+def test_lenses_that_gsplat_refuses_are_refused(arrays, options, reason):
+    scene = arrays(5, 10)
+    with pytest.raises(ValueError, match=reason):
+        call(scene, scene.colors, **options)
 
 
 def test_wrong_shapes_are_named(arrays):

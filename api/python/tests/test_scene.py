@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import struct
 import zlib
@@ -109,6 +110,31 @@ def test_camera_files(tmp_path):
     assert again.focal == tuple(camera.focal) and again.principal == tuple(camera.principal)
     with pytest.raises(ValueError, match="not a rotation"):
         gaurast.Camera.from_matrices(2.0 * np.eye(4), camera.K, 64, 48)
+
+
+def test_lenses_of_camera_files(tmp_path):
+    file = tmp_path / "transforms.json"
+    file.write_text(
+        '{"camera_model": "OPENCV", "fl_x": 50, "w": 64, "h": 48, "k1": -0.25, "p2": 0.125, "frames": [{"file_path": "a.png",'
+        ' "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]}'
+    )
+    (camera,) = gaurast.cameras(file)
+    lens = gaurast.Distortion(radial=(-0.25, 0, 0, 0, 0, 0), tangential=(0, 0.125))
+    assert camera.distortion == lens and camera.resized((32, 24)).distortion == lens
+    assert pickle.loads(pickle.dumps(camera)) == camera
+    with pytest.warns(UserWarning, match=r"distortion \(k1 = -0.25, p2 = 0.125\) is left out"):
+        (ideal,) = gaurast.cameras(file, undistorted=True)
+    assert ideal.distortion is None
+
+
+def test_lenses_that_no_camera_has_are_refused(garden):
+    camera = garden.frame((16, 16))
+    for lens, reason in [
+        (gaurast.Distortion("barrel"), "'barrel' is not a model of distortion"),
+        (gaurast.Distortion("division", (0.1, 0.1, 0, 0, 0, 0)), "a coefficient of the lens"),
+    ]:
+        with pytest.raises(ValueError, match=reason):
+            gaurast.render(garden, dataclasses.replace(camera, distortion=lens))
 
 
 def test_pictures_of_several_cameras(garden):

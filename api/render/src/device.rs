@@ -137,6 +137,10 @@ struct PhysicalDevice {
     max_size: u32,
     max_gaussians: u64,
     max_sh_degree: u32,
+    /// True if it draws lenses that distort.
+    distorts: bool,
+    /// True if it has the unscented transform with any sigma points.
+    has_sigma_points: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
@@ -235,6 +239,16 @@ impl Device {
 
     pub(super) fn max_sh_degree(&self) -> u32 {
         self.physical.max_sh_degree
+    }
+
+    /// Returns true if the device draws lenses that distort.
+    pub(super) fn distorts(&self) -> bool {
+        self.physical.distorts
+    }
+
+    /// Returns true if the device has the unscented transform with any sigma points.
+    pub(super) fn has_sigma_points(&self) -> bool {
+        self.physical.has_sigma_points
     }
 
     /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
@@ -403,6 +417,8 @@ impl PhysicalDevice {
             max_size: max_size.into_iter().min().unwrap_or_default(),
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,
+            distorts: features.gaussian_distortion == vk::TRUE,
+            has_sigma_points: [features.unscented_projection, features.unscented_parameters] == [vk::TRUE; 2],
             // SAFETY: the handle is the instance's.
             memory: unsafe { instance.get_physical_device_memory_properties(handle) },
         }))

@@ -27,7 +27,11 @@ impl Recorder<'_> {
     /// Gaussians, those of `list` are drawn, in its order, or all.
     pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera, list: Option<&List>) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
+        let mut distortion = camera.distortion.to_vulkan();
         let mut vulkan = camera.to_vulkan();
+        if !camera.distortion.is_none() {
+            vulkan = vulkan.push_next(&mut distortion);
+        }
         if list.is_some() {
             // What lies beyond the planes is not listed.
             vulkan = vulkan.near_plane(f32::MIN_POSITIVE).far_plane(f32::INFINITY);

@@ -50,7 +50,7 @@ pub use device::device_names;
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
 pub use gaurast::WorkTrace;
-pub use modes::{CutOff, Precision};
+pub use modes::{CutOff, Precision, SigmaPoints};
 pub use options::{DeviceOptions, Message, MessageFunction};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};

@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, GaussianResolveInputLocationsGAURAST,
+    GaussianPrecisionGAURAST, GaussianResolveInputLocationsGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_scene::{Antialiasing, Geometry, SortOrder};
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,36 @@ impl CutOff {
             Self::TileSquare => GaussianCutOffGAURAST::TILE_SQUARE,
             Self::TileRectangle => GaussianCutOffGAURAST::TILE_RECTANGLE,
         }
+    }
+}
+
+/// The sigma points of the unscented transform, by which covariances are projected without the Jacobian.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SigmaPoints {
+    /// The spread of the points about the mean.
+    pub alpha: f32,
+    /// The part of the mean's own weight that a distribution decides: 2 for Gaussians.
+    pub beta: f32,
+    /// The second parameter of the spread.
+    pub kappa: f32,
+    /// The part of the picture's size by which points that count may lie outside of it.
+    pub picture_margin: f32,
+    /// True if a Gaussian is drawn only if all of its points count, false if one suffices.
+    pub all: bool,
+}
+
+impl SigmaPoints {
+    /// gsplat's.
+    pub const GSPLAT: Self = Self { alpha: 0.1, beta: 2.0, kappa: 0.0, picture_margin: 0.1, all: false };
+
+    /// The structure for the pipeline.
+    pub(crate) fn raw(self) -> PipelineGaussianUnscentedStateCreateInfoGAURAST<'static> {
+        PipelineGaussianUnscentedStateCreateInfoGAURAST::default()
+            .alpha(self.alpha)
+            .beta(self.beta)
+            .kappa(self.kappa)
+            .picture_margin(self.picture_margin)
+            .all_sigma_points(self.all)
     }
 }
 

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianLinearizationGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::device::Device;
 use crate::error::{During, RenderError};
-use crate::modes::{self, Kept};
+use crate::modes::{self, Kept, SigmaPoints};
 use crate::settings::Settings;
 use crate::target::DEPTH_FORMAT;
 use gaurast_scene::GaussianShape;
@@ -116,6 +116,10 @@ impl GaussianPipeline {
             .cut_off(settings.cut_off.raw())
             .cut_off_deviations(settings.cut_off_deviations)
             .compensation_floor(settings.compensation_floor);
+        let mut unscented = settings.sigma_points.map(SigmaPoints::raw);
+        if unscented.is_some() {
+            gaussian = gaussian.linearization(GaussianLinearizationGAURAST::UNSCENTED);
+        }
         let mut create_info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)
@@ -130,6 +134,9 @@ impl GaussianPipeline {
             .push_next(&mut approximation)
             .push_next(&mut footprint)
             .push_next(&mut rendering);
+        if let Some(unscented) = &mut unscented {
+            create_info = create_info.push_next(unscented);
+        }
         if over_mesh {
             create_info = create_info.depth_stencil_state(&depth_test);
         }

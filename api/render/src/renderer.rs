@@ -172,6 +172,9 @@ impl Renderer {
         mut settings: Settings,
         over_mesh: bool,
     ) -> Result<GaussianPipeline, RenderError> {
+        if settings.sigma_points.is_some() && !self.device.has_sigma_points() {
+            return Err(RenderError::Combination("the device has no unscented transform with other sigma points"));
+        }
         settings.sh_degree = settings.sh_degree.min(stored_degree).min(self.device.max_sh_degree());
         GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over_mesh)
     }
@@ -328,6 +331,10 @@ impl Renderer {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
         scene.settings.check(camera)?;
+        if !camera.distortion.is_none() && !self.device.distorts() {
+            let sentence = "the device draws ideal lenses alone, and the camera's distorts (--undistorted)";
+            return Err(RenderError::Combination(sentence));
+        }
         let tested = scene.mesh.is_some();
         if tested {
             scene.settings.check_mesh(camera)?;

@@ -5,7 +5,7 @@ use gaurast_scene::{Antialiasing, Camera, Geometry, MAX_SH_DEGREE, SortOrder};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{CutOff, Kept, Precision};
+use crate::modes::{CutOff, Kept, Precision, SigmaPoints};
 
 /// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +39,8 @@ pub struct Settings {
     pub cut_off_deviations: f32,
     /// The variance of the screen filter in px^2; `None` is 3DGS's 0.3, or 0.5 of flat Gaussians.
     pub low_pass_variance: Option<f32>,
+    /// Project covariances by the unscented transform with these sigma points, and not by the Jacobian.
+    pub sigma_points: Option<SigmaPoints>,
     /// Leave out Gaussians, and sort them, by the z of their centres, whatever `order` says: the renderer lists them for each
     /// frame. Else a fisheye and a panorama go by distance, and the near plane cuts each ray that meets a flat Gaussian.
     pub by_z: bool,
@@ -68,6 +70,7 @@ impl Default for Settings {
             cut_off: CutOff::None,
             cut_off_deviations: 3.0,
             low_pass_variance: None,
+            sigma_points: None,
             by_z: false,
             depth: false,
             linear_depth: false,
@@ -97,6 +100,7 @@ impl Settings {
                 matches!(camera.model, Model::Fisheye | Model::Equirectangular),
                 "meshes are drawn by pinhole and orthographic cameras alone",
             ),
+            (!camera.distortion.is_none(), "meshes are drawn by ideal lenses alone (--undistorted)"),
             (self.kept().is_some(), "depths are not kept of scenes with meshes"),
             (
                 camera.model == Model::Orthographic && camera.far.is_infinite(),
@@ -119,6 +123,7 @@ impl Settings {
         let surfels = self.geometry == Geometry::Surfel;
         let per_pixel = self.order == SortOrder::PerPixel;
         let panorama = camera.model == Model::Equirectangular;
+        let distorted = !camera.distortion.is_none();
         let refused = [
             (surfels && half, "flat Gaussians (2d) are not drawn in binary16 (fp16)"),
             (
@@ -129,6 +134,12 @@ impl Settings {
                 surfels && (panorama || camera.model == Model::Fisheye),
                 "flat Gaussians (2d) are drawn by pinhole and orthographic cameras alone",
             ),
+            (
+                surfels && self.sigma_points.is_some(),
+                "flat Gaussians (2d) are not projected by the unscented transform",
+            ),
+            (surfels && distorted, "flat Gaussians (2d) are drawn by ideal lenses alone (--undistorted)"),
+            (per_pixel && distorted, "the order per-pixel goes with ideal lenses alone (--undistorted)"),
             (half && per_pixel, "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel"),
             (half && panorama, "panoramas are not drawn in binary16 (fp16)"),
             (

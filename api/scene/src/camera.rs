@@ -5,6 +5,8 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::distortion::Distortion;
+
 /// The default vertical field of view, in degrees.
 pub const DEFAULT_FOV: f64 = 50.0;
 
@@ -44,6 +46,9 @@ pub struct Camera {
     pub focal: [f64; 2],
     /// The principal point, in pixels from the picture's upper left corner.
     pub principal: [f64; 2],
+    /// The distortion of the lens, of a pinhole or a fisheye.
+    #[serde(default, skip_serializing_if = "Distortion::is_none")]
+    pub distortion: Distortion,
     /// The picture's width in pixels.
     pub width: u32,
     /// The picture's height in pixels.
@@ -94,6 +99,12 @@ pub enum CameraError {
     /// The near plane is not in front of the camera, or the far plane not behind it.
     #[error("the near plane is not in front of the camera, or the far plane is not beyond it")]
     Planes,
+    /// The lens of a panorama or an orthographic camera distorts.
+    #[error("the lens distorts, which only that of a pinhole or a fisheye does")]
+    Distortion,
+    /// A coefficient of the lens is not finite in binary32, or not one of its model.
+    #[error("a coefficient of the lens is beyond binary32, or not one of its model")]
+    Coefficients,
 }
 
 impl Camera {
@@ -137,6 +148,7 @@ impl Camera {
             eye,
             focal: [focal; 2],
             principal: [width / 2.0, height / 2.0],
+            distortion: Distortion::default(),
             width: size[0],
             height: size[1],
             near: DEFAULT_NEAR,
@@ -144,10 +156,11 @@ impl Camera {
         }
     }
 
-    /// Checks that the camera can draw: its numbers are finite, also in binary32, and its planes are in order.
+    /// Checks that the camera can draw: its numbers are finite, also in binary32, its planes are in order, and its lens is one
+    /// that it can have.
     ///
     /// # Errors
-    /// [`CameraError::NotFinite`], [`CameraError::Focal`] or [`CameraError::Planes`].
+    /// See [`CameraError`].
     pub fn check(&self) -> Result<(), CameraError> {
         let rotation = self.rotation.as_flattened();
         let binary32 = rotation.iter().chain(&self.principal);
@@ -161,6 +174,14 @@ impl Camera {
         let in_front = near > 0.0 || self.model == Model::Orthographic;
         if !near.is_finite() || !in_front || far.is_nan() || far <= near {
             return Err(CameraError::Planes);
+        }
+        if !self.distortion.is_none() {
+            if !matches!(self.model, Model::Pinhole | Model::Fisheye) {
+                return Err(CameraError::Distortion);
+            }
+            if !self.distortion.is_valid() {
+                return Err(CameraError::Coefficients);
+            }
         }
         Ok(())
     }
@@ -177,14 +198,20 @@ impl Camera {
         Self { focal: self.focal.map(|focal| focal * factor), ..*self }
     }
 
-    /// An orthographic camera with the same axes, which shows objects `distance` ahead as large as a pinhole camera
+    /// The camera with an ideal lens.
+    #[must_use]
+    pub fn undistorted(&self) -> Self {
+        Self { distortion: Distortion::default(), ..*self }
+    }
+
+    /// An orthographic camera with the same axes and an ideal lens, which shows objects `distance` ahead as large as a pinhole camera
     /// does.
     #[must_use]
     pub fn orthographic(&self, distance: f64) -> Self {
-        Self { model: Model::Orthographic, focal: self.focal.map(|focal| focal / distance), ..*self }
+        Self { model: Model::Orthographic, focal: self.focal.map(|focal| focal / distance), ..self.undistorted() }
     }
 
-    /// A fisheye with the same axes, whose vertical field of view is `fov` degrees.
+    /// A fisheye with the same axes and an ideal lens, whose vertical field of view is `fov` degrees.
     #[must_use]
     pub fn fisheye(&self, fov: f64) -> Self {
         let height = f64::from(self.height);
@@ -192,11 +219,11 @@ impl Camera {
             model: Model::Fisheye,
             focal: [height / fov.to_radians(); 2],
             principal: [f64::from(self.width) / 2.0, height / 2.0],
-            ..*self
+            ..self.undistorted()
         }
     }
 
-    /// A panorama with the same axes: all 360 by 180 degrees fill the picture.
+    /// A panorama with the same axes and an ideal lens: all 360 by 180 degrees fill the picture.
     #[must_use]
     pub fn panorama(&self) -> Self {
         let [width, height] = [self.width, self.height].map(f64::from);
@@ -204,7 +231,7 @@ impl Camera {
             model: Model::Equirectangular,
             focal: [width / std::f64::consts::TAU, height / std::f64::consts::PI],
             principal: [width / 2.0, height / 2.0],
-            ..*self
+            ..self.undistorted()
         }
     }
 
@@ -243,16 +270,37 @@ impl Camera {
             .collect()
     }
 
-    /// The position of a world point in the picture of a pinhole camera, in pixels. None if the point is not in front
-    /// of the camera.
+    /// The position of a world point in the picture, in pixels, which may lie outside of it. None if the point is not in front
+    /// of a pinhole or an orthographic camera, or if it is at or beyond the fold of the lens.
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
         let t = rotation * (DVec3::from_array(point) - DVec3::from_array(self.eye));
-        (t.z > 0.0)
-            .then(|| [self.focal[0] * t.x / t.z + self.principal[0], self.focal[1] * t.y / t.z + self.principal[1]])
+        let is_ahead = t.z > 0.0;
+        let ideal = match self.model {
+            Model::Pinhole => is_ahead.then(|| [t.x / t.z, t.y / t.z])?,
+            Model::Orthographic => is_ahead.then_some([t.x, t.y])?,
+            Model::Fisheye => {
+                let across = libm::hypot(t.x, t.y);
+                // The limit on the axis.
+                let scale = if across > 0.0 { libm::atan2(across, t.z) / across } else { 0.0 };
+                [scale * t.x, scale * t.y]
+            }
+            Model::Equirectangular => [libm::atan2(t.x, t.z), libm::atan2(t.y, libm::hypot(t.x, t.z))],
+        };
+        let place = if self.distortion.is_none() { ideal } else { self.distortion.distort(ideal)? };
+        Some([0, 1].map(|axis| self.focal[axis] * place[axis] + self.principal[axis]))
     }
 
-    /// The camera as a Vulkan structure for draws.
+    /// The angle from the camera's axis, in radians, at which the lens folds, and from which on there is nothing in the
+    /// picture. None if the lens doesn't fold.
+    pub fn fold_angle(&self) -> Option<f64> {
+        let fold = self.distortion.fold();
+        let angle = if self.model == Model::Fisheye { fold } else { libm::atan(fold) };
+        let greatest = if self.model == Model::Fisheye { std::f64::consts::PI } else { std::f64::consts::FRAC_PI_2 };
+        (angle < greatest).then_some(angle)
+    }
+
+    /// The camera as a Vulkan structure for draws, to which [`Distortion::to_vulkan`] may be chained.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
         let rotation = self.rotation.as_flattened();
         let model = match self.model {
@@ -280,6 +328,12 @@ mod tests {
     fn close(a: Option<[f64; 2]>, b: [f64; 2]) {
         let a = a.expect("in front");
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{a:?} {b:?}");
+    }
+
+    /// The camera with a lens of k1 = -0.4.
+    fn with_lens(camera: &Camera) -> Camera {
+        let distortion = Distortion { radial: [-0.4, 0.0, 0.0, 0.0, 0.0, 0.0], ..Distortion::default() };
+        Camera { distortion, ..camera.clone() }
     }
 
     #[test]
@@ -327,6 +381,10 @@ mod tests {
         let orthographic = Camera { near: -1.0, ..camera.orthographic(4.0) };
         assert_eq!(orthographic.check(), Ok(()));
         assert!((orthographic.focal[0] - camera.focal[0] / 4.0).abs() < 1e-12);
+        let distorted = with_lens(&camera);
+        assert_eq!(distorted.check(), Ok(()));
+        let other = Camera { model: Model::Orthographic, ..distorted };
+        assert_eq!(other.check(), Err(CameraError::Distortion));
     }
 
     #[test]
@@ -337,6 +395,38 @@ mod tests {
         let camera = camera.with_planes(0.01, 50.0);
         let text = serde_json::to_string(&camera).expect("text");
         assert_eq!(serde_json::from_str::<Camera>(&text).expect("a camera"), camera);
+        let distorted = with_lens(&camera);
+        let text = serde_json::to_string(&distorted).expect("text");
+        assert_eq!(serde_json::from_str::<Camera>(&text).expect("a camera"), distorted);
+    }
+
+    #[test]
+    fn a_lens_moves_points_and_shows_none_beyond_its_fold() {
+        let ideal = Camera {
+            eye: [0.0; 3],
+            rotation: DMat3::IDENTITY.to_cols_array_2d(),
+            ..Camera::orbit(1, [64, 48]).remove(0)
+        };
+        let distorted = with_lens(&ideal);
+        // At the slope 1 / 2 the radius is 1 - 0.4 / 4 times as large.
+        let [cx, cy] = ideal.principal;
+        close(distorted.project([0.5, 0.0, 1.0]), [cx + 0.45 * ideal.focal[0], cy]);
+        // 1 - 1.2 r^2 = 0.
+        let fold = distorted.fold_angle().expect("it folds");
+        assert!((libm::tan(fold) - (1.0 / 1.2_f64).sqrt()).abs() < 1e-12);
+        assert!(distorted.project([0.91, 0.0, 1.0]).is_some() && distorted.project([0.92, 0.0, 1.0]).is_none());
+        assert_eq!(ideal.fold_angle(), None);
+        // Scaled pictures of it are of the same lens, and other projections have an ideal one.
+        close(distorted.zoomed(2.0).project([0.5, 0.0, 1.0]), [cx + 0.9 * ideal.focal[0], cy]);
+        assert_eq!(distorted.panorama(), ideal.panorama());
+        assert_eq!(
+            (distorted.fisheye(90.0), distorted.orthographic(2.0)),
+            (ideal.fisheye(90.0), ideal.orthographic(2.0))
+        );
+        // A fisheye sees what is beside it and behind it.
+        let fisheye = ideal.fisheye(180.0);
+        close(fisheye.project([0.0, 2.0, 0.0]), [32.0, 48.0]);
+        assert!(fisheye.project([1.0, 0.0, -1.0]).is_some());
     }
 
     #[test]

@@ -28,8 +28,10 @@ pub fn parse(text: &str, size: [u32; 2]) -> Result<Vec<Keyframe>, serde_json::Er
         poses.map(|(index, pose)| pose.keyframe(pose.frame.map_or(index as f64, |frame| frame / rate), size)).collect()
     } else if let Some(animation) = track.animation_tracks.first() {
         animation.keyframes(size)
-    } else {
+    } else if !track.cameras.is_empty() {
         track.cameras.iter().enumerate().map(|(index, camera)| camera.initial.keyframe(index as f64, size)).collect()
+    } else {
+        track.camera.iter().filter_map(LoneCamera::pose).map(|pose| pose.keyframe(0.0, size)).collect()
     };
     let time = |keyframe: &Keyframe| keyframe.time.unwrap_or_default();
     keyframes.sort_by(|a, b| time(a).total_cmp(&time(b)));
@@ -52,6 +54,23 @@ struct Track {
     animation_tracks: Vec<AnimationTrack>,
     #[serde(default)]
     cameras: Vec<SettingsCamera>,
+    /// The one camera of the viewer's first settings.
+    camera: Option<LoneCamera>,
+}
+
+/// The camera of the first version of the settings of SuperSplat's viewer. A document has one without a position.
+#[derive(Deserialize)]
+struct LoneCamera {
+    position: Option<[f64; 3]>,
+    target: Option<[f64; 3]>,
+    fov: Option<f64>,
+}
+
+impl LoneCamera {
+    fn pose(&self) -> Option<Pose> {
+        let fov = self.fov.unwrap_or_else(default_fov);
+        Some(Pose { frame: None, position: self.position?, target: self.target?, fov })
+    }
 }
 
 #[derive(Deserialize)]
@@ -209,6 +228,11 @@ mod tests {
         let text = r#"{"version": 2, "animTracks": [], "cameras": [{"initial":
             {"position": [-1, -2, 3], "target": [-1, -2, 4], "fov": 90}}]}"#;
         check(&parse(text, [100, 100]).expect("a camera")[0], [100, 100], 50.0);
+        let first = r#"{"camera": {"fov": 90, "position": [-1, -2, 3], "target": [-1, -2, 4], "startAnim": "none"},
+            "background": {"color": [0, 0, 0]}, "animTracks": []}"#;
+        check(&parse(first, [100, 100]).expect("a camera")[0], [100, 100], 50.0);
+        let nowhere = first.replace("[-1, -2, 3]", "null");
+        assert!(parse(&nowhere, [100, 100]).expect("settings").is_empty());
     }
 
     #[test]

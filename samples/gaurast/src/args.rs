@@ -127,9 +127,10 @@ pub struct CameraArguments {
     #[arg(long, value_name = "FILE", requires = "cameras")]
     pub dataparser: Option<PathBuf>,
 
-    /// Ignore the lens distortion of cameras
+    /// Draw with ideal lenses, and ignore the distortion of the camera file's
     ///
-    /// Without this option, a camera with distortion is refused. nerfstudio and gsplat train on undistorted pictures.
+    /// Without this option, pictures are drawn as the lens distorts them, up to the angle where it folds. nerfstudio and gsplat
+    /// train on undistorted pictures.
     #[arg(long)]
     pub undistorted: bool,
 

@@ -214,12 +214,18 @@ pub fn of_scene(known: Known, arguments: &CameraArguments, scene: &Scene, garden
         let note = "--fov is of no account: a panorama has 360 by 180 degrees";
         views.notes.push(note.to_owned());
     }
+    let distorts = views.views.iter().any(|view| !view.camera.distortion.is_none());
     for view in &mut views.views {
         let camera = projected(&view.camera, arguments, &extent);
         let camera = camera.zoomed(arguments.zoom.unwrap_or(1.0));
         let near = arguments.near.unwrap_or(camera.near);
         view.camera = camera.with_planes(near, arguments.far.unwrap_or(camera.far));
         view.camera.check()?;
+    }
+    if distorts {
+        let drawn = lenses(views.views.iter().map(|view| &view.camera));
+        let left_out = || "--camera has an ideal lens, and the distortion of the file's is left out".to_owned();
+        views.notes.push(drawn.unwrap_or_else(left_out));
     }
     if let Some(view) = views.views.first().filter(|view| view.camera.model == Model::Orthographic) {
         let scale = short(1.0 / view.camera.focal[1]);
@@ -244,6 +250,28 @@ fn turned_with(camera: &Camera, scene: &Scene) -> Result<Camera, ViewError> {
     let matrix = file_axes.axes.matrix();
     let turned = |vector: [f64; 3]| (matrix * DVec3::from_array(vector)).to_array();
     Ok(Camera { rotation: camera.rotation.map(turned), eye: turned(camera.eye), ..camera.clone() })
+}
+
+/// A sentence about the lenses of `cameras` that distort, if there are any.
+pub fn lenses<'a>(cameras: impl IntoIterator<Item = &'a Camera>) -> Option<String> {
+    let mut distinct: Vec<&Camera> = Vec::new();
+    for camera in cameras {
+        let is_known = |other: &&Camera| (other.model, other.distortion) == (camera.model, camera.distortion);
+        if !camera.distortion.is_none() && !distinct.iter().any(is_known) {
+            distinct.push(camera);
+        }
+    }
+    let first = distinct.first()?;
+    let lens = first.distortion;
+    let fold = first.fold_angle().map_or_else(String::new, |angle| {
+        format!(", up to {:.1} degrees from its axis, where it folds", angle.to_degrees())
+    });
+    let others = match distinct.len() - 1 {
+        0 => String::new(),
+        1 => ", and so does 1 other".to_owned(),
+        count => format!(", and so do {count} others"),
+    };
+    Some(format!("the lens distorts and is drawn so ({}: {lens}){fold}{others}", lens.model.name()))
 }
 
 /// True if a camera of this model sees all around it, and thus stands in the scene.

@@ -96,6 +96,9 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
     let camera = arguments.modes.cameras(&arguments.camera);
     let Views { views, mut notes, framing, .. } = cameras::of_scene(known, &camera, &scene, garden)?;
     if arguments.camera.frame {
+        if !quiet && views.iter().any(|view| !view.camera.distortion.is_none()) {
+            eprintln!("gaurast: keyframes have ideal lenses: the distortion of the file's is left out");
+        }
         return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }
     notes.extend(source.notes.iter().cloned());

@@ -1,7 +1,7 @@
 //! Other renderers, whose pictures of a scene are asked for.
 
 use clap::ValueEnum;
-use gaurast_render::{CutOff, Settings};
+use gaurast_render::{CutOff, Settings, SigmaPoints};
 use gaurast_scene::camera::Model;
 use gaurast_scene::{Antialiasing, Camera, Geometry, SortOrder};
 
@@ -15,6 +15,8 @@ pub enum OtherRenderer {
     /// gsplat's up to 1.5: the same with alphas of up to 0.999
     #[value(name = "gsplat-1.5")]
     Gsplat15,
+    /// gsplat's with `with_ut=True`: by the unscented transform, as it draws all lenses that distort
+    GsplatUnscented,
     /// As KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
     Gltf,
     /// As OpenUSD's ParticleField3DGaussianSplat says: no cut-off, by depth unless the file has a hint
@@ -25,7 +27,7 @@ impl OtherRenderer {
     /// The order in which it composites, if a file's hint has no say.
     pub fn order(self, of_file: Option<SortOrder>) -> SortOrder {
         match self {
-            Self::Inria | Self::Gsplat | Self::Gsplat15 => SortOrder::Depth,
+            Self::Inria | Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => SortOrder::Depth,
             Self::Gltf => SortOrder::Distance,
             Self::Usd => of_file.unwrap_or(SortOrder::Depth),
         }
@@ -35,7 +37,7 @@ impl OtherRenderer {
     pub fn near(self) -> Option<f64> {
         match self {
             Self::Inria => Some(0.2),
-            Self::Gsplat | Self::Gsplat15 => Some(0.01),
+            Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => Some(0.01),
             Self::Gltf | Self::Usd => None,
         }
     }
@@ -44,22 +46,26 @@ impl OtherRenderer {
     /// 1/255, and finish pixels at 0.0001.
     pub fn settings<'a>(self, settings: Settings, cameras: impl IntoIterator<Item = &'a Camera>) -> Settings {
         let is_surfel = settings.geometry == Geometry::Surfel;
-        let is_gsplat = matches!(self, Self::Gsplat | Self::Gsplat15);
+        let is_gsplat = matches!(self, Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented);
         let (cut_off, cut_off_deviations) = match self {
             Self::Inria => (CutOff::TileSquare, 3.0),
             // The device has no cut-off of 2D Gaussians.
-            Self::Gsplat | Self::Gsplat15 if is_surfel => (CutOff::None, 3.33),
-            Self::Gsplat | Self::Gsplat15 => (CutOff::TileRectangle, 3.33),
+            _ if is_gsplat && is_surfel => (CutOff::None, 3.33),
+            Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => (CutOff::TileRectangle, 3.33),
             Self::Gltf => (CutOff::Ellipse, 3.0),
             Self::Usd => (CutOff::None, 3.0),
         };
         let is_compensated = settings.antialiasing == Antialiasing::Compensated;
-        let is_other_depth = is_surfel || cameras.into_iter().any(|camera| camera.model == Model::Fisheye);
+        let (mut is_other_depth, mut distorts) = (is_surfel, false);
+        for camera in cameras {
+            is_other_depth |= camera.model == Model::Fisheye;
+            distorts |= !camera.distortion.is_none();
+        }
         Settings {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: match self {
                 Self::Gsplat15 => 0.999,
-                Self::Inria | Self::Gsplat | Self::Gltf | Self::Usd => 0.99,
+                Self::Inria | Self::Gsplat | Self::GsplatUnscented | Self::Gltf | Self::Usd => 0.99,
             },
             transmittance_floor: 1e-4,
             cut_off,
@@ -68,6 +74,8 @@ impl OtherRenderer {
                 Self::Inria | Self::Gsplat if is_compensated => 0.000_025,
                 _ => 0.0,
             },
+            // gsplat draws lenses that distort by the unscented transform alone.
+            sigma_points: (self == Self::GsplatUnscented || (is_gsplat && distorts)).then_some(SigmaPoints::GSPLAT),
             by_z: is_gsplat && settings.order == SortOrder::Depth && is_other_depth,
             ..settings
         }

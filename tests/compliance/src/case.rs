@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gaurast_oracle::oracle::{OracleCutOff, OracleOrder, OracleState};
 use gaurast_scene::camera::{DEFAULT_NEAR, Model};
-use gaurast_scene::{Camera, Scene, SceneError, SortOrder};
+use gaurast_scene::{Camera, Distortion, Scene, SceneError, SortOrder};
 
 use crate::gaussian::Gaussian;
 use crate::gltf_file::Gltf;
@@ -299,6 +299,7 @@ fn camera(rotation: [[f64; 3]; 3], eye: [f64; 3]) -> Camera {
         eye,
         focal: [40.0; 2],
         principal: [f64::from(width) / 2.0, f64::from(height) / 2.0],
+        distortion: Distortion::default(),
         width,
         height,
         near: DEFAULT_NEAR,

@@ -8,7 +8,7 @@
 make any Vulkan program run on the driver.
 """
 
-from ._camera import Camera, cameras
+from ._camera import Camera, Distortion, cameras
 from ._env import environment, icd_path, layer_path, use_driver
 from ._gsplat import rasterization
 from ._render import Pictures, render
@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Camera",
+    "Distortion",
     "Pictures",
     "Scene",
     "cameras",

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Optional, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,25 @@ import numpy.typing as npt
 from . import _gaurast
 
 _Row = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """The distortion of a lens. An ideal place (u, v), for focal lengths of 1 and relative to the principal point, at the distance
+    r from it, is moved to another one: by a radial factor, and by what is added to it.
+
+    Attributes:
+        model: "rational" (OpenCV's), "polynomial" (OpenCV's fisheye), "polynomial_first" (Aria's Fisheye624), "field_of_view" or
+            "division".
+        radial: k1 to k6. The angle omega in radians of a field of view, and the coefficient of a division, are the first.
+        tangential: p1 and p2, in OpenCV's order.
+        thin_prism: s1 to s4, in OpenCV's order.
+    """
+
+    model: str = "rational"
+    radial: Sequence[float] = (0.0,) * 6
+    tangential: Sequence[float] = (0.0,) * 2
+    thin_prism: Sequence[float] = (0.0,) * 4
 
 
 @dataclass(frozen=True)
@@ -33,6 +52,8 @@ class Camera:
         near: Gaussians are drawn beyond this depth.
         far: Gaussians are drawn before this depth.
         name: The name of the photograph, of a camera from a file.
+        distortion: The distortion of the lens, of a pinhole or a fisheye; None of an ideal one. Nothing is drawn from the angle on
+            at which the lens folds.
     """
 
     rotation: Sequence[_Row]
@@ -45,10 +66,15 @@ class Camera:
     near: float = 0.2
     far: float = math.inf
     name: str = ""
+    distortion: Optional[Distortion] = None
 
     @classmethod
     def _of(cls, items: _gaurast.CameraItems) -> Camera:
         values = {key: _tuples(value) for key, value in items.items()}
+        lens = values["distortion"]
+        if isinstance(lens, dict):
+            parts: dict[str, Any] = {key: _tuples(value) for key, value in lens.items()}
+            values["distortion"] = Distortion(**parts)
         return cls(**values)  # type: ignore[arg-type]
 
     @classmethod
@@ -82,6 +108,7 @@ class Camera:
         model: str = "pinhole",
         near: float = 0.2,
         far: float = math.inf,
+        distortion: Optional[Distortion] = None,
     ) -> Camera:
         """The camera of a world-to-camera matrix `[4, 4]` (x right, y down, z forward) and intrinsics `[3, 3]`, whose skew is
         ignored.
@@ -107,6 +134,7 @@ class Camera:
             model=model,
             near=float(near),
             far=float(far),
+            distortion=distortion,
         )
 
     @property
@@ -153,7 +181,7 @@ def cameras(
     Args:
         size: The picture's size, for a `transforms.json` that gives none.
         dataparser: nerfstudio's `dataparser_transforms.json`.
-        undistorted: Replace a lens with distortion by an ideal one, instead of refusing it.
+        undistorted: Replace lenses that distort by ideal ones.
 
     Raises:
         OSError: The file can't be read.

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _gaurast
 from ._arrays import Floats, floats, like
-from ._camera import Camera
+from ._camera import Camera, Distortion
 from ._device import device as device_of
 
 # The ceiling of alpha of each version.
@@ -224,6 +224,11 @@ def rasterization(
         render_mode: "RGB", "D" (accumulated depth), "ED" (mean depth), "RGB+D" or "RGB+ED".
         rasterize_mode: "classic" or "antialiased".
         camera_model: "pinhole", "ortho" or "fisheye". Depths of a fisheye are distances, where gsplat's are z.
+        with_ut: Project covariances by the unscented transform, with `ut_params` or gsplat's sigma points.
+        radial_coeffs: Coefficients of lenses, `[..., C, 6]` of pinholes (k1 to k6) or `[..., C, 4]` (k1 to k4). They need `with_ut`, as
+            those below.
+        tangential_coeffs: p1 and p2 of pinholes, `[..., C, 2]`.
+        thin_prism_coeffs: s1 to s4 of pinholes, `[..., C, 4]`.
         covars: Covariances `[..., N, 3, 3]`, instead of `quats` and `scales`.
         version: "1.6" (alpha is at most 0.99, and antialiasing leaves at least 0.005 of the opacity) or "1.5" (0.999, and 0).
         threads: The number of the device's threads; 0 is one for each processor.
@@ -242,19 +247,14 @@ def rasterization(
         {
             "radius_clip": (radius_clip, 0.0),
             "distributed": (distributed, False),
-            "with_ut": (with_ut, False),
             "with_eval3d": (with_eval3d, False),
             "return_normals": (return_normals, False),
             "global_z_order": (global_z_order, True),
             "rays": (rays, None),
-            "radial_coeffs": (radial_coeffs, None),
-            "tangential_coeffs": (tangential_coeffs, None),
-            "thin_prism_coeffs": (thin_prism_coeffs, None),
             "ftheta_coeffs": (ftheta_coeffs, None),
             "lidar_coeffs": (lidar_coeffs, None),
             "external_distortion_coeffs": (external_distortion_coeffs, None),
             "viewmats_rs": (viewmats_rs, None),
-            "ut_params": (ut_params, None),
             "extra_signals": (extra_signals, None),
             "renderer_config": (renderer_config, None),
         }
@@ -271,6 +271,8 @@ def rasterization(
         raise NotImplementedError(f"camera_model={camera_model!r} is not supported: {', '.join(_MODELS)} are")
     if rasterize_mode not in ("classic", "antialiased"):
         raise ValueError(f"rasterize_mode={rasterize_mode!r} is neither 'classic' nor 'antialiased'")
+    if with_ut and (rasterize_mode != "classic" or covars is not None):
+        raise ValueError("with_ut=True goes with rasterize_mode='classic', quats and scales")
     if version not in _CEILINGS:
         raise ValueError(f"version={version!r} is not one of {', '.join(_CEILINGS)}")
 
@@ -307,6 +309,21 @@ def rasterization(
         gaussians["scales"] = deviations.reshape(batches, count, 3)
     views = flat(views, "viewmats", (seen, 4, 4))
     intrinsics = flat(intrinsics, "Ks", (seen, 3, 3))
+    coefficients = {
+        name: (floats(value, name), lengths)
+        for name, value, lengths in (
+            ("radial_coeffs", radial_coeffs, (6, 4)),
+            ("tangential_coeffs", tangential_coeffs, (2,)),
+            ("thin_prism_coeffs", thin_prism_coeffs, (4,)),
+        )
+        if value is not None
+    }
+    if coefficients and not with_ut:
+        raise ValueError(f"{', '.join(coefficients)} need with_ut=True")
+    for name, (value, lengths) in coefficients.items():
+        if value.shape not in [(*lead, seen, length) for length in lengths]:
+            raise ValueError(f"{name} has the shape {value.shape}, not {(*lead, seen, lengths[0])}")
+    lenses = _lenses(camera_model, {name: value for name, (value, _) in coefficients.items()}, batches * seen)
 
     if has_colors and colors is None:
         raise ValueError(f"render_mode={render_mode!r} needs colors")
@@ -322,6 +339,7 @@ def rasterization(
         "low_pass_variance": float(eps2d),
         "compensation_floor": _COMPENSATION_FLOORS[version],
         "by_z": is_fisheye,
+        "sigma_points": sigma_points(ut_params) if with_ut else None,
     }
     model = _MODELS[camera_model]
     device = device_of(threads)
@@ -329,8 +347,8 @@ def rasterization(
     for index in range(batches):
         arrays = Gaussians(**{name: values[index] for name, values in gaussians.items()})
         cameras = [
-            Camera.from_matrices(view, K, width, height, model=model, near=near_plane, far=far_plane)
-            for view, K in zip(views[index], intrinsics[index])
+            Camera.from_matrices(view, K, width, height, model=model, near=near_plane, far=far_plane, distortion=lens)
+            for view, K, lens in zip(views[index], intrinsics[index], lenses[index * seen :])
         ]
         for channels, some in _Batch(by_batch[index], cameras).by_camera():
             frame, alpha = _draw(device, scene, arrays, channels, some, settings, sh_degree, render_mode)
@@ -360,6 +378,35 @@ def rasterization(
         "n_cameras": seen,
     }
     return like(picture, means), like(alpha, means), meta
+
+
+def _lenses(camera_model: str, coefficients: dict[str, Floats], count: int) -> list[Optional[Distortion]]:
+    """The lens of each of `count` cameras, whose arrays of coefficients have one more axis."""
+    if not coefficients:
+        return [None] * count
+    if camera_model == "ortho" or (camera_model == "fisheye" and list(coefficients) != ["radial_coeffs"]):
+        raise ValueError(f"camera_model={camera_model!r} does not go with {', '.join(coefficients)}")
+
+    def rows(name: str, length: int) -> list[tuple[float, ...]]:
+        if name not in coefficients:
+            return [(0.0,) * length] * count
+        given = coefficients[name].reshape(count, -1)
+        return [tuple(row) + (0.0,) * (length - len(row)) for row in given.tolist()]
+
+    model = "polynomial" if camera_model == "fisheye" else "rational"
+    parts = zip(rows("radial_coeffs", 6), rows("tangential_coeffs", 2), rows("thin_prism_coeffs", 4))
+    return [Distortion(model, *of_camera) for of_camera in parts]
+
+
+def sigma_points(ut_params: Any) -> dict[str, Any]:
+    """The settings of gsplat's `UnscentedTransformParameters`, of an object with some of its attributes, or its defaults."""
+    return {
+        "alpha": float(getattr(ut_params, "alpha", 0.1)),
+        "beta": float(getattr(ut_params, "beta", 2.0)),
+        "kappa": float(getattr(ut_params, "kappa", 0.0)),
+        "picture_margin": float(getattr(ut_params, "in_image_margin_factor", 0.1)),
+        "all": bool(getattr(ut_params, "require_all_sigma_points_valid", False)),
+    }
 
 
 def _colors_by_batch(

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ._arrays import Floats, floats
 from ._camera import Camera
 from ._device import device as device_of
-from ._gsplat import Gaussians, draw_channels
+from ._gsplat import Gaussians, draw_channels, sigma_points
 from ._scene import Scene
 
 # What other renderers draw, as the command's --as: cut-off, its size in standard deviations, the ceiling of alpha, order, near plane.
@@ -23,6 +23,7 @@ _RENDERERS: dict[str, tuple[str, float, float, str, Optional[float]]] = {
     "inria": ("TileSquare", 3.0, 0.99, "depth", 0.2),
     "gsplat": ("TileRectangle", 3.33, 0.99, "depth", 0.01),
     "gsplat-1.5": ("TileRectangle", 3.33, 0.999, "depth", 0.01),
+    "gsplat-unscented": ("TileRectangle", 3.33, 0.99, "depth", 0.01),
     "gltf": ("Ellipse", 3.0, 0.99, "distance", None),
     "usd": ("None", 3.0, 0.99, "depth", None),
 }
@@ -117,7 +118,7 @@ def render(
     Args:
         camera: A camera or several of one size; without one, `scene.frame(size)`.
         size: The picture's width and height in pixels, instead of the camera's.
-        as_: Draw what another renderer would: "inria", "gsplat" (1.6), "gsplat-1.5", "gltf" or "usd". With `antialiasing`
+        as_: Draw what another renderer would: "inria", "gsplat" (1.6), "gsplat-1.5", "gsplat-unscented", "gltf" or "usd". With `antialiasing`
             "compensated" it is that renderer's compensated mode. Their near planes are not taken over: a camera has its own.
         sh_degree: The highest degree of spherical harmonics that is drawn.
         order: "depth", "distance" or "per-pixel"; "auto" is what the file says.
@@ -171,12 +172,15 @@ def render(
     settings["order"] = chosen("order", order, ["depth", "distance", "per-pixel"], stated_order, "depth")
     shape = chosen("geometry", geometry, list(_GEOMETRIES), metadata["geometry"], "3d")
     settings["geometry"] = _GEOMETRIES.get(shape, shape)
-    if as_ in ("gsplat", "gsplat-1.5"):
+    if as_ is not None and as_.startswith("gsplat"):
         is_surfel = settings["geometry"] == "surfel"
         if is_surfel:
             settings["cut_off"] = "None"
         is_other_depth = is_surfel or any(camera.model == "fisheye" for camera in cameras)
         settings["by_z"] = is_other_depth and settings["order"] == "depth"
+        if as_ == "gsplat-unscented" or any(camera.distortion is not None for camera in cameras):
+            # gsplat draws lenses that distort by the unscented transform alone.
+            settings["sigma_points"] = sigma_points(None)
 
     drawing = device_of(threads)
     first = {**settings, "linear_depth": True} if depth else settings

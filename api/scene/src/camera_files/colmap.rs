@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::view::{CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError};
+use super::view::{CameraFile, CameraFileError, CameraFileOptions, FileDistortion, Numbers, View, ViewError};
 use crate::camera::Model;
+use crate::distortion::{Distortion, DistortionModel};
 
 /// A camera model of COLMAP.
 struct CameraModel {
@@ -42,13 +43,6 @@ const MODELS: [CameraModel; 18] = [
     model("EUCM", 6),
     CameraModel { earlier: Some(3), ..model("EQUIRECTANGULAR", 2) },
 ];
-
-/// The names of coefficients of lens distortion, in the order in which models have them. Of models with a principal point,
-/// they follow it.
-const OPENCV: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
-const RADIAL: [&str; 4] = ["k1", "k2", "k3", "k4"];
-const THIN_PRISM: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"];
-const RAD_TAN_THIN_PRISM: [&str; 12] = ["k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"];
 
 /// Bytes of a point of an image: its position and the number of the point in space.
 const POINT: usize = 24;
@@ -88,49 +82,69 @@ struct Lens {
     model: Model,
     focal: [f64; 2],
     principal: [f64; 2],
-    distortion: Distortion,
+    distortion: FileDistortion,
 }
 
 impl Intrinsics {
-    /// The projection, whose distortion is not zero unless the lens is ideal.
+    /// The projection.
     fn lens(&self) -> Result<Lens, ViewError> {
         let p = |index: usize| self.parameters.get(index).copied().unwrap_or(0.0);
         let simple = ([p(0), p(0)], [p(1), p(2)], 3);
         let full = ([p(0), p(1)], [p(2), p(3)], 4);
-        let none: &[&'static str] = &[];
-        let (model, (focal, principal, first), names) = match self.model.as_str() {
-            "SIMPLE_PINHOLE" => (Model::Pinhole, simple, none),
-            "PINHOLE" => (Model::Pinhole, full, none),
-            "SIMPLE_RADIAL" | "RADIAL" => (Model::Pinhole, simple, &RADIAL[..]),
-            "OPENCV" | "FULL_OPENCV" => (Model::Pinhole, full, &OPENCV[..]),
-            "FOV" => (Model::Pinhole, full, &["omega"][..]),
-            "SIMPLE_DIVISION" => (Model::Pinhole, simple, &["k"][..]),
-            "DIVISION" => (Model::Pinhole, full, &["k"][..]),
-            // A pinhole if alpha is zero, whatever beta is.
-            "EUCM" => (Model::Pinhole, full, &["alpha"][..]),
-            "SIMPLE_FISHEYE" => (Model::Fisheye, simple, none),
-            "FISHEYE" => (Model::Fisheye, full, none),
-            "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" => (Model::Fisheye, simple, &RADIAL[..]),
-            "OPENCV_FISHEYE" => (Model::Fisheye, full, &RADIAL[..]),
-            "THIN_PRISM_FISHEYE" => (Model::Fisheye, full, &THIN_PRISM[..]),
-            "RAD_TAN_THIN_PRISM_FISHEYE" => (Model::Fisheye, full, &RAD_TAN_THIN_PRISM[..]),
+        let (model, (focal, principal, first)) = match self.model.as_str() {
+            "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "SIMPLE_DIVISION" => (Model::Pinhole, simple),
+            "PINHOLE" | "OPENCV" | "FULL_OPENCV" | "FOV" | "DIVISION" | "EUCM" => (Model::Pinhole, full),
+            "SIMPLE_FISHEYE" | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" => (Model::Fisheye, simple),
+            "FISHEYE" | "OPENCV_FISHEYE" | "THIN_PRISM_FISHEYE" | "RAD_TAN_THIN_PRISM_FISHEYE" => {
+                (Model::Fisheye, full)
+            }
             "EQUIRECTANGULAR" => {
                 // A panorama fills its picture, whatever parameters the file gives.
                 let [width, height] = self.size;
                 let focal = [width / std::f64::consts::TAU, height / std::f64::consts::PI];
-                let distortion = Distortion::default();
                 return Ok(Lens {
                     model: Model::Equirectangular,
                     focal,
                     principal: [width / 2.0, height / 2.0],
-                    distortion,
+                    distortion: FileDistortion::Drawn(Distortion::default()),
                 });
             }
             other => return Err(ViewError::Model(other.to_owned())),
         };
-        let coefficients = self.parameters.get(first..).unwrap_or_default();
-        let distortion = names.iter().copied().zip(coefficients.iter().copied()).collect();
-        Ok(Lens { model, focal, principal, distortion })
+        Ok(Lens { model, focal, principal, distortion: self.distortion(|index| p(first + index)) })
+    }
+
+    /// The distortion of the lens, whose coefficients follow the principal point.
+    fn distortion(&self, c: impl Fn(usize) -> f64) -> FileDistortion {
+        let of = |model, radial| Distortion { model, radial, ..Distortion::default() };
+        let one = |model, coefficient| of(model, [coefficient, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        FileDistortion::Drawn(match self.model.as_str() {
+            "SIMPLE_RADIAL" | "RADIAL" => of(DistortionModel::Rational, [c(0), c(1), 0.0, 0.0, 0.0, 0.0]),
+            "OPENCV" | "FULL_OPENCV" => Distortion {
+                tangential: [c(2), c(3)],
+                ..of(DistortionModel::Rational, [c(0), c(1), c(4), c(5), c(6), c(7)])
+            },
+            // The angle's sign does not matter.
+            "FOV" => one(DistortionModel::FieldOfView, c(0).abs()),
+            "SIMPLE_DIVISION" | "DIVISION" => one(DistortionModel::Division, c(0)),
+            // A pinhole if alpha is zero, whatever beta is.
+            "EUCM" if c(0) != 0.0 => return FileDistortion::Other(format!("alpha = {}, beta = {}", c(0), c(1))),
+            "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "OPENCV_FISHEYE" => {
+                of(DistortionModel::Polynomial, [c(0), c(1), c(2), c(3), 0.0, 0.0])
+            }
+            "THIN_PRISM_FISHEYE" => Distortion {
+                tangential: [c(2), c(3)],
+                thin_prism: [c(6), 0.0, c(7), 0.0],
+                ..of(DistortionModel::Polynomial, [c(0), c(1), c(4), c(5), 0.0, 0.0])
+            },
+            "RAD_TAN_THIN_PRISM_FISHEYE" => Distortion {
+                // p0 multiplies u^2, as OpenCV's p2 does.
+                tangential: [c(7), c(6)],
+                thin_prism: [c(8), c(9), c(10), c(11)],
+                ..of(DistortionModel::PolynomialFirst, [c(0), c(1), c(2), c(3), c(4), c(5)])
+            },
+            _ => Distortion::default(),
+        })
     }
 }
 
@@ -205,7 +219,7 @@ impl Photograph {
         ignored: &mut Vec<String>,
     ) -> Result<View, ViewError> {
         let Lens { model, focal, principal, distortion } = camera.lens()?;
-        distortion.check(options.undistorted, ignored)?;
+        let distortion = distortion.chosen(options.undistorted, ignored)?;
         let [w, x, y, z] = self.rotation;
         let quaternion = DQuat::from_xyzw(x, y, z, w);
         let length = quaternion.length();
@@ -220,6 +234,7 @@ impl Photograph {
             eye: eye.into(),
             focal,
             principal,
+            distortion,
             size: camera.size,
         }
         .camera()?;
@@ -482,10 +497,11 @@ mod tests {
     }
 
     #[test]
-    fn distorted_and_unknown_cameras_are_refused() {
+    fn lenses_are_read_and_unknown_cameras_refused() {
         let distorted = IMAGES.replace(" 1 b.png", " 2 b.png");
-        let refused = model(CAMERAS.as_bytes(), distorted.as_bytes(), "txt").expect_err("distorted");
-        assert!(refused.to_string().contains("k1 = 0.1"), "{refused}");
+        let file = model(CAMERAS.as_bytes(), distorted.as_bytes(), "txt").expect("cameras");
+        let lenses = [0, 1].map(|view: usize| file.views[view].camera.distortion.to_string());
+        assert_eq!(lenses, ["", "k1 = 0.1"]);
         let missing = IMAGES.replace(" 1 b.png", " 5 b.png");
         let refused = model(CAMERAS.as_bytes(), missing.as_bytes(), "txt").expect_err("missing");
         assert!(refused.to_string().contains("not there"), "{refused}");
@@ -523,7 +539,7 @@ mod tests {
 
     /// Tests each model, by number, with all coefficients zero, and with the last one not zero.
     #[test]
-    fn every_model_without_distortion_is_ideal() {
+    fn every_model_is_read_with_its_lens() {
         let simple = [0, 2, 3, 8, 9, 12, 14];
         let fisheyes = [5, 8, 9, 10, 11, 14, 15];
         for (number, entry) in (0..).zip(&MODELS) {
@@ -549,10 +565,15 @@ mod tests {
                     assert_eq!((camera.focal, camera.principal), (focal, [90.0, 60.0]), "{}", entry.name);
                 }
                 if count > first.len() && number < 17 {
-                    let distorted = if number == 16 { 4 } else { count - 1 };
-                    parameters[distorted] = 0.125;
-                    let refused = read(&parameters).expect_err(entry.name).to_string();
-                    assert!(refused.contains("= 0.125"), "{refused}");
+                    if number == 16 {
+                        parameters[4] = 0.125;
+                        let refused = read(&parameters).expect_err(entry.name).to_string();
+                        assert!(refused.contains("the lens distorts (alpha = 0.125, beta = 1)"), "{refused}");
+                    } else {
+                        parameters[count - 1] = 0.125;
+                        let lens = read(&parameters).expect(entry.name).views[0].camera.distortion;
+                        assert!(lens.to_string().ends_with("= 0.125"), "{}: {lens}", entry.name);
+                    }
                 }
             }
         }

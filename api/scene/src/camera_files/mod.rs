@@ -13,6 +13,7 @@ use serde::Deserialize;
 use crate::camera::{CameraError, Model};
 use crate::camera_path::Keyframe;
 use crate::camera_tracks;
+use crate::distortion::Distortion;
 use nerfstudio::{CameraPath, Dataparser, Transforms};
 use view::Numbers;
 pub use view::{CameraFile, CameraFileError, CameraFileOptions, CroppedScene, View, ViewError};
@@ -114,6 +115,7 @@ fn keyframe_view(keyframe: &Keyframe, size: [u32; 2]) -> Result<View, ViewError>
         CameraError::NotFinite => ViewError::NotFinite,
         CameraError::FieldOfView | CameraError::Focal | CameraError::Planes => ViewError::Focal,
         CameraError::NoDirection | CameraError::NoUp => ViewError::Rotation,
+        CameraError::Distortion | CameraError::Coefficients => ViewError::Coefficients,
     })?;
     Ok(View { name: String::new(), camera })
 }
@@ -141,6 +143,7 @@ impl InriaCamera {
             eye: self.position,
             focal: [self.fx, self.fy],
             principal: size.map(|s| s / 2.0),
+            distortion: Distortion::default(),
             size,
         }
         .camera()?;
@@ -151,6 +154,7 @@ impl InriaCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distortion::DistortionModel;
 
     fn read(text: &str) -> Result<Vec<View>, CameraFileError> {
         read_with(text, false, None).map(|file| file.views)
@@ -257,15 +261,44 @@ mod tests {
         [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}]}"#;
 
     #[test]
-    fn distortion_is_refused_or_left_out_and_told() {
+    fn a_lens_is_read_or_left_out_and_told() {
         let camera = &read(FISHEYE).expect("a camera")[0].camera;
-        assert_eq!((camera.model, camera.focal), (Model::Fisheye, [50.0; 2]));
+        assert_eq!((camera.model, camera.focal, camera.distortion), (Model::Fisheye, [50.0; 2], Distortion::default()));
         let distorted = FISHEYE.replace("\"k1\": 0.0", "\"k1\": -0.05, \"p2\": 0.001");
-        let refused = read(&distorted).expect_err("it distorts").to_string();
-        assert!(refused.contains("view 0: the lens distorts (k1 = -0.05, p2 = 0.001)"), "{refused}");
+        let lens = read(&distorted).expect("a camera")[0].camera.distortion;
+        assert_eq!((lens.model, lens.to_string().as_str()), (DistortionModel::Polynomial, "k1 = -0.05, p2 = 0.001"));
         let file = read_with(&distorted, true, None).expect("left out");
         assert_eq!(file.views[0].camera, *camera);
         assert_eq!(file.ignored, ["the lens's distortion (k1 = -0.05, p2 = 0.001) is left out"]);
+        let cropped = FISHEYE.replace("\"k1\"", "\"fisheye_crop_radius\": 90, \"k1\"");
+        let file = read_with(&cropped, false, None).expect("a camera");
+        assert!(file.ignored[0].contains("fisheye_crop_radius is ignored"), "{:?}", file.ignored);
+    }
+
+    #[test]
+    fn a_transforms_jsons_lenses_are_those_of_nerfstudio() {
+        let lens = |model: &str, coefficients: &str| {
+            let text = FISHEYE.replace("OPENCV_FISHEYE", model).replace("\"k1\": 0.0", coefficients);
+            read(&text).map(|views| views[0].camera.distortion)
+        };
+        let opencv = lens("OPENCV", "\"k1\": 0.5, \"k2\": 0.25, \"k3\": 0.125, \"p1\": 1, \"p2\": 2").expect("a lens");
+        let radial = [0.5, 0.25, 0.125, 0.0, 0.0, 0.0];
+        assert_eq!((opencv.model, opencv.radial, opencv.tangential), (DistortionModel::Rational, radial, [1.0, 2.0]));
+        // nerfstudio's k4 multiplies the eighth power; OpenCV's, with k5 and k6, divides.
+        assert_eq!(lens("OPENCV", "\"k4\": 0.5").expect("a lens").model, DistortionModel::Polynomial);
+        assert_eq!(lens("OPENCV", "\"k4\": 0.5, \"k6\": 1").expect("a lens").model, DistortionModel::Rational);
+        let aria =
+            lens("FISHEYE624", "\"distortion_params\": [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]").expect("a lens");
+        assert_eq!((aria.model, aria.radial[5], aria.tangential), (DistortionModel::PolynomialFirst, 6.0, [8.0, 7.0]));
+        assert_eq!(aria.thin_prism, [9.0, 10.0, 11.0, 12.0]);
+        let six = lens("OPENCV", "\"distortion_params\": [1, 2, 3, 0, 5, 6]").expect("a lens");
+        assert_eq!(
+            (six.model, six.radial, six.tangential),
+            (DistortionModel::Rational, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0], [5.0, 6.0])
+        );
+        let refused = lens("OPENCV", "\"distortion_params\": [1, 2]").expect_err("two numbers").to_string();
+        assert!(refused.contains("distortion_params"), "{refused}");
+        assert!(lens("OPENCV", "\"k1\": 1e300").expect_err("too large").to_string().contains("beyond binary32"));
     }
 
     #[test]

@@ -5,9 +5,10 @@ use std::path::Path;
 use glam::{DMat3, DMat4, DVec3};
 use serde::Deserialize;
 
-use super::view::{CameraFileOptions, CroppedScene, Distortion, Numbers, View, ViewError};
+use super::view::{CameraFileOptions, CroppedScene, FileDistortion, Numbers, View, ViewError};
 use crate::camera::Model;
 use crate::crop::Crop;
+use crate::distortion::{Distortion, DistortionModel};
 
 /// A transforms.json, or any other JSON object.
 #[derive(Deserialize)]
@@ -19,6 +20,7 @@ pub(super) struct Transforms {
     /// The transform that was applied to the frames' poses before they were written.
     applied_transform: Option<[[f64; 4]; 3]>,
     applied_scale: Option<f64>,
+    fisheye_crop_radius: Option<f64>,
 }
 
 impl Transforms {
@@ -47,6 +49,9 @@ impl Transforms {
                 scale: dataparser.scale / self.applied_scale.unwrap_or(1.0),
             }
         });
+        if self.fisheye_crop_radius.is_some() {
+            ignored.push("fisheye_crop_radius is ignored: all that the lens sees is drawn".to_owned());
+        }
         let views: Vec<_> = (self.frames.unwrap_or_default().into_iter())
             .map(|mut frame| {
                 let given = frame.intrinsics.size(&self.intrinsics);
@@ -103,14 +108,55 @@ struct Intrinsics {
     k2: Option<f64>,
     k3: Option<f64>,
     k4: Option<f64>,
+    k5: Option<f64>,
+    k6: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
+    /// All coefficients of the lens, in place of the names: k1 to k4, p1 and p2; of a FISHEYE624 k0 to k5, p0, p1, and s0 to s3.
+    distortion_params: Option<Vec<f64>>,
 }
+
+/// The camera model of a FISHEYE624, as Aria's glasses have it.
+const FISHEYE624: &str = "FISHEYE624";
 
 impl Intrinsics {
     /// The size of the picture in pixels.
     fn size(&self, shared: &Self) -> Option<[f64; 2]> {
         Some([self.w.or(shared.w)?, self.h.or(shared.h)?])
+    }
+
+    /// The distortion of the lens of a camera model.
+    fn distortion(&self, shared: &Self, camera_model: &str, model: Model) -> Result<Distortion, ViewError> {
+        let given = self.distortion_params.as_deref().or(shared.distortion_params.as_deref());
+        if camera_model == FISHEYE624 {
+            let Some(&[k1, k2, k3, k4, k5, k6, p0, p1, s1, s2, s3, s4]) = given else {
+                return Err(ViewError::Parameters);
+            };
+            return Ok(Distortion {
+                model: DistortionModel::PolynomialFirst,
+                radial: [k1, k2, k3, k4, k5, k6],
+                // p0 multiplies u^2, as OpenCV's p2 does.
+                tangential: [p1, p0],
+                thin_prism: [s1, s2, s3, s4],
+            });
+        }
+        let named = |name: fn(&Self) -> Option<f64>| name(self).or(name(shared)).unwrap_or(0.0);
+        let [k1, k2, k3, k4, p1, p2] = match given {
+            Some(&[k1, k2, k3, k4, p1, p2]) => [k1, k2, k3, k4, p1, p2],
+            Some(_) => return Err(ViewError::Parameters),
+            None => {
+                [named(|i| i.k1), named(|i| i.k2), named(|i| i.k3), named(|i| i.k4), named(|i| i.p1), named(|i| i.p2)]
+            }
+        };
+        let [k5, k6] = [named(|i| i.k5), named(|i| i.k6)];
+        // nerfstudio's k4 multiplies r^8. OpenCV's, which comes with k5 and k6, divides.
+        let is_polynomial = model == Model::Fisheye || (k4 != 0.0 && k5 == 0.0 && k6 == 0.0);
+        Ok(Distortion {
+            model: if is_polynomial { DistortionModel::Polynomial } else { DistortionModel::Rational },
+            radial: [k1, k2, k3, k4, k5, k6],
+            tangential: [p1, p2],
+            thin_prism: [0.0; 4],
+        })
     }
 }
 
@@ -142,12 +188,12 @@ impl Frame {
     ) -> Result<View, ViewError> {
         let own = self.intrinsics;
         let size = own.size(shared).ok_or(ViewError::Size)?;
-        let model = own.camera_model.or_else(|| shared.camera_model.clone());
-        let model = match model.as_deref() {
-            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => Model::Pinhole,
-            Some("OPENCV_FISHEYE") => Model::Fisheye,
-            Some("EQUIRECTANGULAR") => Model::Equirectangular,
-            Some(other) => return Err(ViewError::Model(other.to_owned())),
+        let camera_model = own.camera_model.as_deref().or(shared.camera_model.as_deref()).unwrap_or("PINHOLE");
+        let model = match camera_model {
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" => Model::Pinhole,
+            "OPENCV_FISHEYE" | FISHEYE624 => Model::Fisheye,
+            "EQUIRECTANGULAR" => Model::Equirectangular,
+            other => return Err(ViewError::Model(other.to_owned())),
         };
         let of_angle = |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / libm::tan(angle / 2.0));
         let fx = own.fl_x.or(shared.fl_x).or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
@@ -162,21 +208,12 @@ impl Frame {
         // Pixels are square unless the file says otherwise.
         let fx = fx.or(fy).ok_or(ViewError::Focal)?;
         let principal = [own.cx.or(shared.cx).unwrap_or(size[0] / 2.0), own.cy.or(shared.cy).unwrap_or(size[1] / 2.0)];
-        let distortion: Distortion = [
-            ("k1", own.k1.or(shared.k1)),
-            ("k2", own.k2.or(shared.k2)),
-            ("k3", own.k3.or(shared.k3)),
-            ("k4", own.k4.or(shared.k4)),
-            ("p1", own.p1.or(shared.p1)),
-            ("p2", own.p2.or(shared.p2)),
-        ]
-        .into_iter()
-        .filter_map(|(name, value)| Some((name, value?)))
-        .collect();
-        distortion.check(options.undistorted || whole, ignored)?;
+        let distortion = FileDistortion::Drawn(own.distortion(shared, camera_model, model)?);
+        let distortion = distortion.chosen(options.undistorted || whole, ignored)?;
         let rows = self.transform_matrix.first_chunk().ok_or(ViewError::Rotation)?;
         let (rotation, eye) = pose(*rows, placement);
-        let camera = Numbers { model, rotation, eye, focal: [fx, fy.unwrap_or(fx)], principal, size }.camera()?;
+        let focal = [fx, fy.unwrap_or(fx)];
+        let camera = Numbers { model, rotation, eye, focal, principal, distortion, size }.camera()?;
         Ok(View { name: self.file_path, camera })
     }
 }
@@ -268,6 +305,7 @@ impl CameraPath {
                 eye,
                 focal,
                 principal: size.map(|side| side / 2.0),
+                distortion: Distortion::default(),
                 size,
             }
             .camera()?;

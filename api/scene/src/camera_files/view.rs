@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use crate::camera::{Camera, DEFAULT_NEAR, Model};
 use crate::crop::Crop;
+use crate::distortion::Distortion;
 
 /// The most pixels along an axis that a camera file may give.
 const MAX_SIZE: f64 = 1e6;
@@ -86,9 +87,15 @@ pub enum ViewError {
     /// A position or a principal point is not finite, or beyond binary32.
     #[error("a number is not finite, or beyond binary32")]
     NotFinite,
-    /// The lens distorts.
+    /// The lens distorts in a way that is not drawn.
     #[error("the lens distorts ({0}), which is drawn only as an ideal lens would see it (--undistorted)")]
     Distorted(String),
+    /// A coefficient of the lens is not one.
+    #[error("a coefficient of the lens is beyond binary32, or not one of its model")]
+    Coefficients,
+    /// The numbers of a transforms.json's lens are too many or too few.
+    #[error("distortion_params are the 12 numbers of a FISHEYE624, or 6 of another model")]
+    Parameters,
     /// The rotation is not one.
     #[error("the rotation's rows are not perpendicular unit vectors")]
     Rotation,
@@ -105,7 +112,7 @@ pub struct CameraFileOptions {
     /// nerfstudio's dataparser_transforms.json of a trained model. It maps the cameras of a transforms.json to the
     /// model's world.
     pub dataparser: Option<PathBuf>,
-    /// True to replace a lens with distortion by an ideal one.
+    /// True to replace a lens that distorts by an ideal one.
     pub undistorted: bool,
 }
 
@@ -129,35 +136,31 @@ pub struct CroppedScene {
     pub background: [f32; 3],
 }
 
-/// The distortion of a lens: the names and values of its coefficients.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Distortion(Vec<(&'static str, f64)>);
-
-impl FromIterator<(&'static str, f64)> for Distortion {
-    fn from_iter<I: IntoIterator<Item = (&'static str, f64)>>(coefficients: I) -> Self {
-        Self(coefficients.into_iter().collect())
-    }
+/// The distortion of a lens in a file.
+pub(super) enum FileDistortion {
+    /// One that is drawn.
+    Drawn(Distortion),
+    /// The coefficients of another one.
+    Other(String),
 }
 
-impl Distortion {
-    /// Checks that there is none, or that it may be left out, which `ignored` is then told.
-    pub(super) fn check(&self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
-        let coefficients: Vec<String> = (self.0.iter())
-            .filter(|(_, value)| *value != 0.0)
-            .map(|(name, value)| format!("{name} = {value}"))
-            .collect();
-        if coefficients.is_empty() {
-            return Ok(());
-        }
-        let coefficients = coefficients.join(", ");
-        if !undistorted {
-            return Err(ViewError::Distorted(coefficients));
-        }
+impl FileDistortion {
+    /// The distortion to draw with: none if it may be left out, which `ignored` is then told.
+    pub(super) fn chosen(self, undistorted: bool, ignored: &mut Vec<String>) -> Result<Distortion, ViewError> {
+        let coefficients = match self {
+            Self::Drawn(distortion) if distortion.is_none() => return Ok(Distortion::default()),
+            Self::Drawn(distortion) if !undistorted => {
+                return if distortion.is_valid() { Ok(distortion) } else { Err(ViewError::Coefficients) };
+            }
+            Self::Other(coefficients) if !undistorted => return Err(ViewError::Distorted(coefficients)),
+            Self::Drawn(distortion) => distortion.to_string(),
+            Self::Other(coefficients) => coefficients,
+        };
         let note = format!("the lens's distortion ({coefficients}) is left out");
         if !ignored.contains(&note) {
             ignored.push(note);
         }
-        Ok(())
+        Ok(Distortion::default())
     }
 }
 
@@ -169,13 +172,14 @@ pub(super) struct Numbers {
     pub(super) eye: [f64; 3],
     pub(super) focal: [f64; 2],
     pub(super) principal: [f64; 2],
+    pub(super) distortion: Distortion,
     pub(super) size: [f64; 2],
 }
 
 impl Numbers {
     /// The camera.
     pub(super) fn camera(self) -> Result<Camera, ViewError> {
-        let Self { model, rotation, eye, focal, principal, size } = self;
+        let Self { model, rotation, eye, focal, principal, distortion, size } = self;
         if !size.iter().all(|s| (1.0..=MAX_SIZE).contains(s) && libm::trunc(*s) == *s) {
             return Err(ViewError::Size);
         }
@@ -201,6 +205,7 @@ impl Numbers {
             eye,
             focal,
             principal,
+            distortion,
             width: size[0] as u32,
             height: size[1] as u32,
             near: DEFAULT_NEAR,

@@ -1,8 +1,9 @@
-//! Tests of scene files: real ones, small ones with known values, malformed ones, and damaged ones.
+//! Tests of scene and camera files: real ones, small ones with known values, malformed ones, and damaged ones.
 
 mod dialects;
 mod gltf;
 mod ksplat;
+mod lenses;
 mod meshes;
 mod metadata;
 mod ply;

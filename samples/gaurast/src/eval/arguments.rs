@@ -31,7 +31,7 @@ pub struct EvalArguments {
     #[arg(long, value_name = "FILE")]
     pub dataparser: Option<PathBuf>,
 
-    /// Ignore the lens distortion of cameras, since the photographs are undistorted ones
+    /// Ignore the lens distortion of cameras, since the photographs are undistorted ones; else they are drawn with the lens
     #[arg(long)]
     pub undistorted: bool,
 

@@ -13,7 +13,7 @@ use super::arguments::{EvalArguments, Values};
 use super::error::Error;
 use super::gsplat_world::Worlds;
 use super::split::Split;
-use crate::cameras::{DEFAULT_SIZE, View};
+use crate::cameras::{self, DEFAULT_SIZE, View};
 use crate::cfg_args::CfgArgs;
 use crate::photographs::{self, Photographs, SizeRule, stem};
 use crate::sources::Source;
@@ -230,6 +230,9 @@ pub fn find(arguments: &EvalArguments, source: &Source) -> Result<Dataset, Error
     });
     choices.insert("values", values.describe().to_owned());
     let background = found.background(arguments, source);
+    if let Some(lenses) = cameras::lenses(views.iter().map(|measured| &measured.view.camera)) {
+        choices.insert("lenses", lenses);
+    }
     choices.insert("background", background.map(|channel| channel.to_string()).join(", "));
     Ok(Dataset { views, background, values, right_half: found.has_exposures(), worlds, choices, notes })
 }

@@ -348,3 +348,24 @@ fn photographs_of_another_shape_are_refused() {
     image::RgbImage::new(48, 30).save(folder.path().join(path)).expect("written");
     fails(&folder, &["eval", "out"], "48x30 pixels are not the shape of its camera's picture, 48x36");
 }
+
+#[gaurast_runner::test]
+fn distorted_photographs_are_compared_with_pictures_of_the_lens() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(&folder, "scene.ply", &scene());
+    let [width, height] = SIZE;
+    write(&folder, "data/sparse/0/cameras.txt", &format!("1 OPENCV {width} {height} 50 50 24 18 -0.3 0.08 0 0\n"));
+    let images = (0..2).map(|index| {
+        let [x, y, z] = position(index).map(|part| -part);
+        format!("{index} 1 0 0 0 {x} {y} {z} 1 p{index:02}.png\n\n")
+    });
+    write(&folder, "data/sparse/0/images.txt", &images.collect::<String>());
+    succeeds(&folder, &["scene.ply", "--cameras", "data", "--view", "all", "-o", "data/images/"]);
+    let json = evaluated(&folder, &["eval", "scene.ply", "data", "--split", "all", "--json"]);
+    assert_eq!(json["mean"]["equal"], 2, "{json}");
+    let lens = "the lens distorts and is drawn so (rational: k1 = -0.3, k2 = 0.08)";
+    assert_eq!(json["choices"]["lenses"], lens);
+    let json = evaluated(&folder, &["eval", "scene.ply", "data", "--split", "all", "--undistorted", "--json"]);
+    assert!(json["views"][0]["psnr"].as_f64().is_some_and(|psnr| psnr < 30.0), "{json}");
+    assert!(json["choices"]["lenses"].is_null());
+}

@@ -409,7 +409,7 @@ fn renderers_differ_and_pictures_are_compared_with_them() {
     let folder = folder();
     let plain = drawn(&folder, &["--near", "0.3"]);
     let mut pictures = vec![plain];
-    for renderer in ["inria", "gsplat", "gsplat-1.5", "usd", "gltf"] {
+    for renderer in ["inria", "gsplat", "gsplat-1.5", "gsplat-unscented", "usd", "gltf"] {
         pictures.push(drawn(&folder, &["--as", renderer]));
     }
     for (index, picture) in pictures.iter().enumerate() {

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
 use gaurast_scene::random::normal;
-use gaurast_scene::{GaussianShape, SH_C0, Scene, sigmoid};
+use gaurast_scene::{Distortion, GaussianShape, SH_C0, Scene, sigmoid};
 
 /// `count` Gaussians of degree 3 as trained scenes have them: 35 % on a sphere of radius 1.5,
 /// 35 % on the plane y = 1.6 (10 x 12 units), 30 % in a box of 8 x 4.4 x 10 units; small, of
@@ -45,6 +45,7 @@ pub fn synthetic_camera([width, height]: [u32; 2]) -> Camera {
         eye: [0., 0., -6.],
         focal: [1000.0 / 720.0 * f64::from(height); 2],
         principal: [f64::from(width) / 2.0, f64::from(height) / 2.0],
+        distortion: Distortion::default(),
         width,
         height,
         near: DEFAULT_NEAR,

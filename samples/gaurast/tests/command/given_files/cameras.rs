@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
+use image::Rgba32FImage;
 use serde_json::Value;
 
 use super::render;
@@ -50,25 +51,24 @@ fn vector(value: &Value) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|i| number(&value[i])))
 }
 
-/// A different colour for each Gaussian.
+/// A different colour for each Gaussian, of at most 18.
 fn colour(index: usize) -> [f64; 3] {
     [index % 2, index / 2 % 3, index / 6].map(|step| 0.3 + 0.3 * step as f64)
 }
 
-/// A PLY file of small, opaque Gaussians at `points`, each about a pixel large for `camera`.
-fn scene(camera: &Expected, points: &[DVec3]) -> String {
+/// A PLY file of opaque Gaussians at points, each with its standard deviation.
+pub(super) fn scene(gaussians: impl ExactSizeIterator<Item = (DVec3, f64)>) -> String {
     let properties = [
         "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
         "f_dc_1", "f_dc_2",
     ];
-    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", points.len());
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", gaussians.len());
     for property in properties {
         text += &format!("property float {property}\n");
     }
     text += "end_header\n";
-    for (index, point) in points.iter().enumerate() {
-        let depth = (camera.to_world.transpose() * (point - camera.eye)).z;
-        let scale = (depth / camera.focal.max_element()).ln();
+    for (index, (point, deviation)) in gaussians.enumerate() {
+        let scale = deviation.ln();
         let [r, g, b] = colour(index).map(|c| (c - 0.5) / 0.282_094_791_773_878_14);
         let [x, y, z] = point.to_array();
         text += &format!("{x} {y} {z} {scale} {scale} {scale} 1 0 0 0 2.2 {r} {g} {b}\n");
@@ -76,21 +76,11 @@ fn scene(camera: &Expected, points: &[DVec3]) -> String {
     text
 }
 
-/// Renders with the camera file and checks that every Gaussian is where `camera` projects it.
-fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let points = camera.points();
-    std::fs::write(folder.path().join("points.ply"), scene(camera, &points)).expect("written");
-    let file = file.to_str().expect("text");
-    let fixed = ["points.ply", "--quiet", "-o", "a.exr", "--cameras", file];
-    let output = render(folder.path(), fixed.iter().chain(arguments));
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{stderr}");
-    let picture = image::open(folder.path().join("a.exr")).expect("an EXR");
-    let picture = picture.into_rgba32f();
-    assert_eq!(<[u32; 2]>::from(picture.dimensions()), camera.size);
-    for (index, point) in points.into_iter().enumerate() {
-        let expected = camera.project(point);
+/// Checks that every Gaussian of a scene is in the picture at its place, which is not near the border or another one. The
+/// result is the largest distance in pixels.
+pub(super) fn check_places(picture: &Rgba32FImage, places: impl Iterator<Item = DVec2>) -> f64 {
+    let mut largest = 0.0_f64;
+    for (index, expected) in places.enumerate() {
         // The pixels of the Gaussian are near it, and those of the next one are not.
         let corner = (expected - 12.0).floor();
         let pixels = (0..24_u32).flat_map(|y| (0..24_u32).map(move |x| DVec2::new(x.into(), y.into())));
@@ -106,9 +96,30 @@ fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
         let centroid = sum / total;
         let distance = centroid.distance(expected);
         assert!(distance < 0.05, "{index}: {centroid} is not {expected}");
+        largest = largest.max(distance);
         let colours = colours / total - DVec3::from_array(colour(index));
         assert!(colours.abs().max_element() < 1e-4, "{index}: {colours} off");
     }
+    largest
+}
+
+/// Renders with the camera file and checks that every Gaussian is where `camera` projects it.
+fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let points = camera.points();
+    // Each is about a pixel large.
+    let deviation = |point: DVec3| (camera.to_world.transpose() * (point - camera.eye)).z / camera.focal.max_element();
+    let text = scene(points.iter().map(|point| (*point, deviation(*point))));
+    std::fs::write(folder.path().join("points.ply"), text).expect("written");
+    let file = file.to_str().expect("text");
+    let fixed = ["points.ply", "--quiet", "-o", "a.exr", "--cameras", file];
+    let output = render(folder.path(), fixed.iter().chain(arguments));
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
+    let picture = image::open(folder.path().join("a.exr")).expect("an EXR");
+    let picture = picture.into_rgba32f();
+    assert_eq!(<[u32; 2]>::from(picture.dimensions()), camera.size);
+    check_places(&picture, points.iter().map(|point| camera.project(*point)));
 }
 
 /// The camera of view `view` of a cameras.json, for a picture of `size`.

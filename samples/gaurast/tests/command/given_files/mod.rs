@@ -6,6 +6,7 @@ mod faults;
 mod fixtures;
 mod golden;
 mod gpu;
+mod lenses;
 
 use std::ffi::OsStr;
 use std::path::Path;

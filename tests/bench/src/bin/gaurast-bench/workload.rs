@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use gaurast_oracle::scenes;
 use gaurast_scene::camera::{Camera, DEFAULT_FOV, DEFAULT_NEAR, Model};
-use gaurast_scene::{GaussianShape, Scene};
+use gaurast_scene::{Distortion, GaussianShape, Scene};
 use serde::{Deserialize, Serialize};
 
 use crate::error::BenchError;
@@ -252,6 +252,7 @@ fn tiles_camera([width, height]: [u32; 2]) -> Camera {
         eye: [0.0; 3],
         focal: [100.0; 2],
         principal: [8.0; 2],
+        distortion: Distortion::default(),
         width,
         height,
         near: DEFAULT_NEAR,
