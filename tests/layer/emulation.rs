@@ -22,6 +22,7 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("surfels", &["surfel"], 50),
     ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
     ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
+    ("logarithms and logits", &["activation"], 12),
     ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];
 

@@ -7,6 +7,7 @@
 #include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
+#include "activation.glsl"
 #include "angles.glsl"
 #include "cameras.glsl"
 #include "harmonics.glsl"
@@ -97,6 +98,14 @@ void main() {
     vec3 position = values[POSITION].xyz, scale = values[SCALE].xyz;
     vec4 rotation = values[ROTATION];
     float opacity = values[OPACITY].x;
+    if (HAS_LOGARITHMS) {
+        for (int j = 0; j < (IS_SURFEL ? 2 : 3); j++) {
+            scale[j] = scale_of_logarithm(scale[j]);
+        }
+    }
+    if (HAS_LOGITS) {
+        opacity = opacity_of_logit(opacity);
+    }
     if (HAS_FACTOR) {
         precise float product = opacity * values[FACTOR].x;
         opacity = product;

@@ -16,3 +16,6 @@ layout(constant_id = 8) const bool IS_UNSCENTED = false;
 layout(constant_id = 9) const bool IS_SURFEL = false;
 // Depths are tested, or a resolve shader reads them.
 layout(constant_id = 10) const bool HAS_DEPTHS = false;
+// Scales are logarithms; opacities are logits.
+layout(constant_id = 11) const bool HAS_LOGARITHMS = false;
+layout(constant_id = 12) const bool HAS_LOGITS = false;

@@ -64,11 +64,15 @@ pub(crate) struct Variant {
     pub(crate) is_surfel: bool,
     /// Depths or stencils are tested.
     pub(crate) has_tests: bool,
+    /// Scales are logarithms.
+    pub(crate) has_logarithms: bool,
+    /// Opacities are logits.
+    pub(crate) has_logits: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 11] {
+    fn of_projection(&self) -> [u32; 13] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -81,6 +85,8 @@ impl Variant {
             u32::from(self.is_unscented),
             u32::from(self.is_surfel),
             u32::from(self.has_tests),
+            u32::from(self.has_logarithms),
+            u32::from(self.has_logits),
         ]
     }
 

@@ -120,7 +120,6 @@ fn refusal(state: &State<'_>, has_fragment_stage: bool) -> Option<&'static str> 
         (has_fragment_stage, "resolveFragmentShader"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
-        (state.flags.intersects(Flags::LOG_SCALE | Flags::LOGIT_OPACITY), "attributeActivation"),
     ];
     refusals.iter().find(|(is_used, _)| *is_used).map(|(_, feature)| *feature)
 }
@@ -291,6 +290,8 @@ pub(crate) unsafe fn create(
             is_unscented: state.linearization == Linearization::UNSCENTED,
             is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
             has_tests: tests.is_some_and(|tests| tests.is_any()),
+            has_logarithms: state.flags.contains(Flags::LOG_SCALE),
+            has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
         };
         // They are compiled now, rather than with the first draw.
         context.kernels.specialized(variant)?;

@@ -70,6 +70,7 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .gaussian_depth_stencil(true)
         .gaussian_multisample(true)
         .gaussian_approximation(true)
+        .attribute_activation(true)
         .spherical_harmonics_buffer(true)
         .gaussian_dynamic_state(true)
         .gaussian_cut_off(true)

@@ -6,7 +6,7 @@ use ash::vk;
 use gaurast_layer_interface::slice;
 
 use crate::emulation::Emulation;
-use crate::hooks::site::record;
+use crate::hooks::site::{Site, record};
 use crate::pass::{Object, Pass, Rendering};
 use crate::recording::{Bound, BoundSet, Condition, IndexBuffer, PushConstants, Query, Recording, VertexBuffer};
 use crate::work::Work;
@@ -354,6 +354,22 @@ pub(super) unsafe extern "system" fn cmd_end_render_pass2(
     }
 }
 
+/// Executes secondary command buffers whose sets are computed before.
+///
+/// # Safety
+/// The command buffers are valid.
+unsafe fn execute(site: &Site<'_>, recording: &mut Recording, works: &[Work], buffers: &[vk::CommandBuffer]) {
+    if buffers.is_empty() {
+        return;
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        recording.before_secondaries(site.emulation, works);
+        recording.activate_queries(site.next);
+        site.next.cmd_execute_commands(recording.commands, buffers);
+    }
+}
+
 pub(super) unsafe extern "system" fn cmd_execute_commands(
     commands: vk::CommandBuffer,
     count: u32,
@@ -366,14 +382,21 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
             commands,
             |site, recording| {
                 let mut works: Vec<Work> = Vec::new();
-                for &secondary in buffers {
-                    if let Some(known) = site.device.recording(secondary) {
-                        works.extend_from_slice(known.lock().unwrap_or_else(PoisonError::into_inner).works());
+                let mut first = 0;
+                for (index, &secondary) in buffers.iter().enumerate() {
+                    let Some(known) = site.device.recording(secondary) else {
+                        continue;
+                    };
+                    let known = known.lock().unwrap_or_else(PoisonError::into_inner);
+                    if known.works().iter().any(|work| work.tests.is_some()) {
+                        // They are tested against what those before store.
+                        execute(site, recording, &works, &buffers[first..index]);
+                        works.clear();
+                        first = index;
                     }
+                    works.extend_from_slice(known.works());
                 }
-                recording.before_secondaries(site.emulation, &works);
-                recording.activate_queries(site.next);
-                site.next.cmd_execute_commands(commands, buffers);
+                execute(site, recording, &works, &buffers[first..]);
                 // All state is undefined now.
                 recording.graphics = Bound::Nothing;
                 recording.compute = vk::Pipeline::null();
