@@ -1,9 +1,15 @@
 //! `VK_LAYER_GAURAST_emulation` over lavapipe: cases of the conformance program, as it is.
 
+use ash::vk;
 use gaurast_conformance::{Device, Outcome, all, cases, run};
 use gaurast_runner::{Case, Need, Variant};
 use gaurast_testkit::loader::with_emulation;
+use gaurast_testkit::{
+    Attachments, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Recorded, Target,
+    TargetOptions, depth_test, over,
+};
 use gaurast_tests::long_run::memory;
+use gaurast_tests::scenes;
 
 /// Parts of the conformance program, each with the least number of its cases that the layer must pass.
 const PARTS: &[(&str, &[&str], usize)] = &[
@@ -89,6 +95,157 @@ fn pictures_do_not_depend_on_the_memory_for_pairs(case: &Case) {
     let [all, some, none] = &pictures;
     assert!(all.iter().any(|byte| *byte != 0));
     assert!(all == some && all == none, "pictures differ");
+}
+
+/// Gaussians in front of a depth, on a device, and what they are drawn to.
+struct Tested {
+    target: Target,
+    scene: GaussianScene,
+}
+
+impl Tested {
+    fn new(gpu: &Gpu) -> Self {
+        let colors = TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT);
+        let target = Target::new(gpu, &TargetOptions { size: [70, 50], depth: Some(vk::Format::D32_SFLOAT), ..colors });
+        Self { target, scene: GaussianScene::new(gpu, &scenes::cloud(5, 300, 0)) }
+    }
+
+    /// A pass that clears the depth to that of Gaussians at a distance of 4.
+    fn pass(flags: vk::RenderingFlags) -> Pass {
+        Pass { depth: vk::ClearDepthStencilValue { depth: 0.8, stencil: 0 }, flags, ..Pass::default() }
+    }
+
+    fn pipeline(&self, gpu: &Gpu, render_pass: Option<vk::RenderPass>) -> GaussianPipeline {
+        let options = GaussianOptions {
+            depth_stencil: depth_test(vk::CompareOp::LESS),
+            formats: self.target.attachment_formats(),
+            blend: vec![over()],
+            render_pass,
+            ..GaussianOptions::new(0)
+        };
+        GaussianPipeline::new(gpu, &options)
+    }
+
+    fn draw(&self, commands: &Commands, pipeline: &GaussianPipeline) {
+        let camera = scenes::camera(70, 50).to_vulkan().depth_coefficients([16.0 / 15.0, -16.0 / 15.0]);
+        commands.whole(&self.target);
+        self.scene.draw(commands, pipeline, &camera);
+    }
+
+    /// Draws in a render pass object that clears to the same values as the pass.
+    fn draw_in_object(&self, gpu: &Gpu) {
+        let device = gpu.device();
+        let attachment = |format: vk::Format| {
+            vk::AttachmentDescription::default()
+                .format(format)
+                .samples(vk::SampleCountFlags::TYPE_1)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(vk::AttachmentStoreOp::STORE)
+                .initial_layout(vk::ImageLayout::GENERAL)
+                .final_layout(vk::ImageLayout::GENERAL)
+        };
+        let attachments = [attachment(vk::Format::R32G32B32A32_SFLOAT), attachment(vk::Format::D32_SFLOAT)];
+        let [color, depth] =
+            [0, 1].map(|index| vk::AttachmentReference { attachment: index, layout: vk::ImageLayout::GENERAL });
+        let colors = [color];
+        let subpasses = [vk::SubpassDescription::default().color_attachments(&colors).depth_stencil_attachment(&depth)];
+        let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
+        let views = [self.target.colors[0].attachment, self.target.depth.as_ref().expect("depths").attachment];
+        let pass = Self::pass(vk::RenderingFlags::empty());
+        let clears = [vk::ClearValue { color: pass.color }, vk::ClearValue { depth_stencil: pass.depth }];
+        // SAFETY: the render pass is valid, and what is created here is destroyed after the commands have run.
+        unsafe {
+            let object = device.create_render_pass(&info, None).expect("a render pass");
+            let info = vk::FramebufferCreateInfo::default()
+                .render_pass(object)
+                .attachments(&views)
+                .width(70)
+                .height(50)
+                .layers(1);
+            let framebuffer = device.create_framebuffer(&info, None).expect("a framebuffer");
+            let pipeline = self.pipeline(gpu, Some(object));
+            gpu.run(|commands| {
+                let (device, raw) = commands.raw();
+                let info = vk::RenderPassBeginInfo::default()
+                    .render_pass(object)
+                    .framebuffer(framebuffer)
+                    .render_area(vk::Rect2D::default().extent(vk::Extent2D { width: 70, height: 50 }))
+                    .clear_values(&clears);
+                commands.barrier();
+                device.cmd_begin_render_pass(raw, &info, vk::SubpassContents::INLINE);
+                self.draw(commands, &pipeline);
+                device.cmd_end_render_pass(raw);
+                commands.barrier();
+            });
+            device.destroy_framebuffer(framebuffer, None);
+            device.destroy_render_pass(object, None);
+        }
+    }
+
+    /// Records a secondary command buffer.
+    fn secondary(&self, gpu: &Gpu, record: impl FnOnce(&Commands)) -> Result<Recorded, vk::Result> {
+        let formats = self.target.attachment_formats();
+        let mut rendering = vk::CommandBufferInheritanceRenderingInfo::default()
+            .color_attachment_formats(&formats.colors)
+            .depth_attachment_format(formats.depth)
+            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let inheritance = vk::CommandBufferInheritanceInfo::default().push_next(&mut rendering);
+        let info = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::RENDER_PASS_CONTINUE)
+            .inheritance_info(&inheritance);
+        gpu.record_as(vk::CommandBufferLevel::SECONDARY, &info, record)
+    }
+}
+
+/// Clears the depths of the picture to the pass's.
+fn clear(commands: &Commands) {
+    let (device, raw) = commands.raw();
+    let depth = Tested::pass(vk::RenderingFlags::empty()).depth;
+    let clear = vk::ClearAttachment::default()
+        .aspect_mask(vk::ImageAspectFlags::DEPTH)
+        .clear_value(vk::ClearValue { depth_stencil: depth });
+    let whole = vk::Rect2D::default().extent(vk::Extent2D { width: 70, height: 50 });
+    let area = vk::ClearRect { rect: whole, base_array_layer: 0, layer_count: 1 };
+    // SAFETY: the pass has such an attachment.
+    unsafe { device.cmd_clear_attachments(raw, &[clear], &[area]) };
+}
+
+/// Depths are tested and stored in render pass objects and in secondary command buffers, as in dynamic rendering.
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
+fn all_passes_test_depths(case: &Case) {
+    with_emulation(case, &[], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        let gpu = device.gpu();
+        let tested = Tested::new(gpu);
+        let pipeline = tested.pipeline(gpu, None);
+        let pass = Tested::pass(vk::RenderingFlags::empty());
+        let empty = tested.target.draw(gpu, &pass, |_| {}).pictures;
+        let wanted = tested.target.draw(gpu, &pass, |commands| tested.draw(commands, &pipeline)).pictures;
+        assert!(
+            empty.iter().zip(&wanted).all(|(empty, drawn)| empty.bytes != drawn.bytes),
+            "colours and depths change"
+        );
+        tested.draw_in_object(gpu);
+        assert!(tested.target.output(gpu).pictures == wanted, "a render pass object differs");
+        // What another secondary command buffer stores before is tested against.
+        let before = tested.secondary(gpu, clear).expect("a secondary command buffer");
+        let drawing = tested.secondary(gpu, |commands| tested.draw(commands, &pipeline));
+        let drawing = drawing.expect("a secondary command buffer");
+        let flags = vk::RenderingFlags::CONTENTS_SECONDARY_COMMAND_BUFFERS;
+        let pass = Pass { flags, ..Pass::default() };
+        let executed = tested.target.draw(gpu, &pass, |commands| {
+            let (device, raw) = commands.raw();
+            // SAFETY: the secondary command buffers are for this pass.
+            unsafe { device.cmd_execute_commands(raw, &[before.raw, drawing.raw]) };
+        });
+        assert!(executed.pictures == wanted, "secondary command buffers differ");
+        // What is stored within a secondary command buffer cannot be.
+        let both = tested.secondary(gpu, |commands| {
+            clear(commands);
+            tested.draw(commands, &pipeline);
+        });
+        assert_eq!(both.err(), Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
+    });
 }
 
 /// Frames leave nothing behind.

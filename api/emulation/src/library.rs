@@ -27,6 +27,7 @@ struct PreRasterization {
     has_vertex_stage: bool,
     viewport: Option<vk::Viewport>,
     scissor: Option<vk::Rect2D>,
+    is_negative_one_to_one: bool,
     layout: vk::PipelineLayout,
     view_mask: u32,
 }
@@ -115,12 +116,15 @@ impl PreRasterization {
             let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
             let state = find::<State<'_>>(info.p_next);
             let footprint = find::<Footprint<'_>>(info.p_next);
+            let clip =
+                viewports.and_then(|state| find::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next));
             Self {
                 state: state.map(|state| State { p_next: null(), _marker: PhantomData, ..*state }),
                 footprint: footprint.map(|state| Footprint { p_next: null(), _marker: PhantomData, ..*state }),
                 has_vertex_stage: has_stage(info, vk::ShaderStageFlags::VERTEX),
                 viewport: viewports.and_then(|state| state.p_viewports.as_ref()).copied(),
                 scissor: viewports.and_then(|state| state.p_scissors.as_ref()).copied(),
+                is_negative_one_to_one: clip.is_some_and(|clip| clip.negative_one_to_one != vk::FALSE),
                 layout: info.layout,
                 view_mask: rendering.map_or(0, |rendering| rendering.view_mask),
             }
@@ -266,7 +270,10 @@ impl Library {
                 stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage));
             }
         }
+        let clip = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
+            .negative_one_to_one(shaders.is_negative_one_to_one);
         let viewports = vk::PipelineViewportStateCreateInfo {
+            p_next: (&raw const clip).cast(),
             p_viewports: shaders.viewport.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
             p_scissors: shaders.scissor.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
             ..Default::default()

@@ -271,6 +271,10 @@ pub(crate) unsafe fn create(
         );
         let tests = info.p_depth_stencil_state.as_ref().map(TestState::of_pipeline).unwrap_or_default();
         let tests = Some(tests).filter(|tests| tests.may_be_any(&dynamic));
+        if tests.is_some() && dynamic.contains(&vk::DynamicState::DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT) {
+            tell("a pipeline that may test depths has negativeOneToOne as a dynamic state, which is not emulated");
+            return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+        }
         let clip =
             viewports.and_then(|state| find::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next));
         let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
