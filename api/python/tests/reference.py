@@ -64,38 +64,6 @@ def project(means, covariances, K, width, height, model):
     return centres, jacobian @ covariances @ jacobian.transpose(0, 2, 1)
 
 
-def distorted(u, v, radial, tangential, thin_prism):
-    """Places of a pinhole's picture as gsplat's lens shows them."""
-    k1, k2, k3, k4, k5, k6 = radial
-    (p1, p2), (s1, s2, s3, s4) = tangential, thin_prism
-    square = u * u + v * v
-    factor = (1 + square * (k1 + square * (k2 + square * k3))) / (1 + square * (k4 + square * (k5 + square * k6)))
-    return (
-        u * factor + 2 * p1 * u * v + p2 * (square + 2 * u * u) + square * (s1 + square * s2),
-        v * factor + p1 * (square + 2 * v * v) + 2 * p2 * u * v + square * (s3 + square * s4),
-    )
-
-
-def project_unscented(means, axes, K, width, height, lens, alpha=0.1, beta=2.0, margin=0.1):
-    """Means and covariances on the screen by the unscented transform, and the Gaussians of which a point counts. `axes` has the
-    standard deviations along them as columns."""
-    fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    spread = 3.0 * alpha * alpha
-    offsets = np.sqrt(spread) * axes.transpose(0, 2, 1)
-    points = np.concatenate([means[:, None], means[:, None] + offsets, means[:, None] - offsets], axis=1)
-    x, y, z = np.moveaxis(points, -1, 0)
-    u, v = distorted(x / z, y / z, *lens)
-    places = np.stack([fx * u + cx, fy * v + cy], axis=-1)
-    size = np.array([width, height])
-    counts = (z > 0) & ((places >= -margin * size) & (places < (1 + margin) * size)).all(axis=-1)
-    weights = np.full(7, 1.0 / (2.0 * spread))
-    weights[0] = (spread - 3.0) / spread
-    centres = np.einsum("i,nij->nj", weights, places)
-    apart = places - centres[:, None]
-    weights[0] += 1.0 - alpha * alpha + beta
-    return centres, np.einsum("i,nij,nik->njk", weights, apart, apart), counts.any(axis=1)
-
-
 def rasterize(means, quats, scales, opacities, colors, viewmat, K, width, height, **options):
     """`[H, W, D]` values, `[H, W]` alphas, `[H, W]` accumulated depths, and `[H, W]` where binary32 may decide otherwise."""
     near, far = options.get("near_plane", 0.01), options.get("far_plane", 1e10)
@@ -115,13 +83,7 @@ def rasterize(means, quats, scales, opacities, colors, viewmat, K, width, height
     covariances = turn @ (axes @ axes.transpose(0, 2, 1)) @ turn.T
     centres = np.zeros((len(means), 2))
     plane = np.tile(np.eye(2), (len(means), 1, 1))
-    if "lens" in options:
-        centres[ahead], plane[ahead], drawn = project_unscented(
-            seen[ahead], turn @ axes[ahead], K, width, height, options["lens"]
-        )
-        ahead[ahead] = drawn
-    else:
-        centres[ahead], plane[ahead] = project(seen[ahead], covariances[ahead], K, width, height, model)
+    centres[ahead], plane[ahead] = project(seen[ahead], covariances[ahead], K, width, height, model)
     before = np.linalg.det(plane)
     plane = plane + eps * np.eye(2)
     after = np.linalg.det(plane)
