@@ -161,8 +161,8 @@ mod tests {
                 moved[axis] += by;
                 place(moved)
             });
-            for row in 0..2 {
-                assert!((jacobian[row][axis] - (ahead[row] - behind[row]) / (2.0 * step)).abs() < 1e-8);
+            for (row, (ahead, behind)) in jacobian.iter().zip(ahead.into_iter().zip(behind)) {
+                assert!((row[axis] - (ahead - behind) / (2.0 * step)).abs() < 1e-8);
             }
         }
     }

@@ -311,9 +311,9 @@ mod tests {
                     [0, 1].map(|axis| (ahead.place[axis] - behind.place[axis]) / (2.0 * step))
                 };
                 let (by_u, by_v) = (ends([step, 0.0]), ends([0.0, step]));
-                for axis in 0..2 {
-                    prop_assert!((found[axis][0] - by_u[axis]).abs() < 1e-8, "{model:?} {u} {v}: {found:?}");
-                    prop_assert!((found[axis][1] - by_v[axis]).abs() < 1e-8, "{model:?} {u} {v}: {found:?}");
+                for ([along_u, along_v], (by_u, by_v)) in found.into_iter().zip(by_u.into_iter().zip(by_v)) {
+                    prop_assert!((along_u - by_u).abs() < 1e-8, "{model:?} {u} {v}: {found:?}");
+                    prop_assert!((along_v - by_v).abs() < 1e-8, "{model:?} {u} {v}: {found:?}");
                 }
             }
         }

@@ -209,9 +209,9 @@ fn fold(model: Model, k: [f64; 6]) -> Fold {
             let (above, below) = ([1.0, k[0], k[1], k[2]], [1.0, k[3], k[4], k[5]]);
             // The numerator of the derivative of r a(r^2) / b(r^2): a b + 2 s (a' b - a b').
             let mut derivative = [0.0; 7];
-            for i in 0..4 {
-                for j in 0..4 {
-                    derivative[i + j] += (1.0 + 2.0 * i as f64 - 2.0 * j as f64) * above[i] * below[j];
+            for (i, a) in above.into_iter().enumerate() {
+                for (j, b) in below.into_iter().enumerate() {
+                    derivative[i + j] += (1.0 + 2.0 * i as f64 - 2.0 * j as f64) * a * b;
                 }
             }
             let (grows, has_pole) = (first_not_positive(&derivative), first_not_positive(&below));
@@ -287,15 +287,12 @@ mod tests {
             }
             for [u, v] in [[0.3, -0.4], [0.001, 0.002], [-0.6, 0.1]] {
                 let (_, by) = lens.distort([u, v]);
-                for axis in 0..2 {
+                for (axis, [along_u, along_v]) in by.into_iter().enumerate() {
                     let by_u =
                         (lens.distort([u + step, v]).0[axis] - lens.distort([u - step, v]).0[axis]) / (2.0 * step);
                     let by_v =
                         (lens.distort([u, v + step]).0[axis] - lens.distort([u, v - step]).0[axis]) / (2.0 * step);
-                    assert!(
-                        (by[axis][0] - by_u).abs() < 1e-8 && (by[axis][1] - by_v).abs() < 1e-8,
-                        "{model:?} {u} {v}"
-                    );
+                    assert!((along_u - by_u).abs() < 1e-8 && (along_v - by_v).abs() < 1e-8, "{model:?} {u} {v}");
                 }
             }
         }
