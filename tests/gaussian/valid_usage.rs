@@ -2,14 +2,15 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianCameraSourceGAURAST,
-    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianDistortionModelGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_runner::Case;
-use gaurast_testkit::devices::{gaussian, open, without_modes};
+use gaurast_testkit::devices::{gaussian, open, with_features_of_gaussians, without_modes};
 use gaurast_testkit::scene::{Scene, camera, splat, splats};
 use gaurast_testkit::settings::strictly;
 use gaurast_testkit::{Gpu, Graphics, Shader};
@@ -95,6 +96,16 @@ fn within(cut_off: GaussianCutOffGAURAST, deviations: f32, floor: f32) -> Graphi
     Graphics { footprint: Some(footprint), ..splats() }
 }
 
+/// A pipeline of the unscented transform with other sigma points.
+fn pointing(
+    change: impl FnOnce(
+        PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>,
+    ) -> PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>,
+) -> Graphics<'static> {
+    let unscented = change(PipelineGaussianUnscentedStateCreateInfoGAURAST::default());
+    Graphics { unscented: Some(unscented), ..with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)) }
+}
+
 /// Pipelines that break one statement each.
 fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let missing = |index: usize| {
@@ -107,6 +118,13 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
         (
             "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
             Graphics { raster: splats().raster.rasterizer_discard_enable(true), ..splats() },
+        ),
+        ("VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-alpha-90091", pointing(|p| p.alpha(0.0))),
+        ("VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-beta-90092", pointing(|p| p.beta(f32::NAN))),
+        ("VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-kappa-90093", pointing(|p| p.kappa(-3.0))),
+        (
+            "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-pictureMargin-90094",
+            pointing(|p| p.picture_margin(-0.5)),
         ),
         ("VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081", Graphics { viewports: 2, ..splats() }),
         (
@@ -257,6 +275,33 @@ fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
     ]
 }
 
+/// Cameras whose lenses violate one statement each.
+fn lenses() -> Vec<(&'static str, GaussianCameraModelGAURAST, GaussianCameraDistortionGAURAST<'static>)> {
+    let pinhole = GaussianCameraModelGAURAST::PINHOLE;
+    let lens = |model| GaussianCameraDistortionGAURAST::default().model(model);
+    let barrel = lens(GaussianDistortionModelGAURAST::POLYNOMIAL).radial([-0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let field_of_view = lens(GaussianDistortionModelGAURAST::FIELD_OF_VIEW);
+    vec![
+        (
+            "VUID-VkGaussianCameraDistortionGAURAST-model-parameter",
+            pinhole,
+            lens(GaussianDistortionModelGAURAST::from_raw(77)),
+        ),
+        ("VUID-VkGaussianCameraDistortionGAURAST-model-90085", GaussianCameraModelGAURAST::ORTHOGRAPHIC, barrel),
+        ("VUID-VkGaussianCameraDistortionGAURAST-radial-90086", pinhole, barrel.tangential([f32::NAN, 0.0])),
+        (
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90087",
+            pinhole,
+            field_of_view.radial([0.5, 0.1, 0.0, 0.0, 0.0, 0.0]),
+        ),
+        (
+            "VUID-VkGaussianCameraDistortionGAURAST-radial-90088",
+            pinhole,
+            field_of_view.radial([4.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ),
+    ]
+}
+
 /// Creates the pipeline, which must fail, and returns the messages.
 fn refused(gpu: &Gpu, request: &Graphics<'_>, result: vk::Result, what: &str) -> String {
     let error = request.create(gpu).expect_err(what);
@@ -296,6 +341,22 @@ fn report_every_statement() {
         assert_eq!(recorded.unwrap_err(), invalid, "{id}");
         heard(id, gpu.message_texts().concat());
     }
+    for (id, model, mut lens) in lenses() {
+        let camera = camera().model(model).push_next(&mut lens);
+        let recorded = gpu.try_record(|recording| {
+            let (_, commands) = recording.raw();
+            // SAFETY: see the crate.
+            unsafe { gaussian(&gpu).cmd_set_gaussian_cameras(commands, &[camera]) };
+        });
+        assert_eq!(recorded.unwrap_err(), invalid, "{id}");
+        heard(id, gpu.message_texts().concat());
+    }
+    let flat = with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D));
+    heard("VUID-vkCmdDraw-None-90089", through_a_lens(open(), &flat));
+    heard(
+        "VUID-VkGaussianCameraDistortionGAURAST-gaussianDistortion-90084",
+        through_a_lens(without_modes(), &splats()),
+    );
     heard("VUID-vkCmdDraw-geometry-90071", flat_through_a_fisheye());
     heard("VUID-vkCmdDraw-maxGaussiansPerDraw-90083", too_many());
     let bare = without_modes();
@@ -309,6 +370,10 @@ fn report_every_statement() {
     for (feature, request) in modes() {
         heard(of_feature(feature), refused(&bare, &request, absent, feature));
     }
+    let features = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
+    let unscented = with_features_of_gaussians(features.gaussian_primitive_topology(true).unscented_projection(true));
+    let other_points = pointing(|points| points.alpha(0.5));
+    heard(of_feature("unscentedParameters"), refused(&unscented, &other_points, absent, "other sigma points"));
     heard(of_feature("resolveFragmentShader"), with_a_fragment_stage(&bare));
     heard(of_feature("gaussianPrimitiveTopology"), without_the_topology());
     // [`a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so`] breaks this one.
@@ -323,6 +388,22 @@ fn too_many() -> String {
     let pixels = scene.draw([0.25; 4], |device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_draw(commands, 1, (1 << 26) + 1, 0, 0) };
+    });
+    assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+    scene.gpu.message_texts().concat()
+}
+
+/// The messages of a draw through a lens that distorts, which draws nothing.
+fn through_a_lens(gpu: Gpu, request: &Graphics<'static>) -> String {
+    let scene = Scene::on(gpu, &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], request);
+    let pixels = scene.draw([0.25; 4], |device, commands| {
+        let mut lens = GaussianCameraDistortionGAURAST::default().radial([-0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let camera = camera().push_next(&mut lens);
+        // SAFETY: see the crate.
+        unsafe {
+            gaussian(&scene.gpu).cmd_set_gaussian_cameras(commands, &[camera]);
+            device.cmd_draw(commands, 1, 1, 0, 0);
+        }
     });
     assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
     scene.gpu.message_texts().concat()

@@ -130,7 +130,7 @@ def test_lenses_of_camera_files(tmp_path):
 def test_lenses_that_no_camera_has_are_refused(garden):
     camera = garden.frame((16, 16))
     for lens, reason in [
-        (gaurast.Distortion("barrel"), "'barrel' is not a model of distortion"),
+        (gaurast.Distortion("barrel"), '"barrel" is not a model of distortion'),
         (gaurast.Distortion("division", (0.1, 0.1, 0, 0, 0, 0)), "a coefficient of the lens"),
     ]:
         with pytest.raises(ValueError, match=reason):

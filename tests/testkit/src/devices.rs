@@ -52,7 +52,8 @@ pub fn open() -> Gpu {
     Gpu::open(&everything_of(Driver::Embedded)).expect("a device")
 }
 
-fn with_features_of_gaussians(features: GaussianFeatures<'static>) -> Gpu {
+/// Opens the device with all that it supports, of the extension only some features.
+pub fn with_features_of_gaussians(features: GaussianFeatures<'static>) -> Gpu {
     let opening = Opening { gaussian: Some(features), ..everything_of(Driver::Embedded) };
     Gpu::open(&opening).expect("a device")
 }
