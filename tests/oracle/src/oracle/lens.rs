@@ -62,6 +62,11 @@ impl Dual {
     fn scaled(self, factor: f64) -> Self {
         self.map(factor * self.value, factor)
     }
+
+    fn times(self, other: Self) -> Self {
+        let by = [0, 1].map(|i| self.by[i] * other.value + self.value * other.by[i]);
+        Self { value: self.value * other.value, by }
+    }
 }
 
 impl Add for Dual {
@@ -76,8 +81,7 @@ impl Mul for Dual {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let by = [0, 1].map(|i| self.by[i] * other.value + self.value * other.by[i]);
-        Self { value: self.value * other.value, by }
+        self.times(other)
     }
 }
 
