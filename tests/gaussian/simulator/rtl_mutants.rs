@@ -26,10 +26,8 @@ const MUTANTS: &[Mutant] = &[
     mutant("ties away from even", "fp_round.sv", "(|significand[EXTRA-2:0] || significand[EXTRA])", "1'b1"),
     mutant("no carry of the rounding", "fp_round.sv", "assign carry = rounded[MANTISSA+1];", "assign carry = 1'b0;"),
     mutant("no sticky bit of the sum", "fp_add.sv", "{aligned[WIDTH-1:1], aligned[0] | lost}", "aligned"),
-    mutant("the sign of a cancellation", "fp_add.sv", "zero && vanished2 ? 1'b0 : sign2", "sign2"),
     mutant("the product's exponent", "fp_mul.sv", "{{(EXPONENT+1){1'b0}}, high}", "{(EXPONENT+2){1'b0}}"),
     mutant("no remainder of the quotient", "fp_div.sv", "rest[STAGES*(SIZE+1)+:SIZE+1] != 0}", "1'b0}"),
-    mutant("the exponential's slope", "fp_exp2.sv", "slope2 <= slope + bend;", "slope2 <= slope;"),
     mutant("no ceiling of alpha", "pe.sv", "power > alpha_ceiling ? alpha_ceiling : power", "power"),
     mutant("the floor of alpha is exclusive", "pe.sv", ".in(!a1[BITS-1])", ".in(!a1[BITS-1] && a1 != 0)"),
     mutant("red and blue", "pe.sv", "assign next_color = {a7, a2, a8};", "assign next_color = {a8, a2, a7};"),
@@ -91,8 +89,8 @@ const MUTANTS: &[Mutant] = &[
 
 /// The mutants that are tried: a sample or, in a long run, all.
 fn tried() -> Vec<Variant> {
-    let step = if is_long() { 1 } else { 12 };
-    MUTANTS.iter().step_by(step).map(|mutant| Variant::new(mutant.name)).collect()
+    let count = if is_long() { MUTANTS.len() } else { 2 };
+    MUTANTS.iter().take(count).map(|mutant| Variant::new(mutant.name)).collect()
 }
 
 /// True if the module of a folder draws generated tiles as the model does.
