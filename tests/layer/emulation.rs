@@ -1,11 +1,16 @@
 //! `VK_LAYER_GAURAST_emulation` over lavapipe: cases of the conformance program, as it is.
 
 use ash::vk;
+use gaurast::vk::{
+    GaussianCameraDistortionGAURAST, GaussianLinearizationGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+};
 use gaurast_conformance::{Device, Outcome, all, cases, run};
 use gaurast_runner::{Case, Need, Variant};
+use gaurast_testkit::devices::gaussian;
 use gaurast_testkit::loader::with_emulation;
+use gaurast_testkit::scene::{camera, splats};
 use gaurast_testkit::{
-    Attachments, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Recorded, Target,
+    Attachments, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Graphics, Pass, Recorded, Target,
     TargetOptions, depth_test, over,
 };
 use gaurast_tests::long_run::memory;
@@ -269,5 +274,33 @@ fn frames_take_no_more_memory(case: &Case) {
             return;
         };
         assert!(late < early + (4 << 20), "{early} bytes, and {late} later");
+    });
+}
+
+/// Lenses that distort and other sigma points are refused, not left out.
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
+fn pictures_that_are_not_emulated_are_refused(case: &Case) {
+    with_emulation(case, &[], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        let gpu = device.gpu();
+        let absent = Some(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+        let unscented = |alpha| {
+            let points = PipelineGaussianUnscentedStateCreateInfoGAURAST::default().alpha(alpha);
+            let request = splats();
+            let gaussian = request.gaussian.map(|state| state.linearization(GaussianLinearizationGAURAST::UNSCENTED));
+            Graphics { gaussian, unscented: Some(points), ..request }.create(gpu).err()
+        };
+        assert_eq!((unscented(1.0), unscented(0.1)), (None, absent));
+        let through = |k1| {
+            let mut lens = GaussianCameraDistortionGAURAST::default().radial([k1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            let camera = camera().push_next(&mut lens);
+            let recorded = gpu.try_record(|commands| {
+                let (_, raw) = commands.raw();
+                // SAFETY: see the crate.
+                unsafe { gaussian(gpu).cmd_set_gaussian_cameras(raw, &[camera]) };
+            });
+            recorded.err()
+        };
+        assert_eq!((through(0.0), through(-0.1)), (None, absent));
     });
 }

@@ -64,15 +64,15 @@ impl TestState {
     }
 
     /// Reports whether something is tested.
-    pub(crate) fn is_any(&self) -> bool {
+    pub(crate) fn tests_anything(&self) -> bool {
         self.is_depth_tested || self.are_bounds_tested || self.is_stencil_tested
     }
 
     /// Reports whether something is tested, or is where commands say so.
-    pub(crate) fn may_be_any(&self, dynamic: &[vk::DynamicState]) -> bool {
+    pub(crate) fn may_test_anything(&self, dynamic: &[vk::DynamicState]) -> bool {
         use vk::DynamicState as Dynamic;
         let enables = [Dynamic::DEPTH_TEST_ENABLE, Dynamic::DEPTH_BOUNDS_TEST_ENABLE, Dynamic::STENCIL_TEST_ENABLE];
-        self.is_any() || enables.iter().any(|enable| dynamic.contains(enable))
+        self.tests_anything() || enables.iter().any(|enable| dynamic.contains(enable))
     }
 
     /// Reports whether two states are one, as far as they have an effect.
@@ -90,7 +90,7 @@ impl TestState {
 }
 
 /// The dynamic states by which a set is shown where it is tested. The kernels have made the tests: what is left is to store.
-pub(crate) const SHOWN: [vk::DynamicState; 7] = [
+pub(crate) const STORED: [vk::DynamicState; 7] = [
     vk::DynamicState::DEPTH_TEST_ENABLE,
     vk::DynamicState::DEPTH_WRITE_ENABLE,
     vk::DynamicState::STENCIL_TEST_ENABLE,

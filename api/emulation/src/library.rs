@@ -6,7 +6,7 @@ use ash::vk;
 use ash::vk::GraphicsPipelineLibraryFlagsEXT as Parts;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
-    PipelineGaussianStateCreateInfoGAURAST as State,
+    PipelineGaussianStateCreateInfoGAURAST as State, PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPoints,
 };
 use gaurast_layer_interface::{find, slice};
 
@@ -24,6 +24,7 @@ struct Input {
 struct PreRasterization {
     state: Option<State<'static>>,
     footprint: Option<Footprint<'static>>,
+    sigma_points: Option<SigmaPoints<'static>>,
     has_vertex_stage: bool,
     viewport: Option<vk::Viewport>,
     scissor: Option<vk::Rect2D>,
@@ -116,11 +117,13 @@ impl PreRasterization {
             let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
             let state = find::<State<'_>>(info.p_next);
             let footprint = find::<Footprint<'_>>(info.p_next);
+            let sigma_points = find::<SigmaPoints<'_>>(info.p_next);
             let clip =
                 viewports.and_then(|state| find::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next));
             Self {
                 state: state.map(|state| State { p_next: null(), _marker: PhantomData, ..*state }),
                 footprint: footprint.map(|state| Footprint { p_next: null(), _marker: PhantomData, ..*state }),
+                sigma_points: sigma_points.map(|state| SigmaPoints { p_next: null(), _marker: PhantomData, ..*state }),
                 has_vertex_stage: has_stage(info, vk::ShaderStageFlags::VERTEX),
                 viewport: viewports.and_then(|state| state.p_viewports.as_ref()).copied(),
                 scissor: viewports.and_then(|state| state.p_scissors.as_ref()).copied(),
@@ -294,6 +297,7 @@ impl Library {
             }
         }
         let mut footprint = shaders.footprint;
+        let mut sigma_points = shaders.sigma_points;
         let layout = if layout == vk::PipelineLayout::null() { shaders.layout } else { layout };
         let linking = vk::PipelineCreateFlags::LIBRARY_KHR
             | vk::PipelineCreateFlags::LINK_TIME_OPTIMIZATION_EXT
@@ -311,6 +315,9 @@ impl Library {
             .push_next(&mut rendering);
         if let Some(footprint) = &mut footprint {
             info = info.push_next(footprint);
+        }
+        if let Some(sigma_points) = &mut sigma_points {
+            info = info.push_next(sigma_points);
         }
         info.p_color_blend_state = blend.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
         info.p_multisample_state = multisample.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);

@@ -10,6 +10,7 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
     PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPoints,
 };
 use gaurast_layer_interface::{find, slice};
 
@@ -113,11 +114,20 @@ pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a
     }
 }
 
+/// Reports whether sigma points are not those of pipelines without the structure.
+fn are_changed(points: &SigmaPoints<'_>) -> bool {
+    let values = |points: &SigmaPoints<'_>| {
+        ([points.alpha, points.beta, points.kappa, points.picture_margin], points.all_sigma_points)
+    };
+    values(points) != values(&SigmaPoints::default())
+}
+
 /// A reason to refuse a pipeline.
-fn refusal(state: &State<'_>, has_fragment_stage: bool) -> Option<&'static str> {
+fn refusal(state: &State<'_>, has_fragment_stage: bool, has_sigma_points: bool) -> Option<&'static str> {
     let refusals = [
         (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
         (has_fragment_stage, "resolveFragmentShader"),
+        (has_sigma_points && state.linearization == Linearization::UNSCENTED, "unscentedParameters"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
     ];
@@ -246,7 +256,8 @@ pub(crate) unsafe fn create(
     unsafe {
         let stages = slice(info.p_stages, info.stage_count);
         let has_fragment_stage = stages.iter().any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
-        if let Some(feature) = refusal(state, has_fragment_stage) {
+        let sigma_points = find::<SigmaPoints<'_>>(info.p_next);
+        if let Some(feature) = refusal(state, has_fragment_stage, sigma_points.is_some_and(are_changed)) {
             tell(&format!("a pipeline needs {feature}, which is not emulated"));
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
@@ -270,7 +281,7 @@ pub(crate) unsafe fn create(
             is_dynamic(vk::DynamicState::SCISSOR, vk::DynamicState::SCISSOR_WITH_COUNT),
         );
         let tests = info.p_depth_stencil_state.as_ref().map(TestState::of_pipeline).unwrap_or_default();
-        let tests = Some(tests).filter(|tests| tests.may_be_any(&dynamic));
+        let tests = Some(tests).filter(|tests| tests.may_test_anything(&dynamic));
         if tests.is_some() && dynamic.contains(&vk::DynamicState::DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT) {
             tell("a pipeline that may test depths has negativeOneToOne as a dynamic state, which is not emulated");
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
@@ -293,7 +304,7 @@ pub(crate) unsafe fn create(
             has_angles: state.camera_source == CameraSource::UNIFORM_BUFFER,
             is_unscented: state.linearization == Linearization::UNSCENTED,
             is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
-            has_tests: tests.is_some_and(|tests| tests.is_any()),
+            has_tests: tests.is_some_and(|tests| tests.tests_anything()),
             has_logarithms: state.flags.contains(Flags::LOG_SCALE),
             has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
         };
@@ -364,7 +375,7 @@ unsafe fn graphics(
     let mut states: Vec<vk::DynamicState> = dynamic.iter().copied().filter(|state| SHOWN.contains(state)).collect();
     states.extend([vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
     if may_be_tested {
-        states.extend(depth_stencil::SHOWN);
+        states.extend(depth_stencil::STORED);
     }
     let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
     // SAFETY: the caller's promise.

@@ -221,7 +221,10 @@ impl Recording {
         }
         Some(SetState {
             values: self.values.of(pipeline)?,
-            tests: pipeline.tests.map(|own| own.with_dynamic(&self.tests, &pipeline.dynamic)).filter(TestState::is_any),
+            tests: pipeline
+                .tests
+                .map(|own| own.with_dynamic(&self.tests, &pipeline.dynamic))
+                .filter(TestState::tests_anything),
             pipeline: Arc::clone(pipeline),
             cameras,
             viewport: pipeline.viewport.or(self.viewport)?,

@@ -218,14 +218,14 @@ pub(crate) struct Picture {
     /// The address of the samples' median depths.
     medians: u64,
     samples: u32,
-    /// What is shown.
+    /// The sample that a draw shows, and the outcome of its tests.
     sample: u32,
     wanted: f32,
     unused: u32,
 }
 
 impl Picture {
-    /// Chooses what is shown.
+    /// Chooses the sample that the next draw shows, and the outcome of its tests.
     pub(crate) fn show(&mut self, sample: u32, outcome: Outcome) {
         self.sample = sample;
         self.wanted = outcome.number();

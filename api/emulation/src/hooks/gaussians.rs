@@ -2,14 +2,29 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST as Camera, GaussianOrderGAURAST as Order,
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraDistortionGAURAST as Distortion,
+    GaussianCameraGAURAST as Camera, GaussianOrderGAURAST as Order,
     GaussianSphericalHarmonicsBufferGAURAST as HarmonicsInfo,
 };
-use gaurast_layer_interface::slice;
+use gaurast_layer_interface::{find, slice};
 
 use crate::hooks::site::record;
 use crate::recording::HarmonicsBuffer;
+use crate::report::tell;
 use crate::set::camera_data;
+
+/// Reports whether the lens of a camera distorts.
+///
+/// # Safety
+/// The camera's chain is valid.
+unsafe fn distorts(camera: &Camera<'_>) -> bool {
+    // SAFETY: the caller's promise.
+    let lens = unsafe { find::<Distortion<'_>>(camera.p_next) };
+    lens.is_some_and(|lens| {
+        let coefficients = lens.radial.iter().chain(&lens.tangential).chain(&lens.thin_prism);
+        coefficients.into_iter().any(|coefficient| *coefficient != 0.0)
+    })
+}
 
 pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
     commands: vk::CommandBuffer,
@@ -19,7 +34,17 @@ pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
     // SAFETY: see the crate.
     unsafe {
         let cameras = slice(cameras, count);
-        record(commands, |_, recording| recording.cameras = cameras.iter().map(camera_data).collect(), |_| {});
+        record(
+            commands,
+            |_, recording| {
+                if cameras.iter().any(|camera| distorts(camera)) {
+                    tell("a camera needs gaussianDistortion, which is not emulated");
+                    recording.failure = Some(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+                }
+                recording.cameras = cameras.iter().map(camera_data).collect();
+            },
+            |_| {},
+        );
     }
 }
 
