@@ -99,10 +99,17 @@ fn design(case: &Case) -> &'static Design {
 fn units_compute_the_models_bits(case: &Case) {
     let format = format(case);
     let bench = UnitBench::build(&folder(), format).expect("a bench");
+    let pairs = pairs(format, if is_long() { 1_000_000 } else { 20_000 });
+    for (pair, results) in pairs.iter().zip(bench.run(&pairs).expect("results")) {
+        assert_eq!(results, results_of_model(format, *pair), "{pair:x?}");
+    }
+}
+
+/// Pairs of numbers: of random bits, of magnitudes near 1, and pairs that cancel.
+pub(super) fn pairs(format: Format, count: usize) -> Vec<[u32; 2]> {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mask = u32::MAX >> (32 - format.bits());
-    let count = if is_long() { 1_000_000 } else { 20_000 };
-    let pairs: Vec<[u32; 2]> = (0..count)
+    (0..count)
         .map(|index| {
             let mut number = || match index % 3 {
                 0 => random.random::<u32>() & mask,
@@ -117,20 +124,14 @@ fn units_compute_the_models_bits(case: &Case) {
             let near = a ^ (1 << (format.bits() - 1)) ^ (index as u32 % 7);
             [a, if index % 6 == 2 { near } else { number() }]
         })
-        .collect();
-    for ([a, b], results) in pairs.iter().zip(bench.run(&pairs).expect("results")) {
-        let (sum, product) = (format.add(*a, *b), format.mul(*a, *b));
-        let expected = [
-            sum,
-            sum,
-            product,
-            product,
-            format.div(*a, *b),
-            exp2(format, Exponential::Table, *a),
-            exp2(format, Exponential::Polynomial, *a),
-        ];
-        assert_eq!(results, expected, "{a:x} {b:x}");
-    }
+        .collect()
+}
+
+/// The model's results for a pair, in the order of [`UnitBench::run`].
+pub(super) fn results_of_model(format: Format, [a, b]: [u32; 2]) -> [u32; 7] {
+    let (sum, product) = (format.add(a, b), format.mul(a, b));
+    let powers = [Exponential::Table, Exponential::Polynomial].map(|exponential| exp2(format, exponential, a));
+    [sum, sum, product, product, format.div(a, b), powers[0], powers[1]]
 }
 
 /// Draws lists on both, and compares every pixel.

@@ -6,9 +6,8 @@ module bench #(
     parameter int TWO_PATHS = 0,
     parameter int BOOTH = 0,
     parameter int POLYNOMIAL = 0,
-    // The most words of a file, and the most cycles.
-    parameter int WORDS = 1 << 20,
-    parameter int CYCLES = 1 << 24
+    // The most words of a file.
+    parameter int WORDS = 1 << 20
 );
     localparam int BITS = 1 + EXPONENT + MANTISSA;
 
@@ -21,7 +20,7 @@ module bench #(
     logic [31:0] words [0:WORDS-1];
     // The words' places: of a tile's numbers, and of the data that answer a request.
     logic [31:0] tiles, latency, next, memory, from, beats, waits;
-    logic [31:0] cycles, way, longest;
+    logic [31:0] cycles, most, way, longest;
     logic [31:0] causes [0:5];
 
     // A word of the file, whose bytes $fread takes as those of a big-endian one.
@@ -65,6 +64,9 @@ module bench #(
         tiles = word(0);
         latency = word(1);
         memory = 9 + 3 * tiles;
+        // A pixel of a primitive waits for no more than the latency of its transmittance.
+        most = 10000 + 2000 * tiles;
+        for (int at = 0; at < tiles; at = at + 1) most = most + 200 * word(11 + 3 * at);
         {next, from, beats, waits, cycles, way, longest} = 0;
         for (int i = 0; i < 6; i = i + 1) causes[i] = 0;
         // The counts come first in the file; they are written once they are known.
@@ -82,7 +84,7 @@ module bench #(
             if (in_flight && way > longest) longest = way;
             causes[cause] = causes[cause] + 1;
             cycles = cycles + 1;
-            if (cycles > CYCLES) $fatal(1, "it does not end");
+            if (cycles > most) $fatal(1, "it does not end");
             if (tile_valid && tile_ready) next = next + 1;
             if (data_valid) begin
                 from = from + 4;

@@ -189,12 +189,20 @@ fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
 pub struct UnitBench(PathBuf);
 
 impl UnitBench {
-    /// Compiles the units for a format in a folder, which keeps the compiled program.
+    /// Writes all files to a folder, and compiles them as [`UnitBench::compile`] does.
+    ///
+    /// # Errors
+    /// Returns an error if a file can't be written, or if Verilator is missing or fails.
+    pub fn build(folder: &Path, format: Format) -> Result<Self> {
+        write(folder)?;
+        Self::compile(folder, format)
+    }
+
+    /// Compiles the units for a format from the files of a folder, which keeps the compiled program.
     ///
     /// # Errors
     /// Returns an error if Verilator is missing or fails.
-    pub fn build(folder: &Path, format: Format) -> Result<Self> {
-        write(folder)?;
+    pub fn compile(folder: &Path, format: Format) -> Result<Self> {
         build(folder, "units", format, &[]).map(Self)
     }
 
