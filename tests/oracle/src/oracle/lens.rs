@@ -193,6 +193,9 @@ impl OracleLens {
         let mut low = 0.0;
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
             *(if reaches(middle) { &mut high } else { &mut low }) = middle;
         }
         (high / corner).max(1.0)

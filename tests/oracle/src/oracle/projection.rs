@@ -64,7 +64,11 @@ fn pinhole(camera: &OracleCamera, margin: f64, t: [f64; 3]) -> ([f64; 2], [[f64;
     let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
     let mut across = [-(cx / fx + margin * width / fx), (width - cx) / fx + margin * width / fx];
     let mut down = [-(cy / fy + margin * height / fy), (height - cy) / fy + margin * height / fy];
-    if let Some(lens) = &camera.lens {
+    let is_between = |slope: f64, [least, greatest]: [f64; 2]| least <= slope && slope <= greatest;
+    // Wider bounds change nothing between the others, and are dear to compute.
+    if let Some(lens) = &camera.lens
+        && !(is_between(tan_x, across) && is_between(tan_y, down))
+    {
         let farthest = |[least, greatest]: [f64; 2]| least.abs().max(greatest.abs());
         let wider = lens.widening(farthest(across).hypot(farthest(down)));
         (across, down) = (across.map(|slope| slope * wider), down.map(|slope| slope * wider));
