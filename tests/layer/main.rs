@@ -7,12 +7,16 @@
 mod before;
 mod cameras;
 mod contents;
+mod depth;
 mod devices;
 mod draws;
 mod dynamic_states;
 mod emulation;
 mod features;
 mod harmonics;
+mod indirect;
+mod libraries;
+mod lifetimes;
 mod locations;
 mod page;
 mod pipelines;
@@ -56,6 +60,10 @@ pub fn chapters() -> Vec<(&'static str, Vec<Mistake>)> {
         ("Sorted sets", sets::mistakes()),
         ("Harmonics in a buffer", harmonics::mistakes()),
         ("Draws", draws::mistakes()),
+        ("Depths", depth::mistakes()),
+        ("Numbers in buffers", indirect::mistakes()),
+        ("Pipeline libraries", libraries::mistakes()),
+        ("Lifetimes", lifetimes::mistakes()),
         ("What buffers hold", contents::mistakes()),
     ]
 }

@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 pub(crate) const INPUT: u32 = 1;
 /// See [`INPUT`].
 pub(crate) const OUTPUT: u32 = 3;
+/// The storage class of push constants.
+const PUSH_CONSTANT: u32 = 9;
 /// The decoration `BuiltIn`'s value for the depth that a fragment shader writes.
 const FRAG_DEPTH: u32 = 22;
 
@@ -173,4 +175,9 @@ impl Interface {
         let module = Module::parse(words);
         Self { slots: module.slots(entry, class), writes_depth: module.writes_depth(entry) }
     }
+}
+
+/// Reports whether a module has push constants.
+pub(crate) fn reads_constants(words: &[u32]) -> bool {
+    Module::parse(words).variables.values().any(|&(_, class)| class == PUSH_CONSTANT)
 }
