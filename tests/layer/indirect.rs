@@ -22,6 +22,13 @@ fn counted(commands: &Commands, buffer: &Buffer, offset: u64, most: u32) {
     unsafe { device.cmd_draw_indirect_count(raw, buffer.raw, 0, buffer.raw, offset, most, 16) };
 }
 
+/// Draws twice by numbers that are some bytes apart.
+pub fn strided(commands: &Commands, buffer: &Buffer, stride: u32) {
+    let (device, raw) = commands.raw();
+    // SAFETY: see the crate.
+    unsafe { device.cmd_draw_indirect(raw, buffer.raw, 0, 2, stride) };
+}
+
 /// A shader that writes the words that are pushed to it.
 const WRITES: &str = "
     layout(local_size_x = 1) in;
@@ -98,14 +105,10 @@ pub fn mistakes() -> Vec<Mistake> {
             commands.draw_indirect(buffer, 2);
         }),
         numbers(
-            "numbers of an indexed draw in a draw of vertices",
+            "a stride of indexed draws for numbers of vertices",
             "GAURAST-Draw-indirect-stride",
-            &[1, 1, 0, 0, 0, 1, 1, 1, 0, 0],
-            |commands, buffer| {
-                let (device, raw) = commands.raw();
-                // SAFETY: see the crate.
-                unsafe { device.cmd_draw_indirect(raw, buffer.raw, 0, 2, 20) };
-            },
+            &[2, 1, 0, 0, 2, 1, 0, 0, 0, 0],
+            |commands, buffer| strided(commands, buffer, 20),
         ),
         numbers(
             "an indirect draw without an instance",

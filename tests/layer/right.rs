@@ -11,7 +11,7 @@ use gaurast_testkit::{Bindings, Buffer, Gpu, Graphics, Message, Pass, PassObject
 use crate::contents::{bytes, grid};
 use crate::depth::{Deep, RIGHT};
 use crate::harmonics::Addressed;
-use crate::indirect::by_compute;
+use crate::indirect::{by_compute, strided};
 use crate::pipelines::allowing;
 use crate::stage::{
     COLOR, IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced, laid_out,
@@ -98,6 +98,13 @@ fn draws() -> Vec<Use> {
             drawing(gpu, &splats(), &[SPLAT; 3], |commands| {
                 commands.camera(&camera());
                 commands.draw_indirect(&draws, 1);
+            })
+        }),
+        right("indirect draws with a word between them", |gpu| {
+            let draws = Buffer::of(gpu, &[1u32, 1, 0, 0, 7, 1, 1, 1, 0, 7]);
+            drawing(gpu, &splats(), &[SPLAT; 3], |commands| {
+                commands.camera(&camera());
+                strided(commands, &draws, 20);
             })
         }),
         right("two draws that blend", |gpu| {

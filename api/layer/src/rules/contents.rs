@@ -124,6 +124,10 @@ impl Look<'_> {
         let Some(number) = indirect::number(&indirect, self.reader, faults) else {
             return calls;
         };
+        indirect::check_stride(&indirect, number, self.reader, faults);
+        if faults.0.len() > before {
+            return calls;
+        }
         for index in 0..number.min(MOST_DRAWS) {
             let Some(call) = indirect::call(&indirect, index, self.reader) else {
                 break;

@@ -7,7 +7,6 @@ use crate::rules::reader::Reader;
 
 /// Checks a command as it is recorded.
 pub(crate) fn check_command(call: &Indirect, facts: &Facts, faults: &mut Faults) {
-    let own = if call.is_indexed { 20 } else { 16 };
     if call.counted.is_some() && call.count == 0 {
         return faults
             .warning("GAURAST-Draw-indirect-count", "maxDrawCount is 0: nothing is drawn, whatever the count is");
@@ -19,18 +18,28 @@ pub(crate) fn check_command(call: &Indirect, facts: &Facts, faults: &mut Faults)
         } else {
             "VUID-vkCmdDrawIndirect-drawCount-02718"
         };
-        return faults.error(
+        faults.error(
             id,
             format!("drawCount of {name} is {}, but the feature multiDrawIndirect is not enabled", call.count),
         );
     }
-    if !call.is_indexed && call.count > 1 && call.stride == 20 {
+}
+
+/// Warns of a stride of 20 bytes for numbers that are 16 apart: those of an indexed draw are 20.
+pub(crate) fn check_stride(indirect: &Indirect, number: u32, reader: &dyn Reader, faults: &mut Faults) {
+    if indirect.is_indexed || indirect.stride != 20 || number < 2 {
+        return;
+    }
+    let are_single = |stride: u32| {
+        let strided = Indirect { stride, ..*indirect };
+        let mut calls = (0..number.min(64)).map(|index| call(&strided, index, reader));
+        calls.all(|call| matches!(call, Some(Call::Vertices([_, _, _, 1]))))
+    };
+    if are_single(16) && !are_single(20) {
         faults.warning(
             "GAURAST-Draw-indirect-stride",
-            format!(
-                "the stride is 20, the size of a VkDrawIndexedIndirectCommand, but this command reads \
-                 VkDrawIndirectCommands of {own} bytes"
-            ),
+            "the stride is 20, the size of a VkDrawIndexedIndirectCommand, but the VkDrawIndirectCommands in the buffer are \
+             16 bytes apart",
         );
     }
 }

@@ -5,7 +5,7 @@ const LEAST: usize = 128;
 /// The number of Gaussians whose nearest neighbours are looked for.
 const LOOKED_AT: usize = 64;
 /// A distance to the nearest neighbour, in standard deviations, at which a scene is dust.
-const APART: f32 = 16.0;
+const APART: f32 = 32.0;
 
 /// Positions of Gaussians, and their greatest standard deviations.
 #[derive(Debug, Default)]
