@@ -29,7 +29,7 @@ pub(crate) struct State {
     pub(crate) libraries: Libraries,
     /// Submissions whose end is awaited.
     pub(crate) pending: Submissions,
-    /// The principal points of cameras, by all else that they have: parts of one picture differ in them alone.
+    /// Principal points of cameras, up to two, by all else that they have: parts of one picture differ in them alone.
     pub(crate) principal_points: HashMap<u64, HashSet<[u32; 2]>>,
 }
 

@@ -21,6 +21,8 @@ use crate::rules::reader::Reader;
 use gaurast_layer_interface::{find, slice};
 
 const FAILED: vk::Result = vk::Result::ERROR_INITIALIZATION_FAILED;
+/// The most views whose principal points are remembered.
+const MOST_VIEWS: usize = 4096;
 /// The most bytes of a transfer that the layer follows.
 const MOST_BYTES: u64 = 512 << 20;
 
@@ -194,8 +196,14 @@ fn execute(device: &Device, state: &mut State, commands: &[vk::CommandBuffer], f
 fn note_cameras(device: &Device, state: &mut State, draw: &Draw) {
     let cameras = contents::known_cameras(draw, &Contents::new(device, state, false));
     for camera in &cameras {
+        if state.principal_points.len() >= MOST_VIEWS {
+            state.principal_points.clear();
+        }
         let points = state.principal_points.entry(contents::view_key(camera)).or_default();
-        points.insert(camera.principal_point.map(f32::to_bits));
+        // Two tell as much as many.
+        if points.len() < 2 {
+            points.insert(camera.principal_point.map(f32::to_bits));
+        }
     }
 }
 

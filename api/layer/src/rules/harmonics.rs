@@ -65,7 +65,8 @@ fn check_alignment(bound: &GaussianSphericalHarmonicsBufferGAURAST<'_>, word: u6
         faults.warning(
             "GAURAST-Harmonics-alignment",
             format!(
-                "{name} is {number}, which is no multiple of {word}, the bytes of a component of {:?}",
+                "{name} is {} beyond a multiple of {word}, the bytes of a component of {:?}",
+                number % word,
                 bound.format
             ),
         );
