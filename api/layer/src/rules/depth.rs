@@ -56,25 +56,25 @@ pub(crate) fn note(recording: &mut Recording, pipeline: &Pipeline) {
 
 /// The depths that pass a comparison: smaller ones, greater ones, or neither.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Passes {
+enum Way {
     Smaller,
     Greater,
     Other,
 }
 
-fn passes(op: vk::CompareOp) -> Passes {
+fn way_of(op: vk::CompareOp) -> Way {
     match op {
-        vk::CompareOp::LESS | vk::CompareOp::LESS_OR_EQUAL => Passes::Smaller,
-        vk::CompareOp::GREATER | vk::CompareOp::GREATER_OR_EQUAL => Passes::Greater,
-        _ => Passes::Other,
+        vk::CompareOp::LESS | vk::CompareOp::LESS_OR_EQUAL => Way::Smaller,
+        vk::CompareOp::GREATER | vk::CompareOp::GREATER_OR_EQUAL => Way::Greater,
+        _ => Way::Other,
     }
 }
 
 /// Checks the depths that a camera gives.
 pub(crate) fn check(camera: &Camera, meets: Option<&DepthUse>, faults: &mut Faults) {
     let Some(meets) = meets else { return };
-    let own = passes(meets.op);
-    if own == Passes::Other {
+    let own_way = way_of(meets.op);
+    if own_way == Way::Other {
         return;
     }
     let [c0, c1] = camera.depth_coefficients;
@@ -95,18 +95,18 @@ pub(crate) fn check(camera: &Camera, meets: Option<&DepthUse>, faults: &mut Faul
             ),
         );
     }
-    check_clear(meets, own, faults);
+    check_clear(meets, own_way, faults);
     if faults.is_empty() {
-        check_direction(camera, meets, own, faults);
+        check_direction(camera, meets, own_way, faults);
     }
 }
 
 /// Warns of a comparison that nothing passes where the depth is as it was cleared.
-fn check_clear(meets: &DepthUse, own: Passes, faults: &mut Faults) {
+fn check_clear(meets: &DepthUse, own_way: Way, faults: &mut Faults) {
     let Some(cleared) = meets.cleared else { return };
-    let only_this_way = meets.writers.iter().all(|&op| passes(op) == own);
-    let is_never = match own {
-        Passes::Smaller => meets.op == vk::CompareOp::LESS && cleared <= 0.0,
+    let only_this_way = meets.writers.iter().all(|&op| way_of(op) == own_way);
+    let is_never = match own_way {
+        Way::Smaller => meets.op == vk::CompareOp::LESS && cleared <= 0.0,
         _ => meets.op == vk::CompareOp::GREATER && cleared >= 1.0,
     };
     if is_never && only_this_way {
@@ -118,13 +118,13 @@ fn check_clear(meets: &DepthUse, own: Passes, faults: &mut Faults) {
 }
 
 /// Warns of depths that grow the other way than the comparison wants, and of draws before that compare the other way.
-fn check_direction(camera: &Camera, meets: &DepthUse, own: Passes, faults: &mut Faults) {
-    let opposite = match own {
-        Passes::Smaller => Passes::Greater,
-        _ => Passes::Smaller,
+fn check_direction(camera: &Camera, meets: &DepthUse, own_way: Way, faults: &mut Faults) {
+    let opposite_way = match own_way {
+        Way::Smaller => Way::Greater,
+        _ => Way::Smaller,
     };
-    let is_of = |way: Passes| meets.writers.iter().any(|&op| passes(op) == way);
-    if is_of(opposite) && !is_of(own) {
+    let is_of = |way: Way| meets.writers.iter().any(|&op| way_of(op) == way);
+    if is_of(opposite_way) && !is_of(own_way) {
         return faults.warning(
             "GAURAST-Draw-depth-compare",
             format!(
@@ -134,18 +134,18 @@ fn check_direction(camera: &Camera, meets: &DepthUse, own: Passes, faults: &mut 
             ),
         );
     }
-    let cleared_for = match meets.cleared {
-        Some(depth) if depth >= 1.0 => Passes::Smaller,
-        Some(depth) if depth <= 0.0 => Passes::Greater,
-        _ => Passes::Other,
+    let cleared_way = match meets.cleared {
+        Some(depth) if depth >= 1.0 => Way::Smaller,
+        Some(depth) if depth <= 0.0 => Way::Greater,
+        _ => Way::Other,
     };
     let [_, c1] = camera.depth_coefficients;
     let grows = if camera.model == Model::ORTHOGRAPHIC { c1 > 0.0 } else { c1 < 0.0 };
     let is_turned = meets.range.is_some_and(|[least, greatest]| greatest < least);
-    let wanted = if grows == is_turned { Passes::Greater } else { Passes::Smaller };
-    if cleared_for == own && wanted != own && c1 != 0.0 {
+    let wanted_way = if grows == is_turned { Way::Greater } else { Way::Smaller };
+    if cleared_way == own_way && wanted_way != own_way && c1 != 0.0 {
         let range = if is_turned { " in a viewport whose depths are turned" } else { "" };
-        let what = if wanted == Passes::Greater { "smaller" } else { "greater" };
+        let what = if wanted_way == Way::Greater { "smaller" } else { "greater" };
         faults.warning(
             "GAURAST-Draw-depth-compare",
             format!(
