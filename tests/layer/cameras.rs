@@ -118,6 +118,8 @@ fn of_cameras() -> Vec<Mistake> {
         set("a near plane at the eye", near, || vec![camera().near_plane(0.0)]),
         set("a far plane before the near one", far, || vec![camera().far_plane(0.1)]),
         set("a far plane of 0 for none", far, || vec![camera().far_plane(0.0)]),
+        set("an eye beyond all positions", "GAURAST-Camera-eye", || vec![camera().eye([1e300, 0.0, 0.0])]),
+        set("a focal length of 1e38", "GAURAST-Camera-focal-length", || vec![camera().focal_length([1e38; 2])]),
         set("a rotation with a scale", "GAURAST-Camera-rotation", || {
             vec![camera().rotation([2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0])]
         }),

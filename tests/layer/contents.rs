@@ -8,8 +8,8 @@ use gaurast::vk::{
 use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Message, Pass, Resource, Target};
 
 use crate::stage::{
-    IDENTITY, Mistake, OPACITY, ROTATION, SCALE, SIZE, SPLAT, Splat, camera, drawing, drawn, instanced, mistake, splat,
-    splats, with,
+    COLOR, IDENTITY, Mistake, OPACITY, ROTATION, SCALE, SIZE, SPLAT, Splat, Stage, camera, drawing, drawn, instanced,
+    mistake, splat, splats, with,
 };
 
 /// A draw of Gaussians that are wrong.
@@ -114,6 +114,14 @@ fn gaussians() -> Vec<Mistake> {
             || with(|s| s.flags(Flags::LOGIT_OPACITY)),
             || vec![SPLAT; 20],
         ),
+        holds("colours from 0 to 1 for coefficients", "GAURAST-Draw-colors", splats, || {
+            (0..32u8).map(|index| splat(COLOR, [f32::from(index) / 31.0, 0.4, 0.6])).collect()
+        }),
+        holds("colours from 0 to 255 for coefficients", "GAURAST-Draw-colors", splats, || {
+            vec![splat(COLOR, [220.0, 64.0, 12.0]); 3]
+        }),
+        holds("scales of 0", "GAURAST-Draw-zero-scale", splats, || vec![splat(SCALE, [0.0; 3]); 16]),
+        holds("variances for standard deviations", "GAURAST-Draw-variances", splats, || grid(0.02 * 0.02)),
         mistake("instances whose opacity's factor is 0", "GAURAST-Draw-model-opacity", |stage| {
             let mut model = IDENTITY;
             model[12] = 0.0;
@@ -127,9 +135,51 @@ fn gaussians() -> Vec<Mistake> {
     ]
 }
 
+/// A sheet of Gaussians 0.02 apart, of another size.
+pub fn grid(scale: f32) -> Vec<Splat> {
+    let at = |index: u16| {
+        let [x, y] = [index % 24, index / 24].map(|place| (f32::from(place) - 11.5) * 0.02);
+        let mut splat = splat(SCALE, [scale; 3]);
+        splat[..3].copy_from_slice(&[x, y, 5.0]);
+        splat
+    };
+    (0..24 * 24).map(at).collect()
+}
+
+/// The messages of a draw through a camera, of Gaussians from 4 to 6 in front of the origin.
+fn row(stage: &Stage, through: &GaussianCameraGAURAST<'static>) -> Vec<Message> {
+    let at = |index: u8| splat(0, [0.0, 0.0, 4.0 + f32::from(index) / 10.0]);
+    let row: Vec<_> = (0..20).map(at).collect();
+    drawing(&stage.full, &splats(), &row, |commands| {
+        commands.camera(through);
+        commands.draw(0..20);
+    })
+}
+
+/// A camera that looks along another axis.
+fn along_x() -> GaussianCameraGAURAST<'static> {
+    // Right is +y, down is +z, and forward is +x.
+    camera().rotation([0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+}
+
 fn places() -> Vec<Mistake> {
     let behind = "GAURAST-Draw-behind-camera";
     vec![
+        mistake("a transposed rotation", "GAURAST-Draw-transposed-rotation", |stage| {
+            let right = along_x();
+            let [a, b, c, d, e, f, g, h, i] = right.rotation;
+            let ahead: Vec<_> = (0..3).map(|_| splat(0, [5.0, 0.0, 0.0])).collect();
+            drawing(&stage.full, &splats(), &ahead, |commands| {
+                commands.camera(&right.rotation([a, d, g, b, e, h, c, f, i]));
+                commands.draw(0..3);
+            })
+        }),
+        mistake("a near plane that is too far", "GAURAST-Draw-near-plane", |stage| {
+            row(stage, &camera().near_plane(5.55))
+        }),
+        mistake("intrinsics of another resolution", "GAURAST-Draw-picture-size", |stage| {
+            row(stage, &camera().focal_length([200.0; 2]).principal_point([64.0, 48.0]))
+        }),
         seen("a camera that looks along -z", behind, || {
             camera().rotation([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0])
         }),
@@ -178,6 +228,23 @@ fn uploads() -> Vec<Mistake> {
                 commands.camera(&camera());
                 commands.draw_indirect(&draws, 1);
             })
+        }),
+        mistake("logarithms in a buffer that shaders may write", id, |stage| {
+            let gpu = &stage.full;
+            let pipeline = splats().create(gpu).expect("a pipeline");
+            let buffer = Buffer::of(gpu, &splat(SCALE, [-1.0; 3]));
+            let _set = Bindings::new(gpu, &[Resource::Storage(buffer.raw)]);
+            let target = Target::floats(gpu, SIZE);
+            gpu.messages();
+            gpu.run(|commands| {
+                commands.pass(&target, &Pass::zeros(), || {
+                    commands.bind(&pipeline);
+                    commands.vertices(&buffer);
+                    commands.camera(&camera());
+                    commands.draw(0..1);
+                });
+            });
+            gpu.messages()
         }),
         mistake("logarithms in memory that stays mapped", id, |stage| {
             let gpu = &stage.full;
@@ -231,6 +298,24 @@ fn cameras() -> Vec<Mistake> {
             wrong[32..32 + rows.len()].copy_from_slice(&rows);
             wrong[32 + rows.len()..80].fill(0);
             through_a_buffer(&stage.full, &wrong, 1)
+        }),
+        mistake("a camera in a uniform buffer whose eye is floats", "GAURAST-Camera-eye", |stage| {
+            let mut wrong = bytes(&camera());
+            let eye: Vec<u8> = [0.5f32, 0.25, -1.0].iter().flat_map(|value| value.to_le_bytes()).collect();
+            wrong[..12].copy_from_slice(&eye);
+            wrong[12..24].fill(0);
+            through_a_buffer(&stage.full, &wrong, 1)
+        }),
+        mistake("a camera by a command that the pipeline does not take", "GAURAST-Draw-camera-source", |stage| {
+            let buffer = Buffer::of(&stage.full, &bytes(&camera()));
+            let set = Bindings::new(&stage.full, &[Resource::Uniform(buffer.raw)]);
+            let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
+            drawing(&stage.full, &request, &[SPLAT], |commands| {
+                commands.bind_set(&set, &[]);
+                commands.camera(&camera());
+                commands.draw(0..1);
+            })
         }),
     ]
 }

@@ -3,9 +3,10 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianCameraDistortionGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST,
+    GaussianPrecisionGAURAST, GaussianResolveInputLocationsGAURAST,
 };
-use gaurast_testkit::{Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Message, Pass, Target, opaque};
+use gaurast_testkit::shader::{Stage as ShaderStage, compile};
+use gaurast_testkit::{Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Message, Pass, Shader, Target, opaque};
 
 use crate::stage::{IDENTITY, Mistake, SIZE, SPLAT, camera, drawing, instanced, mistake, recording, splats, with};
 
@@ -107,11 +108,19 @@ fn cameras() -> Vec<Mistake> {
             commands.draw(0..2);
         }),
         draw("a principal point of zeros", "GAURAST-Draw-principal-point", splats, |commands| {
-            commands.camera(&camera().principal_point([0.0; 2]));
+            // Another eye than in other draws: cameras that differ in the principal point alone are of parts of one picture.
+            commands.camera(&camera().eye([0.0, 0.01, 0.0]).principal_point([0.0; 2]));
             commands.draw(0..2);
         }),
     ]
 }
+
+/// A resolve shader that takes a factor from push constants.
+const PUSHED: &str = "
+    layout(location = 0) in vec4 accumulated;
+    layout(push_constant) uniform Factor { vec4 factor; };
+    layout(location = 0) out vec4 color;
+    void main() { color = factor * accumulated; }";
 
 fn ranges() -> Vec<Mistake> {
     let vertices = "GAURAST-Draw-vertices-past-buffer";
@@ -141,6 +150,25 @@ fn ranges() -> Vec<Mistake> {
                 commands.camera(&camera());
                 commands.vertex_buffer(1, &models, 0);
                 commands.draw_instances(0..1, 0..2);
+            })
+        }),
+        mistake("positions that advance by instance", "GAURAST-Draw-instance-rate", |stage| {
+            let mut request = splats();
+            request.bindings[0].input_rate = vk::VertexInputRate::INSTANCE;
+            drawing(&stage.full, &request, &[SPLAT; 2], |commands| {
+                commands.camera(&camera());
+                commands.draw(0..2);
+            })
+        }),
+        mistake("push constants that were not pushed", "GAURAST-Draw-push-constants", |stage| {
+            let request = splats().with_shader(Shader::fragment(compile(ShaderStage::Fragment, PUSHED)));
+            let locations = GaussianResolveInputLocationsGAURAST::default().accumulated_color(0);
+            let gaussian = request.gaussian.map(|state| state.resolve_input_locations(locations));
+            let push = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS).size(16);
+            let request = Graphics { gaussian, push: vec![push], ..request };
+            drawing(&stage.full, &request, &[SPLAT], |commands| {
+                commands.camera(&camera());
+                commands.draw(0..1);
             })
         }),
         draw("Gaussians as instances of one vertex", "GAURAST-Draw-instances", splats, |commands| {

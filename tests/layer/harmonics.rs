@@ -4,7 +4,7 @@ use ash::vk;
 use gaurast::vk::{GaussianSphericalHarmonicsBufferGAURAST, PipelineGaussianStateCreateFlagsGAURAST};
 use gaurast_testkit::{Gpu, Message};
 
-use crate::stage::{Mistake, SPLAT, drawn, gaussian, mistake, recording, with};
+use crate::stage::{Mistake, SPLAT, Stage, camera, drawing, drawn, gaussian, mistake, recording, with};
 
 type Bound = GaussianSphericalHarmonicsBufferGAURAST<'static>;
 
@@ -68,9 +68,26 @@ fn binding(gpu: &Gpu, bound: Bound) -> Vec<Message> {
     })
 }
 
+/// The messages of a draw of two Gaussians with harmonics of degree 1 in a buffer.
+fn harmonic(stage: &Stage, change: fn(Bound) -> Bound) -> Vec<Message> {
+    let gpu = &stage.full;
+    let buffer = Addressed::new(gpu, 256);
+    let flag = PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER;
+    let request = with(|s| s.flags(flag).spherical_harmonics_degree(1));
+    drawing(gpu, &request, &[SPLAT; 2], |commands| {
+        let bound = change(buffer.bound(256).stride(48).coefficient_stride(12));
+        // SAFETY: see the crate.
+        unsafe { gaussian(gpu).cmd_bind_gaussian_spherical_harmonics(commands.raw, &bound) };
+        commands.camera(&camera());
+        commands.draw(0..2);
+    })
+}
+
 pub fn mistakes() -> Vec<Mistake> {
     let address = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016";
     let format = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-90017";
+    let alignment = "GAURAST-Harmonics-alignment";
+    let past = "GAURAST-Draw-harmonics-past-buffer";
     vec![
         binds("more bytes than the buffer has", address, |b| b.size(257)),
         binds("an address of no buffer", address, |b| b.device_address(0)),
@@ -78,6 +95,17 @@ pub fn mistakes() -> Vec<Mistake> {
         binds("harmonics of two components", format, |b| b.format(vk::Format::R32G32_SFLOAT)),
         binds("harmonics of a format that is not fetched", format, |b| b.format(vk::Format::R64G64B64_SFLOAT)),
         binds("no strides", "GAURAST-Harmonics-stride", |b| b.stride(0)),
+        binds("no bytes of harmonics", "GAURAST-Harmonics-size", |b| b.size(0)),
+        binds("harmonics at an odd address", alignment, |mut b| {
+            b.device_address += 1;
+            b.size(200)
+        }),
+        binds("harmonics whose stride is counted in floats", alignment, |b| b.stride(3)),
+        binds("an odd stride of coefficients", alignment, |b| b.coefficient_stride(6)),
+        mistake("harmonics of the second Gaussian that are not bound", past, |stage| harmonic(stage, |b| b.size(12))),
+        mistake("a stride of coefficients that overflows", past, |stage| {
+            harmonic(stage, |b| b.coefficient_stride(u64::MAX - 3))
+        }),
         binds(
             "the structure's type of the buffer was not set",
             "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-sType-sType",

@@ -9,7 +9,9 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
 
-use crate::stage::{Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, spirv, splats, with};
+use crate::stage::{
+    Mistake, State, creation, instanced, mistake, pipeline, resolved, shaded, shaders, spirv, splats, with,
+};
 
 pub fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {
     let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
@@ -69,7 +71,44 @@ pub fn mistakes() -> Vec<Mistake> {
     all.extend(combinations());
     all.extend(fixed_functions());
     all.extend(output());
+    all.extend(formats());
     all
+}
+
+/// The splats with another format of an attribute.
+fn of_format(index: usize, format: vk::Format) -> impl Fn() -> Graphics<'static> {
+    move || {
+        let mut request = splats();
+        request.attributes[index].format = format;
+        request
+    }
+}
+
+fn formats() -> Vec<Mistake> {
+    let unsigned = "GAURAST-Pipeline-unsigned-format";
+    let logits = PipelineGaussianStateCreateFlagsGAURAST::LOGIT_OPACITY;
+    let of_target = move |format| Graphics { formats: vec![format], ..with(move |s| s.flags(logits)) };
+    vec![
+        pipeline("positions of an unsigned format", unsigned, of_format(0, vk::Format::R16G16B16A16_UNORM)),
+        pipeline("rotations of an unsigned format", unsigned, of_format(2, vk::Format::R8G8B8A8_UNORM)),
+        pipeline("harmonics of an unsigned format", unsigned, of_format(4, vk::Format::R8G8B8A8_UNORM)),
+        pipeline("attributes that overlap", "GAURAST-Pipeline-overlap", || {
+            let mut request = splats();
+            request.attributes[1].offset = 8;
+            request
+        }),
+        pipeline("logits drawn to an sRGB attachment", "GAURAST-Pipeline-srgb-attachment", move || {
+            of_target(vk::Format::R8G8B8A8_SRGB)
+        }),
+        pipeline("a target of picks without a resolve shader", "GAURAST-Pipeline-integer-attachment", || {
+            let formats = vec![vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32_UINT];
+            Graphics { formats, blend: vec![gaurast_testkit::over(), gaurast_testkit::opaque()], ..splats() }
+        }),
+        shaders("a resolve shader that writes floats to integers", "GAURAST-Pipeline-output-type", || {
+            let request = resolved(spirv!("toned.frag"), [2, 5], |s| s);
+            Graphics { formats: vec![vk::Format::R32G32B32A32_UINT], blend: vec![gaurast_testkit::opaque()], ..request }
+        }),
+    ]
 }
 
 fn structures() -> Vec<Mistake> {

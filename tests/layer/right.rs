@@ -8,12 +8,14 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Bindings, Buffer, Gpu, Graphics, Message, Pass, PassObject, Resource, Target, opaque};
 
-use crate::contents::bytes;
+use crate::contents::{bytes, grid};
+use crate::depth::{Deep, RIGHT};
 use crate::harmonics::Addressed;
+use crate::indirect::{by_compute, strided};
 use crate::pipelines::allowing;
 use crate::stage::{
-    IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced, laid_out, resolved,
-    shaded, spirv, splat, splats, with,
+    COLOR, IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced, laid_out,
+    resolved, shaded, spirv, splat, splats, with,
 };
 
 /// A right use: what it is, and what is said of it.
@@ -33,6 +35,8 @@ pub fn uses() -> Vec<Use> {
     all.extend(draws());
     all.extend(shaders());
     all.extend(sources());
+    all.extend(depths());
+    all.extend(near_mistakes());
     all.extend(passes());
     all
 }
@@ -94,6 +98,13 @@ fn draws() -> Vec<Use> {
             drawing(gpu, &splats(), &[SPLAT; 3], |commands| {
                 commands.camera(&camera());
                 commands.draw_indirect(&draws, 1);
+            })
+        }),
+        right("indirect draws with a word between them", |gpu| {
+            let draws = Buffer::of(gpu, &[1u32, 1, 0, 0, 7, 1, 1, 1, 0, 7]);
+            drawing(gpu, &splats(), &[SPLAT; 3], |commands| {
+                commands.camera(&camera());
+                strided(commands, &draws, 20);
             })
         }),
         right("two draws that blend", |gpu| {
@@ -208,20 +219,84 @@ fn sources() -> Vec<Use> {
                 commands.draw(0..1);
             })
         }),
-        right("what shaders may have written is not judged", |gpu| {
+        right("numbers that a compute shader writes", |gpu| {
+            by_compute(gpu, &[SPLAT; 2], &[2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1], false)
+        }),
+        right("numbers that a compute shader writes, and clears afterwards", |gpu| {
+            by_compute(gpu, &[SPLAT; 2], &[2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1], true)
+        }),
+        right("nothing that a compute shader leaves", |gpu| by_compute(gpu, &[SPLAT; 2], &[2, 0, 0, 0], false)),
+    ]
+}
+
+/// Depths of all conventions.
+fn depths() -> Vec<Use> {
+    use vk::CompareOp as Op;
+    let deep = |name, deep: Deep| right(name, move |gpu: &Gpu| deep.messages(gpu));
+    vec![
+        deep("depths from 0 to 1", RIGHT),
+        deep("depths behind others", Deep { before: Some(Op::LESS), ..RIGHT }),
+        deep("depths of a finite far plane", Deep { coefficients: [100.0 / 99.8, -20.0 / 99.8], ..RIGHT }),
+        deep("reversed depths", Deep { op: Op::GREATER, cleared: 0.0, coefficients: [0.0, 0.2], ..RIGHT }),
+        deep("depths that a viewport turns", Deep { op: Op::GREATER, cleared: 0.0, range: [1.0, 0.0], ..RIGHT }),
+        deep("depths that are not compared", Deep { op: Op::ALWAYS, coefficients: [0.0; 2], ..RIGHT }),
+        deep("depths that equal", Deep { op: Op::LESS_OR_EQUAL, before: Some(Op::ALWAYS), ..RIGHT }),
+    ]
+}
+
+/// Contents that are near to mistakes.
+fn near_mistakes() -> Vec<Use> {
+    vec![
+        right("a sheet of Gaussians that touch", |gpu| drawn(gpu, &splats(), &grid(0.02))),
+        right("a sheet of small Gaussians", |gpu| drawn(gpu, &splats(), &grid(0.003))),
+        right("coefficients of both signs", |gpu| {
+            let at = |index: u8| splat(COLOR, [f32::from(index) / 20.0 - 0.7, 0.4, -0.6]);
+            drawn(gpu, &splats(), &(0..32).map(at).collect::<Vec<_>>())
+        }),
+        right("parts of one picture", |gpu| {
             let pipeline = splats().create(gpu).expect("a pipeline");
-            let buffer = Buffer::of(gpu, &splat(SCALE, [-1.0; 3]));
-            let _set = Bindings::new(gpu, &[Resource::Storage(buffer.raw)]);
-            let target = Target::floats(gpu, SIZE);
+            let buffer = Buffer::of(gpu, &SPLAT);
+            let target = Target::floats(gpu, SIZE.map(|side| 2 * side));
             gpu.messages();
             gpu.run(|commands| {
                 commands.pass(&target, &Pass::zeros(), || {
                     commands.bind(&pipeline);
                     commands.vertices(&buffer);
-                    commands.camera(&camera());
-                    commands.draw(0..1);
+                    for part in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
+                        let [x, y] = [part[0] * SIZE[0] as f32, part[1] * SIZE[1] as f32];
+                        commands.viewport([x, y, SIZE[0] as f32, SIZE[1] as f32], [0.0, 1.0]);
+                        let middle = [SIZE[0] as f32 - x + 0.5, SIZE[1] as f32 - y + 0.5];
+                        commands.camera(&camera().principal_point(middle));
+                        commands.draw(0..1);
+                    }
                 });
             });
+            gpu.messages()
+        }),
+        right("Gaussians that are instances", |gpu| {
+            let mut request = splats();
+            request.bindings[0].input_rate = vk::VertexInputRate::INSTANCE;
+            drawing(gpu, &request, &[SPLAT; 2], |commands| {
+                commands.camera(&camera());
+                commands.draw_instances(0..1, 0..2);
+            })
+        }),
+        right("positions from 0 to 1 that a matrix places", |gpu| {
+            let mut request = instanced();
+            request.attributes[0].format = vk::Format::R16G16B16A16_UNORM;
+            request.attributes[0].offset = 0;
+            gpu.messages();
+            request.create(gpu).expect("a pipeline");
+            gpu.messages()
+        }),
+        right("an opacity in the fourth component of positions", |gpu| {
+            let mut request = splats();
+            request.attributes[0].format = vk::Format::R32G32B32A32_SFLOAT;
+            request.attributes[3].offset = 12;
+            request.attributes[1].offset = 16;
+            request.attributes[2].offset = 28;
+            gpu.messages();
+            request.create(gpu).expect("a pipeline");
             gpu.messages()
         }),
     ]

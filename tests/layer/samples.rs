@@ -17,12 +17,16 @@ pub fn settings() -> &'static str {
     after.split_once("```").expect("the block ends").0
 }
 
-/// Writes the page's file of settings to a folder.
-fn write_settings(folder: &Path) -> PathBuf {
+/// Writes the page's file of settings to a folder, and further ones.
+fn write_settings(folder: &Path, further: &str) -> PathBuf {
     let path = folder.join("vk_layer_settings.txt");
-    std::fs::write(&path, settings()).expect("the settings are written");
+    std::fs::write(&path, format!("{}{further}\n", settings())).expect("the settings are written");
     path
 }
+
+/// The setting of the Khronos layer that has it validate synchronization.
+const SYNCHRONIZATION: &str =
+    "khronos_validation.enables = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT";
 
 /// Compiles a C program.
 fn compile(source: &str, folder: &Path) -> PathBuf {
@@ -44,8 +48,13 @@ fn compile(source: &str, folder: &Path) -> PathBuf {
 
 /// Runs a program under layers.
 fn run(program: &Path, arguments: &[&str], layers: &str, folder: &Path) -> Output {
+    run_with("", program, arguments, layers, folder)
+}
+
+/// Runs a program under layers with further settings.
+fn run_with(further: &str, program: &Path, arguments: &[&str], layers: &str, folder: &Path) -> Output {
     let (driver, _) = (manifest(folder), layer_manifest(folder));
-    let settings = write_settings(folder);
+    let settings = write_settings(folder, further);
     Command::new(program)
         .args(arguments)
         .current_dir(folder)
@@ -68,6 +77,184 @@ fn said(output: &Output) -> String {
 }
 
 const HELLO: &str = include_str!("../../samples/c/hello_gaussians.c");
+const SCENE: &str = include_str!("../../samples/c/gaussian_scene.c");
+
+/// What a C program says of the scene's kind, under layers, the Khronos layer with the validation of synchronization.
+fn scene_says(source: &str, layers: &str, folder: &Path) -> String {
+    let program = compile(source, folder);
+    let shaders = concat!(env!("CARGO_MANIFEST_DIR"), "/../samples/c/shaders");
+    said(&run_with(SYNCHRONIZATION, &program, &[shaders], layers, folder))
+}
+
+/// The scene with one of its lines replaced.
+fn changed(right: &str, wrong: &str) -> String {
+    assert_eq!(SCENE.matches(right).count(), 1, "{right}");
+    SCENE.replace(right, wrong)
+}
+
+/// The colour of a pixel of the picture that the scene's program leaves.
+fn pixel(folder: &Path, [x, y]: [usize; 2]) -> [u8; 3] {
+    let picture = std::fs::read(folder.join("gaussian_scene.ppm")).expect("the picture");
+    let texels = picture.strip_prefix(b"P6\n320 240\n255\n").expect("its size");
+    let texel = texels[3 * (320 * y + x)..].first_chunk().expect("its texels");
+    *texel
+}
+
+/// The scene's program draws, culls and picks what it should, and nothing is said of it.
+#[gaurast_runner::test(needs = [
+    Need::Program("cc"),
+    Need::File("/usr/include/vulkan/vulkan.h"),
+    Need::ValidationLayer,
+])]
+fn nothing_is_said_of_the_c_scene() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for layers in [OWN.to_owned(), format!("{OWN}:{KHRONOS}")] {
+        let text = scene_says(SCENE, &layers, folder.path());
+        let lines: Vec<_> = text.lines().collect();
+        let &[clusters, middle, left, corner] = &lines[..] else {
+            panic!("{layers}: {text}");
+        };
+        let drawn: u32 = clusters.strip_suffix(" of 12 clusters").expect("a count").parse().expect("a number");
+        assert!((4..12).contains(&drawn), "some clusters are outside of the picture: {text}");
+        assert!(middle.ends_with(", of the ball"), "{text}");
+        assert!(left.ends_with(", of the tuft"), "{text}");
+        assert!(corner.ends_with(": no Gaussian"), "{text}");
+        let [red, _, blue] = pixel(folder.path(), [160, 100]);
+        assert!(red > blue, "the ball is orange");
+        let [red, green, blue] = pixel(folder.path(), [40, 210]);
+        assert!(green > red && green > blue, "the tuft is green");
+        assert_eq!(pixel(folder.path(), [4, 4]), [158, 173, 191], "fog, as it is cleared");
+        let [red, _, blue] = pixel(folder.path(), [160, 80]);
+        assert!(blue > red, "the box stands above the ball");
+    }
+}
+
+/// A barrier of the scene, and none or another in its place: what the validation of synchronization is for.
+#[gaurast_runner::test(needs = [
+    Need::Program("cc"),
+    Need::File("/usr/include/vulkan/vulkan.h"),
+    Need::ValidationLayer,
+])]
+fn barriers_of_the_c_scene_are_heard_of_with_the_khronos_layer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let right = "VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT";
+    let others = ["0, 0", "VK_PIPELINE_STAGE_2_VERTEX_INPUT_BIT, VK_ACCESS_2_VERTEX_ATTRIBUTE_READ_BIT"];
+    for other in others {
+        let text = scene_says(&changed(right, other), &format!("{OWN}:{KHRONOS}"), folder.path());
+        assert!(text.contains("SYNC-HAZARD-READ-AFTER-WRITE"), "{other}: {text}");
+        assert!(!text.contains(OWN), "{text}");
+    }
+}
+
+/// A mistake in the scene's program: a line, what stands in its place, and the id of what the layer says.
+struct Slip {
+    right: &'static str,
+    wrong: &'static str,
+    id: &'static str,
+}
+
+const fn slip(right: &'static str, wrong: &'static str, id: &'static str) -> Slip {
+    Slip { right, wrong, id }
+}
+
+const CAMERA: &str = "set_cameras(commands, 1, camera);";
+const LOOK_AT: &str = "return vkGaussianCameraLookAtGAURAST(eye, target, up, 0.85, WIDTH, HEIGHT, 0.2f);";
+const COLOR: &str = "at[11 + i] = (color[i] * (1.0f + 0.25f * number()) - 0.5f) / 0.28209479f;";
+const SCALE: &str = "at[3 + i] = size * (1.0f + 0.5f * number());";
+
+/// Mistakes of which nothing was said when a stranger's program of this kind made them.
+const SLIPS: [Slip; 21] = [
+    slip(
+        LOOK_AT,
+        "VkGaussianCameraGAURAST c = vkGaussianCameraLookAtGAURAST(eye, target, up, 0.85, WIDTH, HEIGHT, 0.2f); float t[9]; \
+         for (int i = 0; i < 9; i++) t[i] = c.rotation[i % 3 * 3 + i / 3]; memcpy(c.rotation, t, sizeof t); return c;",
+        "GAURAST-Draw-transposed-rotation",
+    ),
+    slip(
+        LOOK_AT,
+        "return vkGaussianCameraLookAtGAURAST(eye, target, up, 0.85, 2 * WIDTH, 2 * HEIGHT, 0.2f);",
+        "GAURAST-Draw-picture-size",
+    ),
+    slip(
+        LOOK_AT,
+        "return vkGaussianCameraLookAtGAURAST(eye, target, up, 0.85, WIDTH, HEIGHT, 5.0f);",
+        "GAURAST-Draw-behind-camera",
+    ),
+    slip(
+        CAMERA,
+        "VkGaussianCameraGAURAST c = *camera; c.depthCoefficients[0] = c.depthCoefficients[1] = 0; set_cameras(commands, 1, &c);",
+        "GAURAST-Draw-depth-coefficients",
+    ),
+    slip(
+        CAMERA,
+        "VkGaussianCameraGAURAST c = *camera; c.depthCoefficients[1] *= 2; set_cameras(commands, 1, &c);",
+        "GAURAST-Draw-depth-coefficients",
+    ),
+    slip(
+        CAMERA,
+        "VkGaussianCameraGAURAST c = *camera; c.depthCoefficients[0] = 0; c.depthCoefficients[1] = 0.2f; \
+         set_cameras(commands, 1, &c);",
+        "GAURAST-Draw-depth-compare",
+    ),
+    slip(
+        CAMERA,
+        "VkGaussianCameraGAURAST c = *camera; c.focalLength[0] = 1e38f; set_cameras(commands, 1, &c);",
+        "GAURAST-Camera-focal-length",
+    ),
+    slip(COLOR, "at[11 + i] = fminf(1.0f, color[i] * (1.0f + 0.25f * number()));", "GAURAST-Draw-colors"),
+    slip(COLOR, "at[11 + i] = floorf(200.0f * color[i] * (1.0f + 0.25f * number()));", "GAURAST-Draw-colors"),
+    slip(SCALE, "at[3 + i] = 0.0f * size;", "GAURAST-Draw-zero-scale"),
+    slip(
+        "by_vertex.stride = FLOATS * sizeof(float);",
+        "by_vertex.stride = FLOATS * sizeof(float); by_vertex.inputRate = VK_VERTEX_INPUT_RATE_INSTANCE;",
+        "GAURAST-Draw-instance-rate",
+    ),
+    slip(
+        "frame->draws.handle, FIRST_DRAW, frame->draws.handle, 0, CLUSTERS,",
+        "frame->draws.handle, FIRST_DRAW, frame->draws.handle, 16, CLUSTERS,",
+        "GAURAST-Draw-indirect-count",
+    ),
+    slip("frame->draws.handle, 0, CLUSTERS,", "frame->draws.handle, 0, 0,", "GAURAST-Draw-indirect-count"),
+    slip("        sizeof(VkDrawIndirectCommand));", "        20);", "GAURAST-Draw-indirect-stride"),
+    slip("{CLUSTERS, CLUSTER};", "{CLUSTERS, 10 * CLUSTER};", "GAURAST-Draw-vertices-past-buffer"),
+    slip(
+        ".depthCompareOp = VK_COMPARE_OP_LESS}",
+        ".depthCompareOp = gaussian ? VK_COMPARE_OP_GREATER : VK_COMPARE_OP_LESS}",
+        "GAURAST-Draw-depth-compare",
+    ),
+    slip(
+        "create_pipeline(&gaussian, 1, &resolve",
+        "create_pipeline(&gaussian, 0, &resolve",
+        "GAURAST-Pipeline-integer-attachment",
+    ),
+    slip("{COLOR, PICK};", "{PICK, PICK};", "GAURAST-Pipeline-output-type"),
+    slip(".depthStencil = {1.0f, 0}", ".depthStencil = {0.0f, 0}", "GAURAST-Draw-depth-clear"),
+    slip("{0, 0, WIDTH, HEIGHT, 0, 1}", "{0, 0, WIDTH, HEIGHT, 1, 0}", "GAURAST-Draw-depth-compare"),
+    slip(
+        "    vkCmdPushConstants(commands, draw_layout, stages, 0, 64, projection);\n    \
+         vkCmdPushConstants(commands, draw_layout, stages, 64, sizeof FOG, FOG);\n",
+        "    (void)stages, (void)projection;\n",
+        "GAURAST-Draw-push-constants",
+    ),
+];
+
+/// Each slip is made alone, and heard of on the standard error.
+#[gaurast_runner::test(needs = [
+    Need::Program("cc"),
+    Need::File("/usr/include/vulkan/vulkan.h"),
+    Need::VulkanLoader,
+])]
+fn slips_in_the_c_scene_are_heard_of() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut silent = Vec::new();
+    for Slip { right, wrong, id } in SLIPS {
+        let text = scene_says(&changed(right, wrong), OWN, folder.path());
+        if !text.contains(&format!("[{id}]")) {
+            silent.push((wrong, id, text));
+        }
+    }
+    assert!(silent.is_empty(), "{silent:#?}");
+}
 
 #[gaurast_runner::test(needs = [
     Need::Program("cc"),

@@ -1,10 +1,11 @@
 //! Mistakes in sorted sets of several draws.
 
 use ash::vk;
-use gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST;
-use gaurast_testkit::{Commands, Gpu, Message, Pass, Target};
+use gaurast::vk::{DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST, GaussianCameraSourceGAURAST};
+use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Message, Pass, Resource, Target};
 
-use crate::stage::{Mistake, SIZE, SPLAT, camera, drawing, gaussian, mistake, recording, splats};
+use crate::contents::bytes;
+use crate::stage::{Mistake, SIZE, SPLAT, camera, drawing, gaussian, mistake, recording, splats, with};
 
 fn begin(commands: &Commands) {
     // SAFETY: see the crate.
@@ -95,6 +96,53 @@ pub fn mistakes() -> Vec<Mistake> {
             changed(&stage.full, None, |commands| {
                 commands.viewport([0.0, 0.0, 60.0, 40.0], [0.0, 1.0]);
             })
+        }),
+        mistake("another camera in a uniform buffer within a set", other, |stage| {
+            let gpu = &stage.full;
+            let mut cameras = bytes(&camera());
+            cameras.resize(256, 0);
+            cameras.extend(bytes(&camera().eye([0.1, 0.0, 0.0])));
+            let buffer = Buffer::of(gpu, &cameras);
+            let set = Bindings::new(gpu, &[Resource::DynamicUniform(buffer.raw, 128)]);
+            let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+            let request = Graphics { set_layouts: vec![set.layout], ..with(|s| s.camera_source(source)) };
+            drawing(gpu, &request, &[SPLAT; 2], |commands| {
+                begin(commands);
+                commands.bind_set(&set, &[0]);
+                commands.draw(0..1);
+                commands.bind_set(&set, &[256]);
+                commands.draw(1..2);
+                end(commands);
+            })
+        }),
+        mistake("a query that ends within a set", "GAURAST-Set-query", |stage| {
+            let gpu = &stage.full;
+            let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(1);
+            // SAFETY: see the crate.
+            let pool = unsafe { gpu.device().create_query_pool(&info, None) }.expect("a query pool");
+            let pipeline = splats().create(gpu).expect("a pipeline");
+            let buffer = Buffer::of(gpu, &SPLAT);
+            let target = Target::floats(gpu, SIZE);
+            let heard = recording(gpu, |commands| {
+                let (device, raw) = commands.raw();
+                // SAFETY: see the crate.
+                unsafe { device.cmd_reset_query_pool(raw, pool, 0, 1) };
+                commands.pass(&target, &Pass::zeros(), || {
+                    commands.bind(&pipeline);
+                    commands.vertices(&buffer);
+                    commands.camera(&camera());
+                    // SAFETY: see the crate.
+                    unsafe { device.cmd_begin_query(raw, pool, 0, vk::QueryControlFlags::empty()) };
+                    begin(commands);
+                    commands.draw(0..1);
+                    // SAFETY: see the crate.
+                    unsafe { device.cmd_end_query(raw, pool, 0) };
+                    end(commands);
+                });
+            });
+            // SAFETY: see the crate.
+            unsafe { gpu.device().destroy_query_pool(pool, None) };
+            heard
         }),
         mistake("another dynamic alpha floor within a set", other, |stage| {
             let floor = DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST;

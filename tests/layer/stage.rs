@@ -23,6 +23,18 @@ pub struct Stage {
     pub resolving: Gpu,
     /// Without the topology.
     pub without: Gpu,
+    /// Without any feature of Vulkan, and with the topology.
+    pub plain: Gpu,
+    /// With pipeline libraries.
+    pub linking: Gpu,
+}
+
+/// A device under the layer with pipeline libraries.
+pub fn linking(layers: &[&std::ffi::CStr]) -> Gpu {
+    let mut libraries = vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::default().graphics_pipeline_library(true);
+    let names = [ash::khr::pipeline_library::NAME, ash::ext::graphics_pipeline_library::NAME];
+    let opening = Opening { layers, extensions: &names, ..Opening::of(Driver::Loaded) };
+    Gpu::open_with(&opening, &mut libraries).expect("a device with pipeline libraries")
 }
 
 impl Stage {
@@ -47,6 +59,16 @@ impl Stage {
                     .unscented_projection(true),
             )),
             without: open(Some(Features::default())),
+            plain: Gpu::open(&Opening {
+                layers: &[LAYER],
+                extensions: &[gaussian_primitive_topology::NAME],
+                gaussian: Some(Features::default().gaussian_primitive_topology(true)),
+                robust: true,
+                bare: true,
+                ..Opening::of(Driver::Loaded)
+            })
+            .expect("a device"),
+            linking: linking(&[LAYER]),
         };
         // That nothing is enabled was said.
         assert_eq!(said_by_the_layer(&stage.without.messages()).len(), 1);
@@ -83,6 +105,7 @@ pub const SPLAT: Splat = [0.0, 0.0, 5.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.8,
 pub const SCALE: usize = 3;
 pub const ROTATION: usize = 6;
 pub const OPACITY: usize = 10;
+pub const COLOR: usize = 11;
 
 /// A Gaussian with other numbers from a place on.
 pub fn splat<const N: usize>(at: usize, numbers: [f32; N]) -> Splat {

@@ -10,8 +10,10 @@ use crate::facts::Facts;
 use crate::instance::Instance;
 use crate::next::Next;
 use crate::objects::Objects;
+use crate::pending::Submissions;
 use crate::recording::Recording;
 use crate::report::Faults;
+use crate::request::Libraries;
 use gaurast_layer_interface::Live;
 
 /// The greatest number of times that one message is given on a device.
@@ -24,6 +26,11 @@ pub(crate) struct State {
     pub(crate) recordings: HashMap<vk::CommandBuffer, Recording>,
     /// Draws whose contents were looked at, by what they read: applications record the same draw for each frame.
     pub(crate) checked: HashSet<u64>,
+    pub(crate) libraries: Libraries,
+    /// Submissions whose end is awaited.
+    pub(crate) pending: Submissions,
+    /// Principal points of cameras, up to two, by all else that they have: parts of one picture differ in them alone.
+    pub(crate) principal_points: HashMap<u64, HashSet<[u32; 2]>>,
 }
 
 impl State {

@@ -101,6 +101,10 @@ pub(crate) struct Facts {
     pub(crate) max_gaussians_per_draw: u64,
     /// `maxMultiviewViewCount`.
     pub(crate) max_views: u32,
+    /// `multiDrawIndirect`.
+    pub(crate) has_multi_draw_indirect: bool,
+    /// `drawIndirectFirstInstance`.
+    pub(crate) has_first_instance: bool,
     /// The memory types that the host may map, a bit each.
     pub(crate) mappable: u32,
 }

@@ -9,6 +9,12 @@ pub(crate) struct Format {
     pub(crate) components: u32,
     /// Values are integers, which do not convert to floating point.
     pub(crate) is_integer: bool,
+    /// Values are numbers that are never negative.
+    pub(crate) is_unsigned: bool,
+    /// Red, green and blue are encoded when they are stored.
+    pub(crate) is_srgb: bool,
+    /// Components share words.
+    pub(crate) is_packed: bool,
     /// Bytes of an element, 0 if that is not known.
     pub(crate) bytes: u32,
     kind: Kind,
@@ -54,6 +60,9 @@ impl Format {
         Self {
             components,
             is_integer: matches!(kind, "UINT" | "SINT"),
+            is_unsigned: matches!(kind, "UNORM" | "USCALED" | "UFLOAT"),
+            is_srgb: kind == "SRGB",
+            is_packed,
             bytes: bits.iter().sum::<u32>() / 8,
             kind: kind_of,
         }
@@ -62,6 +71,11 @@ impl Format {
     /// Reports whether the layer can read elements.
     pub(crate) fn is_readable(self) -> bool {
         self.kind != Kind::Other
+    }
+
+    /// Bytes of the words that an element is made of.
+    pub(crate) fn word_bytes(self) -> u32 {
+        if self.is_packed { self.bytes } else { self.bytes / self.components.max(1) }
     }
 
     /// An element's components; those that it does not have are 0, 0, 0 and 1. `None` beyond the end.

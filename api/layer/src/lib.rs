@@ -11,6 +11,7 @@
 //! | `next` | the next layer's commands |
 //! | `instance`, `device` | what lives, by the loader's key |
 //! | `objects`, `recording`, `request` | what the layer knows: objects, command buffers, a pipeline that is created |
+//! | `pending` | submissions whose end is awaited |
 //! | `rules` | what is checked |
 //! | `spirv`, `formats` | a shader's interface; how vertex formats are read |
 //! | `report` | messages |
@@ -24,6 +25,7 @@ mod hooks;
 mod instance;
 mod next;
 mod objects;
+mod pending;
 mod recording;
 mod report;
 mod request;

@@ -44,6 +44,16 @@ macro_rules! device_commands {
             end_command_buffer
             queue_submit
             queue_submit2
+            queue_wait_idle
+            device_wait_idle
+            wait_for_fences
+            get_fence_status
+            reset_fences
+            destroy_fence
+            create_semaphore
+            destroy_semaphore
+            wait_semaphores
+            get_semaphore_counter_value
             cmd_bind_pipeline
             cmd_bind_vertex_buffers
             cmd_bind_vertex_buffers2
@@ -75,10 +85,19 @@ macro_rules! device_commands {
             cmd_execute_commands
             cmd_draw
             cmd_draw_indexed
+            cmd_draw_multi
+            cmd_draw_multi_indexed
             cmd_draw_indirect
             cmd_draw_indexed_indirect
             cmd_draw_indirect_count
             cmd_draw_indexed_indirect_count
+            cmd_push_constants
+            cmd_push_constants2
+            cmd_dispatch
+            cmd_dispatch_base
+            cmd_dispatch_indirect
+            cmd_end_query
+            cmd_clear_attachments
             cmd_copy_buffer
             cmd_copy_buffer2
             cmd_update_buffer

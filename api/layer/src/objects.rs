@@ -1,6 +1,6 @@
 //! A device's objects, as far as the layer follows them.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use ash::vk;
@@ -57,12 +57,21 @@ pub(crate) type SetLayout = Vec<LayoutBinding>;
 /// The layouts of a pipeline layout's sets; one that is null or unknown is `None`.
 pub(crate) type Layout = Vec<Option<Arc<SetLayout>>>;
 
-/// A buffer in a descriptor: the buffer, the offset, the range.
-pub(crate) type BufferDescriptor = (vk::Buffer, u64, u64);
+/// A buffer in a descriptor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BufferDescriptor {
+    pub(crate) buffer: vk::Buffer,
+    /// The number of the buffer that had the handle when the descriptor was written.
+    pub(crate) serial: u64,
+    pub(crate) offset: u64,
+    pub(crate) range: u64,
+}
 
 /// A descriptor set.
 #[derive(Clone, Debug)]
 pub(crate) struct Set {
+    /// Its number: handles are used again.
+    pub(crate) serial: u64,
     pub(crate) layout: Option<Arc<SetLayout>>,
     pub(crate) pool: vk::DescriptorPool,
     /// The first descriptor of bindings of buffers.
@@ -79,6 +88,8 @@ pub(crate) struct Subpass {
     pub(crate) colors: Vec<(vk::Format, bool)>,
     /// The format of depth and stencil.
     pub(crate) depth: vk::Format,
+    /// The number of the depth attachment, if the render pass clears it where this subpass begins.
+    pub(crate) cleared_depth: Option<u32>,
 }
 
 /// The subpasses of a render pass.
@@ -101,6 +112,18 @@ pub(crate) struct Attribute {
     pub(crate) offset: u32,
 }
 
+/// The depth test of a pipeline.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct DepthTest {
+    /// There is a depth attachment.
+    pub(crate) is_there: bool,
+    pub(crate) is_enabled: bool,
+    pub(crate) writes: bool,
+    pub(crate) op: vk::CompareOp,
+    /// Depths of clip space are from -1.
+    pub(crate) from_minus_one: bool,
+}
+
 /// A graphics pipeline.
 pub(crate) struct Pipeline {
     /// Its number: handles are used again.
@@ -120,6 +143,11 @@ pub(crate) struct Pipeline {
     pub(crate) replaces: bool,
     /// The viewport, if it is not dynamic.
     pub(crate) viewport: Option<[f32; 4]>,
+    /// The least and the greatest depth of that viewport.
+    pub(crate) depth_range: Option<[f32; 2]>,
+    pub(crate) depth: DepthTest,
+    /// The stages whose shaders read push constants.
+    pub(crate) reads_constants: vk::ShaderStageFlags,
 }
 
 /// All objects of a device that the layer looks at.
@@ -134,6 +162,7 @@ pub(crate) struct Objects {
     pub(crate) sets: HashMap<vk::DescriptorSet, Set>,
     pub(crate) render_passes: HashMap<vk::RenderPass, Arc<RenderPass>>,
     pub(crate) pipelines: HashMap<vk::Pipeline, Arc<Pipeline>>,
+    pub(crate) timelines: HashSet<vk::Semaphore>,
 }
 
 impl Objects {
@@ -153,17 +182,33 @@ impl Objects {
         found.map(|(&handle, buffer)| (handle, buffer))
     }
 
-    /// Bytes of a buffer that the layer is sure of, as the device finds them if nothing else is written meanwhile.
-    /// `map` maps memory that the application has not mapped, and calls back.
+    /// The number of the buffer that has a handle; 0 where there is none.
+    pub(crate) fn serial_of(&self, buffer: vk::Buffer) -> u64 {
+        self.buffers.get(&buffer).map_or(0, |buffer| buffer.serial)
+    }
+
+    /// Reports whether a buffer's bytes are known only after what writes them has ended.
+    pub(crate) fn is_known_late(&self, handle: vk::Buffer) -> bool {
+        let Some(buffer) = self.buffers.get(&handle) else {
+            return false;
+        };
+        let memory = buffer.memory.and_then(|(memory, _)| self.memories.get(&memory));
+        buffer.is_written && memory.is_some_and(|memory| memory.is_mappable)
+    }
+
+    /// Bytes of a buffer that the layer is sure of, as the device finds them if nothing else is written meanwhile; with
+    /// `is_late`, what the device has written, too. `read_mappable` reads memory that the application has not mapped.
     pub(crate) fn read(
         &self,
         handle: vk::Buffer,
         offset: u64,
         length: usize,
+        is_late: bool,
         read_mappable: impl FnOnce(vk::DeviceMemory, u64, &mut [u8]) -> bool,
     ) -> Option<Vec<u8>> {
         let buffer = self.buffers.get(&handle)?;
-        if buffer.is_written || offset.checked_add(length as u64)? > buffer.size {
+        let is_unsure = buffer.is_written && !(is_late && self.is_known_late(handle));
+        if is_unsure || offset.checked_add(length as u64)? > buffer.size {
             return None;
         }
         let (memory_handle, start) = buffer.memory?;

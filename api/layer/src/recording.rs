@@ -27,10 +27,28 @@ pub(crate) struct IndexBuffer {
     pub(crate) ty: vk::IndexType,
 }
 
+/// Harmonics in a buffer, and the buffer in which their address was.
+#[derive(Clone, Copy)]
+pub(crate) struct BoundHarmonics {
+    pub(crate) harmonics: Harmonics,
+    /// The buffer and its number.
+    pub(crate) buffer: Option<(vk::Buffer, u64)>,
+}
+
+/// All that attributes and indices come from.
+#[derive(Clone, Default)]
+pub(crate) struct Inputs {
+    pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
+    pub(crate) index_buffer: Option<IndexBuffer>,
+    pub(crate) harmonics: Option<BoundHarmonics>,
+}
+
 /// A bound descriptor set.
 #[derive(Clone, Debug)]
 pub(crate) struct BoundSet {
     pub(crate) set: vk::DescriptorSet,
+    /// The number of the set that had the handle when it was bound.
+    pub(crate) serial: u64,
     pub(crate) dynamic_offsets: Vec<u32>,
 }
 
@@ -42,6 +60,24 @@ pub(crate) struct Pass {
     pub(crate) index: Option<SubpassIndex>,
     /// The viewports of draws so far.
     pub(crate) drawn: Vec<Option<[f32; 4]>>,
+    /// The depth that is cleared to where the pass begins, if it is.
+    pub(crate) cleared_depth: Option<f32>,
+    /// The comparisons of draws so far that write depths.
+    pub(crate) depth_writers: Vec<vk::CompareOp>,
+}
+
+/// The depths that a draw's depths are compared with.
+#[derive(Clone, Debug)]
+pub(crate) struct DepthUse {
+    pub(crate) op: vk::CompareOp,
+    /// Depths of clip space are from -1.
+    pub(crate) from_minus_one: bool,
+    /// The least and the greatest depth of the viewport, if they are known.
+    pub(crate) range: Option<[f32; 2]>,
+    /// See [`Pass::cleared_depth`].
+    pub(crate) cleared: Option<f32>,
+    /// See [`Pass::depth_writers`].
+    pub(crate) writers: Vec<vk::CompareOp>,
 }
 
 /// A subpass of a render pass object, by its number.
@@ -66,8 +102,21 @@ pub(crate) enum Call {
     Vertices([u32; 4]),
     /// First and number of indices and of instances, and the vertex offset.
     Indices([u32; 4], i32),
-    /// The buffer of parameters, their offset, and whether they are of indexed draws; of the first draw alone.
-    Indirect(vk::Buffer, u64, bool),
+    /// Parameters in a buffer.
+    Indirect(Indirect),
+}
+
+/// Draws whose parameters are in a buffer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Indirect {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) is_indexed: bool,
+    /// The number of draws, or the greatest one.
+    pub(crate) count: u32,
+    pub(crate) stride: u32,
+    /// The buffer of the number of draws, and its offset.
+    pub(crate) counted: Option<(vk::Buffer, u64)>,
 }
 
 /// A draw of Gaussians, whose contents are looked at when it is submitted.
@@ -76,10 +125,13 @@ pub(crate) struct Draw {
     /// The state with the values of its dynamic states.
     pub(crate) state: GaussianState,
     pub(crate) call: Call,
-    pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
-    pub(crate) index_buffer: Option<IndexBuffer>,
+    pub(crate) inputs: Inputs,
     pub(crate) cameras: Option<Arc<Vec<Camera>>>,
     pub(crate) viewport: Option<[f32; 4]>,
+    /// The depth test, if there is one.
+    pub(crate) depth: Option<DepthUse>,
+    /// The first draw of the sorted set, if it is another.
+    pub(crate) first_of_set: Option<Arc<Draw>>,
     /// The set of the camera, and what was pushed for it.
     pub(crate) camera_set: Option<BoundSet>,
     pub(crate) pushed: Option<Option<BufferDescriptor>>,
@@ -94,6 +146,8 @@ pub(crate) enum Operation {
     Fill(vk::Buffer, u64, u64, u32),
     /// Something is written that the layer does not follow.
     Write(vk::Buffer),
+    /// Compute shaders run.
+    Dispatch,
     Draw(Arc<Draw>),
 }
 
@@ -102,20 +156,36 @@ pub(crate) enum Operation {
 pub(crate) struct Recording {
     pub(crate) pool: vk::CommandPool,
     pub(crate) pipeline: Option<Arc<Pipeline>>,
-    pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
-    pub(crate) index_buffer: Option<IndexBuffer>,
+    pub(crate) inputs: Inputs,
     pub(crate) cameras: Option<Arc<Vec<Camera>>>,
     /// The values of dynamic states, by state.
     pub(crate) dynamic: BTreeMap<i32, Vec<u8>>,
     pub(crate) viewport: Option<[f32; 4]>,
+    pub(crate) depth_range: Option<[f32; 2]>,
+    /// The stages for which constants were pushed.
+    pub(crate) constants: vk::ShaderStageFlags,
     pub(crate) sets: BTreeMap<u32, BoundSet>,
     /// The first descriptor of bindings that were pushed, by set; `None` is one that the layer does not follow.
     pub(crate) pushed: BTreeMap<(u32, u32), Option<BufferDescriptor>>,
-    pub(crate) harmonics: Option<Harmonics>,
     pub(crate) pass: Option<Pass>,
     /// A sorted set has begun; with what its draws share, after the first.
     pub(crate) set: Option<Option<Shared>>,
+    /// The first draw of that set.
+    pub(crate) first_of_set: Option<Arc<Draw>>,
+    /// Where cameras came from so far.
+    pub(crate) sources: Sources,
     pub(crate) operations: Vec<Operation>,
+}
+
+/// What a command buffer does with cameras.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Sources {
+    /// It sets cameras.
+    pub(crate) sets: bool,
+    /// It draws through cameras that commands set.
+    pub(crate) by_command: bool,
+    /// It draws through cameras in a buffer.
+    pub(crate) by_buffer: bool,
 }
 
 impl Recording {
@@ -125,8 +195,9 @@ impl Recording {
     }
 
     /// Begins a subpass, in which nothing is drawn yet.
-    pub(crate) fn begin_pass(&mut self, subpass: Subpass, index: Option<SubpassIndex>) {
-        self.pass = Some(Pass { subpass, index, drawn: Vec::new() });
+    pub(crate) fn begin_pass(&mut self, subpass: Subpass, index: Option<SubpassIndex>, cleared_depth: Option<f32>) {
+        let (drawn, depth_writers) = Default::default();
+        self.pass = Some(Pass { subpass, index, drawn, cleared_depth, depth_writers });
     }
 
     /// Goes on with the next subpass.
@@ -136,7 +207,7 @@ impl Recording {
         };
         let index = index + 1;
         let subpass = render_pass.get(index).cloned().unwrap_or_default();
-        self.begin_pass(subpass, Some(SubpassIndex { render_pass, index }));
+        self.begin_pass(subpass, Some(SubpassIndex { render_pass, index }), None);
     }
 
     /// The state that is undefined after other command buffers were executed.
@@ -145,6 +216,7 @@ impl Recording {
             pool: self.pool,
             pass: self.pass.take(),
             set: self.set.take(),
+            sources: self.sources,
             operations: std::mem::take(&mut self.operations),
             ..Self::default()
         };

@@ -6,6 +6,12 @@ use std::collections::BTreeMap;
 pub(crate) const INPUT: u32 = 1;
 /// See [`INPUT`].
 pub(crate) const OUTPUT: u32 = 3;
+/// The storage class of push constants.
+const PUSH_CONSTANT: u32 = 9;
+/// `OpFunction`.
+const FUNCTION: u32 = 54;
+/// Instructions of functions that take pointers to variables: a call, a load, a copy, and the access chains.
+const POINTING: [u32; 6] = [57, 61, 63, 65, 66, 67];
 /// The decoration `BuiltIn`'s value for the depth that a fragment shader writes.
 const FRAG_DEPTH: u32 = 22;
 
@@ -173,4 +179,25 @@ impl Interface {
         let module = Module::parse(words);
         Self { slots: module.slots(entry, class), writes_depth: module.writes_depth(entry) }
     }
+}
+
+/// Reports whether a module reads push constants: whether an instruction of a function names them.
+pub(crate) fn reads_constants(words: &[u32]) -> bool {
+    let module = Module::parse(words);
+    let pushed = |id: &u32| module.variables.get(id).is_some_and(|&(_, class)| class == PUSH_CONSTANT);
+    let mut rest = words.get(5..).unwrap_or_default();
+    let mut is_in_function = false;
+    while let Some(&first) = rest.first() {
+        let (opcode, count) = (first & 0xFFFF, (first >> 16) as usize);
+        if count == 0 || count > rest.len() {
+            break;
+        }
+        let (instruction, after) = rest.split_at(count);
+        is_in_function |= opcode == FUNCTION;
+        if is_in_function && POINTING.contains(&opcode) && instruction[1..].iter().any(pushed) {
+            return true;
+        }
+        rest = after;
+    }
+    false
 }

@@ -70,6 +70,17 @@ commands! {
         [c"vkUpdateDescriptorSetWithTemplate", c"vkUpdateDescriptorSetWithTemplateKHR"];
     queue_submit: ::ash::vk::PFN_vkQueueSubmit = [c"vkQueueSubmit"];
     queue_submit2: ::ash::vk::PFN_vkQueueSubmit2 = [c"vkQueueSubmit2", c"vkQueueSubmit2KHR"];
+    queue_wait_idle: ::ash::vk::PFN_vkQueueWaitIdle = [c"vkQueueWaitIdle"];
+    device_wait_idle: ::ash::vk::PFN_vkDeviceWaitIdle = [c"vkDeviceWaitIdle"];
+    wait_for_fences: ::ash::vk::PFN_vkWaitForFences = [c"vkWaitForFences"];
+    get_fence_status: ::ash::vk::PFN_vkGetFenceStatus = [c"vkGetFenceStatus"];
+    reset_fences: ::ash::vk::PFN_vkResetFences = [c"vkResetFences"];
+    destroy_fence: ::ash::vk::PFN_vkDestroyFence = [c"vkDestroyFence"];
+    create_semaphore: ::ash::vk::PFN_vkCreateSemaphore = [c"vkCreateSemaphore"];
+    destroy_semaphore: ::ash::vk::PFN_vkDestroySemaphore = [c"vkDestroySemaphore"];
+    wait_semaphores: ::ash::vk::PFN_vkWaitSemaphores = [c"vkWaitSemaphores", c"vkWaitSemaphoresKHR"];
+    get_semaphore_counter_value: ::ash::vk::PFN_vkGetSemaphoreCounterValue =
+        [c"vkGetSemaphoreCounterValue", c"vkGetSemaphoreCounterValueKHR"];
     create_image: ::ash::vk::PFN_vkCreateImage = [c"vkCreateImage"];
     destroy_image: ::ash::vk::PFN_vkDestroyImage = [c"vkDestroyImage"];
     create_image_view: ::ash::vk::PFN_vkCreateImageView = [c"vkCreateImageView"];
@@ -85,6 +96,7 @@ commands! {
     cmd_bind_index_buffer: ::ash::vk::PFN_vkCmdBindIndexBuffer = [c"vkCmdBindIndexBuffer"];
     cmd_bind_descriptor_sets: ::ash::vk::PFN_vkCmdBindDescriptorSets = [c"vkCmdBindDescriptorSets"];
     cmd_push_constants: ::ash::vk::PFN_vkCmdPushConstants = [c"vkCmdPushConstants"];
+    cmd_push_constants2: ::ash::vk::PFN_vkCmdPushConstants2KHR = [c"vkCmdPushConstants2KHR"];
     cmd_begin_rendering: ::ash::vk::PFN_vkCmdBeginRendering = [c"vkCmdBeginRendering", c"vkCmdBeginRenderingKHR"];
     cmd_end_rendering: ::ash::vk::PFN_vkCmdEndRendering = [c"vkCmdEndRendering", c"vkCmdEndRenderingKHR"];
     cmd_begin_render_pass: ::ash::vk::PFN_vkCmdBeginRenderPass = [c"vkCmdBeginRenderPass"];
@@ -155,6 +167,8 @@ commands! {
         [c"vkCmdCopyImageToBuffer2", c"vkCmdCopyImageToBuffer2KHR"];
     cmd_clear_attachments: ::ash::vk::PFN_vkCmdClearAttachments = [c"vkCmdClearAttachments"];
     cmd_dispatch: ::ash::vk::PFN_vkCmdDispatch = [c"vkCmdDispatch"];
+    cmd_dispatch_base: ::ash::vk::PFN_vkCmdDispatchBase = [c"vkCmdDispatchBase", c"vkCmdDispatchBaseKHR"];
+    cmd_dispatch_indirect: ::ash::vk::PFN_vkCmdDispatchIndirect = [c"vkCmdDispatchIndirect"];
     cmd_copy_query_pool_results: ::ash::vk::PFN_vkCmdCopyQueryPoolResults = [c"vkCmdCopyQueryPoolResults"];
     cmd_set_gaussian_cameras: ::gaurast::vk::PFN_vkCmdSetGaussianCamerasGAURAST = [c"vkCmdSetGaussianCamerasGAURAST"];
     cmd_begin_gaussian_set: ::gaurast::vk::PFN_vkCmdBeginGaussianSetGAURAST = [c"vkCmdBeginGaussianSetGAURAST"];

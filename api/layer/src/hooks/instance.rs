@@ -15,7 +15,7 @@ use crate::facts::{Facts, Features};
 use crate::instance::Instance;
 use crate::report::Faults;
 use crate::rules;
-use gaurast_layer_interface::{DeviceLink, InstanceLink, chain, slice, string, take_link};
+use gaurast_layer_interface::{DeviceLink, InstanceLink, chain, find, slice, string, take_link};
 
 pub(super) unsafe extern "system" fn create_instance(
     info: *const vk::InstanceCreateInfo<'_>,
@@ -141,24 +141,36 @@ unsafe fn look(
 ) {
     let mut faults = Faults::default();
     // SAFETY: the caller's promise.
-    let (names, features, can) = unsafe {
+    let (names, features, can, of_core) = unsafe {
         let names = slice(info.pp_enabled_extension_names, info.enabled_extension_count);
         let names: Vec<&CStr> = names.iter().map(|&name| string(name)).collect();
         let mut structures = chain(info.p_next);
         let found = structures.find(|s| s.s_type == FeaturesStructure::STRUCTURE_TYPE);
         let features = found.map(|found| Features::of(&*std::ptr::from_ref(found).cast::<FeaturesStructure<'_>>()));
-        (names, features, supported(physical_device, instance))
+        (names, features, supported(physical_device, instance), core_features(info))
     };
     rules::device::check(&names, features.as_ref(), can.as_ref(), &mut faults);
     let is_enabled = names.contains(&gaurast::gaussian_primitive_topology::NAME);
     // SAFETY: the caller's promise.
-    let facts = unsafe { facts(physical_device, instance, is_enabled, features) };
+    let facts = unsafe { facts(physical_device, instance, is_enabled, features, &of_core) };
     for fault in &faults.0 {
         instance.messengers.tell(fault);
     }
     if let Some(device) = created {
         let get = link.get_device_proc_addr;
         Device::new(device, physical_device, get, Arc::clone(instance), facts).register();
+    }
+}
+
+/// The features of Vulkan 1.0 that a device is created with.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn core_features(info: &vk::DeviceCreateInfo<'_>) -> vk::PhysicalDeviceFeatures {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let chained = find::<vk::PhysicalDeviceFeatures2<'_>>(info.p_next).map(|all| all.features);
+        chained.or(info.p_enabled_features.as_ref().copied()).unwrap_or_default()
     }
 }
 
@@ -184,6 +196,7 @@ unsafe fn facts(
     instance: &Instance,
     is_enabled: bool,
     features: Option<Features>,
+    of_core: &vk::PhysicalDeviceFeatures,
 ) -> Facts {
     let none = Features::of(&FeaturesStructure::default());
     let mut own = Properties::default();
@@ -211,6 +224,8 @@ unsafe fn facts(
         sample_counts: own.gaussian_sample_counts,
         max_gaussians_per_draw: own.max_gaussians_per_draw,
         max_views: views.max_multiview_view_count.max(1),
+        has_multi_draw_indirect: of_core.multi_draw_indirect != 0,
+        has_first_instance: of_core.draw_indirect_first_instance != 0,
         mappable,
     }
 }

@@ -8,5 +8,6 @@ mod objects;
 mod recording;
 mod submit;
 mod table;
+mod waits;
 
 pub(crate) use table::{device_hook, instance_hook};

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::device::Device;
-use crate::objects::{Buffer, LayoutBinding, Memory, Pipeline, Set, Subpass};
+use crate::objects::{Buffer, BufferDescriptor, LayoutBinding, Memory, Pipeline, Set, Subpass};
 use crate::report::Faults;
 use crate::request::Request;
 use crate::rules;
@@ -42,7 +42,10 @@ destroys! {
     destroy_descriptor_set_layout(layout: vk::DescriptorSetLayout) |state| state.objects.set_layouts.remove(&layout);
     destroy_pipeline_layout(layout: vk::PipelineLayout) |state| state.objects.layouts.remove(&layout);
     destroy_render_pass(pass: vk::RenderPass) |state| state.objects.render_passes.remove(&pass);
-    destroy_pipeline(pipeline: vk::Pipeline) |state| state.objects.pipelines.remove(&pipeline);
+    destroy_pipeline(pipeline: vk::Pipeline) |state| {
+        state.objects.pipelines.remove(&pipeline);
+        state.libraries.remove(&pipeline);
+    };
     destroy_descriptor_pool(pool: vk::DescriptorPool) |state| state.objects.sets.retain(|_, set| set.pool != pool);
     destroy_command_pool(pool: vk::CommandPool) |state| state.recordings.retain(|_, recording| recording.pool != pool);
 }
@@ -120,7 +123,8 @@ creates! {
     }
     create_render_pass(info: vk::RenderPassCreateInfo<'_>, pass: vk::RenderPass) |state| {
         let attachments = slice(info.p_attachments, info.attachment_count);
-        let attachments: Vec<_> = attachments.iter().map(|a| (a.format, a.load_op)).collect();
+        let attachments: Vec<_> =
+            attachments.iter().map(|a| AttachmentUse { format: a.format, load: a.load_op }).collect();
         let views = find::<vk::RenderPassMultiviewCreateInfo<'_>>(info.p_next);
         let masks = views.map(|views| slice(views.p_view_masks, views.subpass_count)).unwrap_or_default();
         let subpasses = slice(info.p_subpasses, info.subpass_count).iter().enumerate();
@@ -137,7 +141,8 @@ creates! {
     }
     create_render_pass2(info: vk::RenderPassCreateInfo2<'_>, pass: vk::RenderPass) |state| {
         let attachments = slice(info.p_attachments, info.attachment_count);
-        let attachments: Vec<_> = attachments.iter().map(|a| (a.format, a.load_op)).collect();
+        let attachments: Vec<_> =
+            attachments.iter().map(|a| AttachmentUse { format: a.format, load: a.load_op }).collect();
         let subpasses = slice(info.p_subpasses, info.subpass_count).iter().enumerate();
         let known = subpasses
             .map(|(index, subpass)| {
@@ -152,9 +157,16 @@ creates! {
     }
 }
 
+/// An attachment of a render pass.
+#[derive(Clone, Copy)]
+struct AttachmentUse {
+    format: vk::Format,
+    load: vk::AttachmentLoadOp,
+}
+
 /// A subpass by its attachments' numbers.
 fn subpass_of(
-    attachments: &[(vk::Format, vk::AttachmentLoadOp)],
+    attachments: &[AttachmentUse],
     colors: &[u32],
     depth: Option<u32>,
     view_mask: u32,
@@ -163,13 +175,15 @@ fn subpass_of(
     let at = |number: u32| attachments.get(number as usize).copied();
     let colors = colors.iter().map(|&number| match at(number) {
         // What an earlier subpass has drawn is not followed.
-        Some((format, load)) => (format, index == 0 && load == vk::AttachmentLoadOp::LOAD),
+        Some(used) => (used.format, index == 0 && used.load == vk::AttachmentLoadOp::LOAD),
         None => (vk::Format::UNDEFINED, false),
     });
+    let is_cleared = |number: &u32| at(*number).is_some_and(|used| used.load == vk::AttachmentLoadOp::CLEAR);
     Subpass {
         view_mask,
         colors: colors.collect(),
-        depth: depth.and_then(at).map(|(format, _)| format).unwrap_or_default(),
+        depth: depth.and_then(at).map(|used| used.format).unwrap_or_default(),
+        cleared_depth: depth.filter(|number| index == 0 && is_cleared(number)),
     }
 }
 
@@ -372,19 +386,27 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
         let mut requests = Vec::new();
         own.observe(|state, faults| {
             for info in slice(infos, count) {
-                let request = Request::read(info, &state.objects);
-                if let Some(request) = &request {
-                    let mut of_this = Faults::default();
-                    rules::pipeline::check(request, &own.facts, &mut of_this);
-                    faults.0.append(&mut of_this.0);
+                let mut request = Request::read(info, &state.objects, &state.libraries);
+                let mut of_this = Faults::default();
+                if !request.is_whole() {
+                    rules::pipeline::check_library(&request, &own.facts, &mut of_this);
+                } else if !request.is_wrong {
+                    rules::pipeline::check(&request, &own.facts, &mut of_this);
                 }
+                request.is_wrong |= !of_this.is_empty();
+                faults.0.append(&mut of_this.0);
                 requests.push(request);
             }
         });
         let result = next(device, cache, count, infos, allocator, pipelines);
         own.observe(|state, _| {
             for (&pipeline, request) in slice(pipelines, count).iter().zip(requests) {
-                if let Some(request) = request.filter(|_| pipeline != vk::Pipeline::null()) {
+                if pipeline == vk::Pipeline::null() {
+                    continue;
+                }
+                if request.is_library {
+                    state.libraries.insert(pipeline, Arc::new(request));
+                } else if request.is_whole() {
                     let serial = state.objects.next_serial();
                     let known = Arc::new(pipeline_of(request, serial));
                     state.objects.pipelines.insert(pipeline, known);
@@ -399,6 +421,7 @@ fn pipeline_of(request: Request, serial: u64) -> Pipeline {
     let is_blended = request.blend.first().is_some_and(|blend| blend.blend_enable != 0);
     let writes = request.blend.first().is_some_and(|blend| !blend.color_write_mask.is_empty());
     let has_fragment = request.has(vk::ShaderStageFlags::FRAGMENT);
+    let reads_constants = request.reads_constants();
     let (bindings, attributes) = request.vertex_input.unwrap_or_default();
     Pipeline {
         serial,
@@ -410,6 +433,9 @@ fn pipeline_of(request: Request, serial: u64) -> Pipeline {
         attributes,
         replaces: writes && !is_blended && !request.has_logic_op,
         viewport: request.viewport,
+        depth_range: request.depth_range,
+        depth: request.depth,
+        reads_constants,
     }
 }
 
@@ -433,6 +459,7 @@ pub(super) unsafe extern "system" fn allocate_descriptor_sets(
                 let layouts = slice((*info).p_set_layouts, count);
                 for (&set, layout) in slice(sets, count).iter().zip(layouts) {
                     let known = Set {
+                        serial: state.objects.next_serial(),
                         layout: state.objects.set_layouts.get(layout).cloned(),
                         pool: (*info).descriptor_pool,
                         buffers: BTreeMap::new(),
@@ -528,6 +555,7 @@ pub(super) unsafe extern "system" fn update_descriptor_sets(
         own.observe(|state, _| {
             for write in slice(writes, write_count) {
                 let buffers = written_buffers(write);
+                let serial = buffers.first().map_or(0, |(_, info)| state.objects.serial_of(info.buffer));
                 for (_, info) in buffers.iter().filter(|_| is_storage(write.descriptor_type)) {
                     if let Some(known) = state.objects.buffers.get_mut(&info.buffer) {
                         known.is_written = true;
@@ -538,7 +566,8 @@ pub(super) unsafe extern "system" fn update_descriptor_sets(
                 };
                 let first = buffers.first().filter(|_| write.dst_array_element == 0);
                 if let Some(&(binding, info)) = first {
-                    set.buffers.insert(binding, (info.buffer, info.offset, info.range));
+                    let (buffer, offset, range) = (info.buffer, info.offset, info.range);
+                    set.buffers.insert(binding, BufferDescriptor { buffer, serial, offset, range });
                 }
             }
             for copy in slice(copies, copy_count) {

@@ -8,8 +8,10 @@ use gaurast::vk as gvk;
 use crate::device::Device;
 use crate::facts::Harmonics;
 use crate::hooks::objects::{is_storage, written_buffers};
-use crate::objects::{Objects, Subpass};
-use crate::recording::{BoundSet, Call, IndexBuffer, Operation, Recording, SubpassIndex, VertexBuffer};
+use crate::objects::{BufferDescriptor, Objects, Subpass};
+use crate::recording::{
+    BoundHarmonics, BoundSet, Call, IndexBuffer, Indirect, Operation, Recording, SubpassIndex, VertexBuffer,
+};
 use crate::report::Faults;
 use crate::rules::{self, dynamic};
 use gaurast_layer_interface::{find, slice};
@@ -92,7 +94,7 @@ pub(super) unsafe extern "system" fn begin_command_buffer(
                     ..Subpass::default()
                 },
             };
-            recording.begin_pass(subpass, None);
+            recording.begin_pass(subpass, None, None);
         });
         next(commands, info)
     }
@@ -110,6 +112,7 @@ pub(super) unsafe extern "system" fn end_command_buffer(commands: vk::CommandBuf
         own.observe(|state, faults| {
             let (recording, _) = state.recording(commands);
             rules::set::require_ended(recording, "vkEndCommandBuffer", faults);
+            rules::draw::check_sources(recording.sources, faults);
         });
         next(commands)
     }
@@ -149,7 +152,7 @@ records! {
         let pairs = slice(buffers, count).iter().zip(slice(offsets, count));
         for (binding, (&buffer, &offset)) in (first..).zip(pairs) {
             let bound = VertexBuffer { buffer, offset, size: None, stride: None };
-            state.0.vertex_buffers.insert(binding, bound);
+            state.0.inputs.vertex_buffers.insert(binding, bound);
         }
     }
     cmd_bind_vertex_buffers2(
@@ -162,11 +165,11 @@ records! {
             let size = sizes.get(index).copied().filter(|&size| size != vk::WHOLE_SIZE);
             let stride = strides.get(index).and_then(|&stride| u32::try_from(stride).ok());
             let bound = VertexBuffer { buffer, offset, size, stride };
-            state.0.vertex_buffers.insert(first + index as u32, bound);
+            state.0.inputs.vertex_buffers.insert(first + index as u32, bound);
         }
     }
     cmd_bind_index_buffer(buffer: vk::Buffer, offset: vk::DeviceSize, ty: vk::IndexType) |state, _faults| {
-        state.0.index_buffer = Some(IndexBuffer { buffer, offset, ty });
+        state.0.inputs.index_buffer = Some(IndexBuffer { buffer, offset, ty });
     }
     cmd_bind_descriptor_sets(
         point: vk::PipelineBindPoint, layout: vk::PipelineLayout, first: u32, count: u32,
@@ -184,7 +187,8 @@ records! {
             let dynamic: u32 = dynamic.map(|binding| binding.count).sum();
             let (own_offsets, rest) = offsets.split_at((dynamic as usize).min(offsets.len()));
             offsets = rest;
-            let bound = BoundSet { set, dynamic_offsets: own_offsets.to_vec() };
+            let serial = objects.sets.get(&set).map_or(0, |set| set.serial);
+            let bound = BoundSet { set, serial, dynamic_offsets: own_offsets.to_vec() };
             recording.sets.insert(number, bound);
             recording.pushed.retain(|(of, _), _| *of != number);
         }
@@ -202,7 +206,9 @@ records! {
                     known.is_written = true;
                 }
                 if point == vk::PipelineBindPoint::GRAPHICS {
-                    let pushed = (info.buffer, info.offset, info.range);
+                    let serial = objects.serial_of(info.buffer);
+                    let (buffer, offset, range) = (info.buffer, info.offset, info.range);
+                    let pushed = BufferDescriptor { buffer, serial, offset, range };
                     recording.pushed.insert((set, binding), Some(pushed));
                 }
             }
@@ -289,9 +295,11 @@ records! {
             colors: colors
                 .map(|color| (vk::Format::UNDEFINED, resumes || color.load_op == vk::AttachmentLoadOp::LOAD))
                 .collect(),
-            depth: vk::Format::UNDEFINED,
+            ..Subpass::default()
         };
-        state.0.begin_pass(subpass, None);
+        let depth = info.p_depth_attachment.as_ref().filter(|depth| depth.image_view != vk::ImageView::null());
+        let depth = depth.filter(|depth| !resumes && depth.load_op == vk::AttachmentLoadOp::CLEAR);
+        state.0.begin_pass(subpass, None, depth.map(|depth| depth.clear_value.depth_stencil.depth));
     }
     cmd_end_rendering() |state, faults| {
         rules::set::require_ended(state.0, "vkCmdEndRendering", faults);
@@ -306,32 +314,85 @@ records! {
         let call = Call::Indices([first, count, first_instance, instances], offset);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
+    cmd_draw_multi(
+        count: u32, draws: *const vk::MultiDrawInfoEXT, instances: u32, first_instance: u32, stride: u32
+    ) with own |state, faults| {
+        for index in 0..count as usize {
+            let draw = draws.byte_add(index * stride as usize).read_unaligned();
+            let call = Call::Vertices([draw.first_vertex, draw.vertex_count, first_instance, instances]);
+            rules::draw::check(state.0, call, state.1, &own.facts, faults);
+        }
+    }
+    cmd_draw_multi_indexed(
+        count: u32, draws: *const vk::MultiDrawIndexedInfoEXT, instances: u32, first_instance: u32, stride: u32,
+        vertex_offset: *const i32
+    ) with own |state, faults| {
+        let common = vertex_offset.as_ref();
+        for index in 0..count as usize {
+            let draw = draws.byte_add(index * stride as usize).read_unaligned();
+            let offset = common.copied().unwrap_or(draw.vertex_offset);
+            let call = Call::Indices([draw.first_index, draw.index_count, first_instance, instances], offset);
+            rules::draw::check(state.0, call, state.1, &own.facts, faults);
+        }
+    }
     cmd_draw_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32) with own |state, faults| {
         if count > 0 {
-            let call = Call::Indirect(buffer, offset, false);
-            rules::draw::check(state.0, call, state.1, &own.facts, faults);
+            let call = Indirect { buffer, offset, is_indexed: false, count, stride, counted: None };
+            rules::draw::check(state.0, Call::Indirect(call), state.1, &own.facts, faults);
         }
     }
     cmd_draw_indexed_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32)
         with own |state, faults| {
         if count > 0 {
-            let call = Call::Indirect(buffer, offset, true);
-            rules::draw::check(state.0, call, state.1, &own.facts, faults);
+            let call = Indirect { buffer, offset, is_indexed: true, count, stride, counted: None };
+            rules::draw::check(state.0, Call::Indirect(call), state.1, &own.facts, faults);
         }
     }
     cmd_draw_indirect_count(
         buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
         most: u32, stride: u32
     ) with own |state, faults| {
-        let call = Call::Indirect(buffer, offset, false);
-        rules::draw::check(state.0, call, state.1, &own.facts, faults);
+        let counted = Some((counts, count_offset));
+        let call = Indirect { buffer, offset, is_indexed: false, count: most, stride, counted };
+        rules::draw::check(state.0, Call::Indirect(call), state.1, &own.facts, faults);
     }
     cmd_draw_indexed_indirect_count(
         buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
         most: u32, stride: u32
     ) with own |state, faults| {
-        let call = Call::Indirect(buffer, offset, true);
-        rules::draw::check(state.0, call, state.1, &own.facts, faults);
+        let counted = Some((counts, count_offset));
+        let call = Indirect { buffer, offset, is_indexed: true, count: most, stride, counted };
+        rules::draw::check(state.0, Call::Indirect(call), state.1, &own.facts, faults);
+    }
+    cmd_push_constants(
+        layout: vk::PipelineLayout, stages: vk::ShaderStageFlags, offset: u32, size: u32,
+        values: *const std::ffi::c_void
+    ) |state, _faults| {
+        state.0.constants |= stages;
+    }
+    cmd_push_constants2(info: *const vk::PushConstantsInfoKHR<'_>) |state, _faults| {
+        state.0.constants |= (*info).stage_flags;
+    }
+    cmd_dispatch(x: u32, y: u32, z: u32) |state, _faults| {
+        state.0.operations.push(Operation::Dispatch);
+    }
+    cmd_dispatch_base(from_x: u32, from_y: u32, from_z: u32, x: u32, y: u32, z: u32) |state, _faults| {
+        state.0.operations.push(Operation::Dispatch);
+    }
+    cmd_dispatch_indirect(buffer: vk::Buffer, offset: vk::DeviceSize) |state, _faults| {
+        state.0.operations.push(Operation::Dispatch);
+    }
+    cmd_end_query(pool: vk::QueryPool, query: u32) |state, faults| {
+        rules::set::check_query(state.0, faults);
+    }
+    cmd_clear_attachments(
+        attachment_count: u32, attachments: *const vk::ClearAttachment, rect_count: u32, rects: *const vk::ClearRect
+    ) |state, _faults| {
+        let mut cleared = slice(attachments, attachment_count).iter();
+        let clears_depth = cleared.any(|clear| clear.aspect_mask.contains(vk::ImageAspectFlags::DEPTH));
+        if let Some(pass) = state.0.pass.as_mut().filter(|_| clears_depth) {
+            pass.cleared_depth = None;
+        }
     }
     cmd_copy_buffer(from: vk::Buffer, to: vk::Buffer, count: u32, regions: *const vk::BufferCopy)
         |state, _faults| {
@@ -372,6 +433,7 @@ records! {
         let lenses: Vec<_> = cameras.iter().map(|camera| rules::camera::lens(camera)).collect();
         let right = rules::camera::check_command(cameras, &lenses, count, &own.facts, faults);
         state.0.cameras = right.map(Arc::new).or(state.0.cameras.take());
+        state.0.sources.sets = true;
     }
     cmd_begin_gaussian_set() with own |state, faults| {
         rules::set::begin(state.0, &own.facts, faults);
@@ -428,7 +490,8 @@ records! {
             properties.buffer_features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
         };
         rules::harmonics::check(bound, objects, fetches, faults);
-        recording.harmonics = Some(Harmonics::of(bound));
+        let buffer = objects.buffer_at(bound.device_address).map(|(handle, buffer)| (handle, buffer.serial));
+        recording.inputs.harmonics = Some(BoundHarmonics { harmonics: Harmonics::of(bound), buffer });
     }
 }
 
@@ -464,6 +527,7 @@ fn is_dynamic(ty: vk::DescriptorType) -> bool {
 fn set_viewport(recording: &mut Recording, viewport: Option<&vk::Viewport>, state: vk::DynamicState) {
     let Some(v) = viewport else { return };
     recording.viewport = Some([v.x, v.y, v.width, v.height]);
+    recording.depth_range = Some([v.min_depth, v.max_depth]);
     recording.set_dynamic(state, format!("{v:?}"));
 }
 
@@ -481,9 +545,17 @@ fn set_own(recording: &mut Recording, state: vk::DynamicState, bits: u32, faults
     }
 }
 
-fn begin_render_pass(recording: &mut Recording, objects: &Objects, begin: &vk::RenderPassBeginInfo<'_>) {
+/// # Safety
+/// The parameters are valid.
+unsafe fn begin_render_pass(recording: &mut Recording, objects: &Objects, begin: &vk::RenderPassBeginInfo<'_>) {
     let render_pass = objects.render_passes.get(&begin.render_pass).cloned();
-    let subpass = render_pass.as_ref().and_then(|render_pass| render_pass.first().cloned());
+    let subpass = render_pass.as_ref().and_then(|render_pass| render_pass.first().cloned()).unwrap_or_default();
     let index = render_pass.map(|render_pass| SubpassIndex { render_pass, index: 0 });
-    recording.begin_pass(subpass.unwrap_or_default(), index);
+    // SAFETY: the caller's promise; what is cleared has a value, and that of depth is of depth and stencil.
+    let cleared_depth = unsafe {
+        let values = slice(begin.p_clear_values, begin.clear_value_count);
+        let value = subpass.cleared_depth.and_then(|number| values.get(number as usize));
+        value.map(|value| value.depth_stencil.depth)
+    };
+    recording.begin_pass(subpass, index, cleared_depth);
 }

@@ -4,6 +4,7 @@ use crate::hooks::instance::*;
 use crate::hooks::objects::*;
 use crate::hooks::recording::*;
 use crate::hooks::submit::*;
+use crate::hooks::waits::*;
 use crate::next::device_commands;
 use gaurast_layer_interface::hooks;
 

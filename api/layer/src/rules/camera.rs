@@ -98,6 +98,72 @@ pub(crate) fn check(camera: &GaussianCameraGAURAST<'_>, name: &str, facts: &Fact
     if finite(&c.rotation) {
         check_rotation(&c.rotation, name, faults);
     }
+    if eye_is_finite {
+        check_eye(c.eye, name, faults);
+    }
+    if c.focal_length.iter().any(|&f| f.is_finite() && f > MOST_FOCAL) {
+        faults.warning(
+            "GAURAST-Camera-focal-length",
+            format!(
+                "{name}.focalLength is {:?}: its unit is the pixel, and such a picture shows nothing",
+                c.focal_length
+            ),
+        );
+    }
+}
+
+/// A focal length that no camera has, in pixels.
+const MOST_FOCAL: f32 = 1e9;
+
+/// Warns of an eye that is no place among positions in binary32.
+fn check_eye(eye: [f64; 3], name: &str, faults: &mut Faults) {
+    if eye.iter().any(|value| *value != 0.0 && value.abs() < f64::MIN_POSITIVE) {
+        faults.warning(
+            "GAURAST-Camera-eye",
+            format!("{name}.eye is {eye:?}: are these three floats? They are 64-bit floating point"),
+        );
+    } else if eye.iter().any(|value| value.abs() > f64::from(f32::MAX)) {
+        faults.warning(
+            "GAURAST-Camera-eye",
+            format!("{name}.eye is {eye:?}, which is beyond all positions, whose attributes have 32 bits"),
+        );
+    }
+}
+
+/// Warns of a camera whose principal point is in the corner, or the middle of a picture of another size, in proportion.
+pub(crate) fn check_picture(camera: &Camera, viewport: Option<[f32; 4]>, faults: &mut Faults) {
+    let Some([_, _, width, height]) = viewport else { return };
+    let sides = [width.abs(), height.abs()];
+    if sides.iter().any(|&side| side < 32.0) {
+        return;
+    }
+    if camera.model == Model::PINHOLE && camera.principal_point.iter().all(|c| c.abs() <= 1.0) {
+        return faults.warning(
+            "GAURAST-Draw-principal-point",
+            format!(
+                "principalPoint is {:?} with a viewport of {} x {}: it is in pixels from the upper left corner, and mostly the \
+                 middle",
+                camera.principal_point, sides[0], sides[1]
+            ),
+        );
+    }
+    let [across, down] = [0, 1].map(|axis| 2.0 * camera.principal_point[axis] / sides[axis]);
+    let is_in_proportion = (across / down - 1.0).abs() < 0.02;
+    let is_other = !(0.8..=1.25).contains(&across);
+    if across > 0.05 && is_in_proportion && is_other {
+        let [x, y] = camera.principal_point;
+        faults.warning(
+            "GAURAST-Draw-picture-size",
+            format!(
+                "principalPoint is ({x}, {y}), the middle of a picture of {} x {}, but the viewport is {} x {}: are the \
+                 intrinsics those of another resolution?",
+                2.0 * x,
+                2.0 * y,
+                sides[0],
+                sides[1]
+            ),
+        );
+    }
 }
 
 /// Checks the distortion of a camera's lens.

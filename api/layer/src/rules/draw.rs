@@ -1,23 +1,21 @@
 //! Draws as they are recorded.
 
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use ash::vk;
 use gaurast::vk::{
-    self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
-    GaussianCameraModelGAURAST as Model, GaussianCameraSourceGAURAST as CameraSource,
-    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST, GaussianPrecisionGAURAST as Precision,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    self as gvk, GaussianAntialiasingGAURAST, GaussianCameraModelGAURAST as Model,
+    GaussianCameraSourceGAURAST as CameraSource, GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
 use crate::facts::{Camera, Facts, GaussianState};
-use crate::formats::Format;
 use crate::objects::{Objects, Pipeline};
-use crate::recording::{Call, Draw, Operation, Recording};
+use crate::recording::{Call, DepthUse, Draw, Operation, Recording, Sources};
 use crate::report::Faults;
-use crate::rules::{set, state};
+use crate::rules::ranges::Ranges;
+use crate::rules::{depth, indirect, set, state};
 
 /// Checks a draw command, and notes it for the check of its contents.
 pub(crate) fn check(recording: &mut Recording, call: Call, objects: &Objects, facts: &Facts, faults: &mut Faults) {
@@ -29,16 +27,25 @@ pub(crate) fn check(recording: &mut Recording, call: Call, objects: &Objects, fa
     if let Some(gaussian) = pipeline.gaussian {
         set::check_draw(recording, faults);
         let gaussian = with_dynamic(gaussian, &pipeline, recording, facts, faults);
-        check_cameras(recording, &gaussian, viewport, faults);
+        let depth = depth::of(recording, &pipeline);
+        check_cameras(recording, &gaussian, viewport, depth.as_ref(), faults);
         check_harmonics(recording, &gaussian, faults);
-        check_ranges(recording, &pipeline, &gaussian, call, objects, facts, faults);
+        check_constants(recording, &pipeline, faults);
+        if let Call::Indirect(call) = &call {
+            indirect::check_command(call, facts, faults);
+        } else {
+            let size = |buffer| Some(objects.buffers.get(&buffer)?.size);
+            let ranges = Ranges { pipeline: &pipeline, inputs: &recording.inputs, state: &gaussian, size: &size };
+            ranges.check(call, facts, faults);
+        }
         if faults.is_empty() {
             if !continues_set {
                 check_blending(recording, &pipeline, viewport, faults);
             }
-            note(recording, &pipeline, gaussian, call, viewport);
+            note(recording, &pipeline, gaussian, call, viewport, depth);
         }
     }
+    depth::note(recording, &pipeline);
     if let Some(pass) = &mut recording.pass
         && !continues_set
         && !pass.drawn.contains(&viewport)
@@ -130,10 +137,21 @@ fn own_name(own: vk::DynamicState) -> &'static str {
     }
 }
 
-fn check_cameras(recording: &Recording, gaussian: &GaussianState, viewport: Option<[f32; 4]>, faults: &mut Faults) {
-    if !state::is_fixed(gaussian) || gaussian.camera_source != CameraSource::COMMAND {
+fn check_cameras(
+    recording: &mut Recording,
+    gaussian: &GaussianState,
+    viewport: Option<[f32; 4]>,
+    depth: Option<&DepthUse>,
+    faults: &mut Faults,
+) {
+    if !state::is_fixed(gaussian) {
         return;
     }
+    if gaussian.camera_source != CameraSource::COMMAND {
+        recording.sources.by_buffer = true;
+        return;
+    }
+    recording.sources.by_command = true;
     let Some(cameras) = &recording.cameras else {
         return faults.warning(
             "GAURAST-Draw-no-camera",
@@ -155,6 +173,7 @@ fn check_cameras(recording: &Recording, gaussian: &GaussianState, viewport: Opti
         if let Some([_, _, width, height]) = viewport {
             warn_of_units(camera, [width.abs(), height.abs()], faults);
         }
+        depth::check(camera, depth, faults);
     }
 }
 
@@ -188,169 +207,38 @@ fn warn_of_units(camera: &Camera, [width, height]: [f32; 2], faults: &mut Faults
                 camera.focal_length
             ),
         );
-    } else if camera.principal_point.iter().all(|c| c.abs() <= 1.0) {
-        faults.warning(
-            "GAURAST-Draw-principal-point",
-            format!(
-                "principalPoint is {:?} with a viewport of {width} x {height}: it is in pixels from the upper left \
-                     corner, and \
-                 mostly the middle",
-                camera.principal_point
-            ),
-        );
     }
 }
 
 fn check_harmonics(recording: &Recording, gaussian: &GaussianState, faults: &mut Faults) {
     let needs = state::is_fixed(gaussian) && gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
-    faults.require(!needs || recording.harmonics.is_some(), "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018", || {
+    let is_bound = recording.inputs.harmonics.is_some();
+    faults.require(!needs || is_bound, "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018", || {
         "flags has SPHERICAL_HARMONICS_BUFFER, but vkCmdBindGaussianSphericalHarmonicsGAURAST has bound no \
              buffer"
             .to_owned()
     });
 }
 
-/// The numbers of vertices, indices and instances.
-fn check_ranges(
-    recording: &Recording,
-    pipeline: &Pipeline,
-    gaussian: &GaussianState,
-    call: Call,
-    objects: &Objects,
-    facts: &Facts,
-    faults: &mut Faults,
-) {
-    let [first, count, first_instance, instances] = match call {
-        Call::Vertices(numbers) | Call::Indices(numbers, _) => numbers,
-        Call::Indirect(..) => return,
-    };
-    let gaussians = u64::from(count) * u64::from(instances);
-    if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
-        return faults.error(
-            "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
-            format!("the draw has {gaussians} Gaussians, but must not have more than {}", facts.max_gaussians_per_draw),
-        );
-    }
-    if count == 0 || instances == 0 {
-        return;
-    }
-    if let Call::Indices(..) = call {
-        check_indices(recording, first, count, objects, faults);
-    }
-    let range = |first: u32, count: u32| u64::from(first)..u64::from(first) + u64::from(count);
-    let vertices = matches!(call, Call::Vertices(_)).then(|| range(first, count));
-    check_vertices(recording, pipeline, vertices, range(first_instance, instances), objects, faults);
-    let locations = &gaussian.attribute_locations;
-    let used = [
-        locations.position,
-        locations.scale,
-        locations.rotation,
-        locations.opacity,
-        locations.first_spherical_harmonics,
-        locations.first_model_matrix,
-        locations.model_opacity,
-    ];
-    let by_instance = used.into_iter().filter(|&location| location != UNUSED).any(|location| {
-        let attribute = pipeline.attributes.get(&location);
-        let binding = attribute.and_then(|attribute| pipeline.bindings.get(&attribute.binding));
-        binding.is_none_or(|binding| binding.by_instance)
-    });
-    if state::is_fixed(gaussian) && instances > 1 && !by_instance {
+/// Warns of cameras that a command buffer sets, if it draws through cameras in buffers alone.
+pub(crate) fn check_sources(sources: Sources, faults: &mut Faults) {
+    if sources.sets && sources.by_buffer && !sources.by_command {
         faults.warning(
-            "GAURAST-Draw-instances",
-            format!(
-                "the draw has {instances} instances, but no attribute advances by instance: each Gaussian is drawn \
-                     {instances} times \
-                 at one place. Number the Gaussians by vertexCount"
-            ),
+            "GAURAST-Draw-camera-source",
+            "the command buffer sets cameras, but cameraSource of every pipeline that draws in it is UNIFORM_BUFFER: they \
+             are not used",
         );
     }
 }
 
-fn check_indices(recording: &Recording, first: u32, count: u32, objects: &Objects, faults: &mut Faults) {
-    let Some(index) = recording.index_buffer else {
-        return;
-    };
-    let bytes = index_bytes(index.ty);
-    let Some(buffer) = objects.buffers.get(&index.buffer) else {
-        return;
-    };
-    let end = (u64::from(first) + u64::from(count)) * bytes;
-    let has = buffer.size.saturating_sub(index.offset);
-    if end > has {
+/// Warns of shaders that read push constants, of which none were pushed.
+fn check_constants(recording: &Recording, pipeline: &Pipeline, faults: &mut Faults) {
+    let missing = pipeline.reads_constants & !recording.constants;
+    if !missing.is_empty() {
         faults.warning(
-            "GAURAST-Draw-indices-past-buffer",
-            format!(
-                "the draw reads indices {first} to {}, but the index buffer holds {}",
-                u64::from(first) + u64::from(count) - 1,
-                has / bytes
-            ),
+            "GAURAST-Draw-push-constants",
+            format!("the {missing:?} shader has push constants, but none were pushed for it in this command buffer"),
         );
-    }
-}
-
-/// Bytes of an index.
-pub(crate) fn index_bytes(ty: vk::IndexType) -> u64 {
-    match ty {
-        vk::IndexType::UINT16 => 2,
-        vk::IndexType::UINT8_KHR => 1,
-        _ => 4,
-    }
-}
-
-/// The end of what is bound, in bytes after the offset.
-fn bound_bytes(recording: &Recording, binding: u32, objects: &Objects) -> Option<u64> {
-    let bound = recording.vertex_buffers.get(&binding)?;
-    let size = objects.buffers.get(&bound.buffer)?.size.saturating_sub(bound.offset);
-    Some(bound.size.map_or(size, |given| given.min(size)))
-}
-
-/// Warns about attributes of vertices and instances that lie beyond their buffers. Both ranges are not empty; `vertices`
-/// is `None` in indexed draws.
-fn check_vertices(
-    recording: &Recording,
-    pipeline: &Pipeline,
-    vertices: Option<Range<u64>>,
-    instances: Range<u64>,
-    objects: &Objects,
-    faults: &mut Faults,
-) {
-    for (location, attribute) in &pipeline.attributes {
-        let number = attribute.binding;
-        let Some(binding) = pipeline.bindings.get(&number) else {
-            continue;
-        };
-        let Some(bytes) = bound_bytes(recording, number, objects) else {
-            if !recording.vertex_buffers.contains_key(&number) {
-                return faults.warning(
-                    "GAURAST-Draw-no-vertex-buffer",
-                    format!("location {location} comes from binding {number}, to which no vertex buffer is bound"),
-                );
-            }
-            continue;
-        };
-        let stride = recording.vertex_buffers[&number].stride.unwrap_or(binding.stride);
-        let (what, first, last) = if binding.by_instance {
-            let steps = (instances.end - 1 - instances.start).checked_div(binding.divisor.into()).unwrap_or(0);
-            ("instance", instances.start, instances.start + steps)
-        } else {
-            let Some(vertices) = &vertices else {
-                continue;
-            };
-            ("vertex", vertices.start, vertices.end - 1)
-        };
-        let size = u64::from(attribute.offset) + u64::from(Format::of(attribute.format).bytes);
-        let end = last * u64::from(stride) + size;
-        if end > bytes {
-            let holds = if stride == 0 || bytes < size { 0 } else { (bytes - size) / u64::from(stride) + 1 };
-            return faults.warning(
-                "GAURAST-Draw-vertices-past-buffer",
-                format!(
-                    "the draw reads location {location} of {what} {first} to {last}, but the buffer of binding \
-                         {number} holds {holds}"
-                ),
-            );
-        }
     }
 }
 
@@ -375,6 +263,7 @@ fn note(
     gaussian: GaussianState,
     call: Call,
     viewport: Option<[f32; 4]>,
+    depth: Option<DepthUse>,
 ) {
     if !state::is_fixed(&gaussian) {
         return;
@@ -384,13 +273,18 @@ fn note(
         pipeline: Arc::clone(pipeline),
         state: gaussian,
         call,
-        vertex_buffers: recording.vertex_buffers.clone(),
-        index_buffer: recording.index_buffer,
+        inputs: recording.inputs.clone(),
         cameras: recording.cameras.clone(),
         viewport,
+        depth,
+        first_of_set: recording.first_of_set.clone(),
         camera_set: recording.sets.get(&gaussian.camera_set).cloned(),
         pushed: recording.pushed.get(&key).copied(),
         was_checked: AtomicBool::new(false),
     };
-    recording.operations.push(Operation::Draw(Arc::new(draw)));
+    let draw = Arc::new(draw);
+    if recording.set.is_some() && recording.first_of_set.is_none() {
+        recording.first_of_set = Some(Arc::clone(&draw));
+    }
+    recording.operations.push(Operation::Draw(draw));
 }

@@ -43,6 +43,33 @@ pub(crate) fn check(
             "GAURAST-Harmonics-stride",
             "stride and coefficientStride are 0: all coefficients of all Gaussians are the same",
         );
+    } else if bound.size < u64::from(format.bytes) {
+        faults.warning(
+            "GAURAST-Harmonics-size",
+            format!("size is {}: not one coefficient lies within it, and all read as zeros", bound.size),
+        );
+    } else {
+        check_alignment(bound, u64::from(format.word_bytes()), faults);
+    }
+}
+
+/// Warns of coefficients that do not begin at a multiple of their components' size.
+fn check_alignment(bound: &GaussianSphericalHarmonicsBufferGAURAST<'_>, word: u64, faults: &mut Faults) {
+    let numbers = [
+        ("deviceAddress", bound.device_address),
+        ("stride", u64::from(bound.stride)),
+        ("coefficientStride", bound.coefficient_stride),
+    ];
+    let wrong = numbers.into_iter().find(|(_, number)| !number.is_multiple_of(word.max(1)));
+    if let Some((name, number)) = wrong {
+        faults.warning(
+            "GAURAST-Harmonics-alignment",
+            format!(
+                "{name} is {} beyond a multiple of {word}, the bytes of a component of {:?}",
+                number % word,
+                bound.format
+            ),
+        );
     }
 }
 

@@ -1,5 +1,8 @@
 //! The creation of a graphics pipeline.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
@@ -10,6 +13,7 @@ use gaurast::vk::{
 
 use crate::facts::{Facts, GaussianState};
 use crate::formats::{Format, is_integer};
+use crate::objects::Attribute;
 use crate::report::Faults;
 use crate::request::{Footprint, Request, SigmaPoints};
 use crate::rules::{shaders, state};
@@ -76,6 +80,24 @@ pub(crate) fn check(request: &Request, facts: &Facts, faults: &mut Faults) {
     }
     if faults.is_empty() {
         warn(&static_state, request, faults);
+    }
+}
+
+/// Checks the rules of a library's own state. Those of several parts are checked where they are linked.
+pub(crate) fn check_library(request: &Request, facts: &Facts, faults: &mut Faults) {
+    let Some(gaussian) = request.gaussian.filter(|_| request.is_library) else {
+        return;
+    };
+    let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032";
+    if facts.features.gaussian_primitive_topology == 0 {
+        return faults.error(id, state::absent(id));
+    }
+    if !state::check_enums(&gaussian, faults) {
+        return;
+    }
+    state::check_values(&without_dynamic(&gaussian, request), static_approximation(request), false, facts, faults);
+    if let Some(footprint) = &request.footprint {
+        check_footprint(&gaussian, footprint, facts, faults);
     }
 }
 
@@ -156,6 +178,10 @@ fn check_stages(gaussian: &GaussianState, request: &Request, facts: &Facts, faul
         );
         let inputs = interface(Stage::FRAGMENT, INPUT);
         shaders::check_fragment(&gaussian.resolve_input_locations, inputs.as_ref(), faults);
+        if let Some(outputs) = interface(Stage::FRAGMENT, OUTPUT) {
+            let formats: Vec<_> = request.subpass.colors.iter().map(|&(format, _)| format).collect();
+            shaders::check_outputs(&outputs, &formats, faults);
+        }
     }
 }
 
@@ -420,9 +446,12 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
         );
     }
     if !has_fragment {
-        warn_of_output(request, faults);
+        warn_of_output(gaussian, request, faults);
     }
     if let Some((bindings, attributes)) = &request.vertex_input {
+        if state::is_fixed(gaussian) {
+            warn_of_formats(gaussian, attributes, faults);
+        }
         let is_dynamic = request.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE);
         for (name, location, _) in used_locations(gaussian) {
             let Some(attribute) = attributes.get(&location) else {
@@ -446,8 +475,65 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     }
 }
 
+/// Warns of attributes that can't be what their members want, by their formats and offsets.
+fn warn_of_formats(gaussian: &GaussianState, attributes: &BTreeMap<u32, Attribute>, faults: &mut Faults) {
+    let has_matrix = gaussian.attribute_locations.first_model_matrix != UNUSED;
+    // The bytes that are read, by member.
+    let mut read: Vec<(String, u32, Range<u32>)> = Vec::new();
+    for (name, location, components) in used_locations(gaussian) {
+        let Some(attribute) = attributes.get(&location) else {
+            continue;
+        };
+        let format = Format::of(attribute.format);
+        // A matrix may take positions from 0 to 1 to where they are.
+        let is_signed =
+            name == "rotation" || name.starts_with("firstSphericalHarmonics") || name == "position" && !has_matrix;
+        if is_signed && format.is_unsigned {
+            return faults.warning(
+                "GAURAST-Pipeline-unsigned-format",
+                format!(
+                    "{name} is location {location}, whose format is {:?}: it has no negative numbers",
+                    attribute.format
+                ),
+            );
+        }
+        if format.is_packed {
+            continue;
+        }
+        let bytes = attribute.offset..attribute.offset + components * format.word_bytes();
+        let overlaps = |(_, binding, other): &&(String, u32, Range<u32>)| {
+            *binding == attribute.binding && *other != bytes && other.start < bytes.end && bytes.start < other.end
+        };
+        if let Some((other, _, range)) = read.iter().find(overlaps) {
+            return faults.warning(
+                "GAURAST-Pipeline-overlap",
+                format!(
+                    "{name} is read from bytes {} to {} of binding {}, and {other} from bytes {} to {}: they overlap in part",
+                    bytes.start,
+                    bytes.end - 1,
+                    attribute.binding,
+                    range.start,
+                    range.end - 1
+                ),
+            );
+        }
+        read.push((name, attribute.binding, bytes));
+    }
+}
+
 /// Warns of what becomes of the fragment's colour, which is premultiplied.
-fn warn_of_output(request: &Request, faults: &mut Faults) {
+fn warn_of_output(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
+    let attachments = request.subpass.colors.iter().zip(&request.blend).skip(1);
+    let mut written = attachments.filter(|(_, blend)| !blend.color_write_mask.is_empty());
+    if let Some(((format, _), _)) = written.find(|((format, _), _)| is_integer(*format)) {
+        return faults.warning(
+            "GAURAST-Pipeline-integer-attachment",
+            format!(
+                "a colour attachment after the first is {format:?}, and colorWriteMask is not 0: without a fragment stage \
+                 the first one alone is written. What Gaussian a pixel shows is an input of a resolve shader"
+            ),
+        );
+    }
     let Some(&(format, _)) = request.subpass.colors.first() else {
         return;
     };
@@ -463,7 +549,19 @@ fn warn_of_output(request: &Request, faults: &mut Faults) {
     let Some(blend) = request.blend.first() else {
         return;
     };
-    let nothing_else = !request.writes_depth && request.subpass.colors.len() == 1;
+    let are_of_training =
+        state::is_fixed(gaussian) && gaussian.flags.intersects(Flags::LOG_SCALE | Flags::LOGIT_OPACITY);
+    if Format::of(format).is_srgb && are_of_training {
+        return faults.warning(
+            "GAURAST-Pipeline-srgb-attachment",
+            format!(
+                "the first colour attachment is {format:?}, which takes colours for linear light and encodes them, but scenes \
+                 that hold logarithms and logits were trained by colours that are encoded already: UNORM stores them as they \
+                 are"
+            ),
+        );
+    }
+    let nothing_else = !(request.depth.is_enabled && request.depth.writes) && request.subpass.colors.len() == 1;
     if blend.color_write_mask.is_empty() && nothing_else {
         return faults.warning(
             "GAURAST-Pipeline-write-mask",

@@ -23,12 +23,14 @@ pub(crate) fn begin(recording: &mut Recording, facts: &Facts, faults: &mut Fault
     });
     if faults.0.len() == before {
         recording.set = Some(None);
+        recording.first_of_set = None;
     }
 }
 
 /// `vkCmdEndGaussianSetGAURAST`.
 pub(crate) fn end(recording: &mut Recording, facts: &Facts, faults: &mut Faults) {
     let is_open = recording.set.take().is_some();
+    recording.first_of_set = None;
     // Where sets are not enabled, it was said already that none has begun.
     faults.require(is_open || facts.features.merged_draws == 0, "VUID-vkCmdEndGaussianSetGAURAST-None-90004", || {
         "a set ends, but none has begun in this command buffer".to_owned()
@@ -44,6 +46,16 @@ pub(crate) fn require_ended(recording: &mut Recording, command: &str, faults: &m
              has begun"
         )
     });
+}
+
+/// The end of a query: what a set draws is drawn where the set ends.
+pub(crate) fn check_query(recording: &Recording, faults: &mut Faults) {
+    if matches!(recording.set, Some(Some(_))) {
+        faults.warning(
+            "GAURAST-Set-query",
+            "a query ends within a set that has draws: the set is drawn where it ends, so that the query does not count it",
+        );
+    }
 }
 
 /// A draw of Gaussians: in a set it shares the state of the first one.

@@ -1,10 +1,12 @@
 //! The inputs and outputs of a pipeline's shaders at the locations that the Gaussian state names.
 
+use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianResolveInputLocationsGAURAST,
     GaussianVertexOutputLocationsGAURAST,
 };
 
+use crate::formats::is_integer;
 use crate::report::Faults;
 use crate::spirv::{Interface, Slots};
 
@@ -91,6 +93,22 @@ pub(crate) fn check_fragment(
     faults.require(!inputs.writes_depth, "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024", || {
         "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned()
     });
+}
+
+/// Warns of floating-point outputs to attachments of integers.
+pub(crate) fn check_outputs(outputs: &Interface, formats: &[vk::Format], faults: &mut Faults) {
+    for (&(location, _), &is_float) in &outputs.slots {
+        let format = formats.get(location as usize).copied().unwrap_or_default();
+        if is_float && is_integer(format) {
+            return faults.warning(
+                "GAURAST-Pipeline-output-type",
+                format!(
+                    "the fragment shader writes floating point to location {location}, but that colour attachment is \
+                     {format:?}: what it stores is undefined"
+                ),
+            );
+        }
+    }
 }
 
 /// An input that a resolve shader may read.
