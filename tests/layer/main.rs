@@ -16,6 +16,7 @@ mod harmonics;
 mod locations;
 mod page;
 mod pipelines;
+mod resolve;
 mod right;
 mod samples;
 mod sets;

@@ -509,6 +509,9 @@ void main() {
     if (HAS_DEPTHS) {
         push.set.depths.at[i] = vec2(held_depth(camera, depth), depth);
     }
+    if (IS_RESOLVED) {
+        push.set.names.at[i] = uvec2(vertex, instance);
+    }
 
     // The key, as an unsigned number in the same order.
     float by = depth;

@@ -7,6 +7,7 @@ layout(buffer_reference, std430, buffer_reference_align = 8) buffer Couples { uv
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { vec4 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Depths { vec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Floats { float at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Rows { uvec4 at[]; };
 
 // The Gaussian as it is seen: lengths in pixels, the mean from the origin of the framebuffer.
 struct Record {
@@ -89,6 +90,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     Depths depths;               // of each Gaussian: as the attachment holds it, in steps if it has steps; and the depth variable
     Couples stored;              // of each sample: what it stored before, as `depths` has it, and the outcome of its own tests
     Floats medians;              // of each sample: the median depth
+    Couples names;               // of each Gaussian: its vertex and its instance, where a resolve shader reads them
+    Rows inputs;                 // of each sample: expected and median depth and depth variable; median and nearest Gaussian
+    Pixels seen_by;              // the camera of each view, as a resolve shader reads it; or 0
+    uvec2 unused;
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative

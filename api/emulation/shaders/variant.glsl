@@ -19,3 +19,5 @@ layout(constant_id = 10) const bool HAS_DEPTHS = false;
 // Scales are logarithms; opacities are logits.
 layout(constant_id = 11) const bool HAS_LOGARITHMS = false;
 layout(constant_id = 12) const bool HAS_LOGITS = false;
+// A resolve shader reads depths or Gaussians.
+layout(constant_id = 13) const bool IS_RESOLVED = false;

@@ -26,7 +26,8 @@
 //! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
 //! | `attachments`, `depth_stencil` | what is known of depth and stencil attachments, and the tests of Gaussians against them |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
-//! | `set`, `work` | a sorted set that is recorded, and its dispatches |
+//! | `resolve` | the application's fragment shaders, rewritten so that they load what a set has made |
+//! | `set`, `work`, `made` | a sorted set that is recorded, its dispatches, and what they make |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
 //! | `times` | the times of a set's stages |
 //! | `self_test`, `pair` | the test of a device's arithmetic |
@@ -45,6 +46,7 @@ mod hooks;
 mod instance;
 mod kernels;
 mod library;
+mod made;
 mod next;
 mod pair;
 mod pass;
@@ -53,6 +55,7 @@ mod proc_addr;
 mod recording;
 mod render_pass;
 mod report;
+mod resolve;
 mod scratch;
 mod self_test;
 mod set;

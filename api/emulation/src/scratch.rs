@@ -26,7 +26,11 @@ impl Memory {
     /// Allocates memory of the device, or such that the host sees as well.
     pub(crate) fn new(next: &Arc<Next>, size: u64, is_for_host: bool) -> Result<Self, vk::Result> {
         use vk::BufferUsageFlags as Usage;
-        let usage = Usage::STORAGE_BUFFER | Usage::TRANSFER_DST | Usage::INDIRECT_BUFFER | Usage::SHADER_DEVICE_ADDRESS;
+        let usage = Usage::STORAGE_BUFFER
+            | Usage::TRANSFER_DST
+            | Usage::INDIRECT_BUFFER
+            | Usage::VERTEX_BUFFER
+            | Usage::SHADER_DEVICE_ADDRESS;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         // SAFETY: the device lives as long as what is recorded on it.
         unsafe {
@@ -111,6 +115,8 @@ pub(crate) struct Extent {
     pub(crate) pixels: u64,
     /// Samples that are tested.
     pub(crate) tested: u64,
+    /// A resolve shader reads depths or Gaussians.
+    pub(crate) has_inputs: bool,
 }
 
 /// Offsets into scratch.
@@ -134,6 +140,7 @@ pub(crate) struct Places {
     pub(crate) records: u64,
     pub(crate) pixels: u64,
     pub(crate) depths: u64,
+    pub(crate) names: u64,
     pub(crate) copied_depths: u64,
     pub(crate) copied_stencils: u64,
     pub(crate) stored: u64,
@@ -174,7 +181,8 @@ impl Places {
         places.ranges = take(8 * extent.tiles);
         places.records = take(RECORD * n);
         places.pixels = take(extent.pixels);
-        places.depths = take(if extent.tested == 0 { 0 } else { 8 * n });
+        places.depths = take(if extent.tested == 0 && !extent.has_inputs { 0 } else { 8 * n });
+        places.names = take(if extent.has_inputs { 8 * n } else { 0 });
         places.copied_depths = take(4 * extent.tested);
         places.copied_stencils = take(4 * extent.tested);
         places.stored = take(8 * extent.tested);

@@ -6,6 +6,7 @@ use ash::vk;
 
 use crate::depth_stencil::TestState;
 use crate::pipeline::{self, Pipeline};
+use crate::recording::Bindings;
 use crate::support::MAX_GAUSSIANS;
 use crate::work::{Area, Camera, Cameras, Draw, DrawSource, Values, Work};
 
@@ -75,6 +76,8 @@ pub(crate) struct SetState {
     pub(crate) tests: Option<TestState>,
     pub(crate) viewport: vk::Viewport,
     pub(crate) scissor: vk::Rect2D,
+    /// What a resolve shader is bound to, where there is one.
+    pub(crate) bindings: Option<Arc<Bindings>>,
 }
 
 impl SetState {
@@ -153,6 +156,7 @@ impl Set {
             draws: self.draws,
             sources: self.sources,
             gaussians: self.gaussians,
+            bindings: state.bindings,
             pixels: None,
         };
         (!is_empty).then_some(work)

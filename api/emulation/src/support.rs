@@ -69,6 +69,8 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .gaussian_instancing(true)
         .gaussian_depth_stencil(true)
         .gaussian_multisample(true)
+        .resolve_fragment_shader(true)
+        .resolve_gaussian_indices(true)
         .gaussian_approximation(true)
         .attribute_activation(true)
         .spherical_harmonics_buffer(true)

@@ -7,8 +7,10 @@ use ash::vk;
 use crate::attachments::{self, DepthStencil};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
+use crate::made::{Attributes, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
 use crate::pipeline::{Attribute, Pipeline};
+use crate::recording::Bindings;
 use crate::scratch::{Extent, Memory, Places};
 use crate::times::Times;
 
@@ -92,6 +94,10 @@ struct Parameters {
     depths: u64,
     stored: u64,
     medians: u64,
+    names: u64,
+    inputs: u64,
+    seen_by: u64,
+    unused: u64,
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -256,6 +262,8 @@ pub(crate) struct Work {
     pub(crate) sources: Vec<DrawSource>,
     /// The most Gaussians.
     pub(crate) gaussians: u64,
+    /// What a resolve shader is bound to, where there is one.
+    pub(crate) bindings: Option<Arc<Bindings>>,
     /// Pixels in memory of their own, where they are shown by another command buffer.
     pub(crate) pixels: Option<Arc<Memory>>,
 }
@@ -307,35 +315,66 @@ impl Work {
         pixels * u64::from(self.pipeline.planes()) * u64::from(self.samples())
     }
 
-    /// Bytes of the median depths.
-    fn median_bytes(&self) -> u64 {
-        if self.pipeline.tests.is_some() { 4 * self.all_samples() } else { 0 }
-    }
-
     /// The number of tiles of all views.
     fn all_tiles(&self) -> u64 {
         let [across, down] = self.tiles();
         u64::from(across) * u64::from(down) * u64::from(self.pipeline.planes())
     }
 
-    /// The place of the words of tiles in what the set makes: behind pixels and median depths.
-    fn shown_place(&self) -> u64 {
-        16 * self.all_samples() + self.median_bytes()
+    /// The places of what the set makes.
+    pub(crate) fn made(&self) -> MadePlaces {
+        let resolve = self.pipeline.resolve.as_ref();
+        let planes = u64::from(self.pipeline.planes());
+        MadePlaces::of(&MadeExtent {
+            samples: self.all_samples(),
+            has_medians: self.pipeline.tests.is_some(),
+            tiles: self.all_tiles(),
+            has_inputs: self.has_inputs(),
+            cameras: if resolve.is_some_and(|resolve| resolve.has_camera) { planes } else { 0 },
+            draws: if resolve.is_some() { u64::from(self.samples()) } else { 0 },
+        })
     }
 
-    /// Bytes of what the set makes: pixels, median depths, and a word for each tile that says whether it is shown.
-    pub(crate) fn pixel_bytes(&self) -> u64 {
-        self.shown_place() + 4 * self.all_tiles()
+    /// A resolve shader reads depths or Gaussians.
+    fn has_inputs(&self) -> bool {
+        self.pipeline.variant.is_resolved
+    }
+
+    /// Reports whether the set depends on the depth attachment: on what it stores, or on its format.
+    pub(crate) fn knows_attachment(&self) -> bool {
+        self.tests.is_some() || self.has_inputs()
+    }
+
+    /// The attributes of the draws with a resolve shader: one for each sample.
+    fn attributes(&self, address: u64) -> Vec<Attributes> {
+        let Some(resolve) = &self.pipeline.resolve else {
+            return Vec::new();
+        };
+        let all = Attributes::new(address, &self.made(), self.area, self.samples());
+        let all = all.with_quads_of_pixels(resolve.has_quads_of_pixels);
+        (0..self.samples()).map(|sample| all.of_sample(sample)).collect()
+    }
+
+    /// The place of a draw's attributes.
+    pub(crate) fn attributes_place(&self, made: &Made) -> u64 {
+        made.place + self.made().attributes
+    }
+
+    /// Vertices of the draws with a resolve shader, of each tile.
+    pub(crate) fn vertices_of_tile(&self) -> u32 {
+        let quads = self.pipeline.resolve.as_ref().is_some_and(|resolve| resolve.has_quads_of_pixels);
+        if quads { 6 * TILE * TILE } else { 6 }
     }
 
     /// The set's result, for the shaders that show it.
     pub(crate) fn picture(&self, address: u64) -> Picture {
+        let places = self.made();
         Picture {
             image: address,
-            shown: address + self.shown_place(),
+            shown: address + places.shown,
             origin: self.area.origin,
             size: self.area.size,
-            medians: address + 16 * self.all_samples(),
+            medians: address + places.medians,
             samples: self.samples(),
             sample: 0,
             wanted: Outcome::Passed.number(),
@@ -373,19 +412,21 @@ impl Work {
             draws: size_of_val(self.draws.as_slice()) as u64,
             sources: size_of_val(self.sources.as_slice()).max(4) as u64,
             cameras: 128 * u64::from(self.camera_count().max(1)),
-            pixels: if self.pixels.is_some() { 0 } else { self.pixel_bytes() },
+            pixels: if self.pixels.is_some() { 0 } else { self.made().end },
             tested: if self.tests.is_some() { self.all_samples() } else { 0 },
+            has_inputs: self.has_inputs(),
         }
     }
 
-    /// The address of the pixels.
-    pub(crate) fn pixels_at(&self, scratch: &Memory, places: &Places) -> u64 {
-        self.pixels.as_ref().map_or(scratch.address + places.pixels, |memory| memory.address)
+    /// The place of what the set makes.
+    pub(crate) fn made_in(&self, scratch: &Arc<Memory>, places: &Places) -> Made {
+        let own = self.pixels.as_ref().map(|memory| Made { memory: Arc::clone(memory), place: 0 });
+        own.unwrap_or_else(|| Made { memory: Arc::clone(scratch), place: places.pixels })
     }
 
     fn parameters(
         &self,
-        scratch: &Memory,
+        scratch: &Arc<Memory>,
         places: &Places,
         extent: &Extent,
         feedback: u64,
@@ -393,7 +434,9 @@ impl Work {
     ) -> Parameters {
         let depth_compare = self.tests.filter(|tests| tests.is_depth_tested && has_depths(attachment));
         let at = |place: u64| scratch.address + place;
-        let (pipeline, picture) = (&self.pipeline, self.picture(self.pixels_at(scratch, places)));
+        let (pipeline, made) = (&self.pipeline, self.made_in(scratch, places).address());
+        let (picture, made_places) = (self.picture(made), self.made());
+        let has_camera = pipeline.resolve.as_ref().is_some_and(|resolve| resolve.has_camera);
         Parameters {
             counters: at(places.counters),
             keys: at(places.keys),
@@ -416,6 +459,10 @@ impl Work {
             depths: at(places.depths),
             stored: at(places.stored),
             medians: picture.medians,
+            names: at(places.names),
+            inputs: made + made_places.inputs,
+            seen_by: if has_camera { made + made_places.cameras } else { 0 },
+            unused: 0,
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -458,7 +505,7 @@ impl Work {
         next: &Arc<Next>,
         kernels: &Kernels,
         commands: vk::CommandBuffer,
-        scratch: &Memory,
+        scratch: &Arc<Memory>,
         extent: &Extent,
         attachment: Option<&DepthStencil>,
     ) -> Result<Option<Times>, vk::Result> {
@@ -477,11 +524,14 @@ impl Work {
                 Cameras::Command(cameras) => run.write(places.cameras, bytemuck::cast_slice(cameras)),
                 Cameras::Buffer(set, offsets) => self.copy_cameras(&run, *set, offsets),
             }
-            let (shown, buffer) = match &self.pixels {
-                Some(memory) => (self.shown_place(), memory.buffer),
-                None => (places.pixels + self.shown_place(), scratch.buffer),
-            };
-            next.cmd_fill_buffer(commands, buffer, shown, 4 * self.all_tiles(), 0);
+            let made = self.made_in(scratch, &places);
+            let shown = made.place + self.made().shown;
+            next.cmd_fill_buffer(commands, made.memory.buffer, shown, 4 * self.all_tiles(), 0);
+            let attributes = self.attributes(made.address());
+            if !attributes.is_empty() {
+                let at = self.attributes_place(&made);
+                next.cmd_update_buffer(commands, made.memory.buffer, at, bytemuck::cast_slice(&attributes));
+            }
             if let Some(tests) = &self.tests {
                 self.test(&run, tests, attachment)?;
                 run.end_stage("test");
@@ -707,6 +757,7 @@ fn has_depths(attachment: Option<&DepthStencil>) -> bool {
 
 /// The greatest depth of an attachment in steps; 0 if depths are floats.
 fn depth_steps(attachment: Option<&DepthStencil>) -> u32 {
+    let attachment = attachment.filter(|attachment| attachment.aspects.contains(vk::ImageAspectFlags::DEPTH));
     attachment.map_or(0, |attachment| (1 << attachments::depth_bits(attachment.view.image.format)) - 1)
 }
 

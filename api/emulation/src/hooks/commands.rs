@@ -80,7 +80,7 @@ pub(super) unsafe extern "system" fn cmd_bind_vertex_buffers(
                 for ((number, &buffer), &offset) in (first..).zip(buffers).zip(offsets) {
                     let (address, size) = located(site.emulation, buffer, offset);
                     let stride = recording.vertex_buffers.get(&number).and_then(|before| before.stride);
-                    recording.vertex_buffers.insert(number, VertexBuffer { address, size, stride });
+                    recording.vertex_buffers.insert(number, VertexBuffer { buffer, offset, address, size, stride });
                 }
                 pass_on(site.next);
             },
@@ -115,7 +115,7 @@ pub(super) unsafe extern "system" fn cmd_bind_vertex_buffers2(
                     let size = given.get(index).map_or(whole, |&size| size.min(whole));
                     let before = recording.vertex_buffers.get(&number).and_then(|before| before.stride);
                     let stride = by.get(index).map(|&stride| stride as u32).or(before);
-                    recording.vertex_buffers.insert(number, VertexBuffer { address, size, stride });
+                    recording.vertex_buffers.insert(number, VertexBuffer { buffer, offset, address, size, stride });
                 }
                 pass_on(site.next);
             },
