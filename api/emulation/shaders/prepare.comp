@@ -88,6 +88,14 @@ void derive() {
         push.set.derived.of.limits[2 * i] = add(div(sub(pair(size), center), focal), beyond);
         push.set.derived.of.limits[2 * i + 1] = add(div(center, focal), beyond);
     }
+    // A lens that sees more does so within bounds that are as much wider.
+    if (any(notEqual(uvec2(push.set.lenses), uvec2(0u)))) {
+        Lens lens = push.set.lenses.at[min(push.view, push.set.camera_count - 1u)];
+        for (int i = 0; lens.model != 0u && i < 4; i++) {
+            bool is_bounded = lens.widening.x < 1e30;
+            push.set.derived.of.limits[i] = is_bounded ? mul(push.set.derived.of.limits[i], lens.widening) : pair(3.4e38);
+        }
+    }
 }
 
 // The camera as a resolve shader reads it, at six locations.

@@ -41,6 +41,17 @@ struct Derived {
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer DerivedCamera { Derived of; };
 
+// A lens that distorts; numbers are pairs.
+struct Lens {
+    vec2 fold;                   // the square of the radius at which it folds
+    vec2 steepness, scale;       // of a field of view
+    vec2 widening;               // of a pinhole's bounds of slopes; 3.4e38 if there are none
+    uint model;                  // see lens.glsl
+    float radial[6], tangential[2], thin_prism[4];
+    uint unused;
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Lenses { Lens at[]; };
+
 struct Draw {
     uvec2 indices;               // their address
     uint index_bytes;            // 0 without an index buffer
@@ -93,7 +104,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     Couples names;               // of each Gaussian: its vertex and its instance, where a resolve shader reads them
     Rows inputs;                 // of each sample: expected and median depth and depth variable; median and nearest Gaussian
     Pixels seen_by;              // the camera of each view, as a resolve shader reads it; or 0
-    uvec2 unused;
+    Lenses lenses;               // of each camera; or 0
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative
@@ -107,6 +118,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     vec2 depth_range;            // of the viewport
     uint depth_steps;            // 2^n - 1 of an attachment of n bits; 0 of one of floats
     uint is_negative_one_to_one;
+    vec2 sigma_distance;         // of sigma points, in standard deviations
+    vec2 sigma_center, sigma_other; // weights in the covariance
+    vec2 picture[4];             // where sigma points count, from the viewport's corner: least and end of x, of y
+    uint must_count;             // how many of the seven sigma points must count
+    uint unused;
     Attribute attributes[33];
 };
 

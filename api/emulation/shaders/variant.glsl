@@ -21,3 +21,5 @@ layout(constant_id = 11) const bool HAS_LOGARITHMS = false;
 layout(constant_id = 12) const bool HAS_LOGITS = false;
 // A resolve shader reads depths or Gaussians.
 layout(constant_id = 13) const bool IS_RESOLVED = false;
+// A camera has a lens that distorts.
+layout(constant_id = 14) const bool HAS_LENS = false;

@@ -70,11 +70,13 @@ pub(crate) struct Variant {
     pub(crate) has_logits: bool,
     /// A resolve shader reads depths or Gaussians.
     pub(crate) is_resolved: bool,
+    /// A camera has a lens that distorts.
+    pub(crate) has_lens: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 14] {
+    fn of_projection(&self) -> [u32; 15] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -90,6 +92,7 @@ impl Variant {
             u32::from(self.has_logarithms),
             u32::from(self.has_logits),
             u32::from(self.is_resolved),
+            u32::from(self.has_lens),
         ]
     }
 

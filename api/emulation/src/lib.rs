@@ -27,6 +27,7 @@
 //! | `attachments`, `depth_stencil` | what is known of depth and stencil attachments, and the tests of Gaussians against them |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `resolve` | the application's fragment shaders, rewritten so that they load what a set has made |
+//! | `lens` | lenses that distort |
 //! | `set`, `work`, `made` | a sorted set that is recorded, its dispatches, and what they make |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
 //! | `times` | the times of a set's stages |
@@ -45,6 +46,7 @@ mod formats;
 mod hooks;
 mod instance;
 mod kernels;
+mod lens;
 mod library;
 mod made;
 mod next;

@@ -12,7 +12,7 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
     PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
-    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPoints,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPointsInfo,
 };
 use gaurast_layer_interface::{find, slice};
 
@@ -73,6 +73,7 @@ pub(crate) struct Pipeline {
     pub(crate) cut_off: u32,
     pub(crate) cut_off_deviations: f32,
     pub(crate) compensation_floor: f32,
+    pub(crate) sigma_points: SigmaPoints,
     /// The constants that the pipeline fixes in the kernels.
     pub(crate) variant: Variant,
     /// Bytes from a harmonic's attribute to the next one's.
@@ -136,19 +137,49 @@ pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a
     }
 }
 
-/// Reports whether sigma points are not those of pipelines without the structure.
-fn are_changed(points: &SigmaPoints<'_>) -> bool {
-    let values = |points: &SigmaPoints<'_>| {
-        ([points.alpha, points.beta, points.kappa, points.picture_margin], points.all_sigma_points)
-    };
-    values(points) != values(&SigmaPoints::default())
+/// The sigma points of the unscented transform.
+pub(crate) struct SigmaPoints {
+    /// In standard deviations.
+    pub(crate) distance: f64,
+    /// Weights in the covariance of the point in the middle and of each other one.
+    pub(crate) center: f64,
+    pub(crate) other: f64,
+    /// How many must lie in the picture and its margin.
+    pub(crate) must_count: u32,
+    margin: f64,
+}
+
+impl SigmaPoints {
+    fn new(points: &SigmaPointsInfo<'_>) -> Self {
+        let [alpha, beta, kappa] = [points.alpha, points.beta, points.kappa].map(f64::from);
+        // n + lambda in the usual terms.
+        let spread = alpha * alpha * (3.0 + kappa);
+        let is_everywhere = points.picture_margin == f32::INFINITY;
+        Self {
+            distance: spread.sqrt(),
+            center: (spread - 3.0) / spread + 1.0 - alpha * alpha + beta,
+            other: 0.5 / spread,
+            must_count: match points.all_sigma_points {
+                _ if is_everywhere => 0,
+                vk::FALSE => 1,
+                _ => 7,
+            },
+            margin: if is_everywhere { 0.0 } else { points.picture_margin.into() },
+        }
+    }
+
+    /// The part of a viewport's area, from its corner, in which points count: least and end in x and in y, in pixels.
+    pub(crate) fn picture(&self, width: f32, height: f32) -> [f64; 4] {
+        let [width, height] = [width, height].map(f64::from);
+        let margins = [self.margin * width, self.margin * height];
+        [-margins[0], width + margins[0], -margins[1], height + margins[1]]
+    }
 }
 
 /// A reason to refuse a pipeline.
-fn refusal(state: &State<'_>, has_sigma_points: bool) -> Option<&'static str> {
+fn refusal(state: &State<'_>) -> Option<&'static str> {
     let refusals = [
         (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
-        (has_sigma_points && state.linearization == Linearization::UNSCENTED, "unscentedParameters"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
     ];
@@ -275,8 +306,8 @@ pub(crate) unsafe fn create(
 ) -> Result<Pipeline, vk::Result> {
     // SAFETY: the caller's promise.
     unsafe {
-        let sigma_points = find::<SigmaPoints<'_>>(info.p_next);
-        if let Some(feature) = refusal(state, sigma_points.is_some_and(are_changed)) {
+        let sigma_points = find::<SigmaPointsInfo<'_>>(info.p_next).copied().unwrap_or_default();
+        if let Some(feature) = refusal(state) {
             tell(&format!("a pipeline needs {feature}, which is not emulated"));
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
@@ -333,6 +364,8 @@ pub(crate) unsafe fn create(
             has_tests: tests.is_some_and(|tests| tests.tests_anything()),
             has_logarithms: state.flags.contains(Flags::LOG_SCALE),
             has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
+            // What commands set is not known here either.
+            has_lens: false,
             is_resolved: shader.as_ref().is_some_and(|shader| shader.rewritten.has_inputs),
         };
         // They are compiled now, rather than with the first draw.
@@ -351,6 +384,7 @@ pub(crate) unsafe fn create(
             cut_off,
             cut_off_deviations: footprint.map_or(0.0, |footprint| footprint.cut_off_deviations),
             compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
+            sigma_points: SigmaPoints::new(&sigma_points),
             variant,
             harmonics_step: attributes.harmonics_step.unwrap_or(0),
             attributes: attributes.list,

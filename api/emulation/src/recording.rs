@@ -18,7 +18,7 @@ use crate::scratch::{Memory, Places};
 use crate::set::{DynamicValues, Set, SetState};
 use crate::support::MAX_GAUSSIANS;
 use crate::times::Times;
-use crate::work::{Camera, Cameras, Draw, DrawSource, Work, barrier};
+use crate::work::{Cameras, Draw, DrawSource, SeenBy, Work, barrier};
 
 /// The graphics pipeline that is bound.
 #[derive(Clone, Default)]
@@ -130,7 +130,7 @@ pub(crate) struct Recording {
     pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
     pub(crate) index_buffer: Option<IndexBuffer>,
     pub(crate) harmonics: Option<HarmonicsBuffer>,
-    pub(crate) cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<SeenBy>,
     pub(crate) values: DynamicValues,
     /// Depth and stencil tests, as commands have set them.
     pub(crate) tests: TestState,
@@ -223,6 +223,11 @@ impl Recording {
         } else {
             let is_enough = self.cameras.len() == 1 || self.cameras.len() >= pipeline.planes() as usize;
             if self.cameras.is_empty() || !is_enough {
+                return None;
+            }
+            // No disc is seen through a lens that distorts.
+            let mut views = pipeline.views().map(|view| &self.cameras[(view as usize).min(self.cameras.len() - 1)]);
+            if pipeline.variant.is_surfel && views.any(|seen| seen.lens.is_some()) {
                 return None;
             }
             Cameras::Command(self.cameras.clone())

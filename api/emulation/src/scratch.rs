@@ -107,11 +107,12 @@ pub(crate) struct Extent {
     /// The most pairs of tile and Gaussian that are sorted.
     pub(crate) pairs: u64,
     pub(crate) tiles: u64,
-    /// Bytes of parameters, draws, sources and cameras, and of pixels.
+    /// Bytes of parameters, draws, sources, cameras and lenses, and of pixels.
     pub(crate) parameters: u64,
     pub(crate) draws: u64,
     pub(crate) sources: u64,
     pub(crate) cameras: u64,
+    pub(crate) lenses: u64,
     pub(crate) pixels: u64,
     /// Samples that are tested.
     pub(crate) tested: u64,
@@ -126,6 +127,7 @@ pub(crate) struct Places {
     pub(crate) draws: u64,
     pub(crate) sources: u64,
     pub(crate) cameras: u64,
+    pub(crate) lenses: u64,
     pub(crate) derived: u64,
     pub(crate) counters: u64,
     pub(crate) keys: u64,
@@ -168,6 +170,7 @@ impl Places {
         places.draws = take(extent.draws);
         places.sources = take(extent.sources);
         places.cameras = take(extent.cameras);
+        places.lenses = take(extent.lenses);
         places.derived = take(256);
         places.counters = take(256);
         places.keys = take(8 * n);

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::depth_stencil::TestState;
+use crate::lens::Lens;
 use crate::pipeline::{self, Pipeline};
 use crate::recording::Bindings;
 use crate::support::MAX_GAUSSIANS;
-use crate::work::{Area, Camera, Cameras, Draw, DrawSource, Values, Work};
+use crate::work::{Area, Camera, Cameras, Draw, DrawSource, SeenBy, Values, Work};
 
 /// The extension's dynamic states, as far as they have been set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -90,7 +91,9 @@ impl SetState {
             (own, others) => own.is_none() && others.is_none(),
         };
         let cameras = match (&self.cameras, &other.cameras) {
-            (Cameras::Command(own), Cameras::Command(others)) => own == others,
+            (Cameras::Command(own), Cameras::Command(others)) => {
+                own.len() == others.len() && own.iter().zip(others).all(|(own, other)| own.is_same(other))
+            }
             // What is bound is that of the first draw.
             _ => true,
         };
@@ -144,11 +147,20 @@ impl Set {
             extent: vk::Extent2D { width: i32::MAX as u32, height: i32::MAX as u32 },
         };
         let area = common(area, positive);
+        let lenses = match &state.cameras {
+            Cameras::Command(cameras) if cameras.iter().any(|seen| seen.lens.is_some()) => {
+                let size = [viewport[2], viewport[3]];
+                let lens = |seen: &SeenBy| seen.lens.map(|lens| Lens::new(&lens, &seen.camera, size));
+                cameras.iter().map(|seen| lens(seen).unwrap_or_default()).collect()
+            }
+            _ => Vec::new(),
+        };
         let is_empty = area.extent.width == 0 || area.extent.height == 0 || self.gaussians == 0;
         let work = Work {
             pipeline: state.pipeline,
             values: state.values,
             cameras: state.cameras,
+            lenses,
             tests: state.tests,
             depth_range: [v.min_depth, v.max_depth],
             viewport,

@@ -76,6 +76,8 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .spherical_harmonics_buffer(true)
         .gaussian_dynamic_state(true)
         .gaussian_cut_off(true)
+        .gaussian_distortion(true)
+        .unscented_parameters(true)
         .gaussian_multiview(true)
         .opacity_compensation_floor(true);
     (features.s_type, features.p_next) = (s_type, p_next);

@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use ash::vk;
+use gaurast::vk::GaussianCameraDistortionGAURAST as Distortion;
 
 use crate::attachments::{self, DepthStencil};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
+use crate::lens::Lens;
 use crate::made::{Attributes, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
+use crate::pair::{Pair, pair};
 use crate::pipeline::{Attribute, Pipeline};
 use crate::recording::Bindings;
 use crate::scratch::{Extent, Memory, Places};
@@ -97,7 +100,7 @@ struct Parameters {
     names: u64,
     inputs: u64,
     seen_by: u64,
-    unused: u64,
+    lenses: u64,
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -123,6 +126,12 @@ struct Parameters {
     depth_range: [f32; 2],
     depth_steps: u32,
     is_negative_one_to_one: u32,
+    sigma_distance: Pair,
+    sigma_center: Pair,
+    sigma_other: Pair,
+    picture: [Pair; 4],
+    must_count: u32,
+    unused: u32,
     attributes: [Attribute; 33],
     padding: u32,
 }
@@ -203,10 +212,26 @@ pub(crate) struct Values {
     pub(crate) degree: u32,
 }
 
+/// A camera that a command has set, with its lens, if that distorts.
+#[derive(Clone, Copy)]
+pub(crate) struct SeenBy {
+    pub(crate) camera: Camera,
+    pub(crate) lens: Option<Distortion<'static>>,
+}
+
+impl SeenBy {
+    /// Reports whether two are the same.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let numbers =
+            |seen: &Self| seen.lens.map(|lens| (lens.model.as_raw(), lens.radial, lens.tangential, lens.thin_prism));
+        self.camera == other.camera && numbers(self) == numbers(other)
+    }
+}
+
 /// The source of cameras.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) enum Cameras {
-    Command(Vec<Camera>),
+    Command(Vec<SeenBy>),
     /// A descriptor set with its dynamic offsets.
     Buffer(vk::DescriptorSet, Vec<u32>),
 }
@@ -251,6 +276,8 @@ pub(crate) struct Work {
     pub(crate) pipeline: Arc<Pipeline>,
     pub(crate) values: Values,
     pub(crate) cameras: Cameras,
+    /// Those of the cameras, if one distorts.
+    pub(crate) lenses: Vec<Lens>,
     /// Depth and stencil tests, if something is tested.
     pub(crate) tests: Option<TestState>,
     /// The least and the greatest depth of the viewport.
@@ -392,10 +419,11 @@ impl Work {
     /// The kernels that the set needs.
     fn variant(&self) -> Variant {
         let has_angles = match &self.cameras {
-            Cameras::Command(cameras) => cameras.iter().any(|camera| camera.model > ORTHOGRAPHIC),
+            Cameras::Command(cameras) => cameras.iter().any(|seen| seen.camera.model > ORTHOGRAPHIC),
             Cameras::Buffer(..) => true,
         };
-        Variant { has_angles, has_tests: self.tests.is_some(), ..self.pipeline.variant }
+        let has_lens = !self.lenses.is_empty();
+        Variant { has_angles, has_lens, has_tests: self.tests.is_some(), ..self.pipeline.variant }
     }
 
     /// The sizes of the set's scratch. `pairs` is the most of them that any set has had.
@@ -412,6 +440,7 @@ impl Work {
             draws: size_of_val(self.draws.as_slice()) as u64,
             sources: size_of_val(self.sources.as_slice()).max(4) as u64,
             cameras: 128 * u64::from(self.camera_count().max(1)),
+            lenses: size_of_val(self.lenses.as_slice()) as u64,
             pixels: if self.pixels.is_some() { 0 } else { self.made().end },
             tested: if self.tests.is_some() { self.all_samples() } else { 0 },
             has_inputs: self.has_inputs(),
@@ -436,6 +465,7 @@ impl Work {
         let at = |place: u64| scratch.address + place;
         let (pipeline, made) = (&self.pipeline, self.made_in(scratch, places).address());
         let (picture, made_places) = (self.picture(made), self.made());
+        let sigma = &pipeline.sigma_points;
         let has_camera = pipeline.resolve.as_ref().is_some_and(|resolve| resolve.has_camera);
         Parameters {
             counters: at(places.counters),
@@ -462,7 +492,7 @@ impl Work {
             names: at(places.names),
             inputs: made + made_places.inputs,
             seen_by: if has_camera { made + made_places.cameras } else { 0 },
-            unused: 0,
+            lenses: if self.lenses.is_empty() { 0 } else { at(places.lenses) },
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -491,6 +521,12 @@ impl Work {
             depth_range: self.depth_range,
             depth_steps: depth_steps(attachment),
             is_negative_one_to_one: u32::from(pipeline.is_negative_one_to_one),
+            sigma_distance: pair(sigma.distance),
+            sigma_center: pair(sigma.center),
+            sigma_other: pair(sigma.other),
+            picture: sigma.picture(self.viewport[2], self.viewport[3]).map(pair),
+            must_count: sigma.must_count,
+            unused: 0,
             attributes: pipeline.attributes,
             padding: 0,
         }
@@ -521,7 +557,11 @@ impl Work {
             run.write(places.draws, bytemuck::cast_slice(&self.draws));
             run.write(places.sources, bytemuck::cast_slice(&self.sources));
             match &self.cameras {
-                Cameras::Command(cameras) => run.write(places.cameras, bytemuck::cast_slice(cameras)),
+                Cameras::Command(cameras) => {
+                    let cameras: Vec<Camera> = cameras.iter().map(|seen| seen.camera).collect();
+                    run.write(places.cameras, bytemuck::cast_slice(&cameras));
+                    run.write(places.lenses, bytemuck::cast_slice(&self.lenses));
+                }
                 Cameras::Buffer(set, offsets) => self.copy_cameras(&run, *set, offsets),
             }
             let made = self.made_in(scratch, &places);
