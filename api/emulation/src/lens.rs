@@ -2,8 +2,8 @@
 
 use gaurast::vk::{GaussianCameraDistortionGAURAST as Distortion, GaussianDistortionModelGAURAST as Model};
 
+use crate::cameras::Camera;
 use crate::pair::{Pair, pair};
-use crate::work::Camera;
 
 /// The number of coefficients of the polynomials here, the constant one included.
 const COEFFICIENTS: usize = 7;

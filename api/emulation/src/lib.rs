@@ -25,6 +25,7 @@
 //! | `support` | the features and properties that devices get |
 //! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
 //! | `attachments`, `depth_stencil` | what is known of depth and stencil attachments, and the tests of Gaussians against them |
+//! | `bindings`, `cameras` | what shaders are bound to; cameras |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
 //! | `resolve` | the application's fragment shaders, rewritten so that they load what a set has made |
 //! | `lens` | lenses that distort |
@@ -38,6 +39,8 @@
 
 mod attachments;
 mod below;
+mod bindings;
+mod cameras;
 mod depth_stencil;
 mod device;
 mod emulation;

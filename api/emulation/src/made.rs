@@ -3,7 +3,13 @@
 use std::sync::Arc;
 
 use crate::scratch::Memory;
-use crate::work::Area;
+
+/// The part of the framebuffer that a set may reach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Area {
+    pub(crate) origin: [i32; 2],
+    pub(crate) size: [u32; 2],
+}
 
 /// The sizes of what a set makes.
 #[derive(Clone, Copy, Debug)]

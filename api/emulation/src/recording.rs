@@ -6,6 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
 
+use crate::bindings::{Bindings, BoundSet, PushConstants};
+use crate::cameras::{Cameras, SeenBy};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::emulation::Emulation;
 use crate::formats;
@@ -18,7 +20,7 @@ use crate::scratch::{Memory, Places};
 use crate::set::{DynamicValues, Set, SetState};
 use crate::support::MAX_GAUSSIANS;
 use crate::times::Times;
-use crate::work::{Cameras, Draw, DrawSource, SeenBy, Work, barrier};
+use crate::work::{Draw, DrawSource, Work, barrier};
 
 /// The graphics pipeline that is bound.
 #[derive(Clone, Default)]
@@ -56,31 +58,6 @@ pub(crate) struct HarmonicsBuffer {
     pub(crate) format: vk::Format,
     pub(crate) stride: u32,
     pub(crate) coefficient_stride: u64,
-}
-
-/// A descriptor set that is bound.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct BoundSet {
-    pub(crate) layout: vk::PipelineLayout,
-    pub(crate) set: vk::DescriptorSet,
-    pub(crate) offsets: Vec<u32>,
-}
-
-/// Push constants as a command has set them.
-#[derive(Clone, Debug)]
-pub(crate) struct PushConstants {
-    pub(crate) layout: vk::PipelineLayout,
-    pub(crate) stages: vk::ShaderStageFlags,
-    pub(crate) offset: u32,
-    pub(crate) bytes: Vec<u8>,
-}
-
-/// What shaders of graphics pipelines are bound to.
-#[derive(Clone, Debug)]
-pub(crate) struct Bindings {
-    /// By number.
-    sets: BTreeMap<u32, BoundSet>,
-    constants: Vec<PushConstants>,
 }
 
 /// A query that the application has begun within a pass.

@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::bindings::Bindings;
+use crate::cameras::{Cameras, SeenBy};
 use crate::depth_stencil::TestState;
 use crate::lens::Lens;
+use crate::made::Area;
 use crate::pipeline::{self, Pipeline};
-use crate::recording::Bindings;
 use crate::support::MAX_GAUSSIANS;
-use crate::work::{Area, Camera, Cameras, Draw, DrawSource, SeenBy, Values, Work};
+use crate::work::{Draw, DrawSource, Values, Work};
 
 /// The extension's dynamic states, as far as they have been set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -185,21 +187,4 @@ fn common(a: vk::Rect2D, b: vk::Rect2D) -> vk::Rect2D {
     let (x, width) = along(a.offset.x, a.extent.width, b.offset.x, b.extent.width);
     let (y, height) = along(a.offset.y, a.extent.height, b.offset.y, b.extent.height);
     vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } }
-}
-
-/// A camera as kernels read it.
-pub(crate) fn camera_data(camera: &gaurast::vk::GaussianCameraGAURAST<'_>) -> Camera {
-    let r = &camera.rotation;
-    Camera {
-        eye: camera.eye,
-        model: camera.model.as_raw(),
-        reserved: 0,
-        rotation: [[r[0], r[1], r[2], 0.0], [r[3], r[4], r[5], 0.0], [r[6], r[7], r[8], 0.0]],
-        focal_length: camera.focal_length,
-        principal_point: camera.principal_point,
-        depth_coefficients: camera.depth_coefficients,
-        near_plane: camera.near_plane,
-        far_plane: camera.far_plane,
-        unused: [0; 4],
-    }
 }

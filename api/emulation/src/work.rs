@@ -3,17 +3,17 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast::vk::GaussianCameraDistortionGAURAST as Distortion;
 
 use crate::attachments::{self, DepthStencil};
+use crate::bindings::Bindings;
+use crate::cameras::{Camera, Cameras};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
 use crate::lens::Lens;
-use crate::made::{Attributes, Made, MadeExtent, MadePlaces};
+use crate::made::{Area, Attributes, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
 use crate::pair::{Pair, pair};
 use crate::pipeline::{Attribute, Pipeline};
-use crate::recording::Bindings;
 use crate::scratch::{Extent, Memory, Places};
 use crate::times::Times;
 
@@ -55,22 +55,6 @@ pub(crate) struct DrawSource {
     pub(crate) stride: u32,
     pub(crate) divisor: u32,
     pub(crate) unused: u32,
-}
-
-/// A camera: `VkGaussianCameraDataGAURAST`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct Camera {
-    pub(crate) eye: [f64; 3],
-    pub(crate) model: i32,
-    pub(crate) reserved: i32,
-    pub(crate) rotation: [[f32; 4]; 3],
-    pub(crate) focal_length: [f32; 2],
-    pub(crate) principal_point: [f32; 2],
-    pub(crate) depth_coefficients: [f32; 2],
-    pub(crate) near_plane: f32,
-    pub(crate) far_plane: f32,
-    pub(crate) unused: [u32; 4],
 }
 
 /// The parameters of a set, as `shaders/set.glsl` has them.
@@ -212,30 +196,6 @@ pub(crate) struct Values {
     pub(crate) degree: u32,
 }
 
-/// A camera that a command has set, with its lens, if that distorts.
-#[derive(Clone, Copy)]
-pub(crate) struct SeenBy {
-    pub(crate) camera: Camera,
-    pub(crate) lens: Option<Distortion<'static>>,
-}
-
-impl SeenBy {
-    /// Reports whether two are the same.
-    pub(crate) fn is_same(&self, other: &Self) -> bool {
-        let numbers =
-            |seen: &Self| seen.lens.map(|lens| (lens.model.as_raw(), lens.radial, lens.tangential, lens.thin_prism));
-        self.camera == other.camera && numbers(self) == numbers(other)
-    }
-}
-
-/// The source of cameras.
-#[derive(Clone)]
-pub(crate) enum Cameras {
-    Command(Vec<SeenBy>),
-    /// A descriptor set with its dynamic offsets.
-    Buffer(vk::DescriptorSet, Vec<u32>),
-}
-
 /// The result of a set in its area, as `shaders/shown.glsl` has it.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -261,13 +221,6 @@ impl Picture {
         self.sample = sample;
         self.wanted = outcome.number();
     }
-}
-
-/// The part of the framebuffer that a set may reach.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Area {
-    pub(crate) origin: [i32; 2],
-    pub(crate) size: [u32; 2],
 }
 
 /// A set whose draws are known.

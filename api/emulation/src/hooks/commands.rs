@@ -5,10 +5,11 @@ use std::sync::PoisonError;
 use ash::vk;
 use gaurast_layer_interface::slice;
 
+use crate::bindings::{BoundSet, PushConstants};
 use crate::emulation::Emulation;
 use crate::hooks::site::{Site, record};
 use crate::pass::{Object, Pass, Rendering};
-use crate::recording::{Bound, BoundSet, Condition, IndexBuffer, PushConstants, Query, Recording, VertexBuffer};
+use crate::recording::{Bound, Condition, IndexBuffer, Query, Recording, VertexBuffer};
 use crate::work::Work;
 
 pub(super) unsafe extern "system" fn cmd_bind_pipeline(

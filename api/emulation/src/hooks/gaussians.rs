@@ -10,11 +10,10 @@ use gaurast::vk::{
 };
 use gaurast_layer_interface::{find, slice};
 
+use crate::cameras::{SeenBy, camera_data};
 use crate::hooks::site::record;
 use crate::lens;
 use crate::recording::HarmonicsBuffer;
-use crate::set::camera_data;
-use crate::work::SeenBy;
 
 /// The lens of a camera, if it distorts.
 ///
