@@ -37,7 +37,7 @@ const fn shown(name: &'static str, source: &'static str) -> Shown {
     Shown { name, source, samples: 1, is_tested: false, is_sample_shaded: false }
 }
 
-const SHOWN: [Shown; 11] = [
+const SHOWN: [Shown; 10] = [
     shown(
         "the place and the median depth",
         "void main() { color = vec4(gl_FragCoord.xy, gl_FragCoord.z, gl_FragCoord.w); }",
@@ -50,19 +50,18 @@ const SHOWN: [Shown; 11] = [
         }",
     ),
     shown(
-        "derivatives, every other pixel",
+        "every other pixel",
         "void main() {
-            vec2 slope = vec2(dFdxFine(accumulated.a), dFdyFine(accumulated.a));
             if ((int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 2 == 1) discard;
             atomicAdd(count, 1u);
-            color = vec4(slope, gl_HelperInvocation ? 1.0 : 0.0, accumulated.a);
+            color = vec4(gl_HelperInvocation ? 1.0 : 0.0, accumulated.rga);
         }",
     ),
     shown(
-        "arrays, components and integers with a sign",
+        "arrays and components",
         "layout(location = 5) flat in vec4 camera[6];
         layout(location = 11, component = 1) in float median;
-        layout(location = 12) flat in ivec2 nearest;
+        layout(location = 12) flat in uvec2 nearest;
         vec4 chosen(vec4 a) { return a + interpolateAtCentroid(accumulated); }
         void main() { color = chosen(camera[int(gl_FragCoord.x) % 6]) + vec4(median, nearest, 0.0); }",
     ),
@@ -71,14 +70,6 @@ const SHOWN: [Shown; 11] = [
         "layout(location = 5) in Block { flat mat3x4 view; layout(location = 11) vec2 depth; } block;
         void main() { color = block.view[1] + vec4(block.depth, 0.0, 0.0); }",
     ),
-    Shown {
-        samples: 4,
-        is_tested: true,
-        ..shown(
-            "samples that are alike",
-            "void main() { atomicAdd(count, 1u); color = vec4(gl_SampleMaskIn[0], accumulated.rga); }",
-        )
-    },
     Shown {
         samples: 4,
         is_tested: true,
@@ -176,11 +167,19 @@ impl<'a> Stage<'a> {
     /// The texels of all samples after a pass.
     fn draw(&self, record: impl FnOnce(&Commands)) -> Vec<f32> {
         let pictures = self.target.draw(self.gpu, &Pass::clear([0.0; 4]), record).pictures;
-        pictures.iter().flat_map(|picture| picture.texels::<f32>()).collect()
+        pictures.iter().flat_map(|picture| bytemuck::pod_collect_to_vec::<u8, f32>(&picture.bytes)).collect()
     }
 
     fn count(&self) -> u32 {
         self.counter.values::<u32>()[0]
+    }
+}
+
+impl Shown {
+    /// Reports whether samples that are alike have one invocation. This driver takes those for different that store other depths, though
+    /// no Gaussian lies between.
+    fn merges_samples(&self) -> bool {
+        self.samples > 1 && self.is_tested && !self.is_sample_shaded && !self.source.contains("gl_SampleID")
     }
 }
 
@@ -190,7 +189,8 @@ fn drawn(gpu: &Gpu, shown: Shown) -> (Vec<f32>, u32) {
     let half = |graphics: &mut Graphics<'_>| graphics.sample_mask = Some(0b0101);
     let before = stage.pipeline(None, &half).expect("a pipeline without a shader");
     let shading = |graphics: &mut Graphics<'_>| {
-        graphics.multisample = graphics.multisample.sample_shading_enable(shown.is_sample_shaded);
+        graphics.multisample =
+            graphics.multisample.sample_shading_enable(shown.is_sample_shaded).min_sample_shading(1.0);
     };
     let pipeline = stage.pipeline(Some(resolve_shader(shown.source)), &shading).expect("a pipeline");
     let texels = stage.draw(|commands| {
@@ -216,7 +216,8 @@ fn assert_close(name: &str, emulated: &[f32], own: &[f32]) {
     assert_eq!(emulated.len(), own.len(), "{name}");
     assert!(own.iter().any(|texel| *texel != 0.0), "{name} shows nothing");
     for (index, (a, b)) in emulated.iter().zip(own).enumerate() {
-        assert!((a - b).abs() <= 1e-5 * b.abs().max(1.0), "{name}: {a} in place of {b} at {index}");
+        // The far plane may be infinite.
+        assert!(a == b || (a - b).abs() <= 1e-5 * b.abs().max(1.0), "{name}: {a} in place of {b} at {index}");
     }
 }
 
@@ -228,8 +229,63 @@ fn resolve_shaders_draw_what_they_draw_on_this_driver(case: &Case) {
         for shown in SHOWN {
             let ((texels, count), (own_texels, own_count)) = (drawn(emulated.gpu(), shown), drawn(&own, shown));
             assert_close(shown.name, &texels, &own_texels);
-            assert_eq!(count, own_count, "{}", shown.name);
+            let is_as_often = if shown.merges_samples() { count <= own_count } else { count == own_count };
+            assert!(is_as_often, "{}: {count}, {own_count}", shown.name);
         }
+    });
+}
+
+/// A shader runs once for the samples of a pixel that are alike, and knows which these are.
+#[gaurast_runner::test(needs = [Need::Lavapipe, GLSLANG])]
+fn samples_that_are_alike_have_one_invocation(case: &Case) {
+    const MASKS: &str = "void main() { atomicAdd(count, 1u); color = vec4(gl_SampleMaskIn[0], -1.0, accumulated.ra); }";
+    with_emulation(case, &[], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        let (texels, count) = drawn(device.gpu(), Shown { samples: 4, is_tested: true, ..shown("masks", MASKS) });
+        let pixels = (SIZE[0] * SIZE[1]) as usize;
+        let at = |pixel: usize, sample: usize| &texels[4 * (sample * pixels + pixel)..][..4];
+        let (mut invocations, mut parted) = (0, 0);
+        for pixel in 0..pixels {
+            let mut masks = std::collections::BTreeSet::new();
+            for sample in (0..4).filter(|&sample| at(pixel, sample)[1] == -1.0) {
+                let mask = at(pixel, sample)[0] as u32;
+                assert!(mask >> sample & 1 == 1, "{pixel} {sample}: {mask}");
+                for other in (0..4).filter(|other| mask >> other & 1 == 1) {
+                    assert_eq!(at(pixel, sample), at(pixel, other), "{pixel}: {sample} and {other}");
+                }
+                masks.insert(mask);
+            }
+            invocations += masks.len() as u32;
+            parted += u32::from(masks.len() > 1);
+        }
+        assert!(parted > 10 && count == invocations, "{parted}: {count}, {invocations}");
+    });
+}
+
+/// Derivatives are differences within a quad, of which a pixel without a fragment has zeros.
+#[gaurast_runner::test(needs = [Need::Lavapipe, GLSLANG])]
+fn derivatives_see_the_pixels_beside(case: &Case) {
+    const SLOPES: &str = "void main() { color = vec4(dFdx(accumulated.a), dFdy(accumulated.a), 0.0, accumulated.a); }";
+    with_emulation(case, &[], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        let (texels, _) = drawn(device.gpu(), shown("slopes", SLOPES));
+        let [width, height] = SIZE.map(|size| size as usize);
+        let at = |x: usize, y: usize, component: usize| texels[4 * (y * width + x) + component];
+        let mut beside_nothing = 0;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            if at(x, y, 3) == 0.0 {
+                continue;
+            }
+            // Either row and either column of the quad.
+            let (left, right, top, bottom) = (x & !1, x | 1, y & !1, y | 1);
+            let across = [top, bottom].map(|y| at(right, y, 3) - at(left, y, 3));
+            let down = [left, right].map(|x| at(x, bottom, 3) - at(x, top, 3));
+            let is_one = |of: [f32; 2], slope: f32| of.iter().any(|one| (one - slope).abs() < 1e-6);
+            let slopes = [at(x, y, 0), at(x, y, 1)];
+            assert!(is_one(across, slopes[0]) && is_one(down, slopes[1]), "{x} {y}: {slopes:?} {across:?} {down:?}");
+            beside_nothing += u32::from(at(x ^ 1, y, 3) == 0.0);
+        }
+        assert!(beside_nothing > 10, "{beside_nothing}");
     });
 }
 
@@ -283,39 +339,75 @@ fn resolve_shaders_are_bound_to_the_first_draw(case: &Case) {
     });
 }
 
-/// With early tests, queries count what a shader discards; and where such tests decide something, they are refused.
+/// The number of samples that a query counts in a pass.
+fn counted(stage: &Stage<'_>, record: impl FnOnce(&Commands)) -> u32 {
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(1);
+    let device = stage.gpu.device();
+    // SAFETY: the pool is destroyed after the commands have run.
+    unsafe {
+        let pool = device.create_query_pool(&info, None).expect("a query pool");
+        stage.gpu.run(|commands| {
+            let (device, raw) = commands.raw();
+            device.cmd_reset_query_pool(raw, pool, 0, 1);
+            commands.pass(&stage.target, &Pass::clear([0.0; 4]), || {
+                commands.whole(&stage.target);
+                device.cmd_begin_query(raw, pool, 0, vk::QueryControlFlags::PRECISE);
+                record(commands);
+                device.cmd_end_query(raw, pool, 0);
+            });
+        });
+        let mut counted = [0_u32];
+        device.get_query_pool_results(pool, 0, &mut counted, vk::QueryResultFlags::WAIT).expect("a count");
+        device.destroy_query_pool(pool, None);
+        counted[0]
+    }
+}
+
+const EARLY: [&str; 2] = [
+    "layout(early_fragment_tests) in; void main() { color = accumulated; }",
+    "layout(early_fragment_tests) in; void main() { discard; }",
+];
+
+/// With early tests, queries count the pixels that have a fragment, and what a shader discards of them where the device does so for
+/// triangles, which lavapipe 22.3 does not. Where such tests decide something, they are refused.
 #[gaurast_runner::test(needs = [Need::Lavapipe, GLSLANG])]
 fn early_tests_count_what_is_discarded(case: &Case) {
     with_emulation(case, &[], || {
         let (own, emulated) = devices();
-        let early = || resolve_shader("layout(early_fragment_tests) in; void main() { discard; }");
         let counts = [emulated.gpu(), &own].map(|gpu| {
             let stage = Stage::new(gpu, 1, false);
-            let pipeline = stage.pipeline(Some(early()), &|_| {}).expect("a pipeline");
-            let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(1);
-            let device = gpu.device();
-            // SAFETY: the pool is destroyed after the commands have run.
-            unsafe {
-                let pool = device.create_query_pool(&info, None).expect("a query pool");
-                gpu.run(|commands| {
-                    let (device, raw) = commands.raw();
-                    device.cmd_reset_query_pool(raw, pool, 0, 1);
-                    commands.pass(&stage.target, &Pass::clear([0.0; 4]), || {
-                        stage.bind(commands, &pipeline);
-                        device.cmd_begin_query(raw, pool, 0, vk::QueryControlFlags::PRECISE);
-                        commands.draw(0..300);
-                        device.cmd_end_query(raw, pool, 0);
-                    });
-                });
-                let mut counted = [0_u32];
-                device.get_query_pool_results(pool, 0, &mut counted, vk::QueryResultFlags::WAIT).expect("a count");
-                device.destroy_query_pool(pool, None);
-                counted[0]
-            }
+            EARLY.map(|source| {
+                let pipeline = stage.pipeline(Some(resolve_shader(source)), &|_| {}).expect("a pipeline");
+                counted(&stage, |commands| {
+                    stage.bind(commands, &pipeline);
+                    commands.draw(0..300);
+                })
+            })
         });
-        assert!(counts[0] > 500 && counts[0] == counts[1], "{counts:?}");
+        let stage = Stage::new(emulated.gpu(), 1, false);
+        let vertex =
+            "void main() { gl_Position = vec4(4.0 * vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) - 1.0, 0.0, 1.0); }";
+        let triangle = stage.pipeline(None, &|graphics| {
+            graphics.gaussian = None;
+            graphics.topology = vk::PrimitiveTopology::TRIANGLE_LIST;
+            graphics.attributes.clear();
+            let fragment = "layout(early_fragment_tests) in; void main() { discard; }";
+            graphics.shaders = vec![
+                Shader::vertex(compile(ShaderStage::Vertex, vertex)),
+                Shader::fragment(compile(ShaderStage::Fragment, fragment)),
+            ];
+        });
+        let triangle = triangle.expect("a pipeline of triangles");
+        let of_triangle = counted(&stage, |commands| {
+            commands.bind(&triangle);
+            commands.draw(0..3);
+        });
+        let [[kept, discarded], own] = counts;
+        assert!(own[0] > 500 && own[0] == own[1], "{own:?}");
+        assert_eq!(kept, own[0]);
+        assert_eq!(discarded, if of_triangle > 0 { own[1] } else { 0 });
         let tested = Stage::new(emulated.gpu(), 1, true);
-        let refused = tested.pipeline(Some(early()), &|_| {}).err();
+        let refused = tested.pipeline(Some(resolve_shader(EARLY[0])), &|_| {}).err();
         assert_eq!(refused, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
     });
 }

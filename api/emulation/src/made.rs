@@ -64,6 +64,18 @@ impl MadePlaces {
     }
 }
 
+/// The triangles by which draws with a resolve shader cover what a set has made, as `shaders/tiles.vert` has them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Covering {
+    /// Two for each tile.
+    Quads = 0,
+    /// Two for each pixel, so that the device counts no other pixels.
+    Pixels = 1,
+    /// One for each tile, twice as large, so that neither a quad of pixels is parted, whose derivatives are whole on devices whose helper
+    /// invocations load nothing, nor a pixel of several samples, which has one invocation.
+    Triangle = 2,
+}
+
 /// Bytes of the attributes of a draw.
 pub(crate) const ATTRIBUTES: u64 = size_of::<Attributes>() as u64;
 
@@ -80,8 +92,9 @@ pub(crate) struct Attributes {
     samples: u32,
     /// The sample that the draw shows.
     sample: u32,
-    has_quads_of_pixels: u32,
-    unused: u32,
+    covering: u32,
+    /// Width and height << 16.
+    viewport: u32,
 }
 
 impl Attributes {
@@ -96,8 +109,8 @@ impl Attributes {
             size: area.size,
             samples,
             sample: 0,
-            has_quads_of_pixels: 0,
-            unused: 0,
+            covering: Covering::Quads as u32,
+            viewport: area.size[0] | area.size[1] << 16,
         }
     }
 
@@ -107,8 +120,8 @@ impl Attributes {
     }
 
     #[must_use]
-    pub(crate) fn with_quads_of_pixels(self, has_quads_of_pixels: bool) -> Self {
-        Self { has_quads_of_pixels: u32::from(has_quads_of_pixels), ..self }
+    pub(crate) fn covering(self, covering: Covering, viewport: [u32; 2]) -> Self {
+        Self { covering: covering as u32, viewport: viewport[0] | viewport[1] << 16, ..self }
     }
 }
 

@@ -19,7 +19,7 @@ use gaurast_layer_interface::{find, slice};
 use crate::depth_stencil::{self, TestState};
 use crate::formats;
 use crate::kernels::{self, CAMERA, Kernels, Variant};
-use crate::made::ATTRIBUTES;
+use crate::made::{ATTRIBUTES, Covering};
 use crate::next::Next;
 use crate::report::tell;
 use crate::resolve::{self, Request, Rewritten};
@@ -58,8 +58,7 @@ pub(crate) struct Resolve {
     pub(crate) has_camera: bool,
     /// It runs for each sample.
     pub(crate) is_sample_shaded: bool,
-    /// Each pixel is drawn by triangles of its own, so that the device counts none that the shader takes away.
-    pub(crate) has_quads_of_pixels: bool,
+    pub(crate) covering: Covering,
     /// The pipeline that stores the outcomes of samples without a fragment, where something may be tested.
     pub(crate) without_shader: vk::Pipeline,
 }
@@ -400,7 +399,7 @@ pub(crate) unsafe fn create(
             resolve: shader.map(|shader| Resolve {
                 has_camera: shader.rewritten.has_camera,
                 is_sample_shaded: shader.rewritten.is_sample_shaded,
-                has_quads_of_pixels: shader.rewritten.is_early,
+                covering: shader.rewritten.covering,
                 without_shader,
             }),
         };

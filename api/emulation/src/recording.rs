@@ -455,7 +455,7 @@ impl Recording {
         let (next, kernels, commands) = (&emulation.next, emulation.kernels()?, self.commands);
         let ([x, y], [width, height]) = (work.area.origin, work.area.size);
         let area = vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } };
-        let viewport = vk::Viewport {
+        let viewport = |[width, height]: [u32; 2]| vk::Viewport {
             x: x as f32,
             y: y as f32,
             width: width as f32,
@@ -472,7 +472,7 @@ impl Recording {
         unsafe {
             self.activate_queries(next);
             next.cmd_bind_pipeline(commands, graphics, work.pipeline.raw);
-            next.cmd_set_viewport(commands, 0, &[viewport]);
+            next.cmd_set_viewport(commands, 0, &[viewport(work.shown_size(next))]);
             next.cmd_set_scissor(commands, 0, &[area]);
             if resolve.is_some() {
                 self.bind_for_shader(next, work, made);
@@ -490,6 +490,7 @@ impl Recording {
                 }
                 if let Some(resolve) = resolve {
                     next.cmd_bind_pipeline(commands, graphics, resolve.without_shader);
+                    next.cmd_set_viewport(commands, 0, &[viewport(work.area.size)]);
                 }
                 for sample in 0..work.samples() {
                     picture.show(sample, *outcome);

@@ -6,6 +6,8 @@ use std::ffi::CStr;
 
 use gaurast::vk::GaussianResolveInputLocationsGAURAST as Locations;
 
+use crate::made::Covering;
+
 /// Opcodes of SPIR-V.
 mod op {
     pub(super) const EXTENSION: u32 = 10;
@@ -107,6 +109,9 @@ const DEPTH_REPLACING: u32 = 12;
 /// `DepthGreater`, `DepthLess`, `DepthUnchanged`.
 const DEPTH_MODES: [u32; 3] = [14, 15, 16];
 
+/// Opcodes that read the pixels beside: derivatives, implicit levels of detail, and exchanges within quads.
+const BESIDE: [std::ops::RangeInclusive<u32>; 4] = [207..=215, 87..=97, 305..=315, 365..=366];
+
 /// The execution model of fragment shaders.
 const FRAGMENT: u32 = 4;
 
@@ -131,8 +136,7 @@ pub(crate) struct Rewritten {
     pub(crate) has_camera: bool,
     /// It runs for each sample.
     pub(crate) is_sample_shaded: bool,
-    /// Its tests are early: what it discards has been counted.
-    pub(crate) is_early: bool,
+    pub(crate) covering: Covering,
 }
 
 /// Reports whether a module has a fragment shader.
@@ -810,6 +814,7 @@ pub(crate) fn rewrite(request: &Request<'_>) -> Result<Rewritten, String> {
             "a resolve shader has early fragment tests of depths or stencils, which are not emulated".to_owned()
         );
     }
+    let has_derivatives = module.functions.iter().any(|known| BESIDE.iter().any(|ops| ops.contains(&opcode(known))));
     let outputs = module.interface(OUTPUT);
     let output = |module: &Module, wanted: u32| {
         outputs.iter().find(|(id, _)| module.decoration(*id, None, BUILT_IN) == Some(wanted)).copied()
@@ -822,9 +827,6 @@ pub(crate) fn rewrite(request: &Request<'_>) -> Result<Rewritten, String> {
     let is_sample_shaded = request.is_sample_shaded || inputs.reads_samples;
     let tells_samples = request.may_be_tested && request.samples > 1;
     make_private(&mut module, &inputs.all)?;
-    for input in &inputs.all {
-        module.strip(input.ty);
-    }
     if module.memory_model[1] == 0 {
         module.memory_model[1] = 5348;
     }
@@ -868,12 +870,20 @@ pub(crate) fn rewrite(request: &Request<'_>) -> Result<Rewritten, String> {
     body.write(op::FUNCTION_END, &[]);
     let code = body.code;
     module.functions.extend(code);
+    for input in &inputs.all {
+        module.strip(input.ty);
+    }
     Ok(Rewritten {
         words: module.words(),
         has_inputs: inputs.has_inputs,
         has_camera: inputs.has_camera,
         is_sample_shaded,
-        is_early,
+        covering: match (is_early, has_derivatives || request.samples > 1) {
+            // What it discards has been counted.
+            (true, _) => Covering::Pixels,
+            (false, true) => Covering::Triangle,
+            (false, false) => Covering::Quads,
+        },
     })
 }
 
@@ -882,8 +892,8 @@ struct Fragment {
     /// Where the fragment is.
     place: u32,
     view: u32,
-    /// The condition that there is a fragment.
-    is_there: u32,
+    /// The condition that the invocation has a fragment to make.
+    runs: u32,
     color: u32,
     /// Depths and linear depths, and Gaussians.
     depths: u32,
@@ -910,7 +920,7 @@ impl Fragment {
         let (image, shown) = (body.half(passed[0], 0), body.half(passed[0], 2));
         let (made, cameras) = (body.half(passed[1], 0), body.half(passed[1], 2));
         let (origin, size) = (body.half(passed[2], 0), body.half(passed[2], 2));
-        let [samples, mut sample, view, _] = body.components(passed[3]);
+        let [samples, mut sample, view, own_tile] = body.components(passed[3]);
 
         // The pixel, or another one of the area for those that lie beside it.
         let whole = body.run(op::CONVERT_F_TO_U, uints_4, &[place]);
@@ -982,7 +992,9 @@ impl Fragment {
         let nothing = body.run(op::BITCAST, float, &[zero]);
         let has_color = body.run(op::F_ORD_GREATER_THAN_EQUAL, boolean, &[alpha, nothing]);
         let is_there = body.run(op::LOGICAL_AND, boolean, &[is_inside, is_shown]);
-        let mut is_there = body.run(op::LOGICAL_AND, boolean, &[is_there, has_color]);
+        let is_there = body.run(op::LOGICAL_AND, boolean, &[is_there, has_color]);
+        let is_own = body.run(op::I_EQUAL, boolean, &[tile, own_tile]);
+        let mut runs = body.run(op::LOGICAL_AND, boolean, &[is_there, is_own]);
         let mut mask = None;
         if request.may_be_tested && request.samples > 1 && !is_by_sample {
             // The first of the samples that have the same runs for them.
@@ -1004,7 +1016,7 @@ impl Fragment {
             let before = body.uint(op::I_SUB, bit, one);
             let before = body.uint(op::BITWISE_AND, all, before);
             let is_first = body.run(op::I_EQUAL, boolean, &[before, zero]);
-            is_there = body.run(op::LOGICAL_AND, boolean, &[is_there, is_first]);
+            runs = body.run(op::LOGICAL_AND, boolean, &[runs, is_first]);
             mask = Some(all);
         }
         let color = body.only_where(is_there, own[0]);
@@ -1024,14 +1036,14 @@ impl Fragment {
                 camera.push(body.row_at(cameras, row));
             }
         }
-        Self { place, view, is_there, color, depths, gaussians, median_depth, camera, mask }
+        Self { place, view, runs, color, depths, gaussians, median_depth, camera, mask }
     }
 
     /// Makes the invocation a helper where there is no fragment.
     fn demote(&self, body: &mut Body<'_>) {
         let [without, merged] = [(); 2].map(|()| body.module.id());
         body.write(op::SELECTION_MERGE, &[merged, 0]);
-        body.write(op::BRANCH_CONDITIONAL, &[self.is_there, merged, without]);
+        body.write(op::BRANCH_CONDITIONAL, &[self.runs, merged, without]);
         body.write(op::LABEL, &[without]);
         body.write(op::DEMOTE_TO_HELPER_INVOCATION, &[]);
         body.write(op::BRANCH, &[merged]);
@@ -1086,8 +1098,8 @@ impl Fragment {
             HELPER_INVOCATION => {
                 let own = body.interface(INPUT, ty, &[&[BUILT_IN, HELPER_INVOCATION]]);
                 let own = body.load(boolean, own);
-                let is_not_there = body.run(op::LOGICAL_NOT, boolean, &[self.is_there]);
-                body.run(op::LOGICAL_OR, boolean, &[own, is_not_there])
+                let does_not_run = body.run(op::LOGICAL_NOT, boolean, &[self.runs]);
+                body.run(op::LOGICAL_OR, boolean, &[own, does_not_run])
             }
             SAMPLE_MASK => {
                 let own = body.interface(INPUT, ty, &[&[BUILT_IN, SAMPLE_MASK], &[FLAT]]);

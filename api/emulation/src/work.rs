@@ -10,7 +10,7 @@ use crate::cameras::{Camera, Cameras};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
 use crate::lens::Lens;
-use crate::made::{Area, Attributes, Made, MadeExtent, MadePlaces};
+use crate::made::{Area, Attributes, Covering, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
 use crate::pair::{Pair, pair};
 use crate::pipeline::{Attribute, Pipeline};
@@ -326,12 +326,12 @@ impl Work {
     }
 
     /// The attributes of the draws with a resolve shader: one for each sample.
-    fn attributes(&self, address: u64) -> Vec<Attributes> {
+    fn attributes(&self, next: &Next, address: u64) -> Vec<Attributes> {
         let Some(resolve) = &self.pipeline.resolve else {
             return Vec::new();
         };
         let all = Attributes::new(address, &self.made(), self.area, self.samples());
-        let all = all.with_quads_of_pixels(resolve.has_quads_of_pixels);
+        let all = all.covering(resolve.covering, self.shown_size(next));
         (0..self.samples()).map(|sample| all.of_sample(sample)).collect()
     }
 
@@ -342,8 +342,27 @@ impl Work {
 
     /// Vertices of the draws with a resolve shader, of each tile.
     pub(crate) fn vertices_of_tile(&self) -> u32 {
-        let quads = self.pipeline.resolve.as_ref().is_some_and(|resolve| resolve.has_quads_of_pixels);
-        if quads { 6 * TILE * TILE } else { 6 }
+        match self.covering() {
+            Covering::Quads => 6,
+            Covering::Pixels => 6 * TILE * TILE,
+            Covering::Triangle => 3,
+        }
+    }
+
+    fn covering(&self) -> Covering {
+        self.pipeline.resolve.as_ref().map_or(Covering::Quads, |resolve| resolve.covering)
+    }
+
+    /// The size in pixels of the viewport of draws with a resolve shader. It is the area's, or has triangles that reach beyond tiles.
+    pub(crate) fn shown_size(&self, next: &Next) -> [u32; 2] {
+        let [across, down] = self.tiles();
+        match self.covering() {
+            Covering::Triangle => [
+                (TILE * (across + 1)).min(next.max_viewport[0]).max(self.area.size[0]),
+                (TILE * (down + 1)).min(next.max_viewport[1]).max(self.area.size[1]),
+            ],
+            _ => self.area.size,
+        }
     }
 
     /// The set's result, for the shaders that show it.
@@ -520,7 +539,7 @@ impl Work {
             let made = self.made_in(scratch, &places);
             let shown = made.place + self.made().shown;
             next.cmd_fill_buffer(commands, made.memory.buffer, shown, 4 * self.all_tiles(), 0);
-            let attributes = self.attributes(made.address());
+            let attributes = self.attributes(next, made.address());
             if !attributes.is_empty() {
                 let at = self.attributes_place(&made);
                 next.cmd_update_buffer(commands, made.memory.buffer, at, bytemuck::cast_slice(&attributes));
