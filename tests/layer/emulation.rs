@@ -2,19 +2,21 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianCameraDistortionGAURAST, GaussianLinearizationGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+    GaussianCameraDistortionGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_conformance::{Device, Outcome, all, cases, run};
 use gaurast_runner::{Case, Need, Variant};
-use gaurast_testkit::devices::gaussian;
 use gaurast_testkit::loader::with_emulation;
-use gaurast_testkit::scene::{camera, splats};
+use gaurast_testkit::scene::splats;
 use gaurast_testkit::{
     Attachments, Commands, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Graphics, Pass, Recorded, Target,
     TargetOptions, depth_test, over,
 };
 use gaurast_tests::long_run::memory;
 use gaurast_tests::scenes;
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 /// Parts of the conformance program, each with the least number of its cases that the layer must pass.
 const PARTS: &[(&str, &[&str], usize)] = &[
@@ -27,9 +29,12 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("numerics", &["numerics.needles", "numerics.discs"], 12),
     ("views", &["views"], 14),
     ("updates", &["updates"], 20),
-    ("libraries", &["libraries"], 9),
+    ("libraries", &["libraries"], 12),
+    ("resolve shaders", &["resolve.*.pinhole*", "resolve.names", "resolve.camera_2", "resolve.depths.ellipse"], 30),
+    ("targets", &["targets", "resolve.push_constants", "resolve.descriptors", "queries"], 18),
     ("angles", &["camera.fisheye", "camera.panorama"], 20),
-    ("sigma points", &["unscented.pinhole"], 20),
+    ("sigma points", &["unscented.pinhole", "unscented.points.alpha_0.1", "unscented.points.margin_0.1"], 25),
+    ("lenses", &["distortion.*.strange", "distortion.*.pinhole.*", "distortion.fold"], 35),
     ("surfels", &["surfel"], 50),
     ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
     ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
@@ -277,30 +282,46 @@ fn frames_take_no_more_memory(case: &Case) {
     });
 }
 
-/// Lenses that distort and other sigma points are refused, not left out.
+/// What is not emulated is refused, not left out.
 #[gaurast_runner::test(needs = [Need::Lavapipe])]
 fn pictures_that_are_not_emulated_are_refused(case: &Case) {
     with_emulation(case, &[], || {
         let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
         let gpu = device.gpu();
         let absent = Some(vk::Result::ERROR_FEATURE_NOT_PRESENT);
-        let unscented = |alpha| {
-            let points = PipelineGaussianUnscentedStateCreateInfoGAURAST::default().alpha(alpha);
+        let created = |change: &dyn Fn(State) -> State| {
             let request = splats();
-            let gaussian = request.gaussian.map(|state| state.linearization(GaussianLinearizationGAURAST::UNSCENTED));
-            Graphics { gaussian, unscented: Some(points), ..request }.create(gpu).err()
+            Graphics { gaussian: request.gaussian.map(change), ..request }.create(gpu).err()
         };
-        assert_eq!((unscented(1.0), unscented(0.1)), (None, absent));
-        let through = |k1| {
+        assert_eq!(created(&|state| state), None);
+        assert_eq!(created(&|state| state.order(GaussianOrderGAURAST::PER_PIXEL)), absent);
+        assert_eq!(created(&|state| state.precision(GaussianPrecisionGAURAST::FLOAT16)), absent);
+        assert_eq!(created(&|state| state.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)), absent);
+    });
+}
+
+/// No disc is drawn through a lens that distorts, and no coefficients are no lens.
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
+fn discs_are_not_seen_through_lenses(case: &Case) {
+    with_emulation(case, &[], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        let gpu = device.gpu();
+        let target = Target::new(gpu, &TargetOptions { size: [70, 50], ..TargetOptions::default() });
+        let scene = GaussianScene::new(gpu, &scenes::cloud(5, 300, 0));
+        let seen = |geometry: GaussianGeometryGAURAST, k1: f32| {
+            let options = GaussianOptions::over(0, &target);
+            let pipeline =
+                GaussianPipeline::new(gpu, &GaussianOptions { state: options.state.geometry(geometry), ..options });
             let mut lens = GaussianCameraDistortionGAURAST::default().radial([k1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-            let camera = camera().push_next(&mut lens);
-            let recorded = gpu.try_record(|commands| {
-                let (_, raw) = commands.raw();
-                // SAFETY: see the crate.
-                unsafe { gaussian(gpu).cmd_set_gaussian_cameras(raw, &[camera]) };
-            });
-            recorded.err()
+            let camera = scenes::camera(70, 50).to_vulkan().push_next(&mut lens);
+            target.draw(gpu, &Pass::zeros(), |commands| {
+                commands.whole(&target);
+                scene.draw(commands, &pipeline, &camera);
+            })
         };
-        assert_eq!((through(0.0), through(-0.1)), (None, absent));
+        let (volume, disc) = (GaussianGeometryGAURAST::GAUSSIAN_3D, GaussianGeometryGAURAST::GAUSSIAN_2D);
+        assert!(seen(disc, 0.0).shows_something() && seen(volume, -0.1).shows_something());
+        assert!(seen(volume, 0.0).pictures != seen(volume, -0.1).pictures, "a lens changes nothing");
+        assert!(!seen(disc, -0.1).shows_something(), "a disc is drawn through a lens");
     });
 }

@@ -20,6 +20,7 @@ mod lifetimes;
 mod locations;
 mod page;
 mod pipelines;
+mod resolve;
 mod right;
 mod samples;
 mod sets;

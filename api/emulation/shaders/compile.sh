@@ -14,4 +14,6 @@ done
 compile -DVIEWS -o "$folder/tiles_views.vert.spv" tiles.vert
 compile -DVIEWS -o "$folder/fetch_views.frag.spv" fetch.frag
 compile -DVIEWS -o "$folder/fetch_tested_views.frag.spv" fetch_tested.frag
+compile -DRESOLVED -o "$folder/tiles_resolved.vert.spv" tiles.vert
+compile -DRESOLVED -DVIEWS -o "$folder/tiles_resolved_views.vert.spv" tiles.vert
 compile -DSTENCILS -o "$folder/samples_stencils.comp.spv" samples.comp

@@ -88,6 +88,40 @@ void derive() {
         push.set.derived.of.limits[2 * i] = add(div(sub(pair(size), center), focal), beyond);
         push.set.derived.of.limits[2 * i + 1] = add(div(center, focal), beyond);
     }
+    // A lens that sees more does so within bounds that are as much wider.
+    if (any(notEqual(uvec2(push.set.lenses), uvec2(0u)))) {
+        Lens lens = push.set.lenses.at[min(push.view, push.set.camera_count - 1u)];
+        for (int i = 0; lens.model != 0u && i < 4; i++) {
+            bool is_bounded = lens.widening.x < 1e30;
+            push.set.derived.of.limits[i] = is_bounded ? mul(push.set.derived.of.limits[i], lens.widening) : pair(3.4e38);
+        }
+    }
+}
+
+// The camera as a resolve shader reads it, at six locations.
+void show_camera() {
+    Camera camera = push.set.cameras.at[min(push.view, push.set.camera_count - 1u)];
+    uint first = 6u * push.view;
+    vec3 eye;
+    for (int j = 0; j < 3; j++) {
+        vec3 parts = push.set.derived.of.eye[j];
+        precise float rest = parts.y + parts.z;
+        precise float sum = parts.x + rest;
+        eye[j] = sum;
+    }
+    for (int r = 0; r < 3; r++) {
+        vec2 moved = vec2(0.0);
+        for (int c = 0; c < 3; c++) {
+            float turn = camera.rotation[r][c];
+            vec3 parts = push.set.derived.of.eye[c];
+            moved = add(moved, two_product(turn, parts.x));
+            moved = add(moved, add(two_product(turn, parts.y), two_product(turn, parts.z)));
+        }
+        push.set.seen_by.at[first + uint(r)] = vec4(camera.rotation[r].xyz, -moved.x);
+    }
+    push.set.seen_by.at[first + 3u] = vec4(camera.focal_length, camera.principal_point);
+    push.set.seen_by.at[first + 4u] = vec4(camera.depth_coefficients, camera.near_plane, camera.far_plane);
+    push.set.seen_by.at[first + 5u] = vec4(eye, float(camera.model));
 }
 
 void main() {
@@ -119,6 +153,9 @@ void main() {
     }
     uint n = valid ? min(all, push.set.reserve) : 0u;
     derive();
+    if (any(notEqual(uvec2(push.set.seen_by), uvec2(0u)))) {
+        show_camera();
+    }
     Words counters = push.set.counters;
     counters.at[GAUSSIANS] = n;
     counters.at[SEEN] = 0u;

@@ -10,6 +10,7 @@
 #include "activation.glsl"
 #include "angles.glsl"
 #include "cameras.glsl"
+#include "lens.glsl"
 #include "harmonics.glsl"
 #include "tiles.glsl"
 #include "surfel.glsl"
@@ -69,6 +70,23 @@ float held_depth(Camera camera, float z) {
     precise float whole = roundEven(d.x);
     precise float rest = (d.x - whole) + d.y;
     return rest > 0.5 ? whole + 1.0 : rest < -0.5 ? whole - 1.0 : whole;
+}
+
+// The power of two of a length in pixels that is to be 1, where it is beyond any picture.
+int power_of(float length_) {
+    int power = 0;
+    if (length_ > 1e6 && is_finite(length_)) {
+        frexp(length_, power);
+    }
+    return power;
+}
+
+// Reports whether a sigma point's place lies in the part of the picture in which it counts.
+bool counts(Camera camera, vec2 u, vec2 v) {
+    vec2 x = add(mul(u, camera.focal_length.x), pair(camera.principal_point.x));
+    vec2 y = add(mul(v, camera.focal_length.y), pair(camera.principal_point.y));
+    bool is_column = sub(x, push.set.picture[0]).x >= 0.0 && sub(x, push.set.picture[1]).x < 0.0;
+    return is_column && sub(y, push.set.picture[2]).x >= 0.0 && sub(y, push.set.picture[3]).x < 0.0;
 }
 
 void main() {
@@ -157,8 +175,21 @@ void main() {
     // Step 3: mean and covariance.
     vec2 u, v, distance_ = is_orthographic || has_angles ? pair(1.0) : t[2];
     pixel_of(camera.model, t, u, v);
-    vec2 mean_x = add(add(mul(u, camera.focal_length.x), pair(camera.principal_point.x)), pair(push.set.viewport.x));
-    vec2 mean_y = add(add(mul(v, camera.focal_length.y), pair(camera.principal_point.y)), pair(push.set.viewport.y));
+    Lens lens;
+    vec2 shown_u = u, shown_v = v, bent[4];
+    bool has_lens = false;
+    if (HAS_LENS) {
+        lens = lens_of_view();
+        has_lens = lens.model != NO_LENS;
+        if (has_lens) {
+            if (!is_before_fold(lens, u, v)) {
+                return;
+            }
+            distort(lens, u, v, shown_u, shown_v, bent);
+        }
+    }
+    vec2 mean_x = add(add(mul(shown_u, camera.focal_length.x), pair(camera.principal_point.x)), pair(push.set.viewport.x));
+    vec2 mean_y = add(add(mul(shown_v, camera.focal_length.y), pair(camera.principal_point.y)), pair(push.set.viewport.y));
     if (is_orthographic) {
         u = pair(0.0);
         v = pair(0.0);
@@ -184,11 +215,28 @@ void main() {
     vec2 wx = mul(k, mul(q[0], q[1])), wy = mul(k, mul(q[0], q[2])), wz = mul(k, mul(q[0], q[3]));
     vec2 turn[9] = vec2[9](sub(one, add(yy, zz)), sub(xy, wz), add(xz, wy), add(xy, wz), sub(one, add(xx, zz)), sub(yz, wx),
                            sub(xz, wy), add(yz, wx), sub(one, add(xx, yy)));
+    // Rows of the ideal lens's Jacobian times the rotation, for a focal length of 1.
+    vec2 ideal[6];
+    if (HAS_LENS && has_lens) {
+        for (int r = 0; r < 2; r++) {
+            vec2 slope = r == 0 ? u : v;
+            for (int c = 0; c < 3; c++) {
+                if (has_angles) {
+                    vec2 along = add(mul(derivative[r * 3], camera.rotation[0][c]), mul(derivative[r * 3 + 1], camera.rotation[1][c]));
+                    ideal[r * 3 + c] = add(along, mul(derivative[r * 3 + 2], camera.rotation[2][c]));
+                } else {
+                    ideal[r * 3 + c] = div(sub(pair(camera.rotation[r][c]), mul(slope, camera.rotation[2][c])), distance_);
+                }
+            }
+        }
+    }
     vec2 m[6];
     for (int r = 0; r < 2; r++) {
         vec2 slope = r == 0 ? u : v, factor = div(pair(camera.focal_length[r]), distance_), b[3];
         for (int c = 0; c < 3; c++) {
-            if (has_angles) {
+            if (HAS_LENS && has_lens) {
+                b[c] = mul(add(mul(bent[r * 2], ideal[c]), mul(bent[r * 2 + 1], ideal[3 + c])), camera.focal_length[r]);
+            } else if (has_angles) {
                 vec2 along = add(mul(derivative[r * 3], camera.rotation[0][c]), mul(derivative[r * 3 + 1], camera.rotation[1][c]));
                 b[c] = mul(add(along, mul(derivative[r * 3 + 2], camera.rotation[2][c])), camera.focal_length[r]);
             } else {
@@ -207,6 +255,19 @@ void main() {
         }
     }
 
+    // A lens moves what is far beside its axis far away: lengths in the picture are then in units of 2^power pixels, so that their fourth
+    // powers are finite.
+    int power = 0;
+    if (HAS_LENS && has_lens) {
+        float largest_m = 0.0;
+        for (int j = 0; j < 6; j++) {
+            largest_m = max(largest_m, abs(m[j].x));
+        }
+        power = power_of(largest_m);
+        for (int j = 0; j < 6; j++) {
+            m[j] = ldexp(m[j], ivec2(-power));
+        }
+    }
     vec2 a0 = dot3(m[0], m[1], m[2], m[0], m[1], m[2]), b = dot3(m[0], m[1], m[2], m[3], m[4], m[5]);
     vec2 c0 = dot3(m[3], m[4], m[5], m[3], m[4], m[5]);
     vec2 n0 = cross2(m[1], m[5], m[2], m[4]), n1 = cross2(m[2], m[3], m[0], m[5]), n2 = cross2(m[0], m[4], m[1], m[3]);
@@ -231,48 +292,70 @@ void main() {
             }
         }
         // Pixels of the sigma points from that of the middle, which is the first.
-        const vec2 root_3 = vec2(1.7320507764816284, 3.1087250107475484e-08);
-        vec2 us[7], vs[7], middle_u, middle_v, sum_u = vec2(0.0), sum_v = vec2(0.0);
-        pixel_of(camera.model, t, middle_u, middle_v);
+        vec2 us[7], vs[7], middle_u = shown_u, middle_v = shown_v, sum_u = vec2(0.0), sum_v = vec2(0.0);
         bool all_are_seen = true;
+        uint counted = counts(camera, middle_u, middle_v) ? 1u : 0u;
         us[0] = vec2(0.0);
         vs[0] = vec2(0.0);
         for (int point = 1; point < 7; point++) {
             int axis = (point - 1) / 2;
             vec2 place[3], own_u, own_v;
             for (int row = 0; row < 3; row++) {
-                vec2 away = mul(root_3, axes[row * 3 + axis]);
+                vec2 away = mul(push.set.sigma_distance, axes[row * 3 + axis]);
                 place[row] = add(t[row], (point & 1) == 1 ? away : -away);
             }
-            all_are_seen = all_are_seen && is_seen(camera.model, camera.near_plane, t, place);
+            bool is_point_seen = is_seen(camera.model, camera.near_plane, t, place);
             pixel_of(camera.model, place, own_u, own_v);
+            if (HAS_LENS && has_lens) {
+                is_point_seen = is_point_seen && is_before_fold(lens, own_u, own_v);
+                if (is_point_seen) {
+                    vec2 ideal_u = own_u, ideal_v = own_v, unused[4];
+                    distort(lens, ideal_u, ideal_v, own_u, own_v, unused);
+                }
+            }
+            all_are_seen = all_are_seen && is_point_seen;
             own_u = sub(own_u, middle_u);
             if (HAS_ANGLES && camera.model == EQUIRECTANGULAR) {
                 own_u = own_u.x > HALF_PI.x * 2.0 ? sub(own_u, 2.0 * PI) : own_u.x < -HALF_PI.x * 2.0 ? add(own_u, 2.0 * PI) : own_u;
             }
             us[point] = own_u;
             vs[point] = sub(own_v, middle_v);
+            if (is_point_seen && push.set.must_count != 0u && counts(camera, add(us[point], middle_u), own_v)) {
+                counted++;
+            }
             sum_u = add(sum_u, us[point]);
             sum_v = add(sum_v, vs[point]);
         }
+        if (counted < push.set.must_count) {
+            return;
+        }
         if (all_are_seen) {
-            // In pixels, from the mean. The middle's weight is 2, and the others' is 1/6.
-            const vec2 sixth = vec2(0.1666666716337204, -4.967053879312289e-09);
-            vec2 mean_u = mul(sum_u, sixth), mean_v = mul(sum_v, sixth);
+            // In pixels, from the mean.
+            vec2 center = push.set.sigma_center, other_ = push.set.sigma_other;
+            vec2 mean_u = mul(sum_u, other_), mean_v = mul(sum_v, other_);
             a0 = vec2(0.0);
             b = vec2(0.0);
             c0 = vec2(0.0);
             area = vec2(0.0);
+            float largest_m = 0.0;
             for (int point = 0; point < 7; point++) {
-                vec2 weight = point == 0 ? pair(2.0) : sixth;
                 us[point] = mul(sub(us[point], mean_u), camera.focal_length.x);
                 vs[point] = mul(sub(vs[point], mean_v), camera.focal_length.y);
+                largest_m = max(largest_m, max(abs(us[point].x), abs(vs[point].x)));
+            }
+            power = HAS_LENS && has_lens ? power_of(largest_m) : 0;
+            for (int point = 0; point < 7; point++) {
+                vec2 weight = point == 0 ? center : other_;
+                if (HAS_LENS && has_lens) {
+                    us[point] = ldexp(us[point], ivec2(-power));
+                    vs[point] = ldexp(vs[point], ivec2(-power));
+                }
                 a0 = add(a0, mul(weight, mul(us[point], us[point])));
                 b = add(b, mul(weight, mul(us[point], vs[point])));
                 c0 = add(c0, mul(weight, mul(vs[point], vs[point])));
                 for (int other = 0; other < point; other++) {
                     vec2 product = cross2(us[point], vs[other], vs[point], us[other]);
-                    area = add(area, mul(mul(weight, other == 0 ? pair(2.0) : sixth), mul(product, product)));
+                    area = add(area, mul(mul(weight, other == 0 ? center : other_), mul(product, product)));
                 }
             }
             mean_x = add(mean_x, mul(mean_u, camera.focal_length.x));
@@ -281,8 +364,19 @@ void main() {
     }
 
     // Step 4: the low-pass, determinants and compensation.
-    vec2 low_pass = pair(push.set.low_pass), a = add(a0, low_pass), c = add(c0, low_pass);
+    vec2 low_pass = pair(push.set.low_pass);
+    if (HAS_LENS && has_lens) {
+        low_pass = ldexp(low_pass, ivec2(-2 * power));
+        if (!is_finite(mean_x.x) || !is_finite(mean_y.x)) {
+            return;
+        }
+    }
+    vec2 a = add(a0, low_pass), c = add(c0, low_pass);
     vec2 det = add(area, add(mul(low_pass, add(a0, c0)), mul(low_pass, low_pass)));
+    // With a negative weight in the middle the sum may be no covariance.
+    if (IS_UNSCENTED && !(a.x >= 0.0 && c.x >= 0.0)) {
+        return;
+    }
     if (!IS_SURFEL && (!(det.x > 0.0) || !is_finite(det.x))) {
         return;
     }
@@ -334,7 +428,13 @@ void main() {
     if (push.set.cut_off == ELLIPSE) {
         reach = min(reach, deviations * deviations * 1.001 + 2e-3);
     }
-    float half_width = sqrt(reach * a.x) * 1.0001 + 0.01, half_height = sqrt(reach * c.x) * 1.0001 + 0.01;
+    float half_width = sqrt(reach * a.x) * 1.0001, half_height = sqrt(reach * c.x) * 1.0001;
+    if (HAS_LENS && has_lens) {
+        half_width = ldexp(half_width, power);
+        half_height = ldexp(half_height, power);
+    }
+    half_width += 0.01;
+    half_height += 0.01;
     Surfel surfel;
     if (IS_SURFEL) {
         // The axes, in the camera's axes.
@@ -416,6 +516,10 @@ void main() {
     r.half_height = half_height;
     r.half_width = half_width;
     r.reach = b.x / sqrt(a.x) * sqrt(reach);
+    if (HAS_LENS && power != 0) {
+        // A box.
+        r.curve = -1.0;
+    }
     uint reached = 0u;
     for (uint copy = 0u; copy < (HAS_ANGLES ? copies() : 1u); copy++) {
         Reach ellipse = reach_of(r, copy);
@@ -479,11 +583,16 @@ void main() {
         if (push.set.cut_off == TILE_SQUARE) {
             vec2 half_difference = mul(sub(a, c), 0.5);
             vec2 spread = add(mul(half_difference, half_difference), mul(b, b));
-            spread = spread.x < 0.1 ? vec2(0.1, -1.4901161e-9) : spread;
-            radius = vec2(ceil(mul(root(add(mul(add(a, c), 0.5), root(spread))), deviations).x));
+            vec2 least_spread = vec2(0.1, -1.4901161e-9);
+            if (HAS_LENS && has_lens) {
+                least_spread = ldexp(least_spread, ivec2(-4 * power));
+            }
+            spread = spread.x < least_spread.x ? least_spread : spread;
+            radius = vec2(mul(root(add(mul(add(a, c), 0.5), root(spread))), deviations).x);
         } else {
-            radius = vec2(ceil(mul(root(a), deviations).x), ceil(mul(root(c), deviations).x));
+            radius = vec2(mul(root(a), deviations).x, mul(root(c), deviations).x);
         }
+        radius = ceil(HAS_LENS ? ldexp(radius, ivec2(power)) : radius);
         cut_radius = radius.x;
         cut_y = cut_tiles(sub(mean_y, pair(push.set.viewport.y)).x, radius.y);
     }
@@ -493,6 +602,11 @@ void main() {
     r.f0 = div(scale_2, width);
     r.f2 = div(mul(scale_2, width), root(det));
     r.f1 = -div(mul(r.f2, b), a);
+    if (HAS_LENS && has_lens) {
+        r.f0 = ldexp(r.f0, ivec2(-power));
+        r.f1 = ldexp(r.f1, ivec2(-power));
+        r.f2 = ldexp(r.f2, ivec2(-power));
+    }
     r.opacity = opacity;
     r.red = color.x;
     r.green = color.y;
@@ -508,6 +622,9 @@ void main() {
     push.set.reached.at[i] = reached;
     if (HAS_DEPTHS) {
         push.set.depths.at[i] = vec2(held_depth(camera, depth), depth);
+    }
+    if (IS_RESOLVED) {
+        push.set.names.at[i] = uvec2(vertex, instance);
     }
 
     // The key, as an unsigned number in the same order.

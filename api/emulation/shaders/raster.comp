@@ -16,6 +16,8 @@ layout(constant_id = 1) const bool HAS_ANGLES = false;
 layout(constant_id = 2) const bool IS_SURFEL = false;
 // The median depth is kept, and depths are compared with those that samples stored before: a layer of workgroups for each sample.
 layout(constant_id = 3) const bool HAS_TESTS = false;
+// A resolve shader reads depths or Gaussians.
+layout(constant_id = 4) const bool IS_RESOLVED = false;
 
 const uint INVOCATIONS = 64u;
 // Gaussians that are looked at together.
@@ -33,7 +35,7 @@ shared uvec2 cuts[HAS_CUT_TILES ? BATCH : 1u];
 // In a panorama, the places in x at which the copy counts.
 shared vec2 counting[HAS_ANGLES ? BATCH : 1u];
 shared uint members[BATCH];
-shared vec2 depths[HAS_TESTS ? BATCH : 1u];
+shared vec2 depths[HAS_TESTS || IS_RESOLVED ? BATCH : 1u];
 // Where the pairs did not fit: Gaussians that reach the tile, and, of those that are looked at, a bit for each that does.
 shared uint waiting[BATCH + INVOCATIONS];
 shared uint reaching[INVOCATIONS / 32u];
@@ -52,6 +54,11 @@ float floor_, ceiling, end;
 // Of the invocation's samples: what they stored, whether their stencil tests passed, whether anything reached them, and the median depth.
 vec4 stored, median;
 bvec4 has_passed_stencil, is_touched;
+// Of the invocation's pixels, for resolve shaders: the first Gaussian and the median's, the first one's depths, and the sums of weights
+// and of weighted differences from those depths, of batches before and of this one.
+uvec4 nearest, median_of;
+vec4 near_depth, near_distance;
+vec4 total_weight, total_depth, total_distance, sum_weight, sum_depth, sum_distance;
 
 // Reports how depths compare with those that are stored.
 bvec4 compare(float depth) {
@@ -89,11 +96,24 @@ void accumulate(uint k, vec4 exponent, vec4 alpha) {
     bvec4 ends = bvec4(uvec4(is_in) & uvec4(lessThan(next, vec4(end))));
     is_in = bvec4(uvec4(is_in) & uvec4(not(ends)));
     goes_on = bvec4(uvec4(goes_on) & uvec4(not(ends)));
+    if (IS_RESOLVED) {
+        uvec4 member = uvec4(HAS_ANGLES ? members[k] & MEMBER : members[k]);
+        bvec4 is_first = bvec4(uvec4(is_in) & uvec4(not(is_reached)));
+        nearest = mix(nearest, member, is_first);
+        near_depth = mix(near_depth, vec4(depths[k].x), is_first);
+        near_distance = mix(near_distance, vec4(depths[k].y), is_first);
+        median_of = mix(median_of, member, bvec4(uvec4(is_in) & uvec4(greaterThanEqual(transmittance, vec4(0.5)))));
+    }
     is_reached = bvec4(uvec4(is_reached) | uvec4(is_in));
     if (HAS_TESTS) {
         median = mix(median, vec4(depths[k].x), bvec4(uvec4(is_in) & uvec4(greaterThanEqual(transmittance, vec4(0.5)))));
     }
     vec4 weight = mix(vec4(0.0), transmittance * alpha, is_in);
+    if (IS_RESOLVED) {
+        sum_weight += weight;
+        sum_depth += weight * (depths[k].x - near_depth);
+        sum_distance += weight * (depths[k].y - near_distance);
+    }
     transmittance = mix(transmittance, next, is_in);
     for (uint j = 0u; j < ROWS; j++) {
         sum[j] += weight[j] * color;
@@ -140,7 +160,7 @@ void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
     }
     colors[slot] = vec3(r.red, r.green, r.blue);
     members[slot] = member;
-    if (HAS_TESTS) {
+    if (HAS_TESTS || IS_RESOLVED) {
         depths[slot] = push.set.depths.at[HAS_ANGLES ? member & MEMBER : member];
     }
     if (HAS_CUT_TILES) {
@@ -247,6 +267,10 @@ void main() {
     for (uint j = 0u; j < ROWS; j++) {
         total[j] = vec3(0.0);
     }
+    if (IS_RESOLVED) {
+        nearest = median_of = uvec4(0u);
+        near_depth = near_distance = total_weight = total_depth = total_distance = vec4(0.0);
+    }
     // Batches are the same in both cases, so that sums are.
     uint next = range.x, found = 0u;
     while (true) {
@@ -279,6 +303,9 @@ void main() {
         }
         for (uint j = 0u; j < ROWS; j++) {
             sum[j] = vec3(0.0);
+        }
+        if (IS_RESOLVED) {
+            sum_weight = sum_depth = sum_distance = vec4(0.0);
         }
         // Loops, not branches: some devices execute both sides of every branch.
         uint end_of_flat = steep == 0u ? count : 0u, k = 0u;
@@ -346,6 +373,11 @@ void main() {
         for (uint j = 0u; j < ROWS; j++) {
             total[j] += sum[j];
         }
+        if (IS_RESOLVED) {
+            total_weight += sum_weight;
+            total_depth += sum_depth;
+            total_distance += sum_distance;
+        }
         barrier();
         if (is_overflow) {
             // What is left, less than the number of invocations, is the beginning of the next batch.
@@ -366,6 +398,20 @@ void main() {
         if (at.x < size.x && at.y + j < size.y) {
             uint pixel = plane + (at.y + j) * size.x + at.x;
             image.at[pixel] = is_reached[j] ? vec4(total[j], 1.0 - transmittance[j]) : vec4(0.0, 0.0, 0.0, outcome(j));
+            if (IS_RESOLVED && is_reached[j]) {
+                vec2 own = push.set.depths.at[median_of[j]], mean = own;
+                // Weights may underflow.
+                if (total_weight[j] > 0.0) {
+                    mean = vec2(near_depth[j], near_distance[j]) + vec2(total_depth[j], total_distance[j]) / total_weight[j];
+                }
+                uint steps = push.set.depth_steps;
+                if (steps != 0u) {
+                    mean.x = mean.x / float(steps);
+                    own.x = div(pair(own.x), pair(float(steps))).x;
+                }
+                push.set.inputs.at[2u * pixel] = floatBitsToUint(vec4(mean.x, own.x, mean.y, own.y));
+                push.set.inputs.at[2u * pixel + 1u] = uvec4(push.set.names.at[median_of[j]], push.set.names.at[nearest[j]]);
+            }
             if (HAS_TESTS) {
                 uint steps = push.set.depth_steps;
                 push.set.medians.at[pixel] = steps == 0u ? median[j] : div(pair(median[j]), pair(float(steps))).x;

@@ -7,6 +7,7 @@ layout(buffer_reference, std430, buffer_reference_align = 8) buffer Couples { uv
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Pixels { vec4 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Depths { vec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Floats { float at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Rows { uvec4 at[]; };
 
 // The Gaussian as it is seen: lengths in pixels, the mean from the origin of the framebuffer.
 struct Record {
@@ -39,6 +40,17 @@ struct Derived {
     vec2 period;                 // of a panorama's picture in pixels; otherwise 0
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer DerivedCamera { Derived of; };
+
+// A lens that distorts; numbers are pairs.
+struct Lens {
+    vec2 fold;                   // the square of the radius at which it folds
+    vec2 steepness, scale;       // of a field of view
+    vec2 widening;               // of a pinhole's bounds of slopes; 3.4e38 if there are none
+    uint model;                  // see lens.glsl
+    float radial[6], tangential[2], thin_prism[4];
+    uint unused;
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Lenses { Lens at[]; };
 
 struct Draw {
     uvec2 indices;               // their address
@@ -89,6 +101,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     Depths depths;               // of each Gaussian: as the attachment holds it, in steps if it has steps; and the depth variable
     Couples stored;              // of each sample: what it stored before, as `depths` has it, and the outcome of its own tests
     Floats medians;              // of each sample: the median depth
+    Couples names;               // of each Gaussian: its vertex and its instance, where a resolve shader reads them
+    Rows inputs;                 // of each sample: expected and median depth and depth variable; median and nearest Gaussian
+    Pixels seen_by;              // the camera of each view, as a resolve shader reads it; or 0
+    Lenses lenses;               // of each camera; or 0
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative
@@ -102,6 +118,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     vec2 depth_range;            // of the viewport
     uint depth_steps;            // 2^n - 1 of an attachment of n bits; 0 of one of floats
     uint is_negative_one_to_one;
+    vec2 sigma_distance;         // of sigma points, in standard deviations
+    vec2 sigma_center, sigma_other; // weights in the covariance
+    vec2 picture[4];             // where sigma points count, from the viewport's corner: least and end of x, of y
+    uint must_count;             // how many of the seven sigma points must count
+    uint unused;
     Attribute attributes[33];
 };
 

@@ -19,3 +19,7 @@ layout(constant_id = 10) const bool HAS_DEPTHS = false;
 // Scales are logarithms; opacities are logits.
 layout(constant_id = 11) const bool HAS_LOGARITHMS = false;
 layout(constant_id = 12) const bool HAS_LOGITS = false;
+// A resolve shader reads depths or Gaussians.
+layout(constant_id = 13) const bool IS_RESOLVED = false;
+// A camera has a lens that distorts.
+layout(constant_id = 14) const bool HAS_LENS = false;

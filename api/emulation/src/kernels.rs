@@ -68,11 +68,15 @@ pub(crate) struct Variant {
     pub(crate) has_logarithms: bool,
     /// Opacities are logits.
     pub(crate) has_logits: bool,
+    /// A resolve shader reads depths or Gaussians.
+    pub(crate) is_resolved: bool,
+    /// A camera has a lens that distorts.
+    pub(crate) has_lens: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 13] {
+    fn of_projection(&self) -> [u32; 15] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -84,15 +88,17 @@ impl Variant {
             u32::from(self.has_angles),
             u32::from(self.is_unscented),
             u32::from(self.is_surfel),
-            u32::from(self.has_tests),
+            u32::from(self.has_tests || self.is_resolved),
             u32::from(self.has_logarithms),
             u32::from(self.has_logits),
+            u32::from(self.is_resolved),
+            u32::from(self.has_lens),
         ]
     }
 
     /// The specialization constants of the rasterizer.
-    fn of_rasterizer(&self) -> [u32; 4] {
-        [self.has_cut_tiles, self.has_angles, self.is_surfel, self.has_tests].map(u32::from)
+    fn of_rasterizer(&self) -> [u32; 5] {
+        [self.has_cut_tiles, self.has_angles, self.is_surfel, self.has_tests, self.is_resolved].map(u32::from)
     }
 }
 
@@ -153,6 +159,9 @@ pub(crate) struct Kernels {
     /// For passes with views.
     pub(crate) vertex_views: vk::ShaderModule,
     pub(crate) fetch_views: vk::ShaderModule,
+    /// For resolve shaders.
+    pub(crate) vertex_resolved: vk::ShaderModule,
+    pub(crate) vertex_resolved_views: vk::ShaderModule,
     /// For sets whose depths or stencils are tested.
     pub(crate) fetch_tested: vk::ShaderModule,
     pub(crate) fetch_tested_views: vk::ShaderModule,
@@ -178,6 +187,8 @@ impl Kernels {
                 // A device without views has no such passes.
                 vertex_views: module(next, spirv!("tiles_views.vert")).unwrap_or_default(),
                 fetch_views: module(next, spirv!("fetch_views.frag"))?,
+                vertex_resolved: module(next, spirv!("tiles_resolved.vert"))?,
+                vertex_resolved_views: module(next, spirv!("tiles_resolved_views.vert")).unwrap_or_default(),
                 fetch_tested: module(next, spirv!("fetch_tested.frag"))?,
                 fetch_tested_views: module(next, spirv!("fetch_tested_views.frag"))?,
                 samples: Samples::new(next)?,
@@ -234,7 +245,8 @@ impl Drop for Kernels {
                 self.next.destroy_pipeline(pipeline, None);
             }
             let modules = [self.vertex, self.fetch, self.vertex_views, self.fetch_views];
-            for module in modules.into_iter().chain([self.fetch_tested, self.fetch_tested_views]) {
+            let more = [self.fetch_tested, self.fetch_tested_views, self.vertex_resolved, self.vertex_resolved_views];
+            for module in modules.into_iter().chain(more) {
                 self.next.destroy_shader_module(module, None);
             }
             for pipeline in [self.samples.depths, self.samples.stencils] {

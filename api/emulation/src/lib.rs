@@ -25,8 +25,11 @@
 //! | `support` | the features and properties that devices get |
 //! | `formats`, `pipeline`, `library`, `render_pass` | objects that are created for the extension's sake, or otherwise than the application says |
 //! | `attachments`, `depth_stencil` | what is known of depth and stencil attachments, and the tests of Gaussians against them |
+//! | `bindings`, `cameras` | what shaders are bound to; cameras |
 //! | `recording`, `pass` | what is known of a command buffer, and of the render pass instance that it is in |
-//! | `set`, `work` | a sorted set that is recorded, and its dispatches |
+//! | `resolve` | the application's fragment shaders, rewritten so that they load what a set has made |
+//! | `lens` | lenses that distort |
+//! | `set`, `work`, `made` | a sorted set that is recorded, its dispatches, and what they make |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
 //! | `times` | the times of a set's stages |
 //! | `self_test`, `pair` | the test of a device's arithmetic |
@@ -36,6 +39,8 @@
 
 mod attachments;
 mod below;
+mod bindings;
+mod cameras;
 mod depth_stencil;
 mod device;
 mod emulation;
@@ -44,7 +49,9 @@ mod formats;
 mod hooks;
 mod instance;
 mod kernels;
+mod lens;
 mod library;
+mod made;
 mod next;
 mod pair;
 mod pass;
@@ -53,6 +60,7 @@ mod proc_addr;
 mod recording;
 mod render_pass;
 mod report;
+mod resolve;
 mod scratch;
 mod self_test;
 mod set;

@@ -1,5 +1,7 @@
 //! Pipeline libraries: the parts of pipelines, kept until they are linked. The next layer cannot have those of Gaussians.
 
+use std::collections::HashMap;
+use std::ffi::{CStr, CString};
 use std::sync::Arc;
 
 use ash::vk;
@@ -11,6 +13,10 @@ use gaurast::vk::{
 use gaurast_layer_interface::{find, slice};
 
 use crate::next::Next;
+use crate::pipeline;
+
+/// The words of fragment shaders that are modules.
+type Shaders = HashMap<vk::ShaderModule, Arc<[u32]>>;
 
 /// Vertex input, of the vertex input interface.
 struct Input {
@@ -33,9 +39,44 @@ struct PreRasterization {
     view_mask: u32,
 }
 
+/// A fragment shader.
+struct FragmentShader {
+    /// Of its module; none if that is named by an identifier.
+    words: Option<Arc<[u32]>>,
+    name: CString,
+    flags: vk::PipelineShaderStageCreateFlags,
+    constants: Vec<vk::SpecializationMapEntry>,
+    data: Vec<u8>,
+}
+
+impl FragmentShader {
+    /// # Safety
+    /// The creation info is valid.
+    unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>, shaders: &Shaders) -> Option<Self> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let mut stages = slice(info.p_stages, info.stage_count).iter();
+            let stage = stages.find(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT)?;
+            let special = stage.p_specialization_info.as_ref();
+            let name = if stage.p_name.is_null() { c"" } else { CStr::from_ptr(stage.p_name) };
+            Some(Self {
+                words: pipeline::shader_words(stage, shaders),
+                name: name.to_owned(),
+                flags: stage.flags,
+                constants: special
+                    .map(|special| slice(special.p_map_entries, special.map_entry_count).to_vec())
+                    .unwrap_or_default(),
+                data: special
+                    .map(|special| slice(special.p_data.cast::<u8>(), special.data_size as u32).to_vec())
+                    .unwrap_or_default(),
+            })
+        }
+    }
+}
+
 /// The state of the part of the fragment shader.
 struct Fragment {
-    has_stage: bool,
+    shader: Option<FragmentShader>,
     depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'static>>,
 }
 
@@ -136,14 +177,14 @@ impl PreRasterization {
 }
 
 impl Fragment {
-    unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Self {
+    unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>, shaders: &Shaders) -> Self {
         use std::marker::PhantomData;
         use std::ptr::null;
         // SAFETY: the caller's promise.
         unsafe {
             let state = info.p_depth_stencil_state.as_ref();
             Self {
-                has_stage: has_stage(info, vk::ShaderStageFlags::FRAGMENT),
+                shader: FragmentShader::of(info, shaders),
                 depth_stencil: state.map(|state| vk::PipelineDepthStencilStateCreateInfo {
                     p_next: null(),
                     _marker: PhantomData,
@@ -197,7 +238,11 @@ impl Library {
     ///
     /// # Safety
     /// The creation info is valid.
-    pub(crate) unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>, libraries: &[Arc<Self>]) -> Self {
+    pub(crate) unsafe fn new(
+        info: &vk::GraphicsPipelineCreateInfo<'_>,
+        libraries: &[Arc<Self>],
+        shaders: &Shaders,
+    ) -> Self {
         let mut own = Self { render_pass: info.render_pass, subpass: info.subpass, ..Self::default() };
         for library in libraries {
             let Self { input, pre_rasterization, fragment, output, dynamic, render_pass, subpass } =
@@ -222,7 +267,7 @@ impl Library {
                 own.pre_rasterization = Some(Arc::new(PreRasterization::new(info)));
             }
             if parts.contains(Parts::FRAGMENT_SHADER) {
-                own.fragment = Some(Arc::new(Fragment::new(info)));
+                own.fragment = Some(Arc::new(Fragment::new(info, shaders)));
             }
             if parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE) {
                 own.output = Some(Arc::new(Output::new(info)));
@@ -263,15 +308,26 @@ impl Library {
             vertex_input = vertex_input.push_next(&mut divisors);
         }
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(input.topology);
-        // Which stages there are is all that is asked of them.
         let mut stages = Vec::new();
-        for (is_there, stage) in [
-            (shaders.has_vertex_stage, vk::ShaderStageFlags::VERTEX),
-            (self.fragment.as_ref().is_some_and(|part| part.has_stage), vk::ShaderStageFlags::FRAGMENT),
-        ] {
-            if is_there {
-                stages.push(vk::PipelineShaderStageCreateInfo::default().stage(stage));
+        if shaders.has_vertex_stage {
+            // That there is one is all that is asked of it.
+            stages.push(vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::VERTEX));
+        }
+        let fragment = self.fragment.as_ref().and_then(|part| part.shader.as_ref());
+        let code = fragment.and_then(|shader| shader.words.as_deref());
+        let mut module = vk::ShaderModuleCreateInfo::default().code(code.unwrap_or_default());
+        let special =
+            fragment.map(|shader| vk::SpecializationInfo::default().map_entries(&shader.constants).data(&shader.data));
+        if let (Some(shader), Some(special)) = (fragment, &special) {
+            let mut stage = vk::PipelineShaderStageCreateInfo::default()
+                .flags(shader.flags)
+                .stage(vk::ShaderStageFlags::FRAGMENT)
+                .name(&shader.name)
+                .specialization_info(special);
+            if code.is_some() {
+                stage = stage.push_next(&mut module);
             }
+            stages.push(stage);
         }
         let clip = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
             .negative_one_to_one(shaders.is_negative_one_to_one);

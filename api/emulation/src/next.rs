@@ -13,6 +13,8 @@ pub(crate) struct Next {
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
     /// Nanoseconds of a step of timestamps.
     pub(crate) timestamp_period: f32,
+    /// The greatest width and height of a viewport.
+    pub(crate) max_viewport: [u32; 2],
     pub(crate) draw_multi: Option<vk::PFN_vkCmdDrawMultiEXT>,
     pub(crate) draw_multi_indexed: Option<vk::PFN_vkCmdDrawMultiIndexedEXT>,
     pub(crate) begin_conditional_rendering: Option<vk::PFN_vkCmdBeginConditionalRenderingEXT>,
@@ -31,10 +33,12 @@ impl Next {
         // SAFETY: the caller's promise; each name is that of a command of the member's type.
         unsafe {
             let load = |name: &CStr| get(handle, name.as_ptr()).map_or(std::ptr::null(), |found| found as *const _);
+            let limits = instance.next.get_physical_device_properties(physical_device).limits;
             Self {
                 device: ash::Device::load_with(load, handle),
                 memory: instance.next.get_physical_device_memory_properties(physical_device),
-                timestamp_period: instance.next.get_physical_device_properties(physical_device).limits.timestamp_period,
+                timestamp_period: limits.timestamp_period,
+                max_viewport: limits.max_viewport_dimensions,
                 draw_multi: find(get, handle, c"vkCmdDrawMultiEXT"),
                 draw_multi_indexed: find(get, handle, c"vkCmdDrawMultiIndexedEXT"),
                 begin_conditional_rendering: find(get, handle, c"vkCmdBeginConditionalRenderingEXT"),

@@ -3,6 +3,12 @@
 /// A number: the sum rounded, and the rest.
 pub(crate) type Pair = [f32; 2];
 
+/// The pair nearest to a number.
+pub(crate) fn pair(value: f64) -> Pair {
+    let sum = value as f32;
+    [sum, (value - f64::from(sum)) as f32]
+}
+
 pub(crate) fn two_sum(a: f32, b: f32) -> Pair {
     let s = a + b;
     let t = s - a;

@@ -1,5 +1,7 @@
 //! Pipelines of Gaussians: what the kernels need of one, and the graphics pipeline that shows what they have made.
 
+use std::collections::HashMap;
+use std::ffi::CStr;
 use std::sync::Arc;
 
 use ash::vk;
@@ -10,15 +12,17 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
     PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
-    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPoints,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPointsInfo,
 };
 use gaurast_layer_interface::{find, slice};
 
 use crate::depth_stencil::{self, TestState};
 use crate::formats;
 use crate::kernels::{self, CAMERA, Kernels, Variant};
+use crate::made::{ATTRIBUTES, Covering};
 use crate::next::Next;
 use crate::report::tell;
+use crate::resolve::{self, Request, Rewritten};
 
 /// A location that is not used.
 const UNUSED: u32 = !0;
@@ -49,6 +53,16 @@ pub(crate) struct CameraBuffer {
     pub(crate) layout: vk::PipelineLayout,
 }
 
+/// The resolve shader of a pipeline.
+pub(crate) struct Resolve {
+    pub(crate) has_camera: bool,
+    /// It runs for each sample.
+    pub(crate) is_sample_shaded: bool,
+    pub(crate) covering: Covering,
+    /// The pipeline that stores the outcomes of samples without a fragment, where something may be tested.
+    pub(crate) without_shader: vk::Pipeline,
+}
+
 /// A pipeline of Gaussians.
 pub(crate) struct Pipeline {
     next: Arc<Next>,
@@ -58,6 +72,7 @@ pub(crate) struct Pipeline {
     pub(crate) cut_off: u32,
     pub(crate) cut_off_deviations: f32,
     pub(crate) compensation_floor: f32,
+    pub(crate) sigma_points: SigmaPoints,
     /// The constants that the pipeline fixes in the kernels.
     pub(crate) variant: Variant,
     /// Bytes from a harmonic's attribute to the next one's.
@@ -75,10 +90,15 @@ pub(crate) struct Pipeline {
     /// Rasterization samples.
     pub(crate) samples: u32,
     pub(crate) camera_buffer: Option<CameraBuffer>,
+    pub(crate) resolve: Option<Resolve>,
 }
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        if let Some(resolve) = &self.resolve {
+            // SAFETY: as below.
+            unsafe { self.next.destroy_pipeline(resolve.without_shader, None) };
+        }
         if let Some(camera) = &self.camera_buffer {
             // SAFETY: no command buffer that uses it is executed any more.
             unsafe {
@@ -97,6 +117,8 @@ pub(crate) struct Context<'a> {
     pub(crate) view_mask: Option<u32>,
     /// Layouts of the descriptor sets.
     pub(crate) set_layouts: &'a [vk::DescriptorSetLayout],
+    /// The words of fragment shaders that are modules.
+    pub(crate) shaders: &'a HashMap<vk::ShaderModule, Arc<[u32]>>,
     pub(crate) cache: vk::PipelineCache,
 }
 
@@ -114,20 +136,49 @@ pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a
     }
 }
 
-/// Reports whether sigma points are not those of pipelines without the structure.
-fn are_changed(points: &SigmaPoints<'_>) -> bool {
-    let values = |points: &SigmaPoints<'_>| {
-        ([points.alpha, points.beta, points.kappa, points.picture_margin], points.all_sigma_points)
-    };
-    values(points) != values(&SigmaPoints::default())
+/// The sigma points of the unscented transform.
+pub(crate) struct SigmaPoints {
+    /// In standard deviations.
+    pub(crate) distance: f64,
+    /// Weights in the covariance of the point in the middle and of each other one.
+    pub(crate) center: f64,
+    pub(crate) other: f64,
+    /// How many must lie in the picture and its margin.
+    pub(crate) must_count: u32,
+    margin: f64,
+}
+
+impl SigmaPoints {
+    fn new(points: &SigmaPointsInfo<'_>) -> Self {
+        let [alpha, beta, kappa] = [points.alpha, points.beta, points.kappa].map(f64::from);
+        // n + lambda in the usual terms.
+        let spread = alpha * alpha * (3.0 + kappa);
+        let is_everywhere = points.picture_margin == f32::INFINITY;
+        Self {
+            distance: spread.sqrt(),
+            center: (spread - 3.0) / spread + 1.0 - alpha * alpha + beta,
+            other: 0.5 / spread,
+            must_count: match points.all_sigma_points {
+                _ if is_everywhere => 0,
+                vk::FALSE => 1,
+                _ => 7,
+            },
+            margin: if is_everywhere { 0.0 } else { points.picture_margin.into() },
+        }
+    }
+
+    /// The part of a viewport's area, from its corner, in which points count: least and end in x and in y, in pixels.
+    pub(crate) fn picture(&self, width: f32, height: f32) -> [f64; 4] {
+        let [width, height] = [width, height].map(f64::from);
+        let margins = [self.margin * width, self.margin * height];
+        [-margins[0], width + margins[0], -margins[1], height + margins[1]]
+    }
 }
 
 /// A reason to refuse a pipeline.
-fn refusal(state: &State<'_>, has_fragment_stage: bool, has_sigma_points: bool) -> Option<&'static str> {
+fn refusal(state: &State<'_>) -> Option<&'static str> {
     let refusals = [
         (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
-        (has_fragment_stage, "resolveFragmentShader"),
-        (has_sigma_points && state.linearization == Linearization::UNSCENTED, "unscentedParameters"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
     ];
@@ -254,10 +305,8 @@ pub(crate) unsafe fn create(
 ) -> Result<Pipeline, vk::Result> {
     // SAFETY: the caller's promise.
     unsafe {
-        let stages = slice(info.p_stages, info.stage_count);
-        let has_fragment_stage = stages.iter().any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
-        let sigma_points = find::<SigmaPoints<'_>>(info.p_next);
-        if let Some(feature) = refusal(state, has_fragment_stage, sigma_points.is_some_and(are_changed)) {
+        let sigma_points = find::<SigmaPointsInfo<'_>>(info.p_next).copied().unwrap_or_default();
+        if let Some(feature) = refusal(state) {
             tell(&format!("a pipeline needs {feature}, which is not emulated"));
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
@@ -286,6 +335,13 @@ pub(crate) unsafe fn create(
             tell("a pipeline that may test depths has negativeOneToOne as a dynamic state, which is not emulated");
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
+        let shader = match resolve_shader(context, info, state, tests.is_some()) {
+            Ok(shader) => shader,
+            Err(reason) => {
+                tell(&reason);
+                return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
+            }
+        };
         let clip =
             viewports.and_then(|state| find::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next));
         let rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next);
@@ -307,10 +363,19 @@ pub(crate) unsafe fn create(
             has_tests: tests.is_some_and(|tests| tests.tests_anything()),
             has_logarithms: state.flags.contains(Flags::LOG_SCALE),
             has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
+            // What commands set is not known here either.
+            has_lens: false,
+            is_resolved: shader.as_ref().is_some_and(|shader| shader.rewritten.has_inputs),
         };
         // They are compiled now, rather than with the first draw.
         context.kernels.specialized(variant)?;
-        let raw = graphics(context, info, &dynamic, tests.is_some(), view_mask, allocator)?;
+        let show = Show { dynamic: &dynamic, may_be_tested: tests.is_some(), view_mask, allocator };
+        let raw = graphics(context, info, &show, shader.as_ref())?;
+        let without_shader = if tests.is_some() && shader.is_some() {
+            graphics(context, info, &show, None).inspect_err(|_| context.next.destroy_pipeline(raw, allocator))?
+        } else {
+            vk::Pipeline::null()
+        };
         let mut own = Pipeline {
             next: Arc::clone(context.next),
             raw,
@@ -318,6 +383,7 @@ pub(crate) unsafe fn create(
             cut_off,
             cut_off_deviations: footprint.map_or(0.0, |footprint| footprint.cut_off_deviations),
             compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
+            sigma_points: SigmaPoints::new(&sigma_points),
             variant,
             harmonics_step: attributes.harmonics_step.unwrap_or(0),
             attributes: attributes.list,
@@ -328,8 +394,14 @@ pub(crate) unsafe fn create(
             view_mask,
             tests,
             is_negative_one_to_one: clip.is_some_and(|clip| clip.negative_one_to_one != vk::FALSE),
-            samples: info.p_multisample_state.as_ref().map_or(1, |state| state.rasterization_samples.as_raw().max(1)),
+            samples: samples(info),
             camera_buffer: None,
+            resolve: shader.map(|shader| Resolve {
+                has_camera: shader.rewritten.has_camera,
+                is_sample_shaded: shader.rewritten.is_sample_shaded,
+                covering: shader.rewritten.covering,
+                without_shader,
+            }),
         };
         if state.camera_source == CameraSource::UNIFORM_BUFFER {
             match camera_buffer(context, state) {
@@ -344,20 +416,95 @@ pub(crate) unsafe fn create(
     }
 }
 
-/// The graphics pipeline: a triangle over the set's area, whose fragments fetch what the kernels have made.
+/// Rasterization samples.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn samples(info: &vk::GraphicsPipelineCreateInfo<'_>) -> u32 {
+    // SAFETY: the caller's promise.
+    let state = unsafe { info.p_multisample_state.as_ref() };
+    state.map_or(1, |state| state.rasterization_samples.as_raw().max(1))
+}
+
+/// A resolve shader that loads its inputs, and the application's stage.
+struct ResolveShader<'a> {
+    stage: vk::PipelineShaderStageCreateInfo<'a>,
+    rewritten: Rewritten,
+}
+
+/// The resolve shader of a pipeline, if it has one, or the sentence that refuses it.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn resolve_shader<'a>(
+    context: &Context<'_>,
+    info: &vk::GraphicsPipelineCreateInfo<'a>,
+    state: &State<'_>,
+    may_be_tested: bool,
+) -> Result<Option<ResolveShader<'a>>, String> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let mut stages = slice(info.p_stages, info.stage_count).iter();
+        let Some(stage) = stages.find(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT) else {
+            return Ok(None);
+        };
+        let words = shader_words(stage, context.shaders);
+        let words = words.ok_or("a resolve shader is named by an identifier of its module, which is not emulated")?;
+        if stage.p_name.is_null() {
+            return Err("a resolve shader has no name".to_owned());
+        }
+        let multisample = info.p_multisample_state.as_ref();
+        let rewritten = resolve::rewrite(&Request {
+            words: &words,
+            entry: CStr::from_ptr(stage.p_name),
+            locations: state.resolve_input_locations,
+            may_be_tested,
+            samples: samples(info),
+            is_sample_shaded: multisample.is_some_and(|state| state.sample_shading_enable != vk::FALSE),
+        })?;
+        Ok(Some(ResolveShader { stage: *stage, rewritten }))
+    }
+}
+
+/// The words of a stage's module, or of the creation info in its chain.
+///
+/// # Safety
+/// The stage is valid.
+pub(crate) unsafe fn shader_words(
+    stage: &vk::PipelineShaderStageCreateInfo<'_>,
+    shaders: &HashMap<vk::ShaderModule, Arc<[u32]>>,
+) -> Option<Arc<[u32]>> {
+    if let Some(known) = shaders.get(&stage.module) {
+        return Some(Arc::clone(known));
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let module = find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next)?;
+        Some(slice(module.p_code, (module.code_size / 4) as u32).into())
+    }
+}
+
+/// What a graphics pipeline that shows sets needs beside its creation info.
+struct Show<'a> {
+    dynamic: &'a [vk::DynamicState],
+    may_be_tested: bool,
+    view_mask: u32,
+    allocator: Option<&'a vk::AllocationCallbacks<'a>>,
+}
+
+/// The graphics pipeline: two triangles over each tile of the set's area, whose fragments fetch what the kernels have made, or run the
+/// resolve shader.
 ///
 /// # Safety
 /// The creation info is valid.
 unsafe fn graphics(
     context: &Context<'_>,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    dynamic: &[vk::DynamicState],
-    may_be_tested: bool,
-    view_mask: u32,
-    allocator: Option<&vk::AllocationCallbacks<'_>>,
+    show: &Show<'_>,
+    shader: Option<&ResolveShader<'_>>,
 ) -> Result<vk::Pipeline, vk::Result> {
-    let kernels = context.kernels;
-    let (vertex, fetch) = match (view_mask == 0, may_be_tested) {
+    let (kernels, may_be_tested, has_views) = (context.kernels, show.may_be_tested, show.view_mask != 0);
+    let (mut vertex, fetch) = match (!has_views, may_be_tested) {
         (true, false) => (kernels.vertex, kernels.fetch),
         (true, true) => (kernels.vertex, kernels.fetch_tested),
         (false, false) => (kernels.vertex_views, kernels.fetch_views),
@@ -366,13 +513,36 @@ unsafe fn graphics(
     let stage = |stage: vk::ShaderStageFlags, module: vk::ShaderModule| {
         vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
     };
-    let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), stage(vk::ShaderStageFlags::FRAGMENT, fetch)];
-    let input = vk::PipelineVertexInputStateCreateInfo::default();
+    let mut fragment = stage(vk::ShaderStageFlags::FRAGMENT, fetch);
+    let mut input = vk::PipelineVertexInputStateCreateInfo::default();
+    let bindings = [vk::VertexInputBindingDescription {
+        binding: 0,
+        stride: ATTRIBUTES as u32,
+        input_rate: vk::VertexInputRate::INSTANCE,
+    }];
+    let attributes = [0, 1, 2, 3].map(|location| vk::VertexInputAttributeDescription {
+        location,
+        binding: 0,
+        format: vk::Format::R32G32B32A32_UINT,
+        offset: 16 * location,
+    });
+    let mut module = vk::ShaderModule::null();
+    if let Some(shader) = shader {
+        let info = vk::ShaderModuleCreateInfo::default().code(&shader.rewritten.words);
+        // SAFETY: the words are a module's.
+        module = unsafe { context.next.create_shader_module(&info, None)? };
+        fragment = shader.stage.module(module);
+        fragment.p_next = std::ptr::null();
+        vertex = if has_views { kernels.vertex_resolved_views } else { kernels.vertex_resolved };
+        input = input.vertex_binding_descriptions(&bindings).vertex_attribute_descriptions(&attributes);
+    }
+    let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), fragment];
     let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
     let viewports = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
     let depth = vk::PipelineDepthStencilStateCreateInfo::default().depth_compare_op(vk::CompareOp::ALWAYS);
-    let mut states: Vec<vk::DynamicState> = dynamic.iter().copied().filter(|state| SHOWN.contains(state)).collect();
+    let mut states: Vec<vk::DynamicState> =
+        show.dynamic.iter().copied().filter(|state| SHOWN.contains(state)).collect();
     states.extend([vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
     if may_be_tested {
         states.extend(depth_stencil::STORED);
@@ -383,8 +553,9 @@ unsafe fn graphics(
         let blend = info.p_color_blend_state.as_ref();
         let mut attachments =
             blend.map(|blend| slice(blend.p_attachments, blend.attachment_count)).unwrap_or_default().to_vec();
-        // There is a colour at location 0 alone.
-        for attachment in attachments.iter_mut().skip(1) {
+        // Without a resolve shader there is a colour at location 0 alone.
+        let colors = if shader.is_some() { attachments.len() } else { 1 };
+        for attachment in attachments.iter_mut().skip(colors) {
             attachment.color_write_mask = vk::ColorComponentFlags::empty();
         }
         let mut blend = blend.copied().unwrap_or_default();
@@ -392,7 +563,9 @@ unsafe fn graphics(
             blend.p_attachments = attachments.as_ptr();
         }
         let mut multisample = info.p_multisample_state.as_ref().copied().unwrap_or_default();
-        multisample.sample_shading_enable = vk::FALSE;
+        let is_sample_shaded = shader.is_some() && multisample.sample_shading_enable != vk::FALSE;
+        multisample.sample_shading_enable = is_sample_shaded.into();
+        multisample.min_sample_shading = 1.0;
         let mut rendering = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next).copied().unwrap_or_default();
         rendering.p_next = std::ptr::null();
         let mut own = vk::GraphicsPipelineCreateInfo::default()
@@ -406,13 +579,15 @@ unsafe fn graphics(
             .color_blend_state(&blend)
             .multisample_state(&multisample)
             .dynamic_state(&states)
-            .layout(context.kernels.fetch_layout)
+            .layout(if shader.is_some() { info.layout } else { kernels.fetch_layout })
             .render_pass(info.render_pass)
             .subpass(info.subpass);
         if info.render_pass == vk::RenderPass::null() {
             own = own.push_next(&mut rendering);
         }
-        match context.next.create_graphics_pipelines(context.cache, &[own], allocator) {
+        let created = context.next.create_graphics_pipelines(context.cache, &[own], show.allocator);
+        context.next.destroy_shader_module(module, None);
+        match created {
             Ok(created) => created.first().copied().ok_or(vk::Result::ERROR_UNKNOWN),
             Err((_, error)) => Err(error),
         }

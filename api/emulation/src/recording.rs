@@ -6,9 +6,12 @@ use std::sync::Arc;
 use ash::vk;
 use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
 
-use crate::depth_stencil::TestState;
+use crate::bindings::{Bindings, BoundSet, PushConstants};
+use crate::cameras::{Cameras, SeenBy};
+use crate::depth_stencil::{Outcome, TestState};
 use crate::emulation::Emulation;
 use crate::formats;
+use crate::made::Made;
 use crate::next::Next;
 use crate::pass::Pass;
 use crate::pipeline::Pipeline;
@@ -17,7 +20,7 @@ use crate::scratch::{Memory, Places};
 use crate::set::{DynamicValues, Set, SetState};
 use crate::support::MAX_GAUSSIANS;
 use crate::times::Times;
-use crate::work::{Camera, Cameras, Draw, DrawSource, Work, barrier};
+use crate::work::{Draw, DrawSource, Work, barrier};
 
 /// The graphics pipeline that is bound.
 #[derive(Clone, Default)]
@@ -31,6 +34,8 @@ pub(crate) enum Bound {
 /// A vertex buffer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct VertexBuffer {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
     pub(crate) address: u64,
     pub(crate) size: u64,
     /// The stride, if it is dynamic.
@@ -53,23 +58,6 @@ pub(crate) struct HarmonicsBuffer {
     pub(crate) format: vk::Format,
     pub(crate) stride: u32,
     pub(crate) coefficient_stride: u64,
-}
-
-/// A descriptor set that is bound.
-#[derive(Clone, Debug)]
-pub(crate) struct BoundSet {
-    pub(crate) layout: vk::PipelineLayout,
-    pub(crate) set: vk::DescriptorSet,
-    pub(crate) offsets: Vec<u32>,
-}
-
-/// Push constants as a command has set them.
-#[derive(Clone, Debug)]
-pub(crate) struct PushConstants {
-    pub(crate) layout: vk::PipelineLayout,
-    pub(crate) stages: vk::ShaderStageFlags,
-    pub(crate) offset: u32,
-    pub(crate) bytes: Vec<u8>,
 }
 
 /// A query that the application has begun within a pass.
@@ -119,7 +107,7 @@ pub(crate) struct Recording {
     pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
     pub(crate) index_buffer: Option<IndexBuffer>,
     pub(crate) harmonics: Option<HarmonicsBuffer>,
-    pub(crate) cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<SeenBy>,
     pub(crate) values: DynamicValues,
     /// Depth and stencil tests, as commands have set them.
     pub(crate) tests: TestState,
@@ -214,6 +202,11 @@ impl Recording {
             if self.cameras.is_empty() || !is_enough {
                 return None;
             }
+            // No disc is seen through a lens that distorts.
+            let mut views = pipeline.views().map(|view| &self.cameras[(view as usize).min(self.cameras.len() - 1)]);
+            if pipeline.variant.is_surfel && views.any(|seen| seen.lens.is_some()) {
+                return None;
+            }
             Cameras::Command(self.cameras.clone())
         };
         if pipeline.has_harmonics_buffer() {
@@ -229,7 +222,15 @@ impl Recording {
             cameras,
             viewport: pipeline.viewport.or(self.viewport)?,
             scissor: pipeline.scissor.or(self.scissor)?,
+            bindings: pipeline.resolve.as_ref().map(|_| Arc::new(self.bindings())),
         })
+    }
+
+    fn bindings(&self) -> Bindings {
+        let graphics = vk::PipelineBindPoint::GRAPHICS.as_raw();
+        let sets = self.descriptors.iter().filter(|((point, _), _)| *point == graphics);
+        let sets = sets.map(|((_, number), bound)| (*number, bound.clone())).collect();
+        Bindings { sets, constants: self.constants.clone() }
     }
 
     /// The vertex buffers of a draw.
@@ -348,12 +349,11 @@ impl Recording {
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
         self.has_drawn = true;
-        let pixels = Arc::new(Memory::new(&emulation.next, work.pixel_bytes(), false)?);
-        let address = pixels.address;
+        let pixels = Arc::new(Memory::new(&emulation.next, work.made().end, false)?);
         self.kept.push(Arc::clone(&pixels));
-        work.pixels = Some(pixels);
+        work.pixels = Some(Arc::clone(&pixels));
         // SAFETY: the caller's promise.
-        unsafe { self.show(emulation, &work, address)? };
+        unsafe { self.show(emulation, &work, &Made { memory: pixels, place: 0 })? };
         self.works.push(work);
         Ok(())
     }
@@ -365,26 +365,28 @@ impl Recording {
     unsafe fn compute(&mut self, emulation: &Emulation, work: Work) -> Result<(), vk::Result> {
         // SAFETY: the caller's promise.
         unsafe {
-            let address = self.between(emulation, std::slice::from_ref(&work))?;
-            self.show(emulation, &work, address)
+            match self.between(emulation, std::slice::from_ref(&work))? {
+                Some(made) => self.show(emulation, &work, &made),
+                None => Ok(()),
+            }
         }
     }
 
-    /// Breaks the pass for the dispatches of sets. Returns the address of the last one's pixels.
+    /// Breaks the pass for the dispatches of sets. Returns what the last one makes.
     ///
     /// # Safety
     /// See [`Self::activate_queries`].
-    unsafe fn between(&mut self, emulation: &Emulation, works: &[Work]) -> Result<u64, vk::Result> {
+    unsafe fn between(&mut self, emulation: &Emulation, works: &[Work]) -> Result<Option<Made>, vk::Result> {
         let (next, kernels) = (&emulation.next, emulation.kernels()?);
         if self.queries.iter().any(|query| query.is_active) {
             tell("a query that has counted other draws within its render pass cannot count Gaussians too");
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
         let Some(pass) = self.pass.take() else {
-            return Ok(0);
+            return Ok(None);
         };
         let most_pairs = u64::from(kernels.feedback.word(0));
-        let mut address = 0;
+        let mut made = None;
         // SAFETY: the caller's promise.
         unsafe {
             if let (Some(end), Some(_)) = (next.end_conditional_rendering, self.condition) {
@@ -394,7 +396,7 @@ impl Recording {
             let mut failure = None;
             let attachment = pass.depth_stencil(&emulation.objects().views);
             for work in works {
-                let attachment = attachment.as_ref().filter(|_| work.tests.is_some());
+                let attachment = attachment.as_ref().filter(|_| work.knows_attachment());
                 let extent = work.extent(most_pairs);
                 let places = Places::of(&extent);
                 match emulation.scratch(self.family, &mut self.scratch, places.end) {
@@ -403,7 +405,7 @@ impl Recording {
                             Ok(times) => self.times.extend(times),
                             Err(error) => failure = Some(error),
                         }
-                        address = work.pixels_at(&scratch, &places);
+                        made = Some(work.made_in(&scratch, &places));
                         if !self.kept.iter().any(|kept| Arc::ptr_eq(kept, &scratch)) {
                             self.kept.push(scratch);
                         }
@@ -422,7 +424,7 @@ impl Recording {
             }
             self.pass = Some(pass);
             self.restore_compute(next);
-            failure.map_or(Ok(address), Err)
+            failure.map_or(Ok(made), Err)
         }
     }
 
@@ -449,11 +451,11 @@ impl Recording {
     ///
     /// # Safety
     /// See [`Self::activate_queries`].
-    unsafe fn show(&mut self, emulation: &Emulation, work: &Work, pixels: u64) -> Result<(), vk::Result> {
+    unsafe fn show(&mut self, emulation: &Emulation, work: &Work, made: &Made) -> Result<(), vk::Result> {
         let (next, kernels, commands) = (&emulation.next, emulation.kernels()?, self.commands);
         let ([x, y], [width, height]) = (work.area.origin, work.area.size);
         let area = vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } };
-        let viewport = vk::Viewport {
+        let viewport = |[width, height]: [u32; 2]| vk::Viewport {
             x: x as f32,
             y: y as f32,
             width: width as f32,
@@ -461,19 +463,34 @@ impl Recording {
             min_depth: 0.0,
             max_depth: 1.0,
         };
-        let mut picture = work.picture(pixels);
+        let mut picture = work.picture(made.address());
         let [across, down] = work.tiles();
+        let resolve = work.pipeline.resolve.as_ref();
         let graphics = vk::PipelineBindPoint::GRAPHICS;
         let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         // SAFETY: the caller's promise: the application has recorded what is repeated.
         unsafe {
             self.activate_queries(next);
             next.cmd_bind_pipeline(commands, graphics, work.pipeline.raw);
-            next.cmd_set_viewport(commands, 0, &[viewport]);
+            next.cmd_set_viewport(commands, 0, &[viewport(work.shown_size(next))]);
             next.cmd_set_scissor(commands, 0, &[area]);
+            if resolve.is_some() {
+                self.bind_for_shader(next, work, made);
+            }
             for outcome in work.outcomes() {
                 if work.pipeline.tests.is_some() {
                     outcome.set(next, commands, &work.tests.unwrap_or_default());
+                }
+                if let (Some(resolve), Outcome::Passed) = (resolve, outcome) {
+                    let draws = if resolve.is_sample_shaded { 1 } else { work.samples() };
+                    for sample in 0..draws {
+                        next.cmd_draw(commands, work.vertices_of_tile() * across * down, 1, 0, sample);
+                    }
+                    continue;
+                }
+                if let Some(resolve) = resolve {
+                    next.cmd_bind_pipeline(commands, graphics, resolve.without_shader);
+                    next.cmd_set_viewport(commands, 0, &[viewport(work.area.size)]);
                 }
                 for sample in 0..work.samples() {
                     picture.show(sample, *outcome);
@@ -484,6 +501,9 @@ impl Recording {
             for repeat in self.states.values() {
                 repeat(next, commands);
             }
+            if resolve.is_some() {
+                self.restore_after_shader(next, work);
+            }
             if let Bound::Other(pipeline) = self.graphics {
                 next.cmd_bind_pipeline(commands, graphics, pipeline);
             }
@@ -492,6 +512,58 @@ impl Recording {
             }
         }
         Ok(())
+    }
+
+    /// Binds what a resolve shader reads, as it was at the set's first draw.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn bind_for_shader(&self, next: &Next, work: &Work, made: &Made) {
+        // SAFETY: the caller's promise: the application has bound and pushed these.
+        unsafe {
+            next.cmd_bind_vertex_buffers(self.commands, 0, &[made.memory.buffer], &[work.attributes_place(made)]);
+            let Some(bindings) = &work.bindings else {
+                return;
+            };
+            for pushed in &bindings.constants {
+                next.cmd_push_constants(self.commands, pushed.layout, pushed.stages, pushed.offset, &pushed.bytes);
+            }
+            self.bind_sets(next, &bindings.sets, &self.bindings().sets);
+        }
+    }
+
+    /// Binds the application's vertex buffer and descriptor sets again.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn restore_after_shader(&self, next: &Next, work: &Work) {
+        // SAFETY: the caller's promise: the application has bound these.
+        unsafe {
+            if let Some(before) = self.vertex_buffers.get(&0).filter(|before| before.buffer != vk::Buffer::null()) {
+                let strides = before.stride.map(|stride| [u64::from(stride)]);
+                let strides = strides.as_ref().map(<[u64; 1]>::as_slice);
+                let size = if before.size == 0 { vk::WHOLE_SIZE } else { before.size };
+                let (buffers, offsets, sizes) = ([before.buffer], [before.offset], [size]);
+                next.cmd_bind_vertex_buffers2(self.commands, 0, &buffers, &offsets, Some(&sizes), strides);
+            }
+            if let Some(bindings) = &work.bindings {
+                self.bind_sets(next, &self.bindings().sets, &bindings.sets);
+            }
+        }
+    }
+
+    /// Binds the descriptor sets that are not bound already.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn bind_sets(&self, next: &Next, wanted: &BTreeMap<u32, BoundSet>, bound: &BTreeMap<u32, BoundSet>) {
+        let graphics = vk::PipelineBindPoint::GRAPHICS;
+        for (number, one) in wanted.iter().filter(|(number, one)| bound.get(number) != Some(one)) {
+            // SAFETY: the caller's promise.
+            unsafe {
+                next.cmd_bind_descriptor_sets(self.commands, graphics, one.layout, *number, &[one.set], &one.offsets);
+            }
+        }
     }
 
     /// Computes the sets of secondary command buffers that are about to be executed.

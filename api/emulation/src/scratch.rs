@@ -26,7 +26,11 @@ impl Memory {
     /// Allocates memory of the device, or such that the host sees as well.
     pub(crate) fn new(next: &Arc<Next>, size: u64, is_for_host: bool) -> Result<Self, vk::Result> {
         use vk::BufferUsageFlags as Usage;
-        let usage = Usage::STORAGE_BUFFER | Usage::TRANSFER_DST | Usage::INDIRECT_BUFFER | Usage::SHADER_DEVICE_ADDRESS;
+        let usage = Usage::STORAGE_BUFFER
+            | Usage::TRANSFER_DST
+            | Usage::INDIRECT_BUFFER
+            | Usage::VERTEX_BUFFER
+            | Usage::SHADER_DEVICE_ADDRESS;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         // SAFETY: the device lives as long as what is recorded on it.
         unsafe {
@@ -103,14 +107,17 @@ pub(crate) struct Extent {
     /// The most pairs of tile and Gaussian that are sorted.
     pub(crate) pairs: u64,
     pub(crate) tiles: u64,
-    /// Bytes of parameters, draws, sources and cameras, and of pixels.
+    /// Bytes of parameters, draws, sources, cameras and lenses, and of pixels.
     pub(crate) parameters: u64,
     pub(crate) draws: u64,
     pub(crate) sources: u64,
     pub(crate) cameras: u64,
+    pub(crate) lenses: u64,
     pub(crate) pixels: u64,
     /// Samples that are tested.
     pub(crate) tested: u64,
+    /// A resolve shader reads depths or Gaussians.
+    pub(crate) has_inputs: bool,
 }
 
 /// Offsets into scratch.
@@ -120,6 +127,7 @@ pub(crate) struct Places {
     pub(crate) draws: u64,
     pub(crate) sources: u64,
     pub(crate) cameras: u64,
+    pub(crate) lenses: u64,
     pub(crate) derived: u64,
     pub(crate) counters: u64,
     pub(crate) keys: u64,
@@ -134,6 +142,7 @@ pub(crate) struct Places {
     pub(crate) records: u64,
     pub(crate) pixels: u64,
     pub(crate) depths: u64,
+    pub(crate) names: u64,
     pub(crate) copied_depths: u64,
     pub(crate) copied_stencils: u64,
     pub(crate) stored: u64,
@@ -161,6 +170,7 @@ impl Places {
         places.draws = take(extent.draws);
         places.sources = take(extent.sources);
         places.cameras = take(extent.cameras);
+        places.lenses = take(extent.lenses);
         places.derived = take(256);
         places.counters = take(256);
         places.keys = take(8 * n);
@@ -174,7 +184,8 @@ impl Places {
         places.ranges = take(8 * extent.tiles);
         places.records = take(RECORD * n);
         places.pixels = take(extent.pixels);
-        places.depths = take(if extent.tested == 0 { 0 } else { 8 * n });
+        places.depths = take(if extent.tested == 0 && !extent.has_inputs { 0 } else { 8 * n });
+        places.names = take(if extent.has_inputs { 8 * n } else { 0 });
         places.copied_depths = take(4 * extent.tested);
         places.copied_stencils = take(4 * extent.tested);
         places.stored = take(8 * extent.tested);

@@ -4,10 +4,14 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::bindings::Bindings;
+use crate::cameras::{Cameras, SeenBy};
 use crate::depth_stencil::TestState;
+use crate::lens::Lens;
+use crate::made::Area;
 use crate::pipeline::{self, Pipeline};
 use crate::support::MAX_GAUSSIANS;
-use crate::work::{Area, Camera, Cameras, Draw, DrawSource, Values, Work};
+use crate::work::{Draw, DrawSource, Values, Work};
 
 /// The extension's dynamic states, as far as they have been set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,6 +79,8 @@ pub(crate) struct SetState {
     pub(crate) tests: Option<TestState>,
     pub(crate) viewport: vk::Viewport,
     pub(crate) scissor: vk::Rect2D,
+    /// What a resolve shader is bound to, where there is one.
+    pub(crate) bindings: Option<Arc<Bindings>>,
 }
 
 impl SetState {
@@ -87,7 +93,9 @@ impl SetState {
             (own, others) => own.is_none() && others.is_none(),
         };
         let cameras = match (&self.cameras, &other.cameras) {
-            (Cameras::Command(own), Cameras::Command(others)) => own == others,
+            (Cameras::Command(own), Cameras::Command(others)) => {
+                own.len() == others.len() && own.iter().zip(others).all(|(own, other)| own.is_same(other))
+            }
             // What is bound is that of the first draw.
             _ => true,
         };
@@ -141,11 +149,20 @@ impl Set {
             extent: vk::Extent2D { width: i32::MAX as u32, height: i32::MAX as u32 },
         };
         let area = common(area, positive);
+        let lenses = match &state.cameras {
+            Cameras::Command(cameras) if cameras.iter().any(|seen| seen.lens.is_some()) => {
+                let size = [viewport[2], viewport[3]];
+                let lens = |seen: &SeenBy| seen.lens.map(|lens| Lens::new(&lens, &seen.camera, size));
+                cameras.iter().map(|seen| lens(seen).unwrap_or_default()).collect()
+            }
+            _ => Vec::new(),
+        };
         let is_empty = area.extent.width == 0 || area.extent.height == 0 || self.gaussians == 0;
         let work = Work {
             pipeline: state.pipeline,
             values: state.values,
             cameras: state.cameras,
+            lenses,
             tests: state.tests,
             depth_range: [v.min_depth, v.max_depth],
             viewport,
@@ -153,6 +170,7 @@ impl Set {
             draws: self.draws,
             sources: self.sources,
             gaussians: self.gaussians,
+            bindings: state.bindings,
             pixels: None,
         };
         (!is_empty).then_some(work)
@@ -169,21 +187,4 @@ fn common(a: vk::Rect2D, b: vk::Rect2D) -> vk::Rect2D {
     let (x, width) = along(a.offset.x, a.extent.width, b.offset.x, b.extent.width);
     let (y, height) = along(a.offset.y, a.extent.height, b.offset.y, b.extent.height);
     vk::Rect2D { offset: vk::Offset2D { x, y }, extent: vk::Extent2D { width, height } }
-}
-
-/// A camera as kernels read it.
-pub(crate) fn camera_data(camera: &gaurast::vk::GaussianCameraGAURAST<'_>) -> Camera {
-    let r = &camera.rotation;
-    Camera {
-        eye: camera.eye,
-        model: camera.model.as_raw(),
-        reserved: 0,
-        rotation: [[r[0], r[1], r[2], 0.0], [r[3], r[4], r[5], 0.0], [r[6], r[7], r[8], 0.0]],
-        focal_length: camera.focal_length,
-        principal_point: camera.principal_point,
-        depth_coefficients: camera.depth_coefficients,
-        near_plane: camera.near_plane,
-        far_plane: camera.far_plane,
-        unused: [0; 4],
-    }
 }

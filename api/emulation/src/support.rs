@@ -69,11 +69,15 @@ pub(crate) fn answer_features(features: &mut Features<'_>) {
         .gaussian_instancing(true)
         .gaussian_depth_stencil(true)
         .gaussian_multisample(true)
+        .resolve_fragment_shader(true)
+        .resolve_gaussian_indices(true)
         .gaussian_approximation(true)
         .attribute_activation(true)
         .spherical_harmonics_buffer(true)
         .gaussian_dynamic_state(true)
         .gaussian_cut_off(true)
+        .gaussian_distortion(true)
+        .unscented_parameters(true)
         .gaussian_multiview(true)
         .opacity_compensation_floor(true);
     (features.s_type, features.p_next) = (s_type, p_next);

@@ -5,9 +5,14 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::attachments::{self, DepthStencil};
+use crate::bindings::Bindings;
+use crate::cameras::{Camera, Cameras};
 use crate::depth_stencil::{Outcome, TestState};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
+use crate::lens::Lens;
+use crate::made::{Area, Attributes, Covering, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
+use crate::pair::{Pair, pair};
 use crate::pipeline::{Attribute, Pipeline};
 use crate::scratch::{Extent, Memory, Places};
 use crate::times::Times;
@@ -52,22 +57,6 @@ pub(crate) struct DrawSource {
     pub(crate) unused: u32,
 }
 
-/// A camera: `VkGaussianCameraDataGAURAST`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct Camera {
-    pub(crate) eye: [f64; 3],
-    pub(crate) model: i32,
-    pub(crate) reserved: i32,
-    pub(crate) rotation: [[f32; 4]; 3],
-    pub(crate) focal_length: [f32; 2],
-    pub(crate) principal_point: [f32; 2],
-    pub(crate) depth_coefficients: [f32; 2],
-    pub(crate) near_plane: f32,
-    pub(crate) far_plane: f32,
-    pub(crate) unused: [u32; 4],
-}
-
 /// The parameters of a set, as `shaders/set.glsl` has them.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -92,6 +81,10 @@ struct Parameters {
     depths: u64,
     stored: u64,
     medians: u64,
+    names: u64,
+    inputs: u64,
+    seen_by: u64,
+    lenses: u64,
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -117,6 +110,12 @@ struct Parameters {
     depth_range: [f32; 2],
     depth_steps: u32,
     is_negative_one_to_one: u32,
+    sigma_distance: Pair,
+    sigma_center: Pair,
+    sigma_other: Pair,
+    picture: [Pair; 4],
+    must_count: u32,
+    unused: u32,
     attributes: [Attribute; 33],
     padding: u32,
 }
@@ -197,14 +196,6 @@ pub(crate) struct Values {
     pub(crate) degree: u32,
 }
 
-/// The source of cameras.
-#[derive(Clone, Debug)]
-pub(crate) enum Cameras {
-    Command(Vec<Camera>),
-    /// A descriptor set with its dynamic offsets.
-    Buffer(vk::DescriptorSet, Vec<u32>),
-}
-
 /// The result of a set in its area, as `shaders/shown.glsl` has it.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -232,19 +223,14 @@ impl Picture {
     }
 }
 
-/// The part of the framebuffer that a set may reach.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Area {
-    pub(crate) origin: [i32; 2],
-    pub(crate) size: [u32; 2],
-}
-
 /// A set whose draws are known.
 #[derive(Clone)]
 pub(crate) struct Work {
     pub(crate) pipeline: Arc<Pipeline>,
     pub(crate) values: Values,
     pub(crate) cameras: Cameras,
+    /// Those of the cameras, if one distorts.
+    pub(crate) lenses: Vec<Lens>,
     /// Depth and stencil tests, if something is tested.
     pub(crate) tests: Option<TestState>,
     /// The least and the greatest depth of the viewport.
@@ -256,6 +242,8 @@ pub(crate) struct Work {
     pub(crate) sources: Vec<DrawSource>,
     /// The most Gaussians.
     pub(crate) gaussians: u64,
+    /// What a resolve shader is bound to, where there is one.
+    pub(crate) bindings: Option<Arc<Bindings>>,
     /// Pixels in memory of their own, where they are shown by another command buffer.
     pub(crate) pixels: Option<Arc<Memory>>,
 }
@@ -307,35 +295,85 @@ impl Work {
         pixels * u64::from(self.pipeline.planes()) * u64::from(self.samples())
     }
 
-    /// Bytes of the median depths.
-    fn median_bytes(&self) -> u64 {
-        if self.pipeline.tests.is_some() { 4 * self.all_samples() } else { 0 }
-    }
-
     /// The number of tiles of all views.
     fn all_tiles(&self) -> u64 {
         let [across, down] = self.tiles();
         u64::from(across) * u64::from(down) * u64::from(self.pipeline.planes())
     }
 
-    /// The place of the words of tiles in what the set makes: behind pixels and median depths.
-    fn shown_place(&self) -> u64 {
-        16 * self.all_samples() + self.median_bytes()
+    /// The places of what the set makes.
+    pub(crate) fn made(&self) -> MadePlaces {
+        let resolve = self.pipeline.resolve.as_ref();
+        let planes = u64::from(self.pipeline.planes());
+        MadePlaces::of(&MadeExtent {
+            samples: self.all_samples(),
+            has_medians: self.pipeline.tests.is_some(),
+            tiles: self.all_tiles(),
+            has_inputs: self.has_inputs(),
+            cameras: if resolve.is_some_and(|resolve| resolve.has_camera) { planes } else { 0 },
+            draws: if resolve.is_some() { u64::from(self.samples()) } else { 0 },
+        })
     }
 
-    /// Bytes of what the set makes: pixels, median depths, and a word for each tile that says whether it is shown.
-    pub(crate) fn pixel_bytes(&self) -> u64 {
-        self.shown_place() + 4 * self.all_tiles()
+    /// A resolve shader reads depths or Gaussians.
+    fn has_inputs(&self) -> bool {
+        self.pipeline.variant.is_resolved
+    }
+
+    /// Reports whether the set depends on the depth attachment: on what it stores, or on its format.
+    pub(crate) fn knows_attachment(&self) -> bool {
+        self.tests.is_some() || self.has_inputs()
+    }
+
+    /// The attributes of the draws with a resolve shader: one for each sample.
+    fn attributes(&self, next: &Next, address: u64) -> Vec<Attributes> {
+        let Some(resolve) = &self.pipeline.resolve else {
+            return Vec::new();
+        };
+        let all = Attributes::new(address, &self.made(), self.area, self.samples());
+        let all = all.covering(resolve.covering, self.shown_size(next));
+        (0..self.samples()).map(|sample| all.of_sample(sample)).collect()
+    }
+
+    /// The place of a draw's attributes.
+    pub(crate) fn attributes_place(&self, made: &Made) -> u64 {
+        made.place + self.made().attributes
+    }
+
+    /// Vertices of the draws with a resolve shader, of each tile.
+    pub(crate) fn vertices_of_tile(&self) -> u32 {
+        match self.covering() {
+            Covering::Quads => 6,
+            Covering::Pixels => 6 * TILE * TILE,
+            Covering::Triangle => 3,
+        }
+    }
+
+    fn covering(&self) -> Covering {
+        self.pipeline.resolve.as_ref().map_or(Covering::Quads, |resolve| resolve.covering)
+    }
+
+    /// The size in pixels of the viewport of draws with a resolve shader. It is the area's, or has triangles that reach beyond tiles.
+    pub(crate) fn shown_size(&self, next: &Next) -> [u32; 2] {
+        let [across, down] = self.tiles();
+        match self.covering() {
+            Covering::Triangle => [
+                (TILE * (across + 1)).min(next.max_viewport[0]).max(self.area.size[0]),
+                (TILE * (down + 1)).min(next.max_viewport[1]).max(self.area.size[1]),
+            ],
+            _ => self.area.size,
+        }
     }
 
     /// The set's result, for the shaders that show it.
     pub(crate) fn picture(&self, address: u64) -> Picture {
+        let places = self.made();
         Picture {
             image: address,
-            shown: address + self.shown_place(),
+            shown: address + places.shown,
             origin: self.area.origin,
             size: self.area.size,
-            medians: address + 16 * self.all_samples(),
+            medians: address + places.medians,
             samples: self.samples(),
             sample: 0,
             wanted: Outcome::Passed.number(),
@@ -353,10 +391,11 @@ impl Work {
     /// The kernels that the set needs.
     fn variant(&self) -> Variant {
         let has_angles = match &self.cameras {
-            Cameras::Command(cameras) => cameras.iter().any(|camera| camera.model > ORTHOGRAPHIC),
+            Cameras::Command(cameras) => cameras.iter().any(|seen| seen.camera.model > ORTHOGRAPHIC),
             Cameras::Buffer(..) => true,
         };
-        Variant { has_angles, has_tests: self.tests.is_some(), ..self.pipeline.variant }
+        let has_lens = !self.lenses.is_empty();
+        Variant { has_angles, has_lens, has_tests: self.tests.is_some(), ..self.pipeline.variant }
     }
 
     /// The sizes of the set's scratch. `pairs` is the most of them that any set has had.
@@ -373,19 +412,22 @@ impl Work {
             draws: size_of_val(self.draws.as_slice()) as u64,
             sources: size_of_val(self.sources.as_slice()).max(4) as u64,
             cameras: 128 * u64::from(self.camera_count().max(1)),
-            pixels: if self.pixels.is_some() { 0 } else { self.pixel_bytes() },
+            lenses: size_of_val(self.lenses.as_slice()) as u64,
+            pixels: if self.pixels.is_some() { 0 } else { self.made().end },
             tested: if self.tests.is_some() { self.all_samples() } else { 0 },
+            has_inputs: self.has_inputs(),
         }
     }
 
-    /// The address of the pixels.
-    pub(crate) fn pixels_at(&self, scratch: &Memory, places: &Places) -> u64 {
-        self.pixels.as_ref().map_or(scratch.address + places.pixels, |memory| memory.address)
+    /// The place of what the set makes.
+    pub(crate) fn made_in(&self, scratch: &Arc<Memory>, places: &Places) -> Made {
+        let own = self.pixels.as_ref().map(|memory| Made { memory: Arc::clone(memory), place: 0 });
+        own.unwrap_or_else(|| Made { memory: Arc::clone(scratch), place: places.pixels })
     }
 
     fn parameters(
         &self,
-        scratch: &Memory,
+        scratch: &Arc<Memory>,
         places: &Places,
         extent: &Extent,
         feedback: u64,
@@ -393,7 +435,10 @@ impl Work {
     ) -> Parameters {
         let depth_compare = self.tests.filter(|tests| tests.is_depth_tested && has_depths(attachment));
         let at = |place: u64| scratch.address + place;
-        let (pipeline, picture) = (&self.pipeline, self.picture(self.pixels_at(scratch, places)));
+        let (pipeline, made) = (&self.pipeline, self.made_in(scratch, places).address());
+        let (picture, made_places) = (self.picture(made), self.made());
+        let sigma = &pipeline.sigma_points;
+        let has_camera = pipeline.resolve.as_ref().is_some_and(|resolve| resolve.has_camera);
         Parameters {
             counters: at(places.counters),
             keys: at(places.keys),
@@ -416,6 +461,10 @@ impl Work {
             depths: at(places.depths),
             stored: at(places.stored),
             medians: picture.medians,
+            names: at(places.names),
+            inputs: made + made_places.inputs,
+            seen_by: if has_camera { made + made_places.cameras } else { 0 },
+            lenses: if self.lenses.is_empty() { 0 } else { at(places.lenses) },
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -444,6 +493,12 @@ impl Work {
             depth_range: self.depth_range,
             depth_steps: depth_steps(attachment),
             is_negative_one_to_one: u32::from(pipeline.is_negative_one_to_one),
+            sigma_distance: pair(sigma.distance),
+            sigma_center: pair(sigma.center),
+            sigma_other: pair(sigma.other),
+            picture: sigma.picture(self.viewport[2], self.viewport[3]).map(pair),
+            must_count: sigma.must_count,
+            unused: 0,
             attributes: pipeline.attributes,
             padding: 0,
         }
@@ -458,7 +513,7 @@ impl Work {
         next: &Arc<Next>,
         kernels: &Kernels,
         commands: vk::CommandBuffer,
-        scratch: &Memory,
+        scratch: &Arc<Memory>,
         extent: &Extent,
         attachment: Option<&DepthStencil>,
     ) -> Result<Option<Times>, vk::Result> {
@@ -474,14 +529,21 @@ impl Work {
             run.write(places.draws, bytemuck::cast_slice(&self.draws));
             run.write(places.sources, bytemuck::cast_slice(&self.sources));
             match &self.cameras {
-                Cameras::Command(cameras) => run.write(places.cameras, bytemuck::cast_slice(cameras)),
+                Cameras::Command(cameras) => {
+                    let cameras: Vec<Camera> = cameras.iter().map(|seen| seen.camera).collect();
+                    run.write(places.cameras, bytemuck::cast_slice(&cameras));
+                    run.write(places.lenses, bytemuck::cast_slice(&self.lenses));
+                }
                 Cameras::Buffer(set, offsets) => self.copy_cameras(&run, *set, offsets),
             }
-            let (shown, buffer) = match &self.pixels {
-                Some(memory) => (self.shown_place(), memory.buffer),
-                None => (places.pixels + self.shown_place(), scratch.buffer),
-            };
-            next.cmd_fill_buffer(commands, buffer, shown, 4 * self.all_tiles(), 0);
+            let made = self.made_in(scratch, &places);
+            let shown = made.place + self.made().shown;
+            next.cmd_fill_buffer(commands, made.memory.buffer, shown, 4 * self.all_tiles(), 0);
+            let attributes = self.attributes(next, made.address());
+            if !attributes.is_empty() {
+                let at = self.attributes_place(&made);
+                next.cmd_update_buffer(commands, made.memory.buffer, at, bytemuck::cast_slice(&attributes));
+            }
             if let Some(tests) = &self.tests {
                 self.test(&run, tests, attachment)?;
                 run.end_stage("test");
@@ -707,6 +769,7 @@ fn has_depths(attachment: Option<&DepthStencil>) -> bool {
 
 /// The greatest depth of an attachment in steps; 0 if depths are floats.
 fn depth_steps(attachment: Option<&DepthStencil>) -> u32 {
+    let attachment = attachment.filter(|attachment| attachment.aspects.contains(vk::ImageAspectFlags::DEPTH));
     attachment.map_or(0, |attachment| (1 << attachments::depth_bits(attachment.view.image.format)) - 1)
 }
 

@@ -5,10 +5,11 @@ use std::sync::PoisonError;
 use ash::vk;
 use gaurast_layer_interface::slice;
 
+use crate::bindings::{BoundSet, PushConstants};
 use crate::emulation::Emulation;
 use crate::hooks::site::{Site, record};
 use crate::pass::{Object, Pass, Rendering};
-use crate::recording::{Bound, BoundSet, Condition, IndexBuffer, PushConstants, Query, Recording, VertexBuffer};
+use crate::recording::{Bound, Condition, IndexBuffer, Query, Recording, VertexBuffer};
 use crate::work::Work;
 
 pub(super) unsafe extern "system" fn cmd_bind_pipeline(
@@ -80,7 +81,7 @@ pub(super) unsafe extern "system" fn cmd_bind_vertex_buffers(
                 for ((number, &buffer), &offset) in (first..).zip(buffers).zip(offsets) {
                     let (address, size) = located(site.emulation, buffer, offset);
                     let stride = recording.vertex_buffers.get(&number).and_then(|before| before.stride);
-                    recording.vertex_buffers.insert(number, VertexBuffer { address, size, stride });
+                    recording.vertex_buffers.insert(number, VertexBuffer { buffer, offset, address, size, stride });
                 }
                 pass_on(site.next);
             },
@@ -115,7 +116,7 @@ pub(super) unsafe extern "system" fn cmd_bind_vertex_buffers2(
                     let size = given.get(index).map_or(whole, |&size| size.min(whole));
                     let before = recording.vertex_buffers.get(&number).and_then(|before| before.stride);
                     let stride = by.get(index).map(|&stride| stride as u32).or(before);
-                    recording.vertex_buffers.insert(number, VertexBuffer { address, size, stride });
+                    recording.vertex_buffers.insert(number, VertexBuffer { buffer, offset, address, size, stride });
                 }
                 pass_on(site.next);
             },

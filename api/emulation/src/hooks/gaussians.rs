@@ -1,5 +1,7 @@
 //! The extension's own commands.
 
+use std::marker::PhantomData;
+
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraDistortionGAURAST as Distortion,
@@ -8,22 +10,20 @@ use gaurast::vk::{
 };
 use gaurast_layer_interface::{find, slice};
 
+use crate::cameras::{SeenBy, camera_data};
 use crate::hooks::site::record;
+use crate::lens;
 use crate::recording::HarmonicsBuffer;
-use crate::report::tell;
-use crate::set::camera_data;
 
-/// Reports whether the lens of a camera distorts.
+/// The lens of a camera, if it distorts.
 ///
 /// # Safety
 /// The camera's chain is valid.
-unsafe fn distorts(camera: &Camera<'_>) -> bool {
+unsafe fn lens_of(camera: &Camera<'_>) -> Option<Distortion<'static>> {
     // SAFETY: the caller's promise.
     let lens = unsafe { find::<Distortion<'_>>(camera.p_next) };
-    lens.is_some_and(|lens| {
-        let coefficients = lens.radial.iter().chain(&lens.tangential).chain(&lens.thin_prism);
-        coefficients.into_iter().any(|coefficient| *coefficient != 0.0)
-    })
+    let lens = lens.filter(|lens| lens::distorts(lens))?;
+    Some(Distortion { p_next: std::ptr::null(), _marker: PhantomData, ..*lens })
 }
 
 pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
@@ -37,11 +37,8 @@ pub(super) unsafe extern "system" fn cmd_set_gaussian_cameras(
         record(
             commands,
             |_, recording| {
-                if cameras.iter().any(|camera| distorts(camera)) {
-                    tell("a camera needs gaussianDistortion, which is not emulated");
-                    recording.failure = Some(vk::Result::ERROR_FEATURE_NOT_PRESENT);
-                }
-                recording.cameras = cameras.iter().map(camera_data).collect();
+                let seen = |camera: &Camera<'_>| SeenBy { camera: camera_data(camera), lens: lens_of(camera) };
+                recording.cameras = cameras.iter().map(seen).collect();
             },
             |_| {},
         );

@@ -213,8 +213,8 @@ unsafe fn create(
         let mut own = *info;
         own.enabled_extension_count = kept.len() as u32;
         own.pp_enabled_extension_names = kept.as_ptr();
-        let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
-        let changed = Changed::new(&mut own, &mut address);
+        let mut needed = Needed::default();
+        let changed = Changed::new(&mut own, &mut needed);
         let result = create(physical_device, &raw const own, allocator, device);
         drop(changed);
         if result != vk::Result::SUCCESS {
@@ -308,56 +308,80 @@ impl<T> Drop for Unlinked<T> {
     }
 }
 
-/// A chain of `VkDeviceCreateInfo` from which the extension's features are taken out, and in which buffer device addresses are
-/// enabled. It is the application's again when this is dropped.
+/// The features that the emulation needs, as structures that are chained where the application has none with them.
+#[derive(Default)]
+struct Needed<'a> {
+    address: vk::PhysicalDeviceBufferDeviceAddressFeatures<'a>,
+    demote: vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'a>,
+}
+
+/// A chain of `VkDeviceCreateInfo` from which the extension's features are taken out, and in which the features that the emulation needs
+/// are enabled. It is the application's again when this is dropped.
 struct Changed {
     _unlinked: Unlinked<Features<'static>>,
-    /// A feature that was off.
-    enabled: Option<*mut vk::Bool32>,
+    /// Features that were off.
+    enabled: Vec<*mut vk::Bool32>,
 }
 
 impl Changed {
     /// # Safety
     /// The chain is valid, and nobody else uses it while this lives.
-    unsafe fn new<'a>(
-        info: &mut vk::DeviceCreateInfo<'a>,
-        address: &'a mut vk::PhysicalDeviceBufferDeviceAddressFeatures<'a>,
-    ) -> Self {
+    unsafe fn new<'a>(info: &mut vk::DeviceCreateInfo<'a>, needed: &'a mut Needed<'a>) -> Self {
         // SAFETY: the caller's promise. The structures are restored as soon as the device is created.
         unsafe {
             let unlinked = Unlinked::new((&raw mut info.p_next).cast());
-            let mut own = Self { _unlinked: unlinked, enabled: None };
+            let mut own = Self { _unlinked: unlinked, enabled: Vec::new() };
             let first = info.p_next.cast_mut();
-            let feature = if let Some(all) = find_mut::<vk::PhysicalDeviceVulkan12Features<'_>>(first) {
-                Some(&raw mut all.buffer_device_address)
-            } else {
-                let one = find_mut::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(first);
-                one.map(|one| &raw mut one.buffer_device_address)
+            let address = match find_mut::<vk::PhysicalDeviceVulkan12Features<'_>>(first) {
+                Some(all) => Some(&raw mut all.buffer_device_address),
+                None => find_mut::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(first)
+                    .map(|one| &raw mut one.buffer_device_address),
             };
+            let demote = match find_mut::<vk::PhysicalDeviceVulkan13Features<'_>>(first) {
+                Some(all) => Some(&raw mut all.shader_demote_to_helper_invocation),
+                None => find_mut::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(first)
+                    .map(|one| &raw mut one.shader_demote_to_helper_invocation),
+            };
+            // The extension's features may have been the first, which the copied creation info names.
+            if !own.enable(address) {
+                needed.address.buffer_device_address = vk::TRUE;
+                needed.address.p_next = info.p_next.cast_mut();
+                info.p_next = (&raw const needed.address).cast();
+            }
+            if !own.enable(demote) {
+                needed.demote.shader_demote_to_helper_invocation = vk::TRUE;
+                needed.demote.p_next = info.p_next.cast_mut();
+                info.p_next = (&raw const needed.demote).cast();
+            }
+            own
+        }
+    }
+
+    /// Enables a feature, if the application's chain has it.
+    ///
+    /// # Safety
+    /// The feature is the chain's.
+    unsafe fn enable(&mut self, feature: Option<*mut vk::Bool32>) -> bool {
+        // SAFETY: the caller's promise.
+        unsafe {
             match feature {
                 Some(feature) if *feature == vk::FALSE => {
                     *feature = vk::TRUE;
-                    own.enabled = Some(feature);
+                    self.enabled.push(feature);
+                    true
                 }
-                Some(_) => {}
-                None => {
-                    // The extension's features may have been the first, which the copied creation info names.
-                    address.p_next = info.p_next.cast_mut();
-                    info.p_next = (&raw const *address).cast();
-                }
+                Some(_) => true,
+                None => false,
             }
-            own
         }
     }
 }
 
 impl Drop for Changed {
     fn drop(&mut self) {
-        // SAFETY: the application's structures are as valid as before.
-        unsafe {
-            if let Some(feature) = self.enabled {
-                *feature = vk::FALSE;
-            }
+        for feature in self.enabled.drain(..) {
+            // SAFETY: the application's structures are as valid as before.
+            unsafe { *feature = vk::FALSE };
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Devices, memory, buffers, layouts, render passes and pipelines.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use ash::vk;
@@ -7,11 +8,12 @@ use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST as State;
 use gaurast_layer_interface::{find_mut, slice};
 
 use crate::device::Device;
-use crate::emulation::Emulation;
+use crate::emulation::{Emulation, Objects};
 use crate::hooks::site::call;
 use crate::library::{self, Library};
 use crate::pipeline::{self, Context, Pipeline};
 use crate::render_pass;
+use crate::resolve;
 
 pub(super) unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const vk::AllocationCallbacks<'_>) {
     // SAFETY: see the crate.
@@ -186,6 +188,44 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
     }
 }
 
+pub(super) unsafe extern "system" fn create_shader_module(
+    device: vk::Device,
+    info: *const vk::ShaderModuleCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    module: *mut vk::ShaderModule,
+) -> vk::Result {
+    // SAFETY: see the crate.
+    unsafe {
+        call(device, |own| {
+            let result = (own.next.fp_v1_0().create_shader_module)(device, info, allocator, module);
+            if let (Some(emulation), vk::Result::SUCCESS) = (&own.emulation, result) {
+                let words = slice((*info).p_code, ((*info).code_size / 4) as u32);
+                if resolve::has_fragment_shader(words) {
+                    emulation.objects_mut().shaders.insert(*module, words.into());
+                }
+            }
+            result
+        })
+    }
+}
+
+pub(super) unsafe extern "system" fn destroy_shader_module(
+    device: vk::Device,
+    module: vk::ShaderModule,
+    allocator: *const vk::AllocationCallbacks<'_>,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let _ = call(device, |own| {
+            if let Some(emulation) = &own.emulation {
+                emulation.objects_mut().shaders.remove(&module);
+            }
+            own.next.destroy_shader_module(module, allocator.as_ref());
+            vk::Result::SUCCESS
+        });
+    }
+}
+
 pub(super) unsafe extern "system" fn destroy_pipeline_layout(
     device: vk::Device,
     layout: vk::PipelineLayout,
@@ -250,6 +290,20 @@ pub(super) unsafe extern "system" fn destroy_render_pass(
     }
 }
 
+/// The words of the fragment shaders that a pipeline is created with.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn shaders_of(
+    objects: &Objects,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> HashMap<vk::ShaderModule, Arc<[u32]>> {
+    // SAFETY: the caller's promise.
+    let stages = unsafe { slice(info.p_stages, info.stage_count) };
+    let modules = stages.iter().map(|stage| stage.module);
+    modules.filter_map(|module| Some((module, Arc::clone(objects.shaders.get(&module)?)))).collect()
+}
+
 /// Creates a pipeline: of Gaussians or not, whole or linked from libraries, or a library.
 ///
 /// # Safety
@@ -275,7 +329,8 @@ unsafe fn create_graphics_pipeline(
             let linked: Vec<Arc<Library>> =
                 libraries.iter().filter_map(|library| objects.libraries.get(library)).cloned().collect();
             drop(objects);
-            let parts = Library::new(info, &linked);
+            let shaders = shaders_of(&emulation.objects(), info);
+            let parts = Library::new(info, &linked, &shaders);
             if is_library {
                 let result = if parts.is_gaussian() {
                     library::empty(&own.next, allocator).map_or_else(
@@ -328,9 +383,17 @@ unsafe fn create_gaussian_pipeline(
     let known = objects.render_passes.get(&info.render_pass);
     let view_mask = known.and_then(|known| known.view_masks.get(info.subpass as usize)).copied();
     let set_layouts = objects.layouts.get(&info.layout).cloned().unwrap_or_default();
+    // SAFETY: the caller's promise.
+    let shaders = unsafe { shaders_of(&objects, info) };
     drop(objects);
-    let context =
-        Context { next: &own.next, kernels: emulation.kernels()?, view_mask, set_layouts: &set_layouts, cache };
+    let context = Context {
+        next: &own.next,
+        kernels: emulation.kernels()?,
+        view_mask,
+        set_layouts: &set_layouts,
+        shaders: &shaders,
+        cache,
+    };
     // SAFETY: the caller's promise.
     unsafe { pipeline::create(&context, info, state, allocator) }
 }

@@ -37,6 +37,8 @@ gaurast_layer_interface::hooks! {
     destroy_framebuffer
     create_descriptor_set_layout
     destroy_descriptor_set_layout
+    create_shader_module
+    destroy_shader_module
     create_pipeline_layout
     destroy_pipeline_layout
     create_render_pass
