@@ -10,110 +10,136 @@ use crate::made::Covering;
 
 /// Opcodes of SPIR-V.
 mod op {
-    pub(super) const EXTENSION: u32 = 10;
-    pub(super) const EXT_INST_IMPORT: u32 = 11;
-    pub(super) const EXT_INST: u32 = 12;
-    pub(super) const MEMORY_MODEL: u32 = 14;
-    pub(super) const ENTRY_POINT: u32 = 15;
-    pub(super) const EXECUTION_MODE: u32 = 16;
-    pub(super) const CAPABILITY: u32 = 17;
-    pub(super) const TYPE_BOOL: u32 = 20;
-    pub(super) const TYPE_INT: u32 = 21;
-    pub(super) const TYPE_FLOAT: u32 = 22;
-    pub(super) const TYPE_VECTOR: u32 = 23;
-    pub(super) const TYPE_MATRIX: u32 = 24;
-    pub(super) const TYPE_ARRAY: u32 = 28;
-    pub(super) const TYPE_RUNTIME_ARRAY: u32 = 29;
-    pub(super) const TYPE_STRUCT: u32 = 30;
-    pub(super) const TYPE_POINTER: u32 = 32;
-    pub(super) const CONSTANT: u32 = 43;
-    pub(super) const CONSTANT_NULL: u32 = 46;
-    pub(super) const FUNCTION: u32 = 54;
-    pub(super) const FUNCTION_END: u32 = 56;
-    pub(super) const FUNCTION_CALL: u32 = 57;
-    pub(super) const VARIABLE: u32 = 59;
-    pub(super) const LOAD: u32 = 61;
-    pub(super) const STORE: u32 = 62;
-    pub(super) const ACCESS_CHAIN: u32 = 65;
-    pub(super) const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
-    pub(super) const DECORATE: u32 = 71;
-    pub(super) const MEMBER_DECORATE: u32 = 72;
-    pub(super) const GROUP_DECORATE: u32 = 74;
-    pub(super) const GROUP_MEMBER_DECORATE: u32 = 75;
-    pub(super) const VECTOR_SHUFFLE: u32 = 79;
-    pub(super) const COMPOSITE_CONSTRUCT: u32 = 80;
-    pub(super) const COMPOSITE_EXTRACT: u32 = 81;
-    pub(super) const COPY_OBJECT: u32 = 83;
-    pub(super) const CONVERT_F_TO_U: u32 = 109;
-    pub(super) const BITCAST: u32 = 124;
-    pub(super) const I_ADD: u32 = 128;
-    pub(super) const I_SUB: u32 = 130;
-    pub(super) const I_MUL: u32 = 132;
-    pub(super) const ALL: u32 = 155;
-    pub(super) const LOGICAL_OR: u32 = 166;
-    pub(super) const LOGICAL_AND: u32 = 167;
-    pub(super) const LOGICAL_NOT: u32 = 168;
-    pub(super) const SELECT: u32 = 169;
-    pub(super) const I_EQUAL: u32 = 170;
-    pub(super) const I_NOT_EQUAL: u32 = 171;
-    pub(super) const U_LESS_THAN: u32 = 176;
-    pub(super) const F_ORD_GREATER_THAN_EQUAL: u32 = 190;
-    pub(super) const SHIFT_RIGHT_LOGICAL: u32 = 194;
-    pub(super) const SHIFT_LEFT_LOGICAL: u32 = 196;
-    pub(super) const BITWISE_OR: u32 = 197;
-    pub(super) const BITWISE_AND: u32 = 199;
-    pub(super) const SELECTION_MERGE: u32 = 247;
-    pub(super) const LABEL: u32 = 248;
-    pub(super) const BRANCH: u32 = 249;
-    pub(super) const BRANCH_CONDITIONAL: u32 = 250;
-    pub(super) const RETURN: u32 = 253;
-    pub(super) const EXECUTION_MODE_ID: u32 = 331;
-    pub(super) const DEMOTE_TO_HELPER_INVOCATION: u32 = 5380;
+    use spirv::Op;
+
+    pub(super) const SOURCE_CONTINUED: u32 = Op::SourceContinued as u32;
+    pub(super) const STRING: u32 = Op::String as u32;
+    pub(super) const MODULE_PROCESSED: u32 = Op::ModuleProcessed as u32;
+    pub(super) const DECORATE_ID: u32 = Op::DecorateId as u32;
+    pub(super) const DECORATE_STRING: u32 = Op::DecorateString as u32;
+    pub(super) const MEMBER_DECORATE_STRING: u32 = Op::MemberDecorateString as u32;
+    pub(super) const EXTENSION: u32 = Op::Extension as u32;
+    pub(super) const EXT_INST_IMPORT: u32 = Op::ExtInstImport as u32;
+    pub(super) const EXT_INST: u32 = Op::ExtInst as u32;
+    pub(super) const MEMORY_MODEL: u32 = Op::MemoryModel as u32;
+    pub(super) const ENTRY_POINT: u32 = Op::EntryPoint as u32;
+    pub(super) const EXECUTION_MODE: u32 = Op::ExecutionMode as u32;
+    pub(super) const CAPABILITY: u32 = Op::Capability as u32;
+    pub(super) const TYPE_BOOL: u32 = Op::TypeBool as u32;
+    pub(super) const TYPE_INT: u32 = Op::TypeInt as u32;
+    pub(super) const TYPE_FLOAT: u32 = Op::TypeFloat as u32;
+    pub(super) const TYPE_VECTOR: u32 = Op::TypeVector as u32;
+    pub(super) const TYPE_MATRIX: u32 = Op::TypeMatrix as u32;
+    pub(super) const TYPE_ARRAY: u32 = Op::TypeArray as u32;
+    pub(super) const TYPE_RUNTIME_ARRAY: u32 = Op::TypeRuntimeArray as u32;
+    pub(super) const TYPE_STRUCT: u32 = Op::TypeStruct as u32;
+    pub(super) const TYPE_POINTER: u32 = Op::TypePointer as u32;
+    pub(super) const CONSTANT: u32 = Op::Constant as u32;
+    pub(super) const CONSTANT_NULL: u32 = Op::ConstantNull as u32;
+    pub(super) const SPEC_CONSTANT: u32 = Op::SpecConstant as u32;
+    pub(super) const FUNCTION: u32 = Op::Function as u32;
+    pub(super) const FUNCTION_END: u32 = Op::FunctionEnd as u32;
+    pub(super) const FUNCTION_CALL: u32 = Op::FunctionCall as u32;
+    pub(super) const VARIABLE: u32 = Op::Variable as u32;
+    pub(super) const LOAD: u32 = Op::Load as u32;
+    pub(super) const STORE: u32 = Op::Store as u32;
+    pub(super) const ACCESS_CHAIN: u32 = Op::AccessChain as u32;
+    pub(super) const IN_BOUNDS_ACCESS_CHAIN: u32 = Op::InBoundsAccessChain as u32;
+    pub(super) const DECORATE: u32 = Op::Decorate as u32;
+    pub(super) const MEMBER_DECORATE: u32 = Op::MemberDecorate as u32;
+    pub(super) const GROUP_DECORATE: u32 = Op::GroupDecorate as u32;
+    pub(super) const GROUP_MEMBER_DECORATE: u32 = Op::GroupMemberDecorate as u32;
+    pub(super) const VECTOR_SHUFFLE: u32 = Op::VectorShuffle as u32;
+    pub(super) const COMPOSITE_CONSTRUCT: u32 = Op::CompositeConstruct as u32;
+    pub(super) const COMPOSITE_EXTRACT: u32 = Op::CompositeExtract as u32;
+    pub(super) const COPY_OBJECT: u32 = Op::CopyObject as u32;
+    pub(super) const CONVERT_F_TO_U: u32 = Op::ConvertFToU as u32;
+    pub(super) const BITCAST: u32 = Op::Bitcast as u32;
+    pub(super) const I_ADD: u32 = Op::IAdd as u32;
+    pub(super) const I_SUB: u32 = Op::ISub as u32;
+    pub(super) const I_MUL: u32 = Op::IMul as u32;
+    pub(super) const ALL: u32 = Op::All as u32;
+    pub(super) const LOGICAL_OR: u32 = Op::LogicalOr as u32;
+    pub(super) const LOGICAL_AND: u32 = Op::LogicalAnd as u32;
+    pub(super) const LOGICAL_NOT: u32 = Op::LogicalNot as u32;
+    pub(super) const SELECT: u32 = Op::Select as u32;
+    pub(super) const I_EQUAL: u32 = Op::IEqual as u32;
+    pub(super) const I_NOT_EQUAL: u32 = Op::INotEqual as u32;
+    pub(super) const U_LESS_THAN: u32 = Op::ULessThan as u32;
+    pub(super) const F_ORD_GREATER_THAN_EQUAL: u32 = Op::FOrdGreaterThanEqual as u32;
+    pub(super) const SHIFT_RIGHT_LOGICAL: u32 = Op::ShiftRightLogical as u32;
+    pub(super) const SHIFT_LEFT_LOGICAL: u32 = Op::ShiftLeftLogical as u32;
+    pub(super) const BITWISE_OR: u32 = Op::BitwiseOr as u32;
+    pub(super) const BITWISE_AND: u32 = Op::BitwiseAnd as u32;
+    pub(super) const SELECTION_MERGE: u32 = Op::SelectionMerge as u32;
+    pub(super) const LABEL: u32 = Op::Label as u32;
+    pub(super) const BRANCH: u32 = Op::Branch as u32;
+    pub(super) const BRANCH_CONDITIONAL: u32 = Op::BranchConditional as u32;
+    pub(super) const RETURN: u32 = Op::Return as u32;
+    pub(super) const EXECUTION_MODE_ID: u32 = Op::ExecutionModeId as u32;
+    pub(super) const DEMOTE_TO_HELPER_INVOCATION: u32 = Op::DemoteToHelperInvocation as u32;
 }
 
 /// Storage classes.
-const INPUT: u32 = 1;
-const OUTPUT: u32 = 3;
-const PRIVATE: u32 = 6;
-const PHYSICAL_STORAGE_BUFFER: u32 = 5349;
+const INPUT: u32 = spirv::StorageClass::Input as u32;
+const OUTPUT: u32 = spirv::StorageClass::Output as u32;
+const PRIVATE: u32 = spirv::StorageClass::Private as u32;
+const PHYSICAL_STORAGE_BUFFER: u32 = spirv::StorageClass::PhysicalStorageBuffer as u32;
 
 /// Decorations.
-const BLOCK: u32 = 2;
-const ARRAY_STRIDE: u32 = 6;
-const BUILT_IN: u32 = 11;
-const FLAT: u32 = 14;
-const NON_WRITABLE: u32 = 24;
-const LOCATION: u32 = 30;
-const COMPONENT: u32 = 31;
-const OFFSET: u32 = 35;
-/// Those that belong to a variable of an interface: `BuiltIn`, `NoPerspective`, `Flat`, `Centroid`, `Sample`, `Location`, `Component`.
-const OF_INTERFACES: [u32; 7] = [BUILT_IN, 13, FLAT, 16, 17, LOCATION, COMPONENT];
+const BLOCK: u32 = spirv::Decoration::Block as u32;
+const ARRAY_STRIDE: u32 = spirv::Decoration::ArrayStride as u32;
+const BUILT_IN: u32 = spirv::Decoration::BuiltIn as u32;
+const FLAT: u32 = spirv::Decoration::Flat as u32;
+const NON_WRITABLE: u32 = spirv::Decoration::NonWritable as u32;
+const LOCATION: u32 = spirv::Decoration::Location as u32;
+const COMPONENT: u32 = spirv::Decoration::Component as u32;
+const OFFSET: u32 = spirv::Decoration::Offset as u32;
+/// Those that belong to a variable of an interface.
+const OF_INTERFACES: [u32; 7] = [
+    BUILT_IN,
+    spirv::Decoration::NoPerspective as u32,
+    FLAT,
+    spirv::Decoration::Centroid as u32,
+    spirv::Decoration::Sample as u32,
+    LOCATION,
+    COMPONENT,
+];
 
 /// Built-ins.
-const PRIMITIVE_ID: u32 = 7;
-const LAYER: u32 = 9;
-const VIEWPORT_INDEX: u32 = 10;
-const FRAG_COORD: u32 = 15;
-const POINT_COORD: u32 = 16;
-const FRONT_FACING: u32 = 17;
-const SAMPLE_ID: u32 = 18;
-const SAMPLE_POSITION: u32 = 19;
-const SAMPLE_MASK: u32 = 20;
-const FRAG_DEPTH: u32 = 22;
-const HELPER_INVOCATION: u32 = 23;
-const VIEW_INDEX: u32 = 4440;
+const PRIMITIVE_ID: u32 = spirv::BuiltIn::PrimitiveId as u32;
+const LAYER: u32 = spirv::BuiltIn::Layer as u32;
+const VIEWPORT_INDEX: u32 = spirv::BuiltIn::ViewportIndex as u32;
+const FRAG_COORD: u32 = spirv::BuiltIn::FragCoord as u32;
+const POINT_COORD: u32 = spirv::BuiltIn::PointCoord as u32;
+const FRONT_FACING: u32 = spirv::BuiltIn::FrontFacing as u32;
+const SAMPLE_ID: u32 = spirv::BuiltIn::SampleId as u32;
+const SAMPLE_POSITION: u32 = spirv::BuiltIn::SamplePosition as u32;
+const SAMPLE_MASK: u32 = spirv::BuiltIn::SampleMask as u32;
+const FRAG_DEPTH: u32 = spirv::BuiltIn::FragDepth as u32;
+const HELPER_INVOCATION: u32 = spirv::BuiltIn::HelperInvocation as u32;
+const VIEW_INDEX: u32 = spirv::BuiltIn::ViewIndex as u32;
 
 /// Execution modes.
-const EARLY_FRAGMENT_TESTS: u32 = 9;
-const DEPTH_REPLACING: u32 = 12;
-/// `DepthGreater`, `DepthLess`, `DepthUnchanged`.
-const DEPTH_MODES: [u32; 3] = [14, 15, 16];
+const EARLY_FRAGMENT_TESTS: u32 = spirv::ExecutionMode::EarlyFragmentTests as u32;
+const DEPTH_REPLACING: u32 = spirv::ExecutionMode::DepthReplacing as u32;
+/// Those that say how a shader changes depths.
+const DEPTH_MODES: [u32; 3] = [
+    spirv::ExecutionMode::DepthGreater as u32,
+    spirv::ExecutionMode::DepthLess as u32,
+    spirv::ExecutionMode::DepthUnchanged as u32,
+];
 
 /// Opcodes that read the pixels beside: derivatives, implicit levels of detail, and exchanges within quads.
-const BESIDE: [std::ops::RangeInclusive<u32>; 4] = [207..=215, 87..=97, 305..=315, 365..=366];
+const BESIDE: [std::ops::RangeInclusive<u32>; 4] = [
+    spirv::Op::DPdx as u32..=spirv::Op::FwidthCoarse as u32,
+    spirv::Op::ImageSampleImplicitLod as u32..=spirv::Op::ImageDrefGather as u32,
+    spirv::Op::ImageSparseSampleImplicitLod as u32..=spirv::Op::ImageSparseDrefGather as u32,
+    spirv::Op::GroupNonUniformQuadBroadcast as u32..=spirv::Op::GroupNonUniformQuadSwap as u32,
+];
 
 /// The execution model of fragment shaders.
-const FRAGMENT: u32 = 4;
+const FRAGMENT: u32 = spirv::ExecutionModel::Fragment as u32;
 
 /// A fragment shader, and what its pipeline does.
 pub(crate) struct Request<'a> {
@@ -263,8 +289,11 @@ impl Module {
             }
             op::EXECUTION_MODE | op::EXECUTION_MODE_ID => self.modes.push(owned),
             // Sources, names, strings and processes.
-            2..=7 | 330 => self.debug.push(owned),
-            op::DECORATE..=op::GROUP_MEMBER_DECORATE | 332 | 5632 | 5633 => self.annotations.push(owned),
+            op::SOURCE_CONTINUED..=op::STRING | op::MODULE_PROCESSED => self.debug.push(owned),
+            op::DECORATE..=op::GROUP_MEMBER_DECORATE
+            | op::DECORATE_ID
+            | op::DECORATE_STRING
+            | op::MEMBER_DECORATE_STRING => self.annotations.push(owned),
             op::FUNCTION => self.functions.push(owned),
             _ => {
                 self.learn(instruction);
@@ -281,7 +310,7 @@ impl Module {
             (op::TYPE_MATRIX, [_, id, of, count]) => self.know(*id, Type::Matrix(*of, *count)),
             (op::TYPE_ARRAY, [_, id, of, count]) => self.know(*id, Type::Array(*of, *count)),
             (op::TYPE_STRUCT, [_, id, members @ ..]) => self.know(*id, Type::Structure(members.to_vec())),
-            (op::CONSTANT | 50, [_, _, id, value]) => {
+            (op::CONSTANT | op::SPEC_CONSTANT, [_, _, id, value]) => {
                 self.constants.insert(*id, *value);
             }
             _ => {}
@@ -828,7 +857,7 @@ pub(crate) fn rewrite(request: &Request<'_>) -> Result<Rewritten, String> {
     let tells_samples = request.may_be_tested && request.samples > 1;
     make_private(&mut module, &inputs.all)?;
     if module.memory_model[1] == 0 {
-        module.memory_model[1] = 5348;
+        module.memory_model[1] = spirv::AddressingModel::PhysicalStorageBuffer64 as u32;
     }
     // PhysicalStorageBufferAddresses, DemoteToHelperInvocation.
     module.need(5347);
