@@ -8,7 +8,7 @@ mod vectors;
 use fearless_simd::Simd;
 
 use super::batch::Batch;
-use super::cross_lane::{identity, subgroup_by_lane};
+use super::cross_lane::{combine, identity, subgroup_by_lane};
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, Type, VECTOR_LANES};
@@ -129,33 +129,22 @@ fn truth(value: bool) -> u32 {
     if value { u32::MAX } else { 0 }
 }
 
-/// Evaluates an expression with the function of an associative operation. Each is compiled on its own. Only sums that do
-/// not depend on their order may be formed in another one.
+/// Evaluates an expression with the function of an associative operation. Those whose order matters are compiled each on
+/// its own: [`vectors`] has the others, except of subgroups smaller than a vector.
 macro_rules! with_operation {
-    ($op:expr, |$combine:ident, $any_order:ident| $body:expr) => {{
+    ($op:expr, |$combine:ident| $body:expr) => {{
         macro_rules! each {
-            ($f:expr, $order:expr) => {{
+            ($f:expr) => {{
                 let $combine = $f;
-                let $any_order: bool = $order;
                 $body
             }};
         }
         match $op {
-            Op::BAnd | Op::And => each!(|a: u32, b: u32| a & b, true),
-            Op::BOr | Op::Or => each!(|a: u32, b: u32| a | b, true),
-            Op::BXor | Op::Xor => each!(|a: u32, b: u32| a ^ b, true),
-            Op::IAdd => each!(|a: u32, b: u32| a.wrapping_add(b), true),
-            Op::IMul => each!(|a: u32, b: u32| a.wrapping_mul(b), true),
-            Op::SMin => each!(|a: u32, b: u32| a.cast_signed().min(b.cast_signed()).cast_unsigned(), true),
-            Op::SMax => each!(|a: u32, b: u32| a.cast_signed().max(b.cast_signed()).cast_unsigned(), true),
-            Op::UMin => each!(|a: u32, b: u32| a.min(b), true),
-            Op::UMax => each!(|a: u32, b: u32| a.max(b), true),
-            Op::FAdd => each!(|a: u32, b: u32| (f32::from_bits(a) + f32::from_bits(b)).to_bits(), false),
-            Op::FMul => each!(|a: u32, b: u32| (f32::from_bits(a) * f32::from_bits(b)).to_bits(), false),
-            Op::FMin => each!(|a: u32, b: u32| least(f32::from_bits(a), f32::from_bits(b)).to_bits(), false),
-            Op::FMax => each!(|a: u32, b: u32| greatest(f32::from_bits(a), f32::from_bits(b)).to_bits(), false),
-            // Validation allows no other operation of 32 bits.
-            _ => each!(|a: u32, _: u32| a, false),
+            Op::FAdd => each!(|a: u32, b: u32| (f32::from_bits(a) + f32::from_bits(b)).to_bits()),
+            Op::FMul => each!(|a: u32, b: u32| (f32::from_bits(a) * f32::from_bits(b)).to_bits()),
+            Op::FMin => each!(|a: u32, b: u32| least(f32::from_bits(a), f32::from_bits(b)).to_bits()),
+            Op::FMax => each!(|a: u32, b: u32| greatest(f32::from_bits(a), f32::from_bits(b)).to_bits()),
+            op => each!(|a: u32, b: u32| combine(op, u64::from(a), u64::from(b)) as u32),
         }
     }};
 }
@@ -246,17 +235,13 @@ impl Subgroup<'_> {
     #[inline(always)]
     fn reduce(&self, op: Op, cluster: usize, out: &mut [u32]) {
         let none = identity(op) as u32;
-        with_operation!(op, |combine, any_order| {
+        with_operation!(op, |combine| {
             for (number, out) in out.chunks_mut(cluster).enumerate() {
                 let start = number * cluster;
                 let values = &self.values[start..start + out.len()];
                 let mut rest = self.active >> start & ones(out.len());
                 let mut total = none;
-                if any_order {
-                    for (lane, value) in values.iter().enumerate() {
-                        total = combine(total, if rest >> lane & 1 != 0 { *value } else { none });
-                    }
-                } else if rest != 0 {
+                if rest != 0 {
                     total = values[rest.trailing_zeros() as usize];
                     rest &= rest - 1;
                     while rest != 0 {
@@ -272,7 +257,7 @@ impl Subgroup<'_> {
     #[inline(always)]
     fn scan(&self, op: Op, inclusive: bool, out: &mut [u32]) {
         let none = identity(op) as u32;
-        with_operation!(op, |combine, _any_order| {
+        with_operation!(op, |combine| {
             let (mut sum, mut is_first) = (none, true);
             for (lane, (out, value)) in out.iter_mut().zip(self.values).enumerate() {
                 *out = 0;

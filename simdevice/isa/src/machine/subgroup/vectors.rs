@@ -97,11 +97,9 @@ pub(super) fn run<S: Simd>(
             let cluster = (cluster as usize).min(size);
             with_any_order!(op, Combined => each!(|group| group.reduce::<Combined>(dst[0], op, cluster)))
         }
-        SubgroupOp::InclusiveScan(op) => {
-            with_any_order!(op, Combined => each!(|group| group.scan::<Combined>(dst[0], op, true)))
-        }
-        SubgroupOp::ExclusiveScan(op) => {
-            with_any_order!(op, Combined => each!(|group| group.scan::<Combined>(dst[0], op, false)))
+        SubgroupOp::InclusiveScan(scanned) | SubgroupOp::ExclusiveScan(scanned) => {
+            let inclusive = op == SubgroupOp::InclusiveScan(scanned);
+            with_any_order!(scanned, Combined => each!(|group| group.scan::<Combined>(dst[0], scanned, inclusive)))
         }
         SubgroupOp::QuadBroadcast | SubgroupOp::QuadSwap => false,
     }
