@@ -62,7 +62,7 @@ fn places<S: Simd>(simd: S, surface: &Surface, level: &PackedLevel, request: &Te
         if let Some(number) = number {
             let coordinate = u32x16::simd_from(simd, request.coordinate[number]);
             is_inside &= coordinate.simd_lt(splat(size));
-            index = index + coordinate * splat(pitch);
+            index += coordinate * splat(pitch);
         }
     }
     let inside = is_inside.to_bitmask() as u16 & request.mask;

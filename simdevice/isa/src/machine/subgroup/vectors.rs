@@ -230,7 +230,7 @@ impl<S: Simd> Group<'_, S> {
             *values = exchanged(self.active_values(vector, zero), mask);
         }
         for (number, vector) in self.vectors.clone().enumerate() {
-            let from = number ^ mask / VECTOR_LANES;
+            let from = number ^ (mask / VECTOR_LANES);
             self.set(dst, vector, if from < self.vectors.len() { values[from] } else { zero });
         }
     }
