@@ -105,6 +105,38 @@ pub(super) fn to_unorm8(value: f32) -> u8 {
     to_unorm(value, 8) as u8
 }
 
+/// The results of [`to_unorm8`] for four numbers, in binary32: the compiler makes vectors of this.
+pub(super) fn to_unorm8x4(values: [f32; 4]) -> [u8; 4] {
+    // At this magnitude binary32 has no bits for a fraction.
+    const NO_FRACTION: f32 = 8_388_608.0;
+    let mut codes = [0; 4];
+    for c in 0..4 {
+        let value = if values[c] > 0.0 { values[c].min(1.0) } else { 0.0 };
+        // 255 v = 256 v - v. The first term is exact, so that its nearest integer is the result or one more.
+        let scaled = value * 256.0;
+        let rounded = scaled + NO_FRACTION;
+        let excess = (scaled - (rounded - NO_FRACTION) + 0.5) - value;
+        codes[c] = (rounded.to_bits() - u32::from(excess < 0.0)) as u8;
+    }
+    codes
+}
+
+/// Four numbers from 0 to 1 of a word: three of ten bits, from the least significant one, and one of two.
+pub(super) fn from_unorm10(word: u32) -> [f32; 4] {
+    let codes = [word & 0x3FF, word >> 10 & 0x3FF, word >> 20 & 0x3FF, word >> 30];
+    let greatest = [1023.0, 1023.0, 1023.0, 3.0];
+    let mut numbers = [0.0; 4];
+    for c in 0..4 {
+        numbers[c] = codes[c].cast_signed() as f32 / greatest[c];
+    }
+    numbers
+}
+
+/// The inverse of [`from_unorm10`].
+pub(super) fn to_unorm10([x, y, z, w]: [f32; 4]) -> u32 {
+    to_unorm(x, 10) | to_unorm(y, 10) << 10 | to_unorm(z, 10) << 20 | to_unorm(w, 2) << 30
+}
+
 /// Decodes sRGB: R, G and B by the transfer function, A linearly.
 pub(super) fn from_srgb8([r, g, b, a]: [u8; 4]) -> [f32; 4] {
     let linear = &SRGB.linear;

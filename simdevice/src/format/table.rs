@@ -255,6 +255,17 @@ impl Format {
             Self::B8G8R8A8Srgb => {
                 decode_each(bytes, out, |[b, g, r, a]| convert::from_srgb8([r, g, b, a]));
             }
+            Self::R8Unorm => decode_each(bytes, out, |[r]: [u8; 1]| [convert::from_unorm8(r), 0.0, 0.0, 1.0]),
+            Self::R8G8Unorm => {
+                decode_each(bytes, out, |[r, g]| [convert::from_unorm8(r), convert::from_unorm8(g), 0.0, 1.0]);
+            }
+            Self::A2B10G10R10UnormPack32 => {
+                decode_each(bytes, out, |texel| convert::from_unorm10(u32::from_le_bytes(texel)));
+            }
+            Self::A2R10G10B10UnormPack32 => decode_each(bytes, out, |texel| {
+                let [b, g, r, a] = convert::from_unorm10(u32::from_le_bytes(texel));
+                [r, g, b, a]
+            }),
             Self::R16G16B16A16Sfloat => {
                 let (texels, _) = bytes.as_chunks::<8>();
                 convert::from_halves(texels.as_flattened(), out.as_flattened_mut());
@@ -287,9 +298,15 @@ impl Format {
     pub fn encode_row(self, texels: &[[f32; 4]], out: &mut [u8]) {
         match self {
             Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
-                encode_each(texels, out, |texel| texel.map(convert::to_unorm8));
+                encode_each(texels, out, convert::to_unorm8x4);
             }
-            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| [b, g, r, a].map(convert::to_unorm8)),
+            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| convert::to_unorm8x4([b, g, r, a])),
+            Self::R8Unorm => encode_each(texels, out, |[r, ..]| [convert::to_unorm8(r)]),
+            Self::R8G8Unorm => encode_each(texels, out, |[r, g, ..]| [r, g].map(convert::to_unorm8)),
+            Self::A2B10G10R10UnormPack32 => encode_each(texels, out, |texel| convert::to_unorm10(texel).to_le_bytes()),
+            Self::A2R10G10B10UnormPack32 => {
+                encode_each(texels, out, |[r, g, b, a]| convert::to_unorm10([b, g, r, a]).to_le_bytes());
+            }
             Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
                 encode_each(texels, out, convert::to_srgb8);
             }

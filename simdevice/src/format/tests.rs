@@ -104,17 +104,28 @@ fn unorm_rounds_to_nearest_even_and_clamps() {
 
 #[gaurast_runner::test]
 fn fast_rows_agree_with_single_components() {
-    let values = [-0.5, 0.0, 1e-9, 0.001, 0.25, 0.5, 0.7, 1.0, 1.5, f32::INFINITY];
+    let mut values = vec![-0.5, -0.0, 0.0, 1e-9, 0.001, 0.25, 0.5, 0.7, 1.0, 1.5, f32::INFINITY, f32::NEG_INFINITY];
+    // The floats around each code and around the middle between two, for bytes and for ten bits.
+    for halves in [510, 2046] {
+        for half in 0..=halves {
+            let at = (f64::from(half) / f64::from(halves)) as f32;
+            values.extend((-3..=3).map(|step| f32::from_bits(at.to_bits().saturating_add_signed(step))));
+        }
+    }
     for format in [
+        Format::R8Unorm,
+        Format::R8G8Unorm,
         Format::R8G8B8A8Unorm,
         Format::B8G8R8A8Unorm,
+        Format::A2B10G10R10UnormPack32,
+        Format::A2R10G10B10UnormPack32,
         Format::R8G8B8A8Srgb,
         Format::B8G8R8A8Srgb,
         Format::R16G16B16A16Sfloat,
         Format::R32G32B32A32Sfloat,
         Format::R32G32B32Sfloat,
     ] {
-        for x in values {
+        for &x in &values {
             let texel = [x, x * 0.5, x * 0.25, x * 0.125];
             let size = format.texel_size();
             let fast = format.encode(texel);

@@ -1,5 +1,9 @@
 //! Cube maps: the face that a direction meets, and the texels across an edge.
 
+use crate::simd::floats_of;
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+use isa::resources::LaneWords;
+
 /// The point in which a direction meets the cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
@@ -66,6 +70,30 @@ impl Hit {
     }
 }
 
+/// The results of [`Hit::new`] and [`Hit::coordinates`] for 16 directions: faces, and s and t from 0 to 1.
+#[inline(always)]
+pub(super) fn faces<S: Simd>(simd: S, direction: [LaneWords; 3]) -> (u32x16<S>, f32x16<S>, f32x16<S>) {
+    let [x, y, z] = direction;
+    let (x, y, z) = (u32x16::simd_from(simd, x), u32x16::simd_from(simd, y), u32x16::simd_from(simd, z));
+    // Changing a sign is exact, also that of a NaN.
+    let sign = u32x16::splat(simd, 1 << 31);
+    let (far_x, far_y, far_z) = (floats_of(x & !sign), floats_of(y & !sign), floats_of(z & !sign));
+    let along_z: mask32x16<S> = far_z.simd_ge(far_x) & far_z.simd_ge(far_y);
+    let along_y: mask32x16<S> = far_y.simd_ge(far_x);
+    let component = along_z.select(z, along_y.select(y, x));
+    let is_negative: mask32x16<S> = floats_of(component).simd_lt(f32x16::splat(simd, 0.0));
+    let zero = u32x16::splat(simd, 0);
+    // The components are negated on faces of negative directions.
+    let flip = is_negative.select(sign, zero);
+    let other = flip ^ sign;
+    let sc = floats_of(along_z.select(x ^ flip, along_y.select(x, z ^ other)));
+    let tc = floats_of(along_z.select(y ^ sign, along_y.select(z ^ flip, y ^ sign)));
+    let major = floats_of(component ^ flip);
+    let axis = along_z.select(u32x16::splat(simd, 4), along_y.select(u32x16::splat(simd, 2), zero));
+    let face = axis + is_negative.select(u32x16::splat(simd, 1), zero);
+    (face, sc / major * 0.5 + 0.5, tc / major * 0.5 + 0.5)
+}
+
 /// The face and texel for (i, j), of which one coordinate is a texel outside of `face`, which has `size` texels per
 /// side.
 fn across_edge(face: u32, [i, j]: [i32; 2], size: u32) -> (u32, [u32; 2]) {
@@ -100,6 +128,12 @@ pub(super) fn texels(face: u32, at: [i32; 2], size: u32) -> ([(u32, [u32; 2]); 3
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::token_of;
+    use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
+    use rand::seq::IndexedRandom;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     /// A texel's centre as a point on the cube of half side `size`.
     fn center(face: u32, [i, j]: [u32; 2], size: u32) -> [f32; 3] {
@@ -123,6 +157,34 @@ mod tests {
         }
         assert_eq!(Hit::new([1.0, 1.0, -1.0]).face, 5);
         assert_eq!(Hit::new([1.0, -1.0, 0.0]).face, 3);
+    }
+
+    #[gaurast_runner::test(each = simd_levels())]
+    fn sixteen_directions_meet_what_each_meets(case: &Case) {
+        let level = token_of(case);
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        for round in 0..4000 {
+            let direction: [LaneWords; 3] = [(); 3].map(|()| {
+                std::array::from_fn(|_| match (round + rng.random_range(0..2)) % 8 {
+                    0 => rng.random(),
+                    1 => *[0.0, -0.0, 1.0, -1.0, f32::NAN, f32::INFINITY].choose(&mut rng).unwrap(),
+                    _ => rng.random_range(-1.0..1.0_f32),
+                })
+                .map(f32::to_bits)
+            });
+            let (face, s, t): (LaneWords, [f32; 16], [f32; 16]) = dispatch!(level, simd => {
+                let (face, s, t) = faces(simd, direction);
+                (face.into(), s.into(), t.into())
+            });
+            for lane in 0..16 {
+                let hit = Hit::new(direction.map(|lanes| f32::from_bits(lanes[lane])));
+                assert_eq!(face[lane], hit.face, "{direction:?}");
+                for (found, expected) in [s[lane], t[lane]].into_iter().zip(hit.coordinates()) {
+                    let same = found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan();
+                    assert!(same, "{direction:?}, {lane}");
+                }
+            }
+        }
     }
 
     #[gaurast_runner::test]

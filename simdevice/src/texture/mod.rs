@@ -7,8 +7,10 @@
 //!
 //! An anisotropic sample (`anisotropy`) is the mean of several isotropic ones. There are two implementations of those:
 //! lane by lane (`scalar`), which supports everything, and 16 lanes at once (`vector`), which supports the common
-//! formats. They agree bit for bit, at every SIMD level.
+//! formats. Single texels are read and written lane by lane or 16 at once too (`access`). They agree bit for bit, at every
+//! SIMD level.
 
+mod access;
 mod addressing;
 mod anisotropy;
 mod cube;

@@ -1,6 +1,6 @@
 //! Image accesses lane by lane: samples and gathers of any format, shape and sampler, fetches, reads, writes and
-//! atomics. [`super::vector`] takes common samples faster, with the same bits. All accesses are bounds-checked: texels
-//! outside are read as zero, and writes to them are ignored.
+//! atomics. [`super::vector`] takes common samples faster, and [`super::access`] common reads and writes, with the same
+//! bits. All accesses are bounds-checked: texels outside are read as zero, and writes to them are ignored.
 
 use super::addressing::{self, Taps};
 use super::cube;

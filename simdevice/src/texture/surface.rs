@@ -149,16 +149,46 @@ impl Surface {
                 layer_pitch: texels(level.layer_pitch)?,
             })
         });
+        Some(VectorLayout {
+            codec,
+            words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
+            levels: levels.collect::<Option<_>>()?,
+            order: self.stored_order(),
+            is_filterable: !self.is_integer(),
+        })
+    }
+
+    /// The index of the stored component for red, green, blue and alpha.
+    fn stored_order(&self) -> [usize; 4] {
         let components = self.format.components();
         let position = |channel: Channel, otherwise: usize| {
             let found = components.iter().position(|c| c.channel == channel);
             found.unwrap_or(otherwise)
         };
+        [position(Channel::R, 0), position(Channel::G, 1), position(Channel::B, 2), position(Channel::A, 3)]
+    }
+
+    /// The layout of a buffer for reading 16 texels at a time; `None` if they must be read one by one.
+    fn find_buffer_layout(&self) -> Option<VectorLayout> {
+        let codec = TexelCodec::of(self.format)?;
+        let [level] = self.levels.as_slice() else {
+            return None;
+        };
+        let [texels, ..] = level.extent;
+        let words = (u64::from(texels) * self.texel_size as u64).div_ceil(4);
+        let begin = level.offset / 4;
+        // An incomplete word at the end of the memory is not among its words.
+        let are_words = level.offset.is_multiple_of(4) && begin + words <= self.memory.len() / 4;
+        if !are_words || u32::try_from(words).is_err() {
+            return None;
+        }
+        let size = PackedLevel { extent: level.extent, base: 0, row_pitch: 0, depth_pitch: 0, layer_pitch: 0 };
         Some(VectorLayout {
             codec,
-            words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
-            levels: levels.collect::<Option<_>>()?,
-            order: [position(Channel::R, 0), position(Channel::G, 1), position(Channel::B, 2), position(Channel::A, 3)],
+            words: begin as usize..(begin + words) as usize,
+            levels: vec![size],
+            order: self.stored_order(),
+            is_filterable: false,
         })
     }
 
@@ -171,7 +201,7 @@ impl Surface {
             return None;
         }
         let texels = u32::try_from(range.size / texel_size as u64).unwrap_or(u32::MAX);
-        Some(Self {
+        let mut surface = Self {
             memory: range.memory.clone(),
             format: buffer.format,
             texel_size,
@@ -188,7 +218,9 @@ impl Surface {
             swizzle: IDENTITY,
             layout: None,
             writable: true,
-        })
+        };
+        surface.layout = surface.find_buffer_layout();
+        Some(surface)
     }
 
     /// The byte offset of a texel; `None` if there is no such texel.

@@ -6,7 +6,7 @@ use fearless_simd::Level;
 use super::sampler::{Reduction, Sampler};
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{anisotropy, lod, scalar, vector};
+use super::{access, anisotropy, lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, LaneWords, SampleRequest, TexelRequest};
 
@@ -43,7 +43,7 @@ impl ImageTable {
         }
     }
 
-    /// The same table, but every lane is filtered by itself: slower, with the same bits. For tests.
+    /// The same table, but every lane is filtered, read and written by itself: slower, with the same bits. For tests.
     #[must_use]
     pub fn lane_by_lane(mut self) -> Self {
         self.batched = false;
@@ -71,6 +71,14 @@ impl ImageTable {
         batched.unwrap_or_else(|| scalar::sample(surface, sampler, request))
     }
 
+    /// Reads texels. It has the kernels of all codecs, so there is one copy of it.
+    #[inline(never)]
+    fn read_texels(&self, surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] {
+        let batched =
+            if self.batched { dispatch!(self.level, simd => access::read(simd, surface, request)) } else { None };
+        batched.unwrap_or_else(|| scalar::read(surface, request))
+    }
+
     fn pair(&self, image: u32, sampler: u32) -> Option<(&Surface, &Sampler)> {
         let sampler = self.samplers.get(sampler as usize)?.as_ref()?;
         Some((self.surface(image)?, sampler))
@@ -93,12 +101,15 @@ impl ImageUnit for ImageTable {
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
-        self.surface(image).map_or_else(Default::default, |surface| scalar::read(surface, request))
+        self.surface(image).map_or_else(Default::default, |surface| self.read_texels(surface, request))
     }
 
     fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]) {
         if let Some(surface) = self.surface(image) {
-            scalar::write(surface, request, texel);
+            let written = self.batched && dispatch!(self.level, simd => access::write(simd, surface, request, texel));
+            if !written {
+                scalar::write(surface, request, texel);
+            }
         }
     }
 

@@ -13,6 +13,7 @@ use fearless_simd::{Simd, f32x8, f32x16, i32x8, u32x8, u32x16};
 
 use crate::format::Format;
 use crate::format::unorm8::unorm8_fraction_8;
+use crate::state::CompareOp;
 use isa::ir::VECTOR_LANES;
 use isa::resources::LaneWords;
 
@@ -24,8 +25,11 @@ pub(super) enum TexelCodec {
     Unorm8x4,
     Srgb8x4,
     Unorm16,
+    Float16,
+    Float16x2,
     Float16x4,
     Float32,
+    Float32x2,
     Float32x4,
 }
 
@@ -49,6 +53,8 @@ pub(super) struct VectorLayout {
     pub levels: Vec<PackedLevel>,
     /// The index of the stored component for red, green, blue and alpha.
     pub order: [usize; 4],
+    /// False if texels are only read and written one by one: those of integers, and those of buffers.
+    pub is_filterable: bool,
 }
 
 impl VectorLayout {
@@ -60,7 +66,8 @@ impl VectorLayout {
 }
 
 impl TexelCodec {
-    /// The codec of a format; `None` if its texels must be read one by one.
+    /// The codec of a format; `None` if its texels must be read one by one. Integers of 32 bits are kept as they are, as
+    /// floats of 32 bits are.
     pub fn of(format: Format) -> Option<Self> {
         Some(match format {
             Format::R8Unorm => Self::Unorm8,
@@ -68,9 +75,12 @@ impl TexelCodec {
             Format::R8G8B8A8Unorm | Format::B8G8R8A8Unorm | Format::A8B8G8R8UnormPack32 => Self::Unorm8x4,
             Format::R8G8B8A8Srgb | Format::B8G8R8A8Srgb | Format::A8B8G8R8SrgbPack32 => Self::Srgb8x4,
             Format::R16Unorm | Format::D16Unorm => Self::Unorm16,
+            Format::R16Sfloat => Self::Float16,
+            Format::R16G16Sfloat => Self::Float16x2,
             Format::R16G16B16A16Sfloat => Self::Float16x4,
-            Format::R32Sfloat | Format::D32Sfloat => Self::Float32,
-            Format::R32G32B32A32Sfloat => Self::Float32x4,
+            Format::R32Sfloat | Format::D32Sfloat | Format::R32Uint | Format::R32Sint => Self::Float32,
+            Format::R32G32Sfloat | Format::R32G32Uint | Format::R32G32Sint => Self::Float32x2,
+            Format::R32G32B32A32Sfloat | Format::R32G32B32A32Uint | Format::R32G32B32A32Sint => Self::Float32x4,
             _ => return None,
         })
     }
@@ -94,8 +104,11 @@ macro_rules! for_codec {
             $crate::texture::texels::TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
             $crate::texture::texels::TexelCodec::Srgb8x4 => for_codec!($simd, $kernel, Srgb8x4, $($argument),*),
             $crate::texture::texels::TexelCodec::Unorm16 => for_codec!($simd, $kernel, Unorm16, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float16 => for_codec!($simd, $kernel, Float16, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float16x2 => for_codec!($simd, $kernel, Float16x2, $($argument),*),
             $crate::texture::texels::TexelCodec::Float16x4 => for_codec!($simd, $kernel, Float16x4, $($argument),*),
             $crate::texture::texels::TexelCodec::Float32 => for_codec!($simd, $kernel, Float32, $($argument),*),
+            $crate::texture::texels::TexelCodec::Float32x2 => for_codec!($simd, $kernel, Float32x2, $($argument),*),
             $crate::texture::texels::TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
         }
     };
@@ -112,8 +125,8 @@ impl TexelCodec {
     /// The number of components that are stored.
     pub fn components(self) -> usize {
         match self {
-            Self::Unorm8 | Self::Unorm16 | Self::Float32 => 1,
-            Self::Unorm8x2 => 2,
+            Self::Unorm8 | Self::Unorm16 | Self::Float16 | Self::Float32 => 1,
+            Self::Unorm8x2 | Self::Float16x2 | Self::Float32x2 => 2,
             Self::Unorm8x4 | Self::Srgb8x4 | Self::Float16x4 | Self::Float32x4 => 4,
         }
     }
@@ -164,7 +177,7 @@ fn bilinear<S: Simd, T: Texels>(
         columns: [u32x16::simd_from(simd, rows.x[0]), u32x16::simd_from(simd, rows.x[1])],
         weights: [f32x16::simd_from(simd, *weight_x), f32x16::simd_from(simd, *weight_y)],
     };
-    let texel = around.filter::<T>(simd, words);
+    let texel = around.filter::<T>(simd, words, None);
     let mut out = [[0.0; VECTOR_LANES]; 4];
     for c in 0..T::COMPONENTS {
         out[c] = texel[c].into();
@@ -183,17 +196,31 @@ pub(super) struct Footprint2x2<S: Simd> {
     pub weights: [f32x16<S>; 2],
 }
 
+/// A depth comparison in 16 lanes.
+#[derive(Clone, Copy)]
+pub(super) struct Comparison<S: Simd> {
+    pub op: CompareOp,
+    pub reference: f32x16<S>,
+}
+
 impl<S: Simd> Footprint2x2<S> {
-    /// The weighted mean.
+    /// The weighted mean. If a comparison is given, the first component of each texel is its result, 1 or 0.
     #[inline(always)]
-    pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x16<S>; 4] {
+    pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32], comparison: Option<Comparison<S>>) -> [f32x16<S>; 4] {
         let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
         // Half of the lanes at a time, because most processors have enough registers for those only.
         let (top, bottom) = (top.split(), bottom.split());
         let (left, right) = (left.split(), right.split());
         let (x, y) = (x.split(), y.split());
-        let first = Half { rows: [top.0, bottom.0], columns: [left.0, right.0], weights: [x.0, y.0] };
-        let second = Half { rows: [top.1, bottom.1], columns: [left.1, right.1], weights: [x.1, y.1] };
+        let mut halves = [None; 2];
+        if let Some(Comparison { op, reference }) = comparison {
+            let (first, second) = reference.split();
+            halves = [Some((op, first)), Some((op, second))];
+        }
+        let first =
+            Half { rows: [top.0, bottom.0], columns: [left.0, right.0], weights: [x.0, y.0], comparison: halves[0] };
+        let second =
+            Half { rows: [top.1, bottom.1], columns: [left.1, right.1], weights: [x.1, y.1], comparison: halves[1] };
         let (first, second) = (first.filter::<T>(simd, words), second.filter::<T>(simd, words));
         let mut out = [f32x16::splat(simd, 0.0); 4];
         for c in 0..T::COMPONENTS {
@@ -208,24 +235,51 @@ struct Half<S: Simd> {
     rows: [u32x8<S>; 2],
     columns: [u32x8<S>; 2],
     weights: [f32x8<S>; 2],
+    comparison: Option<(CompareOp, f32x8<S>)>,
 }
 
 impl<S: Simd> Half<S> {
+    /// Texels, compared if that is requested.
+    #[inline(always)]
+    fn load<T: Texels>(&self, simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let mut texels = T::load(simd, words, index);
+        if let Some((op, reference)) = self.comparison {
+            texels[0] = compare(simd, op, reference, texels[0]);
+        }
+        texels
+    }
+
     #[inline(always)]
     fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x8<S>; 4] {
         let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
-        let mut upper = T::load(simd, words, top + left);
-        let other = T::load(simd, words, top + right);
+        let mut upper = self.load::<T>(simd, words, top + left);
+        let other = self.load::<T>(simd, words, top + right);
         for c in 0..T::COMPONENTS {
             upper[c] = upper[c] + x * (other[c] - upper[c]);
         }
-        let mut lower = T::load(simd, words, bottom + left);
-        let other = T::load(simd, words, bottom + right);
+        let mut lower = self.load::<T>(simd, words, bottom + left);
+        let other = self.load::<T>(simd, words, bottom + right);
         for c in 0..T::COMPONENTS {
             lower[c] = lower[c] + x * (other[c] - lower[c]);
             upper[c] = upper[c] + y * (lower[c] - upper[c]);
         }
         upper
+    }
+}
+
+/// 1 where a comparison of the reference with the depth holds, otherwise 0; see [`CompareOp::holds`].
+#[inline(always)]
+fn compare<S: Simd>(simd: S, op: CompareOp, reference: f32x8<S>, depth: f32x8<S>) -> f32x8<S> {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    match op {
+        CompareOp::Never => zero,
+        CompareOp::Less => reference.simd_lt(depth).select(one, zero),
+        CompareOp::Equal => reference.simd_eq(depth).select(one, zero),
+        CompareOp::LessOrEqual => reference.simd_le(depth).select(one, zero),
+        CompareOp::Greater => reference.simd_gt(depth).select(one, zero),
+        CompareOp::NotEqual => reference.simd_eq(depth).select(zero, one),
+        CompareOp::GreaterOrEqual => reference.simd_ge(depth).select(one, zero),
+        CompareOp::Always => one,
     }
 }
 
@@ -343,7 +397,7 @@ impl Texels for Unorm16 {
     }
 }
 
-pub(super) struct Float16x4;
+pub(super) struct Float16;
 
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
@@ -367,6 +421,33 @@ fn float16<S: Simd>(simd: S, bits: u32x8<S>) -> f32x8<S> {
     (magnitude | sign).bitcast()
 }
 
+impl Texels for Float16 {
+    const COMPONENTS: usize = 1;
+    const FINITE: bool = false;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
+        [float16(simd, gather_narrow(simd, words, index, 2)), zero, zero, zero]
+    }
+}
+
+pub(super) struct Float16x2;
+
+impl Texels for Float16x2 {
+    const COMPONENTS: usize = 2;
+    const FINITE: bool = false;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
+        let word = gather(simd, words, index);
+        [float16(simd, word), float16(simd, word >> 16), zero, zero]
+    }
+}
+
+pub(super) struct Float16x4;
+
 impl Texels for Float16x4 {
     const COMPONENTS: usize = 4;
     const FINITE: bool = false;
@@ -389,6 +470,20 @@ impl Texels for Float32 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
         [gather(simd, words, index).bitcast(), zero, zero, zero]
+    }
+}
+
+pub(super) struct Float32x2;
+
+impl Texels for Float32x2 {
+    const COMPONENTS: usize = 2;
+    const FINITE: bool = false;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
+        let first = index * 2;
+        [gather(simd, words, first).bitcast(), gather(simd, words, first + 1).bitcast(), zero, zero]
     }
 }
 
@@ -451,8 +546,11 @@ mod tests {
         agree::<Srgb8x4>(case, Format::R8G8B8A8Srgb, &bytes);
         let halves: Vec<u32> = (0..1 << 16).map(|half| half << 16 | (half ^ 0xFFFF)).collect();
         agree::<Unorm16>(case, Format::R16Unorm, &halves);
+        agree::<Float16>(case, Format::R16Sfloat, &halves);
+        agree::<Float16x2>(case, Format::R16G16Sfloat, &halves);
         agree::<Float16x4>(case, Format::R16G16B16A16Sfloat, &halves);
         agree::<Float32>(case, Format::R32Sfloat, &halves);
+        agree::<Float32x2>(case, Format::R32G32Sfloat, &halves);
         agree::<Float32x4>(case, Format::R32G32B32A32Sfloat, &halves);
     }
 }

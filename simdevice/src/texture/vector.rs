@@ -19,9 +19,9 @@ use super::lod::{self, QUADS, Selection};
 use super::sampler::{AddressMode, Filter, Reduction, Sampler};
 use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
-use super::texels::{Footprint2x2, PackedLevel, Rows, Texels, VectorLayout, for_codec};
+use super::texels::{Comparison, Footprint2x2, PackedLevel, Rows, TexelCodec, Texels, VectorLayout, for_codec};
 use crate::format::Numeric;
-use crate::simd::spread;
+use crate::simd::{bits_of, spread};
 use crate::state::CompareOp;
 use crate::texture::texels::Floats;
 use isa::ir::{Dimension, VECTOR_LANES};
@@ -49,7 +49,7 @@ pub(super) fn general<S: Simd>(
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> Option<[LaneWords; 4]> {
-    let layout = surface.layout.as_ref()?;
+    let layout = surface.layout.as_ref().filter(|layout| layout.is_filterable)?;
     let shape = request.shape;
     let is_mean = sampler.reduction == Reduction::WeightedAverage;
     if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() || !is_mean {
@@ -205,19 +205,12 @@ impl<S: Simd> Batch<'_, S> {
         Some(mix(&slice, &next, &z.weight))
     }
 
-    /// The faces that the lanes' directions meet, and the coordinates on them.
+    /// The faces that the lanes' directions meet, and the coordinates on them; see [`cube::Hit`].
     #[inline(always)]
     fn faces(&self) -> (LaneWords, [LaneWords; 4]) {
-        let mut faces = [0; VECTOR_LANES];
-        let mut coordinate = [[0; VECTOR_LANES]; 4];
-        for lane in 0..VECTOR_LANES {
-            let direction = [0, 1, 2].map(|axis| self.request.coordinate[axis][lane]);
-            let hit = cube::Hit::new(direction.map(f32::from_bits));
-            let [s, t] = hit.coordinates();
-            faces[lane] = hit.face;
-            [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
-        }
-        (faces, coordinate)
+        let [x, y, z, _] = self.request.coordinate;
+        let (face, s, t) = cube::faces(self.simd, [x, y, z]);
+        (face.into(), [bits_of(s).into(), bits_of(t).into(), [0; VECTOR_LANES], [0; VECTOR_LANES]])
     }
 
     /// The layer of each lane; `None` if it is the first for all.
@@ -393,11 +386,23 @@ pub(super) fn bilinear<S: Simd>(
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> Option<[LaneWords; 4]> {
-    let layout = surface.layout.as_ref()?;
+    let layout = surface.layout.as_ref().filter(|layout| layout.is_filterable)?;
     if !is_plain(sampler, request) {
         return None;
     }
-    Some(for_codec!(simd, layout.codec, filter(surface, layout, sampler, request)))
+    if let (Some(op), Some(bits)) = (sampler.compare_op, &request.compare) {
+        let reference = Some((op, references(surface, bits)));
+        return match layout.codec {
+            TexelCodec::Unorm16 => {
+                Some(for_codec!(simd, filter, Unorm16, surface, layout, sampler, request, reference))
+            }
+            TexelCodec::Float32 => {
+                Some(for_codec!(simd, filter, Float32, surface, layout, sampler, request, reference))
+            }
+            _ => None,
+        };
+    }
+    Some(for_codec!(simd, layout.codec, filter(surface, layout, sampler, request, None)))
 }
 
 /// True if a request needs nothing but bilinear filtering and mip levels per quad.
@@ -414,7 +419,6 @@ fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
         && !shape.multisampled
         && request.lod == LodRequest::Automatic
         && request.gather.is_none()
-        && (request.compare.is_none() || sampler.compare_op.is_none())
         && (sampler.mag_filter, sampler.min_filter) == (Filter::Linear, Filter::Linear)
         && !sampler.unnormalized_coordinates
         && sampler.reduction == Reduction::WeightedAverage
@@ -430,9 +434,14 @@ fn filter<S: Simd, T: Texels>(
     layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
+    comparison: Option<(CompareOp, Floats)>,
 ) -> [LaneWords; 4] {
     let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
+    let comparison = match comparison {
+        Some((op, reference)) => Some(Comparison { op, reference: f32x16::simd_from(simd, reference) }),
+        None => None,
+    };
     let zero = f32x16::splat(simd, 0.0);
     let mut texel = [zero; 4];
     // A loop, so that one copy of the level's code serves both levels.
@@ -440,7 +449,7 @@ fn filter<S: Simd, T: Texels>(
         if is_low && selection.weight == [0.0; QUADS] {
             break;
         }
-        let found = level::<S, T>(simd, words, layout, sampler, request, levels);
+        let found = level::<S, T>(simd, words, layout, sampler, request, comparison, levels);
         if !is_low {
             texel = found;
             continue;
@@ -464,6 +473,7 @@ fn level<S: Simd, T: Texels>(
     layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
+    comparison: Option<Comparison<S>>,
     levels: &[u32; QUADS],
 ) -> [f32x16<S>; 4] {
     let (width, height, base, row_pitch);
@@ -490,7 +500,7 @@ fn level<S: Simd, T: Texels>(
         columns: [x.first, x.second],
         weights: [x.weight, y.weight],
     };
-    around.filter::<T>(simd, words)
+    around.filter::<T>(simd, words, comparison)
 }
 
 /// A property of each level. (The standard library's `map` is not always inlined.)

@@ -43,6 +43,15 @@ struct Tap {
     weight: f32,
 }
 
+impl Tap {
+    /// The weighted mean of two texels of a row that begins with a column.
+    #[inline(always)]
+    fn sample(&self, row: &[[f32; 4]], first_column: u32) -> [f32; 4] {
+        let [a, b] = self.index.map(|index| row[(index - first_column) as usize]);
+        if self.weight > 0.0 { mix(a, b, self.weight) } else { a }
+    }
+}
+
 /// The texels of the target along an axis, and the taps of each.
 #[derive(Debug)]
 struct Axis {
@@ -209,13 +218,14 @@ impl<'a> Rows<'a> {
             for (y, y_weight) in taps(y).into_iter().flatten() {
                 let weight = z_weight * y_weight;
                 let row = self.decode([y, z])?;
-                for (tap, out) in x.taps.iter().zip(&mut *out) {
-                    let [a, b] = tap.index.map(|index| row[(index - first_column) as usize]);
-                    let texel = if tap.weight > 0.0 { mix(a, b, tap.weight) } else { a };
-                    if is_first && weight == 1.0 {
-                        // Integers must stay unchanged.
-                        *out = texel;
-                    } else {
+                if is_first && weight == 1.0 {
+                    // Integers must stay unchanged.
+                    for (tap, out) in x.taps.iter().zip(&mut *out) {
+                        *out = tap.sample(row, first_column);
+                    }
+                } else {
+                    for (tap, out) in x.taps.iter().zip(&mut *out) {
+                        let texel = tap.sample(row, first_column);
                         for (out, component) in out.iter_mut().zip(texel) {
                             *out += weight * component;
                         }

@@ -152,7 +152,7 @@ impl Group<'_> {
 }
 
 /// An associative operation on bits.
-fn combine(op: Op, a: u64, b: u64) -> u64 {
+pub(super) fn combine(op: Op, a: u64, b: u64) -> u64 {
     let (a32, b32) = (a as u32, b as u32);
     let (sa, sb) = (a32.cast_signed(), b32.cast_signed());
     let (fa, fb) = (f32::from_bits(a32), f32::from_bits(b32));

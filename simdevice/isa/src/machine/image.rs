@@ -123,28 +123,47 @@ fn sample_each(
     texel
 }
 
-fn texel_request(
+/// A request for texels. Coordinates, levels and samples that are not operands keep these values for all vectors.
+fn no_texels(shape: ImageShape) -> TexelRequest {
+    let zero = [0; VECTOR_LANES];
+    TexelRequest { mask: 0, shape, coordinate: [zero; 4], level: zero, sample: zero }
+}
+
+/// Sets the position of the texels that 16 lanes access.
+fn place(
+    request: &mut TexelRequest,
     batch: &Batch<'_>,
-    shape: ImageShape,
     coordinate: &[Reg],
     level: Option<Reg>,
     sample: Option<Reg>,
     vector: usize,
-) -> TexelRequest {
-    TexelRequest {
-        mask: 0,
-        shape,
-        coordinate: all_words(batch, coordinate, vector),
-        level: words_or_zero(batch, level, vector),
-        sample: words_or_zero(batch, sample, vector),
+) {
+    for (lanes, reg) in request.coordinate.iter_mut().zip(coordinate) {
+        *lanes = words(batch, *reg, vector);
+    }
+    if let Some(level) = level {
+        request.level = words(batch, level, vector);
+    }
+    if let Some(sample) = sample {
+        request.sample = words(batch, sample, vector);
     }
 }
 
 pub fn read(batch: &Batch<'_>, read: &ImageRead) {
+    let mut request = no_texels(read.shape);
+    let bound = fixed_point(&read.image);
     for vector in 0..batch.file.width() {
         let active = batch.masks.bits(MaskId::ACTIVE, vector);
+        if active == 0 {
+            continue;
+        }
+        place(&mut request, batch, &read.coordinate, read.level, read.sample, vector);
+        if let Some(image) = bound {
+            request.mask = active;
+            put_texel(batch, &read.dst, vector, &batch.resources.images.read(image, &request));
+            continue;
+        }
         let images = bind_points(batch, &read.image, vector);
-        let mut request = texel_request(batch, read.shape, &read.coordinate, read.level, read.sample, vector);
         let mut texel = [[0; VECTOR_LANES]; 4];
         for_each_binding(&images, &[0; VECTOR_LANES], active, |image, _, lanes| {
             request.mask = lanes;
@@ -155,11 +174,21 @@ pub fn read(batch: &Batch<'_>, read: &ImageRead) {
 }
 
 pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
+    let mut request = no_texels(write.shape);
+    let bound = fixed_point(&write.image);
     for vector in 0..batch.file.width() {
         let lanes = batch.masks.writing(vector);
-        let images = bind_points(batch, &write.image, vector);
-        let mut request = texel_request(batch, write.shape, &write.coordinate, None, write.sample, vector);
+        if lanes == 0 {
+            continue;
+        }
+        place(&mut request, batch, &write.coordinate, None, write.sample, vector);
         let texel = all_words(batch, &write.texel, vector);
+        if let Some(image) = bound {
+            request.mask = lanes;
+            batch.resources.images.write(image, &request, &texel);
+            continue;
+        }
+        let images = bind_points(batch, &write.image, vector);
         for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
             request.mask = lanes;
             batch.resources.images.write(image, &request, &texel);
@@ -168,10 +197,11 @@ pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
 }
 
 pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
+    let mut request = no_texels(atomic.shape);
     for vector in 0..batch.file.width() {
         let lanes = batch.masks.writing(vector);
         let images = bind_points(batch, &atomic.image, vector);
-        let mut request = texel_request(batch, atomic.shape, &atomic.coordinate, None, atomic.sample, vector);
+        place(&mut request, batch, &atomic.coordinate, None, atomic.sample, vector);
         let value = words(batch, atomic.value, vector);
         let comparator = words_or_zero(batch, atomic.comparator, vector);
         let mut old = [[0; VECTOR_LANES]];

@@ -57,6 +57,18 @@ fn random_sampler(rng: &mut ChaCha8Rng) -> Sampler {
     }
 }
 
+/// All comparisons.
+const COMPARISONS: [CompareOp; 8] = [
+    CompareOp::Never,
+    CompareOp::Less,
+    CompareOp::Equal,
+    CompareOp::LessOrEqual,
+    CompareOp::Greater,
+    CompareOp::NotEqual,
+    CompareOp::GreaterOrEqual,
+    CompareOp::Always,
+];
+
 fn assert_agree(case: &Case, image: &SampledImage, sampler: Sampler, request: &SampleRequest) {
     let level = token_of(case);
     let binding = ImageBinding::Sampled(image.clone());
@@ -81,9 +93,13 @@ fn at_once_or_one_by_one_is_the_same(case: &Case) {
         Format::R8G8B8A8Srgb,
         Format::B8G8R8A8Srgb,
         Format::R16Unorm,
+        Format::R16Sfloat,
+        Format::R16G16Sfloat,
         Format::R16G16B16A16Sfloat,
         Format::R32Sfloat,
+        Format::R32G32Sfloat,
         Format::R32G32B32A32Sfloat,
+        Format::R32G32Uint,
         Format::D16Unorm,
         Format::D32Sfloat,
         Format::D32SfloatS8Uint,
@@ -136,17 +152,7 @@ fn at_once_or_one_by_one_is_the_same(case: &Case) {
             request.offset = [(); 3].map(|()| lanes(|| rng.random()));
         }
         if format.aspects()[0] == Aspect::Depth && rng.random() {
-            let ops = [
-                CompareOp::Never,
-                CompareOp::Less,
-                CompareOp::Equal,
-                CompareOp::LessOrEqual,
-                CompareOp::Greater,
-                CompareOp::NotEqual,
-                CompareOp::GreaterOrEqual,
-                CompareOp::Always,
-            ];
-            sampler.compare_op = Some(*ops.choose(&mut rng).unwrap());
+            sampler.compare_op = Some(*COMPARISONS.choose(&mut rng).unwrap());
             request.compare = Some(lanes(|| coordinate(&mut rng).to_bits()));
         }
         assert_agree(case, &image, sampler, &request);
@@ -173,12 +179,22 @@ fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
 #[gaurast_runner::test(each = simd_levels())]
 fn plain_samples_are_the_same_one_by_one(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let formats = [Format::R8G8B8A8Unorm, Format::B8G8R8A8Unorm, Format::R8G8B8A8Srgb, Format::B8G8R8A8Srgb];
-    for round in 0..1500 {
+    let formats = [
+        Format::R8G8B8A8Unorm,
+        Format::B8G8R8A8Unorm,
+        Format::R8G8B8A8Srgb,
+        Format::B8G8R8A8Srgb,
+        Format::R32Uint,
+        Format::D16Unorm,
+        Format::D32Sfloat,
+        Format::D32Sfloat,
+    ];
+    for round in 0..2500 {
         let [width, height]: [u32; 2] = [(); 2].map(|()| rng.random_range(1..70));
+        let format = *formats.choose(&mut rng).unwrap();
         let desc = ImageDesc {
             mip_levels: rng.random_range(1..=width.max(height).ilog2() + 1),
-            ..desc(ImageKind::D2, *formats.choose(&mut rng).unwrap(), [width, height, 1])
+            ..desc(ImageKind::D2, format, [width, height, 1])
         };
         let texels: Vec<[f32; 4]> = (0..97).map(|_| rng.random()).collect();
         let mut image = image(desc, |level, _, [x, y, _]| texels[(7 * level + x + 14 * y) as usize % texels.len()]);
@@ -186,7 +202,7 @@ fn plain_samples_are_the_same_one_by_one(case: &Case) {
             image.swizzle =
                 [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Alpha, ComponentSwizzle::Zero];
         }
-        let sampler = Sampler {
+        let mut sampler = Sampler {
             mag_filter: Filter::Linear,
             min_filter: Filter::Linear,
             unnormalized_coordinates: false,
@@ -197,6 +213,11 @@ fn plain_samples_are_the_same_one_by_one(case: &Case) {
         request.mask = if round % 2 == 0 { u16::MAX } else { rng.random() };
         if round % 10 == 0 {
             request.offset[round / 10 % 2] = [2; 16];
+        }
+        if format.aspects()[0] == Aspect::Depth && rng.random_range(0..8) != 0 {
+            sampler.compare_op = Some(*COMPARISONS.choose(&mut rng).unwrap());
+            let texel = texels.choose(&mut rng).unwrap()[0].to_bits();
+            request.compare = Some(lanes(|| if rng.random() { texel } else { coordinate(&mut rng).to_bits() }));
         }
         assert_agree(case, &image, sampler, &request);
     }

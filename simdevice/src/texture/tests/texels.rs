@@ -1,8 +1,13 @@
 //! Tests of fetches, storage images, texel buffers and queries.
 
 use super::*;
+use crate::token_of;
 use devmem::BufferRange;
+use gaurast_runner::{Case, simd_levels};
 use isa::ir::AtomicOp;
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// An access at these coordinates, lane by lane. Only as many lanes as coordinates are active.
 fn texels(shape: ImageShape, coordinates: &[[u32; 4]]) -> TexelRequest {
@@ -139,6 +144,155 @@ fn lanes_together_do_as_each_alone() {
         assert_eq!(all, each, "{format:?}");
     }
     assert!(checked > 50, "{checked}");
+}
+
+/// Formats that are accessed 16 lanes at once, and some that are not.
+const ACCESSED: [Format; 24] = [
+    Format::R8Unorm,
+    Format::R8G8Unorm,
+    Format::R8G8B8A8Unorm,
+    Format::B8G8R8A8Unorm,
+    Format::A8B8G8R8UnormPack32,
+    Format::R8G8B8A8Srgb,
+    Format::B8G8R8A8Srgb,
+    Format::R8G8B8A8Uint,
+    Format::R16Unorm,
+    Format::R16Sfloat,
+    Format::R16G16Sfloat,
+    Format::R16G16B16A16Sfloat,
+    Format::R16G16B16A16Uint,
+    Format::R32Sfloat,
+    Format::R32Uint,
+    Format::R32Sint,
+    Format::R32G32Sfloat,
+    Format::R32G32Uint,
+    Format::R32G32B32A32Sfloat,
+    Format::R32G32B32A32Uint,
+    Format::R32G32B32A32Sint,
+    Format::A2B10G10R10UnormPack32,
+    Format::D16Unorm,
+    Format::D32Sfloat,
+];
+
+/// An access of 16 lanes to places in and around an image: anywhere, or in rows.
+fn random_access(rng: &mut ChaCha8Rng, shape: ImageShape, levels: u32) -> TexelRequest {
+    let mut request = texels(shape, &[[0; 4]]);
+    request.mask = if rng.random() { u16::MAX } else { rng.random() };
+    let in_rows = rng.random_range(0..3) == 0;
+    for (axis, lanes) in request.coordinate.iter_mut().enumerate() {
+        let first = rng.random_range(0..3);
+        for (lane, coordinate) in (0..).zip(lanes) {
+            *coordinate = match rng.random_range(0..40) {
+                0 if !in_rows => rng.random(),
+                _ if in_rows && axis == 0 => first + lane,
+                _ if in_rows => first,
+                _ => rng.random_range(0..14),
+            };
+        }
+    }
+    let level = rng.random_range(0..levels + 1);
+    request.level = [level; 16];
+    if rng.random_range(0..8) == 0 {
+        request.level = std::array::from_fn(|_| rng.random_range(0..levels + 1));
+    }
+    request
+}
+
+/// Bits of floats and integers: ordinary, special or any.
+fn random_value(rng: &mut ChaCha8Rng) -> u32 {
+    match rng.random_range(0..5) {
+        0 => rng.random(),
+        1 => rng.random_range(0..300),
+        2 => [f32::NAN, f32::INFINITY, -0.0, 0.5 / 255.0, 1.5 / 255.0, 65_519.9, 1e-7].choose(rng).unwrap().to_bits(),
+        _ => rng.random_range(-0.5..1.5_f32).to_bits(),
+    }
+}
+
+fn random_bytes(rng: &mut ChaCha8Rng, memory: &Allocation) {
+    let bytes: Vec<u8> = (0..memory.len()).map(|_| rng.random()).collect();
+    memory.write(0, &bytes).unwrap();
+}
+
+fn bytes_of(memory: &Allocation) -> Vec<u8> {
+    let mut bytes = vec![0; memory.len() as usize];
+    memory.read(0, &mut bytes).unwrap();
+    bytes
+}
+
+/// Asserts that an access at once reads and writes what it reads and writes lane by lane.
+fn assert_agree(rng: &mut ChaCha8Rng, table: &ImageTable, memory: &Allocation, request: &TexelRequest, format: Format) {
+    let alone = table.clone().lane_by_lane();
+    let (found, expected) = (table.read(0, request), alone.read(0, request));
+    assert_eq!(found, expected, "{format:?} {request:?}");
+    let values: [LaneWords; 4] = [(); 4].map(|()| std::array::from_fn(|_| random_value(rng)));
+    let before = bytes_of(memory);
+    table.write(0, request, &values);
+    let found = bytes_of(memory);
+    memory.write(0, &before).unwrap();
+    alone.write(0, request, &values);
+    assert!(found == bytes_of(memory), "{format:?} {request:?} {values:?}");
+}
+
+#[gaurast_runner::test(each = simd_levels())]
+fn accesses_at_once_are_those_one_by_one(case: &Case) {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    for round in 0..2500 {
+        let format = *ACCESSED.choose(&mut rng).unwrap();
+        let dimension = *[Dimension::D1, Dimension::D2, Dimension::D2, Dimension::D3].choose(&mut rng).unwrap();
+        let arrayed = dimension != Dimension::D3 && rng.random();
+        let [x, y, z] = [(); 3].map(|()| rng.random_range(1..30));
+        let (kind, extent) = match dimension {
+            Dimension::D1 => (ImageKind::D1, [x, 1, 1]),
+            Dimension::D3 => (ImageKind::D3, [x, y, z]),
+            _ => (ImageKind::D2, [x, y, 1]),
+        };
+        let mip_levels = rng.random_range(1..4);
+        let desc = ImageDesc { mip_levels, array_layers: if arrayed { 5 } else { 1 }, ..desc(kind, format, extent) };
+        let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
+        random_bytes(&mut rng, &memory);
+        let view = ImageView {
+            image: Arc::new(Image::new(desc, memory.clone(), 0).unwrap()),
+            format,
+            base_mip_level: 0,
+            level_count: mip_levels,
+            base_layer: 0,
+            layer_count: desc.array_layers,
+        };
+        let aspect = format.aspects()[0];
+        let binding = if round % 2 == 0 && aspect == Aspect::Color {
+            ImageBinding::Storage(StorageImage { view })
+        } else {
+            let swizzle =
+                [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Alpha, ComponentSwizzle::Red];
+            ImageBinding::Sampled(SampledImage { view, aspect, swizzle: if rng.random() { swizzle } else { IDENTITY } })
+        };
+        let table = ImageTable::new(token_of(case), [binding], []);
+        for _ in 0..4 {
+            let request = random_access(&mut rng, ImageShape { arrayed, ..shape(dimension) }, mip_levels);
+            assert_agree(&mut rng, &table, &memory, &request, format);
+        }
+    }
+}
+
+#[gaurast_runner::test(each = simd_levels())]
+fn accesses_of_buffers_at_once_are_those_one_by_one(case: &Case) {
+    let mut rng = ChaCha8Rng::seed_from_u64(18);
+    for _ in 0..1000 {
+        let format = *ACCESSED[..22].choose(&mut rng).unwrap();
+        let memory = Allocation::new_zeroed(rng.random_range(200..300)).unwrap();
+        random_bytes(&mut rng, &memory);
+        let offset = *[0, 4, 16, 24, 2].choose(&mut rng).unwrap();
+        // Some buffers end with the memory, within a word or a texel.
+        let size = if rng.random() { memory.len() - offset } else { rng.random_range(0..memory.len() - offset) };
+        let range = BufferRange { memory: memory.clone(), offset, size };
+        let table = ImageTable::new(token_of(case), [ImageBinding::TexelBuffer(TexelBuffer { range, format })], []);
+        for _ in 0..4 {
+            let mut request = random_access(&mut rng, shape(Dimension::Buffer), 1);
+            let first = rng.random_range(0..40);
+            request.coordinate[0] = request.coordinate[0].map(|x| x.wrapping_add(first));
+            assert_agree(&mut rng, &table, &memory, &request, format);
+        }
+    }
 }
 
 #[gaurast_runner::test]
