@@ -13,6 +13,7 @@ use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, Type, VECTOR_LANES};
 use crate::kernels::float::{greatest, least};
+use vectors::{as_words, truth};
 
 /// The lanes of one subgroup.
 pub(super) struct Subgroup<'a> {
@@ -115,18 +116,6 @@ fn run_part(
 #[inline(always)]
 fn ones(lanes: usize) -> u128 {
     u128::MAX >> (128 - lanes)
-}
-
-/// The lanes of a set, 32 to a word.
-#[inline(always)]
-fn as_words(lanes: u128) -> [u32; 4] {
-    [lanes as u32, (lanes >> 32) as u32, (lanes >> 64) as u32, (lanes >> 96) as u32]
-}
-
-/// A bool as a register holds it.
-#[inline(always)]
-fn truth(value: bool) -> u32 {
-    if value { u32::MAX } else { 0 }
 }
 
 /// Evaluates an expression with the function of an associative operation. Those whose order matters are compiled each on

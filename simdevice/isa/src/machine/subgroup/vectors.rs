@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, i32x16, prelude::*, u32x16, u64x8};
 
-use super::{as_words, truth};
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{MAX_SUBGROUP_SIZE, Reg, SubgroupOp, VECTOR_LANES};
@@ -103,6 +102,18 @@ pub(super) fn run<S: Simd>(
         }
         SubgroupOp::QuadBroadcast | SubgroupOp::QuadSwap => false,
     }
+}
+
+/// The lanes of a set, 32 to a word.
+#[inline(always)]
+pub(super) fn as_words(lanes: u128) -> [u32; 4] {
+    [lanes as u32, (lanes >> 32) as u32, (lanes >> 64) as u32, (lanes >> 96) as u32]
+}
+
+/// A bool as a register holds it.
+#[inline(always)]
+pub(super) fn truth(value: bool) -> u32 {
+    if value { u32::MAX } else { 0 }
 }
 
 /// The active lanes that a vote counts.
