@@ -82,7 +82,7 @@ pub struct Draw {
     pub depth: Option<Depth>,
     /// Number of samples per pixel.
     pub samples: u32,
-    /// Mask of the samples that are written.
+    /// Mask of the samples of each 32 that are written.
     pub sample_mask: u32,
     /// The rules that the oracle follows: the text's, but for mistakes.
     pub rules: Rules,

@@ -256,8 +256,9 @@ fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
             (i64::from(offset.x)..right).contains(&x) && (i64::from(offset.y)..bottom).contains(&y)
         })
     };
-    let samples = (1_u64 << draw.samples) - 1;
-    let written = (u64::from(draw.sample_mask) & samples).count_ones();
+    let samples = u64::MAX >> (64 - draw.samples);
+    let mask = u64::from(draw.sample_mask);
+    let written = ((mask << 32 | mask) & samples).count_ones();
     let share = f64::from(written) / f64::from(draw.samples);
     for at in 0..held.nominal.len() {
         let place = [at as u32 % held.width, at as u32 / held.width].map(i64::from);

@@ -1,7 +1,9 @@
 //! `gaurast-conformance`: tests an implementation of the Gaussian primitive against the extension's text.
 
+use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use clap::Parser;
@@ -12,7 +14,7 @@ use gaurast_mutants::MUTANTS;
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
-/// The exit code is 0 if no case fails, 1 if one does, and 2 if there is nothing to test.
+/// The exit code is 0 if no case fails, 1 if one does, and 2 if there is nothing to test or this program has a defect.
 #[derive(Debug, Parser)]
 #[command(name = "gaurast-conformance", version)]
 struct Arguments {
@@ -56,8 +58,23 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // A panic is an outcome of a case, with its message.
-    std::panic::set_hook(Box::new(|_| {}));
+    // A driver's panic is an outcome of a case, with its message. One of this program ends it.
+    let last_panic = Arc::new(Mutex::new(String::new()));
+    let heard = Arc::clone(&last_panic);
+    std::panic::set_hook(Box::new(move |panic| {
+        if let Ok(mut heard) = heard.lock() {
+            *heard = panic.to_string();
+        }
+    }));
+    catch_unwind(|| test(&arguments)).unwrap_or_else(|_| {
+        let said = last_panic.lock().map(|said| said.clone()).unwrap_or_default();
+        eprintln!("a defect of this program: {said}");
+        ExitCode::from(2)
+    })
+}
+
+/// Does what the arguments say.
+fn test(arguments: &Arguments) -> ExitCode {
     let mut cases = if arguments.large { cases::with_largest() } else { cases::all() };
     if !arguments.case.is_empty() {
         cases.retain(|case| arguments.case.iter().any(|pattern| cases::fits(&case.path(), pattern)));
@@ -72,7 +89,7 @@ fn main() -> ExitCode {
         return catch_mistakes(&cases);
     }
     if let Some(folder) = &arguments.mutants {
-        return catch_mutants(cases, folder, &arguments);
+        return catch_mutants(cases, folder, arguments);
     }
     let device = match open(&arguments.driver) {
         Ok(device) => device,
@@ -82,7 +99,7 @@ fn main() -> ExitCode {
         }
     };
     println!("{} cases on {}", cases.len(), device.name());
-    let results: Vec<Result> = cases.iter().map(|case| tell(&*device, case, &arguments)).collect();
+    let results: Vec<Result> = cases.iter().map(|case| tell(&*device, case, arguments)).collect();
     for chapter in cases::chapters() {
         let own: Vec<&Result> = results.iter().filter(|result| result.chapter == chapter).collect();
         let counts = Counts::of(own.iter().copied());

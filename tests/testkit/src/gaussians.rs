@@ -131,7 +131,7 @@ pub struct GaussianOptions<'a> {
     pub negative_one_to_one: bool,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
-    /// The samples that are written.
+    /// The samples of each 32 that are written.
     pub sample_mask: u32,
     /// Blending of each colour attachment; further attachments use the first.
     pub blend: Vec<vk::PipelineColorBlendAttachmentState>,

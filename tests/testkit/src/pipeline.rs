@@ -87,7 +87,7 @@ pub struct Graphics<'a> {
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
     /// Sample count and sample shading.
     pub multisample: vk::PipelineMultisampleStateCreateInfo<'static>,
-    /// The samples that are written, or `None` for all.
+    /// The samples of each 32 that are written, or `None` for all.
     pub sample_mask: Option<u32>,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
@@ -262,8 +262,9 @@ impl Graphics<'_> {
         if self.negative_one_to_one {
             viewport = viewport.push_next(&mut control);
         }
-        let mask: Vec<_> = self.sample_mask.into_iter().collect();
         let mut multisample = self.multisample;
+        let words = multisample.rasterization_samples.as_raw().div_ceil(32).max(1) as usize;
+        let mask: Vec<_> = self.sample_mask.into_iter().flat_map(|word| vec![word; words]).collect();
         if !mask.is_empty() {
             multisample = multisample.sample_mask(&mask);
         }
@@ -401,7 +402,7 @@ pub struct PipelineOptions<'a> {
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
     /// The minimum share of samples that are shaded separately, or `None` without sample shading.
     pub sample_shading: Option<f32>,
-    /// The samples that are written.
+    /// The samples of each 32 that are written.
     pub sample_mask: u32,
     /// True if alpha determines the covered samples.
     pub alpha_to_coverage: bool,
