@@ -37,23 +37,28 @@ fn logarithms() -> Vec<Splat> {
     vec![splat(SCALE, [-2.3; 3]); 3]
 }
 
-/// The messages of a draw from memory that the host can't map, to which `upload` records how Gaussians get there.
-fn from_the_device(gpu: &Gpu, upload: impl FnOnce(&Commands, vk::Buffer)) -> Vec<Message> {
+/// The messages of a draw of a buffer's first Gaussians, before which `upload` records how they get there.
+fn from_a_buffer(gpu: &Gpu, buffer: &Buffer, count: u32, upload: impl FnOnce(&Commands)) -> Vec<Message> {
     let pipeline = splats().create(gpu).expect("a pipeline");
-    let size = 3 * size_of::<Splat>() as u64;
-    let buffer = Buffer::within(gpu, size, vk::MemoryPropertyFlags::DEVICE_LOCAL);
     let target = Target::floats(gpu, SIZE);
     gpu.messages();
     gpu.run(|commands| {
-        upload(commands, buffer.raw);
+        upload(commands);
         commands.pass(&target, &Pass::zeros(), || {
             commands.bind(&pipeline);
-            commands.vertices(&buffer);
+            commands.vertices(buffer);
             commands.camera(&camera());
-            commands.draw(0..3);
+            commands.draw(0..count);
         });
     });
     gpu.messages()
+}
+
+/// The messages of a draw from memory that the host can't map, to which `upload` records how Gaussians get there.
+fn from_the_device(gpu: &Gpu, upload: impl FnOnce(&Commands, vk::Buffer)) -> Vec<Message> {
+    let size = 3 * size_of::<Splat>() as u64;
+    let buffer = Buffer::within(gpu, size, vk::MemoryPropertyFlags::DEVICE_LOCAL);
+    from_a_buffer(gpu, &buffer, 3, |commands| upload(commands, buffer.raw))
 }
 
 /// The messages of a draw whose camera comes from a uniform buffer.
@@ -231,42 +236,21 @@ fn uploads() -> Vec<Mistake> {
         }),
         mistake("logarithms in a buffer that shaders may write", id, |stage| {
             let gpu = &stage.full;
-            let pipeline = splats().create(gpu).expect("a pipeline");
             let buffer = Buffer::of(gpu, &splat(SCALE, [-1.0; 3]));
             let _set = Bindings::new(gpu, &[Resource::Storage(buffer.raw)]);
-            let target = Target::floats(gpu, SIZE);
-            gpu.messages();
-            gpu.run(|commands| {
-                commands.pass(&target, &Pass::zeros(), || {
-                    commands.bind(&pipeline);
-                    commands.vertices(&buffer);
-                    commands.camera(&camera());
-                    commands.draw(0..1);
-                });
-            });
-            gpu.messages()
+            from_a_buffer(gpu, &buffer, 1, |_| {})
         }),
         mistake("logarithms in memory that stays mapped", id, |stage| {
             let gpu = &stage.full;
-            let pipeline = splats().create(gpu).expect("a pipeline");
             let buffer = Buffer::of(gpu, logarithms().as_flattened());
-            let target = Target::floats(gpu, SIZE);
             let device = gpu.device();
             let flags = vk::MemoryMapFlags::empty();
             // SAFETY: see the crate.
             unsafe { device.map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags) }.expect("mapped");
-            gpu.messages();
-            gpu.run(|commands| {
-                commands.pass(&target, &Pass::zeros(), || {
-                    commands.bind(&pipeline);
-                    commands.vertices(&buffer);
-                    commands.camera(&camera());
-                    commands.draw(0..3);
-                });
-            });
+            let messages = from_a_buffer(gpu, &buffer, 3, |_| {});
             // SAFETY: see the crate.
             unsafe { device.unmap_memory(buffer.memory) };
-            gpu.messages()
+            messages
         }),
     ]
 }

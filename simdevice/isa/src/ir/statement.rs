@@ -77,6 +77,21 @@ pub enum SubgroupOp {
     ExclusiveScan(Op),
 }
 
+impl SubgroupOp {
+    /// Reports whether the operation has an index as an operand.
+    pub fn has_index(self) -> bool {
+        matches!(
+            self,
+            Self::Shuffle
+                | Self::ShuffleXor
+                | Self::ShuffleUp
+                | Self::ShuffleDown
+                | Self::QuadBroadcast
+                | Self::QuadSwap
+        )
+    }
+}
+
 /// Reports whether subgroup reductions and scans may use an operation.
 pub fn is_reducible(op: Op) -> bool {
     use Op::*;

@@ -337,16 +337,7 @@ impl Checker<'_> {
         let results = if op == SubgroupOp::Ballot { 4 } else { 1 };
         require(dst.len() == results, || "wrong number of results".into())?;
         require(src.is_some() != (op == SubgroupOp::Elect), || "wrong number of operands".into())?;
-        let indexed = matches!(
-            op,
-            SubgroupOp::Shuffle
-                | SubgroupOp::ShuffleXor
-                | SubgroupOp::ShuffleUp
-                | SubgroupOp::ShuffleDown
-                | SubgroupOp::QuadBroadcast
-                | SubgroupOp::QuadSwap
-        );
-        require(index.is_some() == indexed, || "wrong number of operands".into())?;
+        require(index.is_some() == op.has_index(), || "wrong number of operands".into())?;
         self.expect_words(&index)?;
         let source = src.map_or(Ok(Type::Bool), |src| self.type_of(src))?;
         let is = |ty: Type| require(source == ty, || format!("the operand is {source:?}, not {ty:?}"));

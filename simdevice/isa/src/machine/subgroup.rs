@@ -374,16 +374,7 @@ mod tests {
     fn program(op: SubgroupOp, index: Index) -> Program {
         let mut b = Builder::new();
         let mut src = b.input(0, Type::B32, Rate::Varying);
-        let has_index = matches!(
-            op,
-            SubgroupOp::Shuffle
-                | SubgroupOp::ShuffleXor
-                | SubgroupOp::ShuffleUp
-                | SubgroupOp::ShuffleDown
-                | SubgroupOp::QuadBroadcast
-                | SubgroupOp::QuadSwap
-        );
-        let index = has_index.then(|| match index {
+        let index = op.has_index().then(|| match index {
             Index::Constant(index) => b.u32(index),
             Index::Input => b.input(1, Type::B32, Rate::Varying),
         });

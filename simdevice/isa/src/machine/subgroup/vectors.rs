@@ -119,11 +119,11 @@ pub(super) fn truth(value: bool) -> u32 {
 /// The active lanes that a vote counts.
 #[derive(Clone, Copy, PartialEq)]
 enum Vote {
-    /// Those whose value is zero.
+    /// Lanes whose value is zero.
     False,
-    /// Those whose value is not zero.
+    /// Lanes whose value is not zero.
     True,
-    /// Those whose value is not that of the first active lane.
+    /// Lanes whose value is not that of the first active lane.
     Different,
 }
 
