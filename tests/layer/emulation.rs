@@ -282,7 +282,7 @@ fn frames_take_no_more_memory(case: &Case) {
     });
 }
 
-/// What is not emulated is refused, not left out.
+/// Pipelines and cameras that are not emulated are refused.
 #[gaurast_runner::test(needs = [Need::Lavapipe])]
 fn pictures_that_are_not_emulated_are_refused(case: &Case) {
     with_emulation(case, &[], || {

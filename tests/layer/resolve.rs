@@ -15,7 +15,7 @@ use gaurast_tests::scenes;
 
 const SIZE: [u32; 2] = [70, 50];
 
-/// What begins every shader: its inputs, its output, and a counter.
+/// The beginning of every shader: its inputs, its output, and a counter.
 const HEAD: &str = "
     layout(location = 2) in vec4 accumulated;
     layout(location = 0) out vec4 color;
@@ -183,7 +183,7 @@ impl Shown {
     }
 }
 
-/// What a shader leaves on a device, and how often it counts.
+/// The texels that a shader leaves on a device, and its count.
 fn drawn(gpu: &Gpu, shown: Shown) -> (Vec<f32>, u32) {
     let stage = Stage::new(gpu, shown.samples, shown.is_tested);
     let half = |graphics: &mut Graphics<'_>| graphics.sample_mask = Some(0b0101);
@@ -205,7 +205,7 @@ fn drawn(gpu: &Gpu, shown: Shown) -> (Vec<f32>, u32) {
     (texels, stage.count())
 }
 
-/// This driver, and lavapipe through the layer.
+/// Opens this driver, and lavapipe through the layer.
 fn devices() -> (Gpu, Device) {
     let own = Gpu::open(&Opening::of(Driver::Embedded)).expect("this driver");
     (own, Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0)))
@@ -221,7 +221,7 @@ fn assert_close(name: &str, emulated: &[f32], own: &[f32]) {
     }
 }
 
-/// What shaders read of a set, what they discard, and how often they run.
+/// Shaders read, discard and run as on this driver.
 #[gaurast_runner::test(needs = [Need::Lavapipe, GLSLANG])]
 fn resolve_shaders_draw_what_they_draw_on_this_driver(case: &Case) {
     with_emulation(case, &[], || {
@@ -368,7 +368,7 @@ const EARLY: [&str; 2] = [
     "layout(early_fragment_tests) in; void main() { discard; }",
 ];
 
-/// With early tests, queries count the pixels that have a fragment, and what a shader discards of them where the device does so for
+/// Queries with early tests count the pixels that have a fragment, and what a shader discards of them where the device does so for
 /// triangles, which lavapipe 22.3 does not. Where such tests decide something, they are refused.
 #[gaurast_runner::test(needs = [Need::Lavapipe, GLSLANG])]
 fn early_tests_count_what_is_discarded(case: &Case) {

@@ -79,7 +79,7 @@ fn said(output: &Output) -> String {
 const HELLO: &str = include_str!("../../samples/c/hello_gaussians.c");
 const SCENE: &str = include_str!("../../samples/c/gaussian_scene.c");
 
-/// What a C program says of the scene's kind, under layers, the Khronos layer with the validation of synchronization.
+/// The messages of a C program like the scene's under layers; the Khronos layer validates synchronization.
 fn scene_says(source: &str, layers: &str, folder: &Path) -> String {
     let program = compile(source, folder);
     let shaders = concat!(env!("CARGO_MANIFEST_DIR"), "/../samples/c/shaders");

@@ -25,7 +25,7 @@ pub struct Stage {
     pub without: Gpu,
     /// Without any feature of Vulkan, and with the topology.
     pub plain: Gpu,
-    /// With pipeline libraries.
+    /// A device with pipeline libraries.
     pub linking: Gpu,
 }
 

@@ -1,4 +1,4 @@
-//! What shaders are bound to.
+//! Descriptor sets and push constants as commands have bound them.
 
 use std::collections::BTreeMap;
 
@@ -21,10 +21,10 @@ pub(crate) struct PushConstants {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// What shaders of graphics pipelines are bound to.
+/// Descriptor sets and push constants of graphics pipelines.
 #[derive(Clone, Debug)]
 pub(crate) struct Bindings {
-    /// By number.
+    /// The sets, by number.
     pub(crate) sets: BTreeMap<u32, BoundSet>,
     pub(crate) constants: Vec<PushConstants>,
 }

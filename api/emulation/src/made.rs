@@ -1,4 +1,4 @@
-//! What a set makes in its area: pixels, and what the shaders that show them read beside these.
+//! Results of a set's kernels in memory: pixels, and the depths, Gaussians and cameras that resolve shaders read.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ pub(crate) struct Area {
     pub(crate) size: [u32; 2],
 }
 
-/// The sizes of what a set makes.
+/// The sizes of a set's results.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MadeExtent {
     /// Samples that are told apart, of all views.
@@ -27,16 +27,16 @@ pub(crate) struct MadeExtent {
     pub(crate) draws: u64,
 }
 
-/// Offsets into what a set makes, which begins with the pixels, 16 bytes each.
+/// Offsets into a set's results, which begin with the pixels, 16 bytes each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct MadePlaces {
-    /// Of each sample: the median depth.
+    /// The median depth of each sample.
     pub(crate) medians: u64,
-    /// Of each tile: whether it has a contribution.
+    /// A flag for each tile that has a contribution.
     pub(crate) shown: u64,
-    /// Of each sample: depths and Gaussians.
+    /// Depths and Gaussians of each sample.
     pub(crate) inputs: u64,
-    /// Of each view: the camera.
+    /// The camera of each view.
     pub(crate) cameras: u64,
     pub(crate) attributes: u64,
     pub(crate) end: u64,
@@ -125,7 +125,7 @@ impl Attributes {
     }
 }
 
-/// What a set has made, in its memory.
+/// The results of a set, in its memory.
 #[derive(Clone)]
 pub(crate) struct Made {
     pub(crate) memory: Arc<Memory>,

@@ -138,12 +138,12 @@ pub(crate) unsafe fn gaussian_state<'a>(info: &vk::GraphicsPipelineCreateInfo<'a
 
 /// The sigma points of the unscented transform.
 pub(crate) struct SigmaPoints {
-    /// In standard deviations.
+    /// Distance from the mean in standard deviations.
     pub(crate) distance: f64,
     /// Weights in the covariance of the point in the middle and of each other one.
     pub(crate) center: f64,
     pub(crate) other: f64,
-    /// How many must lie in the picture and its margin.
+    /// The least number of points in the picture and its margin.
     pub(crate) must_count: u32,
     margin: f64,
 }
@@ -484,7 +484,7 @@ pub(crate) unsafe fn shader_words(
     }
 }
 
-/// What a graphics pipeline that shows sets needs beside its creation info.
+/// Parameters of a graphics pipeline that shows sets, beside its creation info.
 struct Show<'a> {
     dynamic: &'a [vk::DynamicState],
     may_be_tested: bool,

@@ -95,7 +95,7 @@ const NON_WRITABLE: u32 = spirv::Decoration::NonWritable as u32;
 const LOCATION: u32 = spirv::Decoration::Location as u32;
 const COMPONENT: u32 = spirv::Decoration::Component as u32;
 const OFFSET: u32 = spirv::Decoration::Offset as u32;
-/// Those that belong to a variable of an interface.
+/// Decorations of a variable of an interface.
 const OF_INTERFACES: [u32; 7] = [
     BUILT_IN,
     spirv::Decoration::NoPerspective as u32,
@@ -123,7 +123,7 @@ const VIEW_INDEX: u32 = spirv::BuiltIn::ViewIndex as u32;
 /// Execution modes.
 const EARLY_FRAGMENT_TESTS: u32 = spirv::ExecutionMode::EarlyFragmentTests as u32;
 const DEPTH_REPLACING: u32 = spirv::ExecutionMode::DepthReplacing as u32;
-/// Those that say how a shader changes depths.
+/// Execution modes that bound the change of a depth.
 const DEPTH_MODES: [u32; 3] = [
     spirv::ExecutionMode::DepthGreater as u32,
     spirv::ExecutionMode::DepthLess as u32,
@@ -157,10 +157,10 @@ pub(crate) struct Request<'a> {
 /// A fragment shader that loads its inputs.
 pub(crate) struct Rewritten {
     pub(crate) words: Vec<u32>,
-    /// It reads depths or Gaussians.
+    /// True if it reads depths or Gaussians.
     pub(crate) has_inputs: bool,
     pub(crate) has_camera: bool,
-    /// It runs for each sample.
+    /// True if it runs for each sample.
     pub(crate) is_sample_shaded: bool,
     pub(crate) covering: Covering,
 }
@@ -208,7 +208,7 @@ enum Type {
     Number(u32),
     Vector(u32, u32),
     Matrix(u32, u32),
-    /// Of elements, with the constant of their number.
+    /// An array: the type of its elements, and the constant of their number.
     Array(u32, u32),
     Structure(Vec<u32>),
     Other,
@@ -462,7 +462,7 @@ struct Input {
     meaning: Meaning,
 }
 
-/// What an input is.
+/// The meaning of an input.
 #[derive(Clone, Copy)]
 enum Meaning {
     /// At a location and a component; `None` where members have locations of their own.
@@ -918,7 +918,7 @@ pub(crate) fn rewrite(request: &Request<'_>) -> Result<Rewritten, String> {
 
 /// The ids of what an invocation has loaded.
 struct Fragment {
-    /// Where the fragment is.
+    /// The fragment's place in the results.
     place: u32,
     view: u32,
     /// The condition that the invocation has a fragment to make.

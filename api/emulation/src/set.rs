@@ -79,7 +79,7 @@ pub(crate) struct SetState {
     pub(crate) tests: Option<TestState>,
     pub(crate) viewport: vk::Viewport,
     pub(crate) scissor: vk::Rect2D,
-    /// What a resolve shader is bound to, where there is one.
+    /// Descriptor sets and push constants of a resolve shader, if there is one.
     pub(crate) bindings: Option<Arc<Bindings>>,
 }
 

@@ -229,7 +229,7 @@ pub(crate) struct Work {
     pub(crate) pipeline: Arc<Pipeline>,
     pub(crate) values: Values,
     pub(crate) cameras: Cameras,
-    /// Those of the cameras, if one distorts.
+    /// The lenses of the cameras, if one distorts.
     pub(crate) lenses: Vec<Lens>,
     /// Depth and stencil tests, if something is tested.
     pub(crate) tests: Option<TestState>,
@@ -242,7 +242,7 @@ pub(crate) struct Work {
     pub(crate) sources: Vec<DrawSource>,
     /// The most Gaussians.
     pub(crate) gaussians: u64,
-    /// What a resolve shader is bound to, where there is one.
+    /// Descriptor sets and push constants of a resolve shader, if there is one.
     pub(crate) bindings: Option<Arc<Bindings>>,
     /// Pixels in memory of their own, where they are shown by another command buffer.
     pub(crate) pixels: Option<Arc<Memory>>,

@@ -172,19 +172,19 @@ pub(crate) struct Recording {
     pub(crate) set: Option<Option<Shared>>,
     /// The first draw of that set.
     pub(crate) first_of_set: Option<Arc<Draw>>,
-    /// Where cameras came from so far.
+    /// The sources of cameras so far.
     pub(crate) sources: Sources,
     pub(crate) operations: Vec<Operation>,
 }
 
-/// What a command buffer does with cameras.
+/// Sources of the cameras of a command buffer.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Sources {
-    /// It sets cameras.
+    /// True if it sets cameras.
     pub(crate) sets: bool,
-    /// It draws through cameras that commands set.
+    /// True if it draws through cameras that commands set.
     pub(crate) by_command: bool,
-    /// It draws through cameras in a buffer.
+    /// True if it draws through cameras in a buffer.
     pub(crate) by_buffer: bool,
 }
 

@@ -67,7 +67,7 @@ pub(crate) type Libraries = HashMap<vk::Pipeline, Arc<Request>>;
 pub(crate) struct Request {
     /// The parts of the state that are known.
     pub(crate) parts: Parts,
-    /// It makes a library.
+    /// True if it makes a library.
     pub(crate) is_library: bool,
     /// Something is wrong with a library, which was said.
     pub(crate) is_wrong: bool,

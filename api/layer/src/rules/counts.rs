@@ -63,7 +63,7 @@ impl Colors {
         }
     }
 
-    /// What they are, if they are no coefficients.
+    /// The likely meaning of the values, if they are no coefficients.
     fn told(&self) -> Option<&'static str> {
         let range = self.least..=self.greatest;
         if self.number >= 16

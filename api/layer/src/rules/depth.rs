@@ -29,7 +29,7 @@ fn test(recording: &Recording, pipeline: &Pipeline) -> Option<Test> {
     Some(Test { op: op.unwrap_or(stored.op), writes })
 }
 
-/// What a draw's depths meet, if they are tested.
+/// The state that tests a draw's depths, if they are tested.
 pub(crate) fn of(recording: &Recording, pipeline: &Pipeline) -> Option<DepthUse> {
     let test = test(recording, pipeline)?;
     let pass = recording.pass.as_ref()?;

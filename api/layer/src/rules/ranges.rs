@@ -12,7 +12,7 @@ use crate::recording::{Call, Inputs};
 use crate::report::Faults;
 use crate::rules::state;
 
-/// What a draw reads.
+/// The inputs of a draw, whose ranges are checked.
 pub(crate) struct Ranges<'a> {
     pub(crate) pipeline: &'a Pipeline,
     pub(crate) inputs: &'a Inputs,

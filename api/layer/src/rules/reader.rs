@@ -1,4 +1,4 @@
-//! What rules read of buffers, descriptors and cameras as a draw executes.
+//! Reading of buffers, descriptors and cameras as a draw executes.
 
 use ash::vk;
 
