@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianCameraDistortionGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_conformance::{Device, Outcome, all, cases, run};
 use gaurast_runner::{Case, Need, Variant};
@@ -39,6 +39,7 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
     ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
     ("logarithms and logits", &["activation"], 12),
+    ("projecting shaders", &["projection"], 19),
     ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];
 
@@ -296,7 +297,6 @@ fn pictures_that_are_not_emulated_are_refused(case: &Case) {
         assert_eq!(created(&|state| state), None);
         assert_eq!(created(&|state| state.order(GaussianOrderGAURAST::PER_PIXEL)), absent);
         assert_eq!(created(&|state| state.precision(GaussianPrecisionGAURAST::FLOAT16)), absent);
-        assert_eq!(created(&|state| state.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)), absent);
     });
 }
 

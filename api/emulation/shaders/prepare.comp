@@ -34,6 +34,20 @@ uint resolve(uint index) {
         push.set.draws.at[index].vertex_offset = d.vertex_offset;
         push.set.draws.at[index].first_instance = d.first_instance;
     }
+    if (d.shaded.outputs != uvec2(0u)) {
+        // What indices name is known by the host alone.
+        Shaded own = d.shaded;
+        own.first_vertex = d.is_indexed != 0u ? 0u : d.first;
+        own.vertices = d.is_indexed != 0u ? own.vertices : min(d.count, own.capacity);
+        own.instances = own.vertices == 0u ? 0u : min(d.instances, own.capacity / own.vertices);
+        own.first_instance = d.first_instance;
+        own.command[0] = d.is_indexed != 0u ? d.count : own.vertices;
+        own.command[1] = own.instances;
+        own.command[2] = d.first;
+        own.command[3] = d.is_indexed != 0u ? uint(d.vertex_offset) : d.first_instance;
+        own.command[4] = d.first_instance;
+        push.set.draws.at[index].shaded = own;
+    }
     uint high, low;
     umulExtended(d.count, d.instances, high, low);
     return high != 0u ? 0xffffffu : min(low, 0xffffffu);
@@ -147,12 +161,16 @@ void main() {
     if (l != 0u) {
         return;
     }
-    bool valid = push.set.camera_count > 0u;
+    bool valid = push.set.camera_count > 0u || push.set.is_shaded != 0u;
     for (uint i = 0u; i < push.set.camera_count; i++) {
         valid = valid && is_valid(push.set.cameras.at[i]);
     }
     uint n = valid ? min(all, push.set.reserve) : 0u;
-    derive();
+    if (push.set.is_shaded == 0u) {
+        derive();
+    } else {
+        push.set.derived.of.period = vec2(0.0);
+    }
     if (any(notEqual(uvec2(push.set.seen_by), uvec2(0u)))) {
         show_camera();
     }

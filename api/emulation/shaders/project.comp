@@ -7,79 +7,17 @@
 #include "variant.glsl"
 #include "attributes.glsl"
 #include "pair.glsl"
+#include "draws.glsl"
+#include "depths.glsl"
 #include "activation.glsl"
 #include "angles.glsl"
 #include "cameras.glsl"
 #include "lens.glsl"
 #include "harmonics.glsl"
 #include "tiles.glsl"
+#include "footprint.glsl"
 #include "surfel.glsl"
 layout(local_size_x = 256) in;
-
-bool is_finite(float x) {
-    return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
-}
-
-bool are_finite(vec4 v) {
-    return is_finite(v.x) && is_finite(v.y) && is_finite(v.z) && is_finite(v.w);
-}
-
-// The draw that a Gaussian of the set belongs to: the last that begins at or before it.
-uint draw_of(uint index) {
-    uint low = 0u, high = push.set.draw_count;
-    while (high - low > 1u) {
-        uint middle = (low + high) / 2u;
-        if (push.set.draws.at[middle].base <= index) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
-uint index_at(Draw d, uint place) {
-    if (place >= d.index_count) {
-        return 0u;
-    }
-    // No more than 2^32 bytes: an index buffer beyond has indices that no draw of 2^24 Gaussians reaches.
-    uvec2 at = advanced(d.indices, place * d.index_bytes);
-    return d.index_bytes == 1u ? byte_at(at) : d.index_bytes == 2u ? half_at(at) : any_word_at(at);
-}
-
-// The depth of a centre as the attachment holds it: in steps, if it has steps.
-float held_depth(Camera camera, float z) {
-    float c0 = camera.depth_coefficients.x, c1 = camera.depth_coefficients.y;
-    float rough = camera.model == ORTHOGRAPHIC ? c0 + c1 * z : c0 + c1 / z;
-    vec2 d;
-    if (abs(rough) < 4.0) {
-        d = add(pair(c0), camera.model == ORTHOGRAPHIC ? two_product(c1, z) : div(pair(c1), pair(z)));
-    } else {
-        d = pair(rough > 0.0 ? 4.0 : -4.0);
-    }
-    if (push.set.is_negative_one_to_one != 0u) {
-        d = add(0.5 * d, pair(0.5));
-    }
-    d = sub(d, pair(1.0)).x >= 0.0 ? pair(1.0) : d.x <= 0.0 ? pair(0.0) : d;
-    float nearest = push.set.depth_range.x;
-    d = add(pair(nearest), mul(d, two_sum(push.set.depth_range.y, -nearest)));
-    if (push.set.depth_steps == 0u) {
-        return d.x;
-    }
-    d = mul(d, float(push.set.depth_steps));
-    precise float whole = roundEven(d.x);
-    precise float rest = (d.x - whole) + d.y;
-    return rest > 0.5 ? whole + 1.0 : rest < -0.5 ? whole - 1.0 : whole;
-}
-
-// The power of two of a length in pixels that is to be 1, where it is beyond any picture.
-int power_of(float length_) {
-    int power = 0;
-    if (length_ > 1e6 && is_finite(length_)) {
-        frexp(length_, power);
-    }
-    return power;
-}
 
 // Reports whether a sigma point's place lies in the part of the picture in which it counts.
 bool counts(Camera camera, vec2 u, vec2 v) {
@@ -99,10 +37,8 @@ void main() {
     // The vertex and its attributes.
     uint draw = draw_of(i);
     Draw d = push.set.draws.at[draw];
-    uint within = i - d.base, vertex = d.first + within % d.count, instance = d.first_instance + within / d.count;
-    if (d.is_indexed != 0u) {
-        vertex = index_at(d, vertex) + uint(d.vertex_offset);
-    }
+    uvec2 member = member_of(d, i);
+    uint vertex = member.x, instance = member.y;
     vec4 values[8];
     for (uint which = 0u; which < 8u; which++) {
         bool is_used = which < MATRIX || (which == FACTOR ? HAS_FACTOR : HAS_MATRIX);
@@ -423,11 +359,7 @@ void main() {
     }
 
     // The ellipse in which alpha reaches the floor, a little larger, and its tiles.
-    float reach = max(0.0, 2.0 * (log(opacity) - log(least))) * 1.001 + 2e-3;
-    float deviations = push.set.cut_off_deviations;
-    if (push.set.cut_off == ELLIPSE) {
-        reach = min(reach, deviations * deviations * 1.001 + 2e-3);
-    }
+    float reach = reach_of_alpha(opacity, least);
     float half_width = sqrt(reach * a.x) * 1.0001, half_height = sqrt(reach * c.x) * 1.0001;
     if (HAS_LENS && has_lens) {
         half_width = ldexp(half_width, power);
@@ -500,34 +432,11 @@ void main() {
         half_width = max(halves.x, filtered);
         half_height = max(halves.y, filtered);
     }
-    vec2 mean = vec2(mean_x.x, mean_y.x), place = place_of_copy(mean, 0u);
-    uvec2 tiles = push.set.tiles;
-    float top = floor(place.y - half_height - 0.5), bottom = ceil(place.y + half_height + 0.5);
-    if (!(bottom >= 0.0 && top < float(push.set.area_size.y))) {
-        return;
-    }
-    uint first_row = uint(max(top, 0.0)) / TILE, last_row = min(uint(min(bottom, 65536.0)) / TILE, tiles.y - 1u);
     Record r;
     r.mean_x = mean_x;
     r.mean_y = mean_y;
-    r.tiles_y = first_row | last_row << 16;
-    r.slope = b.x / c.x;
-    r.curve = reach * (det.x / c.x);
-    r.half_height = half_height;
-    r.half_width = half_width;
-    r.reach = b.x / sqrt(a.x) * sqrt(reach);
-    if (HAS_LENS && power != 0) {
-        // A box.
-        r.curve = -1.0;
-    }
-    uint reached = 0u;
-    for (uint copy = 0u; copy < (HAS_ANGLES ? copies() : 1u); copy++) {
-        Reach ellipse = reach_of(r, copy);
-        for (uint row = first_row; row <= last_row; row++) {
-            uvec2 columns_ = tiles_of_row(ellipse, row, tiles.x);
-            reached += columns_.y - columns_.x;
-        }
-    }
+    // In units of a power of two there is but a box.
+    uint reached = set_tiles(r, a, b, c, det, reach, vec2(half_width, half_height), HAS_LENS && power != 0);
     if (reached == 0u) {
         return;
     }
@@ -575,44 +484,12 @@ void main() {
     }
     color = clamp(color, vec3(0.0), vec3(3.4028235e38));
 
-    // Tiles of a cut-off, from the viewport's corner.
-    float cut_radius = 0.0;
-    uint cut_y = 0u;
-    if (HAS_CUT_TILES) {
-        vec2 radius;
-        if (push.set.cut_off == TILE_SQUARE) {
-            vec2 half_difference = mul(sub(a, c), 0.5);
-            vec2 spread = add(mul(half_difference, half_difference), mul(b, b));
-            vec2 least_spread = vec2(0.1, -1.4901161e-9);
-            if (HAS_LENS && has_lens) {
-                least_spread = ldexp(least_spread, ivec2(-4 * power));
-            }
-            spread = spread.x < least_spread.x ? least_spread : spread;
-            radius = vec2(mul(root(add(mul(add(a, c), 0.5), root(spread))), deviations).x);
-        } else {
-            radius = vec2(mul(root(a), deviations).x, mul(root(c), deviations).x);
-        }
-        radius = ceil(HAS_LENS ? ldexp(radius, ivec2(power)) : radius);
-        cut_radius = radius.x;
-        cut_y = cut_tiles(sub(mean_y, pair(push.set.viewport.y)).x, radius.y);
-    }
-
-    // The factor of the inverse covariance; sqrt(log2(e) / 2).
-    vec2 width = root(a), scale_2 = vec2(0.8493217825889587, 1.7699059995379685e-08);
-    r.f0 = div(scale_2, width);
-    r.f2 = div(mul(scale_2, width), root(det));
-    r.f1 = -div(mul(r.f2, b), a);
-    if (HAS_LENS && has_lens) {
-        r.f0 = ldexp(r.f0, ivec2(-power));
-        r.f1 = ldexp(r.f1, ivec2(-power));
-        r.f2 = ldexp(r.f2, ivec2(-power));
-    }
+    set_cut(r, a, b, c, HAS_LENS ? power : 0);
+    set_factor(r, a, b, det, HAS_LENS ? power : 0);
     r.opacity = opacity;
     r.red = color.x;
     r.green = color.y;
     r.blue = color.z;
-    r.cut_y = cut_y;
-    r.cut_radius = cut_radius;
     r.unused0 = 0.0;
     r.unused1 = 0.0;
     if (IS_SURFEL) {
@@ -627,12 +504,9 @@ void main() {
         push.set.names.at[i] = uvec2(vertex, instance);
     }
 
-    // The key, as an unsigned number in the same order.
     float by = depth;
     if (push.set.order == RADIAL_DISTANCE) {
         by = root(dot3(e[0], e[1], e[2], e[0], e[1], e[2])).x;
     }
-    uint key = floatBitsToUint(by);
-    key = (key & 0x80000000u) != 0u ? ~key : key | 0x80000000u;
-    push.set.keys.at[i] = push.set.order == PRIMITIVE ? 0u : key;
+    push.set.keys.at[i] = key_of(by);
 }

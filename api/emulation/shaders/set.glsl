@@ -52,6 +52,17 @@ struct Lens {
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Lenses { Lens at[]; };
 
+// The outputs of a projecting shader: three vec4 for each vertex of each instance of each view.
+struct Shaded {
+    uvec2 outputs;               // their address; 0 without a projecting shader
+    uint first_vertex, vertices; // of an instance
+    uint instances, first_instance;
+    uint capacity;               // the most outputs of a view
+    uint unused;
+    uint command[5];             // VkDraw(Indexed)IndirectCommand, as it is executed
+    uint unused_;
+};
+
 struct Draw {
     uvec2 indices;               // their address
     uint index_bytes;            // 0 without an index buffer
@@ -66,6 +77,7 @@ struct Draw {
     uvec2 draw_count;            // address of the number of draws, or 0
     uvec2 harmonics;             // address of the buffer of harmonics
     uint harmonics_bytes, harmonics_format, harmonics_stride, harmonics_coefficient_stride;
+    Shaded shaded;
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Draws { Draw at[]; };
 
@@ -122,7 +134,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     vec2 sigma_center, sigma_other; // weights in the covariance
     vec2 picture[4];             // where sigma points count, from the viewport's corner: least and end of x, of y
     uint must_count;             // how many of the seven sigma points must count
-    uint unused;
+    uint is_shaded;              // a vertex shader projects
+    vec2 center[2], half_size;   // of the viewport: pairs; the height's half is negative if it is
     Attribute attributes[33];
 };
 

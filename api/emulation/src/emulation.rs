@@ -34,7 +34,7 @@ pub(crate) struct Objects {
     pub(crate) render_passes: HashMap<vk::RenderPass, Arc<RenderPass>>,
     pub(crate) pipelines: HashMap<vk::Pipeline, Arc<Pipeline>>,
     pub(crate) libraries: HashMap<vk::Pipeline, Arc<Library>>,
-    /// The words of fragment shaders.
+    /// The words of vertex and fragment shaders.
     pub(crate) shaders: HashMap<vk::ShaderModule, Arc<[u32]>>,
     /// The number of dynamic descriptors of each layout.
     pub(crate) set_layouts: HashMap<vk::DescriptorSetLayout, usize>,

@@ -72,6 +72,8 @@ pub(crate) struct Variant {
     pub(crate) is_resolved: bool,
     /// A camera has a lens that distorts.
     pub(crate) has_lens: bool,
+    /// A vertex shader projects: in another kernel.
+    pub(crate) is_shaded: bool,
 }
 
 impl Variant {
@@ -223,7 +225,8 @@ impl Kernels {
                 pipeline
             }
         };
-        let project = create(spirv!("project.comp"), &variant.of_projection())?;
+        let projecting: &[u8] = if variant.is_shaded { spirv!("project_shaded.comp") } else { spirv!("project.comp") };
+        let project = create(projecting, &variant.of_projection())?;
         let raster = create(spirv!("raster.comp"), &variant.of_rasterizer());
         let raster = raster.inspect_err(|_| {
             // SAFETY: nothing uses it yet.

@@ -15,7 +15,7 @@ use gaurast_layer_interface::{find, slice};
 use crate::next::Next;
 use crate::pipeline;
 
-/// The words of fragment shaders that are modules.
+/// The words of shaders that are modules.
 type Shaders = HashMap<vk::ShaderModule, Arc<[u32]>>;
 
 /// Vertex input, of the vertex input interface.
@@ -31,7 +31,7 @@ struct PreRasterization {
     state: Option<State<'static>>,
     footprint: Option<Footprint<'static>>,
     sigma_points: Option<SigmaPoints<'static>>,
-    has_vertex_stage: bool,
+    vertex: Option<Shader>,
     viewport: Option<vk::Viewport>,
     scissor: Option<vk::Rect2D>,
     is_negative_one_to_one: bool,
@@ -39,8 +39,9 @@ struct PreRasterization {
     view_mask: u32,
 }
 
-/// A fragment shader.
-struct FragmentShader {
+/// A shader.
+struct Shader {
+    stage: vk::ShaderStageFlags,
     /// Of its module; none if that is named by an identifier.
     words: Option<Arc<[u32]>>,
     name: CString,
@@ -49,17 +50,22 @@ struct FragmentShader {
     data: Vec<u8>,
 }
 
-impl FragmentShader {
+impl Shader {
     /// # Safety
     /// The creation info is valid.
-    unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>, shaders: &Shaders) -> Option<Self> {
+    unsafe fn of(
+        info: &vk::GraphicsPipelineCreateInfo<'_>,
+        wanted: vk::ShaderStageFlags,
+        shaders: &Shaders,
+    ) -> Option<Self> {
         // SAFETY: the caller's promise.
         unsafe {
             let mut stages = slice(info.p_stages, info.stage_count).iter();
-            let stage = stages.find(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT)?;
+            let stage = stages.find(|stage| stage.stage == wanted)?;
             let special = stage.p_specialization_info.as_ref();
             let name = if stage.p_name.is_null() { c"" } else { CStr::from_ptr(stage.p_name) };
             Some(Self {
+                stage: wanted,
                 words: pipeline::shader_words(stage, shaders),
                 name: name.to_owned(),
                 flags: stage.flags,
@@ -72,11 +78,20 @@ impl FragmentShader {
             })
         }
     }
+
+    /// The creation info of its module.
+    fn module(&self) -> vk::ShaderModuleCreateInfo<'_> {
+        vk::ShaderModuleCreateInfo::default().code(self.words.as_deref().unwrap_or_default())
+    }
+
+    fn specialization(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default().map_entries(&self.constants).data(&self.data)
+    }
 }
 
 /// The state of the part of the fragment shader.
 struct Fragment {
-    shader: Option<FragmentShader>,
+    shader: Option<Shader>,
     depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'static>>,
 }
 
@@ -142,14 +157,8 @@ impl Input {
     }
 }
 
-/// Reports whether a pipeline has a stage.
-unsafe fn has_stage(info: &vk::GraphicsPipelineCreateInfo<'_>, wanted: vk::ShaderStageFlags) -> bool {
-    // SAFETY: the caller's promise.
-    unsafe { slice(info.p_stages, info.stage_count) }.iter().any(|stage| stage.stage == wanted)
-}
-
 impl PreRasterization {
-    unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Self {
+    unsafe fn new(info: &vk::GraphicsPipelineCreateInfo<'_>, shaders: &Shaders) -> Self {
         use std::marker::PhantomData;
         use std::ptr::null;
         // SAFETY: the caller's promise.
@@ -165,7 +174,7 @@ impl PreRasterization {
                 state: state.map(|state| State { p_next: null(), _marker: PhantomData, ..*state }),
                 footprint: footprint.map(|state| Footprint { p_next: null(), _marker: PhantomData, ..*state }),
                 sigma_points: sigma_points.map(|state| SigmaPoints { p_next: null(), _marker: PhantomData, ..*state }),
-                has_vertex_stage: has_stage(info, vk::ShaderStageFlags::VERTEX),
+                vertex: Shader::of(info, vk::ShaderStageFlags::VERTEX, shaders),
                 viewport: viewports.and_then(|state| state.p_viewports.as_ref()).copied(),
                 scissor: viewports.and_then(|state| state.p_scissors.as_ref()).copied(),
                 is_negative_one_to_one: clip.is_some_and(|clip| clip.negative_one_to_one != vk::FALSE),
@@ -184,7 +193,7 @@ impl Fragment {
         unsafe {
             let state = info.p_depth_stencil_state.as_ref();
             Self {
-                shader: FragmentShader::of(info, shaders),
+                shader: Shader::of(info, vk::ShaderStageFlags::FRAGMENT, shaders),
                 depth_stencil: state.map(|state| vk::PipelineDepthStencilStateCreateInfo {
                     p_next: null(),
                     _marker: PhantomData,
@@ -264,7 +273,7 @@ impl Library {
                 own.input = Some(Arc::new(Input::new(info)));
             }
             if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
-                own.pre_rasterization = Some(Arc::new(PreRasterization::new(info)));
+                own.pre_rasterization = Some(Arc::new(PreRasterization::new(info, shaders)));
             }
             if parts.contains(Parts::FRAGMENT_SHADER) {
                 own.fragment = Some(Arc::new(Fragment::new(info, shaders)));
@@ -284,7 +293,7 @@ impl Library {
         let input = self.input.as_ref();
         let has_topology = input.is_some_and(|input| input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
         has_topology
-            || self.pre_rasterization.as_ref().is_some_and(|part| part.state.is_some() && !part.has_vertex_stage)
+            || self.pre_rasterization.as_ref().is_some_and(|part| part.state.is_some() && part.vertex.is_none())
     }
 
     /// Calls a function with the creation info of the pipeline that the parts make, and its state of Gaussians. `None` where it has
@@ -308,27 +317,23 @@ impl Library {
             vertex_input = vertex_input.push_next(&mut divisors);
         }
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(input.topology);
-        let mut stages = Vec::new();
-        if shaders.has_vertex_stage {
-            // That there is one is all that is asked of it.
-            stages.push(vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::VERTEX));
-        }
         let fragment = self.fragment.as_ref().and_then(|part| part.shader.as_ref());
-        let code = fragment.and_then(|shader| shader.words.as_deref());
-        let mut module = vk::ShaderModuleCreateInfo::default().code(code.unwrap_or_default());
-        let special =
-            fragment.map(|shader| vk::SpecializationInfo::default().map_entries(&shader.constants).data(&shader.data));
-        if let (Some(shader), Some(special)) = (fragment, &special) {
-            let mut stage = vk::PipelineShaderStageCreateInfo::default()
-                .flags(shader.flags)
-                .stage(vk::ShaderStageFlags::FRAGMENT)
-                .name(&shader.name)
-                .specialization_info(special);
-            if code.is_some() {
-                stage = stage.push_next(&mut module);
-            }
-            stages.push(stage);
-        }
+        let both: Vec<&Shader> = shaders.vertex.iter().chain(fragment).collect();
+        let mut modules: Vec<_> = both.iter().map(|shader| shader.module()).collect();
+        let constants: Vec<_> = both.iter().map(|shader| shader.specialization()).collect();
+        let stages: Vec<_> = both
+            .iter()
+            .zip(&mut modules)
+            .zip(&constants)
+            .map(|((shader, module), constants)| {
+                let stage = vk::PipelineShaderStageCreateInfo::default()
+                    .flags(shader.flags)
+                    .stage(shader.stage)
+                    .name(&shader.name)
+                    .specialization_info(constants);
+                if shader.words.is_some() { stage.push_next(module) } else { stage }
+            })
+            .collect();
         let clip = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
             .negative_one_to_one(shaders.is_negative_one_to_one);
         let viewports = vk::PipelineViewportStateCreateInfo {

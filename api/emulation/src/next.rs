@@ -15,6 +15,8 @@ pub(crate) struct Next {
     pub(crate) timestamp_period: f32,
     /// The greatest width and height of a viewport.
     pub(crate) max_viewport: [u32; 2],
+    pub(crate) max_vertex_bindings: u32,
+    pub(crate) max_vertex_attributes: u32,
     pub(crate) draw_multi: Option<vk::PFN_vkCmdDrawMultiEXT>,
     pub(crate) draw_multi_indexed: Option<vk::PFN_vkCmdDrawMultiIndexedEXT>,
     pub(crate) begin_conditional_rendering: Option<vk::PFN_vkCmdBeginConditionalRenderingEXT>,
@@ -39,6 +41,8 @@ impl Next {
                 memory: instance.next.get_physical_device_memory_properties(physical_device),
                 timestamp_period: limits.timestamp_period,
                 max_viewport: limits.max_viewport_dimensions,
+                max_vertex_bindings: limits.max_vertex_input_bindings,
+                max_vertex_attributes: limits.max_vertex_input_attributes,
                 draw_multi: find(get, handle, c"vkCmdDrawMultiEXT"),
                 draw_multi_indexed: find(get, handle, c"vkCmdDrawMultiIndexedEXT"),
                 begin_conditional_rendering: find(get, handle, c"vkCmdBeginConditionalRenderingEXT"),

@@ -17,10 +17,12 @@ use gaurast::vk::{
 use gaurast_layer_interface::{find, slice};
 
 use crate::depth_stencil::{self, TestState};
+use crate::draw_call::SHADED;
 use crate::formats;
 use crate::kernels::{self, CAMERA, Kernels, Variant};
 use crate::made::{ATTRIBUTES, Covering};
 use crate::next::Next;
+use crate::projecting;
 use crate::report::tell;
 use crate::resolve::{self, Request, Rewritten};
 
@@ -63,6 +65,14 @@ pub(crate) struct Resolve {
     pub(crate) without_shader: vk::Pipeline,
 }
 
+/// The pipeline that runs a projecting shader.
+pub(crate) struct Projecting {
+    pub(crate) raw: vk::Pipeline,
+    /// The vertex binding that says where outputs are stored.
+    pub(crate) binding: u32,
+    pub(crate) has_dynamic_strides: bool,
+}
+
 /// A pipeline of Gaussians.
 pub(crate) struct Pipeline {
     next: Arc<Next>,
@@ -91,6 +101,7 @@ pub(crate) struct Pipeline {
     pub(crate) samples: u32,
     pub(crate) camera_buffer: Option<CameraBuffer>,
     pub(crate) resolve: Option<Resolve>,
+    pub(crate) projecting: Option<Projecting>,
 }
 
 impl Drop for Pipeline {
@@ -98,6 +109,10 @@ impl Drop for Pipeline {
         if let Some(resolve) = &self.resolve {
             // SAFETY: as below.
             unsafe { self.next.destroy_pipeline(resolve.without_shader, None) };
+        }
+        if let Some(projecting) = &self.projecting {
+            // SAFETY: as below.
+            unsafe { self.next.destroy_pipeline(projecting.raw, None) };
         }
         if let Some(camera) = &self.camera_buffer {
             // SAFETY: no command buffer that uses it is executed any more.
@@ -117,7 +132,7 @@ pub(crate) struct Context<'a> {
     pub(crate) view_mask: Option<u32>,
     /// Layouts of the descriptor sets.
     pub(crate) set_layouts: &'a [vk::DescriptorSetLayout],
-    /// The words of fragment shaders that are modules.
+    /// The words of vertex and fragment shaders that are modules.
     pub(crate) shaders: &'a HashMap<vk::ShaderModule, Arc<[u32]>>,
     pub(crate) cache: vk::PipelineCache,
 }
@@ -175,10 +190,14 @@ impl SigmaPoints {
     }
 }
 
+/// Reports whether a vertex shader projects.
+fn is_shaded(state: &State<'_>) -> bool {
+    state.projection_mode == ProjectionMode::VERTEX_SHADER
+}
+
 /// A reason to refuse a pipeline.
 fn refusal(state: &State<'_>) -> Option<&'static str> {
     let refusals = [
-        (state.projection_mode != ProjectionMode::FIXED_FUNCTION, "vertexShaderProjection"),
         (state.order == Order::PER_PIXEL, "perPixelOrder"),
         (state.precision == Precision::FLOAT16, "rasterizationFloat16"),
     ];
@@ -244,6 +263,19 @@ impl Attributes {
         };
         let mut own =
             Self { list: [Attribute::default(); 33], sources: Vec::new(), is_float32: true, harmonics_step: None };
+        let source = |binding: &vk::VertexInputBindingDescription| {
+            let divisor = divisors.iter().find(|divisor| divisor.binding == binding.binding);
+            let by_instance = binding.input_rate == vk::VertexInputRate::INSTANCE;
+            Source {
+                binding: binding.binding,
+                stride: binding.stride,
+                divisor: by_instance.then(|| divisor.map_or(1, |divisor| divisor.divisor)),
+            }
+        };
+        if is_shaded(state) {
+            own.sources = bindings.iter().map(source).collect();
+            return Ok(own);
+        }
         let at = &state.attribute_locations;
         let harmonics = if state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
             0
@@ -267,13 +299,7 @@ impl Attributes {
                 .ok_or_else(|| format!("attributes of format {:?} are not read", attribute.format))?;
             let binding = bindings.iter().find(|binding| binding.binding == attribute.binding);
             let binding = binding.ok_or_else(|| format!("there is no vertex binding {}", attribute.binding))?;
-            let divisor = divisors.iter().find(|divisor| divisor.binding == binding.binding);
-            let by_instance = binding.input_rate == vk::VertexInputRate::INSTANCE;
-            let source = Source {
-                binding: binding.binding,
-                stride: binding.stride,
-                divisor: by_instance.then(|| divisor.map_or(1, |divisor| divisor.divisor)),
-            };
+            let source = source(binding);
             let known = own.sources.iter().position(|other| *other == source);
             let source = known.unwrap_or_else(|| {
                 own.sources.push(source);
@@ -348,24 +374,33 @@ pub(crate) unsafe fn create(
         let view_mask = context.view_mask.or(rendering.map(|rendering| rendering.view_mask)).unwrap_or(0);
         let footprint = find::<Footprint<'_>>(info.p_next);
         let cut_off = footprint.map_or(0, |footprint| footprint.cut_off.as_raw().cast_unsigned());
-        let variant = Variant {
-            has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
-            has_factor: state.attribute_locations.model_opacity != UNUSED,
-            harmonics_in_buffer: state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER),
-            is_float32: attributes.is_float32,
-            are_harmonics_even: attributes.harmonics_step.is_some(),
+        let of_footprint = Variant {
             has_cut_tiles: cut_off >= 2,
-            degree: state.spherical_harmonics_degree,
-            // What a buffer holds is not known here, and what a command gives, later.
-            has_angles: state.camera_source == CameraSource::UNIFORM_BUFFER,
-            is_unscented: state.linearization == Linearization::UNSCENTED,
-            is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
             has_tests: tests.is_some_and(|tests| tests.tests_anything()),
-            has_logarithms: state.flags.contains(Flags::LOG_SCALE),
-            has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
-            // What commands set is not known here either.
-            has_lens: false,
             is_resolved: shader.as_ref().is_some_and(|shader| shader.rewritten.has_inputs),
+            is_shaded: is_shaded(state),
+            ..Variant::default()
+        };
+        let variant = if is_shaded(state) {
+            of_footprint
+        } else {
+            Variant {
+                has_matrix: state.attribute_locations.first_model_matrix != UNUSED,
+                has_factor: state.attribute_locations.model_opacity != UNUSED,
+                harmonics_in_buffer: state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER),
+                is_float32: attributes.is_float32,
+                are_harmonics_even: attributes.harmonics_step.is_some(),
+                degree: state.spherical_harmonics_degree,
+                // What a buffer holds is not known here, and what a command gives, later.
+                has_angles: state.camera_source == CameraSource::UNIFORM_BUFFER,
+                is_unscented: state.linearization == Linearization::UNSCENTED,
+                is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
+                has_logarithms: state.flags.contains(Flags::LOG_SCALE),
+                has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
+                // What commands set is not known here either.
+                has_lens: false,
+                ..of_footprint
+            }
         };
         // They are compiled now, rather than with the first draw.
         context.kernels.specialized(variant)?;
@@ -375,6 +410,17 @@ pub(crate) unsafe fn create(
             graphics(context, info, &show, None).inspect_err(|_| context.next.destroy_pipeline(raw, allocator))?
         } else {
             vk::Pipeline::null()
+        };
+        let projecting = match projecting_shader(context, info, state, view_mask, &dynamic) {
+            Ok(projecting) => projecting,
+            Err(refusal) => {
+                context.next.destroy_pipeline(raw, allocator);
+                context.next.destroy_pipeline(without_shader, allocator);
+                if let Some(reason) = refusal.reason {
+                    tell(&reason);
+                }
+                return Err(refusal.result);
+            }
         };
         let mut own = Pipeline {
             next: Arc::clone(context.next),
@@ -402,8 +448,9 @@ pub(crate) unsafe fn create(
                 covering: shader.rewritten.covering,
                 without_shader,
             }),
+            projecting,
         };
-        if state.camera_source == CameraSource::UNIFORM_BUFFER {
+        if state.camera_source == CameraSource::UNIFORM_BUFFER && !is_shaded(state) {
             match camera_buffer(context, state) {
                 Ok(camera) => own.camera_buffer = Some(camera),
                 Err(error) => {
@@ -463,6 +510,125 @@ unsafe fn resolve_shader<'a>(
             is_sample_shaded: multisample.is_some_and(|state| state.sample_shading_enable != vk::FALSE),
         })?;
         Ok(Some(ResolveShader { stage: *stage, rewritten }))
+    }
+}
+
+/// A reason not to create a pipeline; none where the next layer has failed.
+struct Refusal {
+    reason: Option<String>,
+    result: vk::Result,
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Self {
+        Self { reason: Some(reason), result: vk::Result::ERROR_FEATURE_NOT_PRESENT }
+    }
+}
+
+impl From<vk::Result> for Refusal {
+    fn from(result: vk::Result) -> Self {
+        Self { reason: None, result }
+    }
+}
+
+/// The highest two numbers below a limit that are not used.
+fn unused<const N: usize>(limit: u32, used: impl Fn(u32) -> bool) -> Option<[u32; N]> {
+    let mut free = (0..limit).rev().filter(|&number| !used(number));
+    let found: Vec<u32> = free.by_ref().take(N).collect();
+    found.try_into().ok()
+}
+
+/// The pipeline that runs a projecting shader, if there is one: it draws points, of which nothing is rasterized.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn projecting_shader(
+    context: &Context<'_>,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    state: &State<'_>,
+    view_mask: u32,
+    dynamic: &[vk::DynamicState],
+) -> Result<Option<Projecting>, Refusal> {
+    if !is_shaded(state) {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let mut stages = slice(info.p_stages, info.stage_count).iter();
+        let stage = stages.find(|stage| stage.stage == vk::ShaderStageFlags::VERTEX);
+        let stage = stage.ok_or_else(|| "a pipeline whose vertex shader projects has none".to_owned())?;
+        let words = shader_words(stage, context.shaders).ok_or_else(|| {
+            "a projecting shader is named by an identifier of its module, which is not emulated".to_owned()
+        })?;
+        if stage.p_name.is_null() {
+            return Err("a projecting shader has no name".to_owned().into());
+        }
+        let input = info.p_vertex_input_state.as_ref().copied().unwrap_or_default();
+        let mut bindings = slice(input.p_vertex_binding_descriptions, input.vertex_binding_description_count).to_vec();
+        let mut attributes =
+            slice(input.p_vertex_attribute_descriptions, input.vertex_attribute_description_count).to_vec();
+        let binding =
+            unused(context.next.max_vertex_bindings, |number| bindings.iter().any(|binding| binding.binding == number));
+        let locations = unused(context.next.max_vertex_attributes, |number| {
+            attributes.iter().any(|attribute| attribute.location == number)
+        });
+        let (Some([binding]), Some(places)) = (binding, locations) else {
+            return Err("a projecting shader leaves no vertex binding, or no two locations, to the emulation"
+                .to_owned()
+                .into());
+        };
+        bindings.push(vk::VertexInputBindingDescription {
+            binding,
+            stride: 0,
+            input_rate: vk::VertexInputRate::VERTEX,
+        });
+        for (location, offset) in places.into_iter().zip(SHADED) {
+            let format = vk::Format::R32G32B32A32_UINT;
+            attributes.push(vk::VertexInputAttributeDescription { location, binding, format, offset });
+        }
+        let input = vk::PipelineVertexInputStateCreateInfo {
+            p_next: input.p_next,
+            ..vk::PipelineVertexInputStateCreateInfo::default()
+                .vertex_binding_descriptions(&bindings)
+                .vertex_attribute_descriptions(&attributes)
+        };
+        let rewritten = projecting::rewrite(&projecting::Request {
+            words: &words,
+            entry: CStr::from_ptr(stage.p_name),
+            locations: state.vertex_output_locations,
+            places,
+            has_views: view_mask != 0,
+        })?;
+        let module =
+            context.next.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&rewritten), None)?;
+        let mut stage = stage.module(module);
+        stage.p_next = std::ptr::null();
+        let stages = [stage];
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::POINT_LIST);
+        let raster =
+            vk::PipelineRasterizationStateCreateInfo::default().rasterizer_discard_enable(true).line_width(1.0);
+        let strides = vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE;
+        let has_dynamic_strides = dynamic.contains(&strides);
+        let states: &[vk::DynamicState] = if has_dynamic_strides { &[strides] } else { &[] };
+        let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(states);
+        let mut rendering = vk::PipelineRenderingCreateInfo::default().view_mask(view_mask);
+        let own = vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&input)
+            .input_assembly_state(&assembly)
+            .rasterization_state(&raster)
+            .dynamic_state(&states)
+            .layout(info.layout)
+            .push_next(&mut rendering);
+        let created = context.next.create_graphics_pipelines(context.cache, &[own], None);
+        context.next.destroy_shader_module(module, None);
+        match created {
+            Ok(created) => {
+                let raw = created.first().copied().ok_or(vk::Result::ERROR_UNKNOWN)?;
+                Ok(Some(Projecting { raw, binding, has_dynamic_strides }))
+            }
+            Err((_, error)) => Err(error.into()),
+        }
     }
 }
 
@@ -646,7 +812,7 @@ impl Pipeline {
 
     /// Reports whether harmonics come from a buffer of their own.
     pub(crate) fn has_harmonics_buffer(&self) -> bool {
-        self.state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER)
+        self.state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) && self.projecting.is_none()
     }
 }
 

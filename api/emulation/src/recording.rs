@@ -9,6 +9,7 @@ use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
 use crate::bindings::{Bindings, BoundSet, PushConstants};
 use crate::cameras::{Cameras, SeenBy};
 use crate::depth_stencil::{Outcome, TestState};
+use crate::draw_call::{Call, Draw, IndexBuffer, Shaded, ShaderDraw, VertexBuffer};
 use crate::emulation::Emulation;
 use crate::formats;
 use crate::made::Made;
@@ -20,7 +21,7 @@ use crate::scratch::{Memory, Places};
 use crate::set::{DynamicValues, Set, SetState};
 use crate::support::MAX_GAUSSIANS;
 use crate::times::Times;
-use crate::work::{Draw, DrawSource, Work, barrier};
+use crate::work::{DrawSource, Work, barrier};
 
 /// The graphics pipeline that is bound.
 #[derive(Clone, Default)]
@@ -29,25 +30,6 @@ pub(crate) enum Bound {
     Nothing,
     Other(vk::Pipeline),
     Gaussians(Arc<Pipeline>),
-}
-
-/// A vertex buffer.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct VertexBuffer {
-    pub(crate) buffer: vk::Buffer,
-    pub(crate) offset: u64,
-    pub(crate) address: u64,
-    pub(crate) size: u64,
-    /// The stride, if it is dynamic.
-    pub(crate) stride: Option<u32>,
-}
-
-/// The index buffer.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct IndexBuffer {
-    pub(crate) address: u64,
-    pub(crate) size: u64,
-    pub(crate) bytes: u32,
 }
 
 /// The buffer of spherical harmonics.
@@ -78,24 +60,11 @@ pub(crate) struct Condition {
     pub(crate) flags: vk::ConditionalRenderingFlagsEXT,
 }
 
+/// The least number of Gaussians, or of vertices, that a draw has room for where its own is not known.
+const LEAST_GUESS: u64 = 1 << 18;
+
 /// A command that sets dynamic state, for repeating it.
 pub(crate) type Repeat = Box<dyn Fn(&Next, vk::CommandBuffer) + Send>;
-
-/// A draw as a command gives it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Call {
-    pub(crate) first: u32,
-    pub(crate) count: u32,
-    pub(crate) vertex_offset: i32,
-    pub(crate) first_instance: u32,
-    pub(crate) instances: u32,
-    pub(crate) is_indexed: bool,
-    /// The address of the parameters, or 0.
-    pub(crate) parameters: u64,
-    /// The address of the number of draws, or 0.
-    pub(crate) draw_count: u64,
-    pub(crate) indirect_index: u32,
-}
 
 /// A command buffer.
 pub(crate) struct Recording {
@@ -193,7 +162,9 @@ impl Recording {
 
     /// The state of a draw of Gaussians; `None` where the text says that it draws nothing.
     fn state(&self, pipeline: &Arc<Pipeline>) -> Option<SetState> {
-        let cameras = if pipeline.state.camera_source == CameraSource::UNIFORM_BUFFER {
+        let cameras = if pipeline.projecting.is_some() {
+            Cameras::Command(Vec::new())
+        } else if pipeline.state.camera_source == CameraSource::UNIFORM_BUFFER {
             let number = pipeline.camera_buffer.as_ref()?.set;
             let bound = self.descriptors.get(&(vk::PipelineBindPoint::GRAPHICS.as_raw(), number))?;
             Cameras::Buffer(bound.set, bound.offsets.clone())
@@ -250,24 +221,46 @@ impl Recording {
         pipeline.sources.iter().map(source).collect()
     }
 
+    /// The most elements that the vertex buffers of a draw have, by vertex or by instance.
+    fn elements(pipeline: &Pipeline, sources: &[DrawSource], by_instance: bool) -> Option<u64> {
+        let all = sources.iter().zip(&pipeline.sources);
+        let own = all.filter(|(_, source)| match source.divisor {
+            None => !by_instance,
+            Some(divisor) => by_instance && divisor != 0,
+        });
+        own.map(|(source, of)| u64::from(source.bytes / source.stride.max(1)) * u64::from(of.divisor.unwrap_or(1)))
+            .max()
+    }
+
     /// The most Gaussians of a draw. That of an indirect one is not known here: it is taken from the sizes of what it reads.
     fn most(&self, call: &Call, pipeline: &Pipeline, sources: &[DrawSource]) -> u64 {
         if call.parameters == 0 {
             return (u64::from(call.count) * u64::from(call.instances)).min(u64::from(MAX_GAUSSIANS));
         }
-        let elements = |by_instance: bool| {
-            let all = sources.iter().zip(&pipeline.sources);
-            let own = all.filter(|(_, source)| match source.divisor {
-                None => !by_instance,
-                Some(divisor) => by_instance && divisor != 0,
-            });
-            own.map(|(source, of)| u64::from(source.bytes / source.stride.max(1)) * u64::from(of.divisor.unwrap_or(1)))
-                .max()
-        };
         let indices = self.index_buffer.filter(|_| call.is_indexed);
-        let vertices = indices.map(|buffer| buffer.size / u64::from(buffer.bytes)).or_else(|| elements(false));
-        let guess = vertices.unwrap_or(1) * elements(true).unwrap_or(1);
-        guess.clamp(1 << 18, u64::from(MAX_GAUSSIANS))
+        let vertices = indices
+            .map(|buffer| buffer.size / u64::from(buffer.bytes))
+            .or_else(|| Self::elements(pipeline, sources, false));
+        let guess = vertices.unwrap_or(1) * Self::elements(pipeline, sources, true).unwrap_or(1);
+        guess.clamp(LEAST_GUESS, u64::from(MAX_GAUSSIANS))
+    }
+
+    /// The room for what the projecting shader of a draw of at most as many Gaussians writes. With indices it has a place for each vertex
+    /// of the buffers.
+    fn shaded(call: &Call, pipeline: &Pipeline, sources: &[DrawSource], gaussians: u64) -> Shaded {
+        let (mut vertices, mut capacity) = (0, gaussians);
+        if call.is_indexed {
+            vertices = Self::elements(pipeline, sources, false).unwrap_or(LEAST_GUESS).max(1);
+            let of_buffers = || Self::elements(pipeline, sources, true).unwrap_or(1);
+            capacity = vertices * if call.parameters == 0 { u64::from(call.instances) } else { of_buffers() };
+        }
+        if capacity > u64::from(MAX_GAUSSIANS) {
+            tell(
+                "an indexed draw with a projecting shader names more than 16,777,215 vertices of instances: later instances are not drawn",
+            );
+        }
+        let [vertices, capacity] = [vertices, capacity].map(|most| most.min(u64::from(MAX_GAUSSIANS)) as u32);
+        Shaded::with_room(vertices, capacity)
     }
 
     /// Records a draw of Gaussians.
@@ -309,8 +302,20 @@ impl Recording {
             harmonics_stride: harmonics.map_or(0, |buffer| buffer.stride),
             harmonics_coefficient_stride: harmonics
                 .map_or(0, |buffer| u32::try_from(buffer.coefficient_stride).unwrap_or(u32::MAX)),
+            shaded: match &pipeline.projecting {
+                Some(_) => Self::shaded(&call, pipeline, &sources, gaussians),
+                None => Shaded::default(),
+            },
         };
-        self.set.get_or_insert_with(|| Set::new(state)).push(draw, &sources, gaussians);
+        let shader_draw = pipeline.projecting.as_ref().map(|_| ShaderDraw {
+            call,
+            bindings: Arc::new(self.bindings()),
+            vertex_buffers: self.vertex_buffers.clone(),
+            index_buffer: index,
+        });
+        let set = self.set.get_or_insert_with(|| Set::new(state));
+        set.push(draw, &sources, gaussians);
+        set.shader_draws.extend(shader_draw);
         if !self.is_in_set {
             // SAFETY: the caller's promise.
             unsafe { self.end_set(emulation) };
@@ -424,6 +429,9 @@ impl Recording {
             }
             self.pass = Some(pass);
             self.restore_compute(next);
+            for work in works {
+                self.restore_after_projecting(next, work);
+            }
             failure.map_or(Ok(made), Err)
         }
     }
@@ -443,6 +451,26 @@ impl Recording {
             for ((_, number), bound) in own {
                 let sets = [bound.set];
                 next.cmd_bind_descriptor_sets(self.commands, compute, bound.layout, *number, &sets, &bound.offsets);
+            }
+        }
+    }
+
+    /// Binds again what the draws with projecting shaders have replaced, but for the pipeline and push constants.
+    ///
+    /// # Safety
+    /// See [`Self::activate_queries`].
+    unsafe fn restore_after_projecting(&self, next: &Next, work: &Work) {
+        let Some(last) = work.shader_draws.last() else {
+            return;
+        };
+        // SAFETY: the caller's promise: the application has bound these.
+        unsafe {
+            self.bindings().bind_sets(next, self.commands, &last.bindings.sets);
+            for (&binding, buffer) in &self.vertex_buffers {
+                buffer.bind(next, self.commands, binding);
+            }
+            if let Some(index) = &self.index_buffer {
+                next.cmd_bind_index_buffer(self.commands, index.buffer, index.offset, index.ty);
             }
         }
     }
@@ -507,9 +535,7 @@ impl Recording {
             if let Bound::Other(pipeline) = self.graphics {
                 next.cmd_bind_pipeline(commands, graphics, pipeline);
             }
-            for pushed in &self.constants {
-                next.cmd_push_constants(commands, pushed.layout, pushed.stages, pushed.offset, &pushed.bytes);
-            }
+            self.bindings().push_constants(next, commands);
         }
         Ok(())
     }
@@ -525,10 +551,8 @@ impl Recording {
             let Some(bindings) = &work.bindings else {
                 return;
             };
-            for pushed in &bindings.constants {
-                next.cmd_push_constants(self.commands, pushed.layout, pushed.stages, pushed.offset, &pushed.bytes);
-            }
-            self.bind_sets(next, &bindings.sets, &self.bindings().sets);
+            bindings.push_constants(next, self.commands);
+            bindings.bind_sets(next, self.commands, &self.bindings().sets);
         }
     }
 
@@ -539,29 +563,11 @@ impl Recording {
     unsafe fn restore_after_shader(&self, next: &Next, work: &Work) {
         // SAFETY: the caller's promise: the application has bound these.
         unsafe {
-            if let Some(before) = self.vertex_buffers.get(&0).filter(|before| before.buffer != vk::Buffer::null()) {
-                let strides = before.stride.map(|stride| [u64::from(stride)]);
-                let strides = strides.as_ref().map(<[u64; 1]>::as_slice);
-                let size = if before.size == 0 { vk::WHOLE_SIZE } else { before.size };
-                let (buffers, offsets, sizes) = ([before.buffer], [before.offset], [size]);
-                next.cmd_bind_vertex_buffers2(self.commands, 0, &buffers, &offsets, Some(&sizes), strides);
+            if let Some(before) = self.vertex_buffers.get(&0) {
+                before.bind(next, self.commands, 0);
             }
             if let Some(bindings) = &work.bindings {
-                self.bind_sets(next, &self.bindings().sets, &bindings.sets);
-            }
-        }
-    }
-
-    /// Binds the descriptor sets that are not bound already.
-    ///
-    /// # Safety
-    /// See [`Self::activate_queries`].
-    unsafe fn bind_sets(&self, next: &Next, wanted: &BTreeMap<u32, BoundSet>, bound: &BTreeMap<u32, BoundSet>) {
-        let graphics = vk::PipelineBindPoint::GRAPHICS;
-        for (number, one) in wanted.iter().filter(|(number, one)| bound.get(number) != Some(one)) {
-            // SAFETY: the caller's promise.
-            unsafe {
-                next.cmd_bind_descriptor_sets(self.commands, graphics, one.layout, *number, &[one.set], &one.offsets);
+                self.bindings().bind_sets(next, self.commands, &bindings.sets);
             }
         }
     }

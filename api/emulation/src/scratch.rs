@@ -114,6 +114,8 @@ pub(crate) struct Extent {
     pub(crate) cameras: u64,
     pub(crate) lenses: u64,
     pub(crate) pixels: u64,
+    /// Bytes of what projecting shaders write.
+    pub(crate) outputs: u64,
     /// Samples that are tested.
     pub(crate) tested: u64,
     /// A resolve shader reads depths or Gaussians.
@@ -146,6 +148,7 @@ pub(crate) struct Places {
     pub(crate) copied_depths: u64,
     pub(crate) copied_stencils: u64,
     pub(crate) stored: u64,
+    pub(crate) outputs: u64,
     /// The size of all.
     pub(crate) end: u64,
 }
@@ -189,6 +192,7 @@ impl Places {
         places.copied_depths = take(4 * extent.tested);
         places.copied_stencils = take(4 * extent.tested);
         places.stored = take(8 * extent.tested);
+        places.outputs = take(extent.outputs);
         places.end = end;
         places
     }

@@ -7,11 +7,12 @@ use ash::vk;
 use crate::bindings::Bindings;
 use crate::cameras::{Cameras, SeenBy};
 use crate::depth_stencil::TestState;
+use crate::draw_call::{Draw, ShaderDraw};
 use crate::lens::Lens;
 use crate::made::Area;
 use crate::pipeline::{self, Pipeline};
 use crate::support::MAX_GAUSSIANS;
-use crate::work::{Draw, DrawSource, Values, Work};
+use crate::work::{DrawSource, Values, Work};
 
 /// The extension's dynamic states, as far as they have been set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -113,13 +114,15 @@ pub(crate) struct Set {
     pub(crate) state: SetState,
     pub(crate) draws: Vec<Draw>,
     pub(crate) sources: Vec<DrawSource>,
+    /// Of each draw, where a vertex shader projects.
+    pub(crate) shader_draws: Vec<ShaderDraw>,
     /// The most Gaussians.
     pub(crate) gaussians: u64,
 }
 
 impl Set {
     pub(crate) fn new(state: SetState) -> Self {
-        Self { state, draws: Vec::new(), sources: Vec::new(), gaussians: 0 }
+        Self { state, draws: Vec::new(), sources: Vec::new(), shader_draws: Vec::new(), gaussians: 0 }
     }
 
     pub(crate) fn push(&mut self, draw: Draw, sources: &[DrawSource], gaussians: u64) {
@@ -134,6 +137,7 @@ impl Set {
         let v = &state.viewport;
         let (x, y) = (v.x + v.width.min(0.0), v.y + v.height.min(0.0));
         let viewport = [x, y, v.width.abs(), v.height.abs()];
+        let center = [(v.x, v.width), (v.y, v.height)].map(|(at, size)| f64::from(at) + 0.5 * f64::from(size));
         let around = vk::Rect2D {
             offset: vk::Offset2D { x: x.floor() as i32, y: y.floor() as i32 },
             extent: vk::Extent2D {
@@ -166,9 +170,12 @@ impl Set {
             tests: state.tests,
             depth_range: [v.min_depth, v.max_depth],
             viewport,
+            center,
+            half_size: [0.5 * v.width, 0.5 * v.height],
             area: Area { origin: [area.offset.x, area.offset.y], size: [area.extent.width, area.extent.height] },
             draws: self.draws,
             sources: self.sources,
+            shader_draws: self.shader_draws,
             gaussians: self.gaussians,
             bindings: state.bindings,
             pixels: None,

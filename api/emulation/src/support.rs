@@ -51,11 +51,12 @@ pub(crate) fn is_forced() -> bool {
     std::env::var_os("GAURAST_EMULATION_FORCE").is_some_and(|value| value == "1")
 }
 
-/// Fills in the extension's features.
-pub(crate) fn answer_features(features: &mut Features<'_>) {
+/// Fills in the extension's features. Vertex shaders project where they can store what they write.
+pub(crate) fn answer_features(features: &mut Features<'_>, vertex_shaders_store: bool) {
     let (s_type, p_next) = (features.s_type, features.p_next);
     *features = Features::default()
         .gaussian_primitive_topology(true)
+        .vertex_shader_projection(vertex_shaders_store)
         .radial_distance_order(true)
         .primitive_order(true)
         .opacity_compensation(true)

@@ -1,5 +1,6 @@
 //! The work of a sorted set: parameters for the kernels, and their dispatches.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ash::vk;
@@ -8,12 +9,14 @@ use crate::attachments::{self, DepthStencil};
 use crate::bindings::Bindings;
 use crate::cameras::{Camera, Cameras};
 use crate::depth_stencil::{Outcome, TestState};
+use crate::draw_call::{COMMAND, Draw, ShaderDraw};
 use crate::kernels::{Kernel, Kernels, PUSHED, Specialized, Variant};
 use crate::lens::Lens;
 use crate::made::{Area, Attributes, Covering, Made, MadeExtent, MadePlaces};
 use crate::next::Next;
 use crate::pair::{Pair, pair};
-use crate::pipeline::{Attribute, Pipeline};
+use crate::pipeline::{Attribute, Pipeline, Projecting};
+use crate::projecting::OUTPUTS;
 use crate::scratch::{Extent, Memory, Places};
 use crate::times::Times;
 
@@ -21,30 +24,6 @@ use crate::times::Times;
 const ORTHOGRAPHIC: i32 = 1;
 /// Width and height of a tile.
 const TILE: u32 = 16;
-
-/// A draw, as `shaders/set.glsl` has it.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct Draw {
-    pub(crate) indices: u64,
-    pub(crate) index_bytes: u32,
-    pub(crate) index_count: u32,
-    pub(crate) first: u32,
-    pub(crate) count: u32,
-    pub(crate) vertex_offset: i32,
-    pub(crate) first_instance: u32,
-    pub(crate) instances: u32,
-    pub(crate) base: u32,
-    pub(crate) indirect_index: u32,
-    pub(crate) is_indexed: u32,
-    pub(crate) parameters: u64,
-    pub(crate) draw_count: u64,
-    pub(crate) harmonics: u64,
-    pub(crate) harmonics_bytes: u32,
-    pub(crate) harmonics_format: u32,
-    pub(crate) harmonics_stride: u32,
-    pub(crate) harmonics_coefficient_stride: u32,
-}
 
 /// A vertex buffer of a draw, as `shaders/set.glsl` has it.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -115,7 +94,9 @@ struct Parameters {
     sigma_other: Pair,
     picture: [Pair; 4],
     must_count: u32,
-    unused: u32,
+    is_shaded: u32,
+    center: [Pair; 2],
+    half_size: [f32; 2],
     attributes: [Attribute; 33],
     padding: u32,
 }
@@ -237,9 +218,15 @@ pub(crate) struct Work {
     pub(crate) depth_range: [f32; 2],
     /// x, y, width and height; not negative.
     pub(crate) viewport: [f32; 4],
+    /// The middle of the viewport.
+    pub(crate) center: [f64; 2],
+    /// Half of its width and of its height, which may be negative.
+    pub(crate) half_size: [f32; 2],
     pub(crate) area: Area,
     pub(crate) draws: Vec<Draw>,
     pub(crate) sources: Vec<DrawSource>,
+    /// Of each draw, where a vertex shader projects.
+    pub(crate) shader_draws: Vec<ShaderDraw>,
     /// The most Gaussians.
     pub(crate) gaussians: u64,
     /// Descriptor sets and push constants of a resolve shader, if there is one.
@@ -414,9 +401,28 @@ impl Work {
             cameras: 128 * u64::from(self.camera_count().max(1)),
             lenses: size_of_val(self.lenses.as_slice()) as u64,
             pixels: if self.pixels.is_some() { 0 } else { self.made().end },
+            outputs: self.draws.iter().map(|draw| self.bytes_of_outputs(draw)).sum(),
             tested: if self.tests.is_some() { self.all_samples() } else { 0 },
             has_inputs: self.has_inputs(),
         }
+    }
+
+    /// Bytes of what the projecting shader of a draw writes, for all views.
+    fn bytes_of_outputs(&self, draw: &Draw) -> u64 {
+        OUTPUTS * u64::from(draw.shaded.capacity) * u64::from(self.pipeline.planes())
+    }
+
+    /// The draws, with the addresses of what their projecting shader writes.
+    fn draws_with_outputs(&self, first: u64) -> Vec<Draw> {
+        let mut draws = self.draws.clone();
+        if self.pipeline.projecting.is_some() {
+            let mut at = first;
+            for draw in &mut draws {
+                draw.shaded.outputs = at;
+                at += self.bytes_of_outputs(draw);
+            }
+        }
+        draws
     }
 
     /// The place of what the set makes.
@@ -498,7 +504,9 @@ impl Work {
             sigma_other: pair(sigma.other),
             picture: sigma.picture(self.viewport[2], self.viewport[3]).map(pair),
             must_count: sigma.must_count,
-            unused: 0,
+            is_shaded: u32::from(pipeline.projecting.is_some()),
+            center: self.center.map(pair),
+            half_size: self.half_size,
             attributes: pipeline.attributes,
             padding: 0,
         }
@@ -526,7 +534,12 @@ impl Work {
             let mut run = Run { next, kernels, commands, scratch, extent, places, specialized, times };
             run.barrier();
             run.write(places.parameters, bytemuck::bytes_of(&parameters));
-            run.write(places.draws, bytemuck::cast_slice(&self.draws));
+            let draws = self.draws_with_outputs(scratch.address + places.outputs);
+            run.write(places.draws, bytemuck::cast_slice(&draws));
+            if extent.outputs > 0 {
+                // What is not written is no number, and draws nothing.
+                next.cmd_fill_buffer(commands, scratch.buffer, places.outputs, extent.outputs, !0);
+            }
             run.write(places.sources, bytemuck::cast_slice(&self.sources));
             match &self.cameras {
                 Cameras::Command(cameras) => {
@@ -548,8 +561,8 @@ impl Work {
                 self.test(&run, tests, attachment)?;
                 run.end_stage("test");
             }
-            for view in self.pipeline.views() {
-                self.record_view(&mut run, view);
+            for (index, view) in self.pipeline.views().enumerate() {
+                self.record_view(&mut run, view, index == 0);
             }
             run.barrier();
             Ok(run.times)
@@ -706,9 +719,60 @@ impl Work {
         Ok(())
     }
 
+    /// Runs the projecting shader of each draw, for all views.
+    ///
     /// # Safety
     /// As [`Self::record`].
-    unsafe fn record_view(&self, run: &mut Run<'_>, view: u32) {
+    unsafe fn shade(&self, run: &Run<'_>, projecting: &Projecting) {
+        let (next, commands, scratch) = (run.next, run.commands, run.scratch.buffer);
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: 1, height: 1 } };
+        let rendering =
+            vk::RenderingInfo::default().render_area(area).layer_count(1).view_mask(self.pipeline.view_mask);
+        let mut bound = BTreeMap::new();
+        // SAFETY: the caller's promise: the application has bound all that is bound here in this command buffer, or in the secondary one
+        // that the set is of.
+        unsafe {
+            run.barrier();
+            next.cmd_begin_rendering(commands, &rendering);
+            next.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, projecting.raw);
+            for (index, draw) in self.shader_draws.iter().enumerate() {
+                draw.bindings.push_constants(next, commands);
+                draw.bindings.bind_sets(next, commands, &bound);
+                bound.clone_from(&draw.bindings.sets);
+                for (&binding, buffer) in &draw.vertex_buffers {
+                    buffer.bind(next, commands, binding);
+                }
+                let place = run.places.draws + (index * size_of::<Draw>()) as u64;
+                let strides = projecting.has_dynamic_strides.then_some(&[0_u64][..]);
+                next.cmd_bind_vertex_buffers2(commands, projecting.binding, &[scratch], &[place], None, strides);
+                let call = &draw.call;
+                if let Some(index) = &draw.index_buffer {
+                    next.cmd_bind_index_buffer(commands, index.buffer, index.offset, index.ty);
+                }
+                match (call.parameters != 0, call.is_indexed) {
+                    (false, false) => {
+                        next.cmd_draw(commands, call.count, call.instances, call.first, call.first_instance);
+                    }
+                    (false, true) => next.cmd_draw_indexed(
+                        commands,
+                        call.count,
+                        call.instances,
+                        call.first,
+                        call.vertex_offset,
+                        call.first_instance,
+                    ),
+                    (true, false) => next.cmd_draw_indirect(commands, scratch, place + COMMAND, 1, 0),
+                    (true, true) => next.cmd_draw_indexed_indirect(commands, scratch, place + COMMAND, 1, 0),
+                }
+            }
+            next.cmd_end_rendering(commands);
+            run.barrier();
+        }
+    }
+
+    /// # Safety
+    /// As [`Self::record`].
+    unsafe fn record_view(&self, run: &mut Run<'_>, view: u32, is_first: bool) {
         let [across, down] = self.tiles();
         let tiles = across * down;
         let plane = view * self.samples() * self.area.size[0] * self.area.size[1];
@@ -734,6 +798,10 @@ impl Work {
             run.next.cmd_fill_buffer(run.commands, run.scratch.buffer, run.places.ranges, 8 * u64::from(tiles), 0);
             run.one(Kernel::Prepare, pushed);
             run.end_stage("prepare");
+            if let (Some(projecting), true) = (&self.pipeline.projecting, is_first) {
+                self.shade(run, projecting);
+                run.end_stage("vertex shader");
+            }
             run.indirect(specialized.project, &pushed, Counter::ByGaussian);
             run.end_stage("project");
             // What is not seen falls out with the first digit.

@@ -6,10 +6,11 @@ use ash::vk;
 use gaurast_layer_interface::slice;
 
 use crate::bindings::{BoundSet, PushConstants};
+use crate::draw_call::{IndexBuffer, VertexBuffer};
 use crate::emulation::Emulation;
 use crate::hooks::site::{Site, record};
 use crate::pass::{Object, Pass, Rendering};
-use crate::recording::{Bound, Condition, IndexBuffer, Query, Recording, VertexBuffer};
+use crate::recording::{Bound, Condition, Query, Recording};
 use crate::work::Work;
 
 pub(super) unsafe extern "system" fn cmd_bind_pipeline(
@@ -142,7 +143,7 @@ pub(super) unsafe extern "system" fn cmd_bind_index_buffer(
                     vk::IndexType::UINT32 => 4,
                     _ => 1,
                 };
-                recording.index_buffer = Some(IndexBuffer { address, size, bytes });
+                recording.index_buffer = Some(IndexBuffer { buffer, offset, ty, address, size, bytes });
                 site.next.cmd_bind_index_buffer(commands, buffer, offset, ty);
             },
             |next| next.cmd_bind_index_buffer(commands, buffer, offset, ty),

@@ -2,10 +2,11 @@
 
 use ash::vk;
 
+use crate::draw_call::Call;
 use crate::hooks::commands::address;
 use crate::hooks::site::{Site, record};
 use crate::next::Next;
-use crate::recording::{Bound, Call, Recording};
+use crate::recording::{Bound, Recording};
 
 /// Records draws of Gaussians, if the bound pipeline draws them; otherwise passes the command on.
 ///

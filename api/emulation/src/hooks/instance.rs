@@ -1,12 +1,11 @@
 //! Instances, physical devices, and the creation of devices.
 
 use std::collections::HashMap;
-use std::ffi::{CStr, c_char, c_void};
-use std::marker::PhantomData;
+use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use ash::vk::{self, TaggedStructure};
+use ash::vk;
 use gaurast::gaussian_primitive_topology::{NAME, SPEC_VERSION};
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
@@ -22,6 +21,7 @@ use crate::next::Next;
 use crate::report::tell;
 use crate::self_test::{self, TestQueue};
 use crate::support;
+use crate::unlinked::Unlinked;
 
 /// The layer's name.
 const LAYER: &CStr = c"VK_LAYER_GAURAST_emulation";
@@ -136,8 +136,9 @@ pub(super) unsafe extern "system" fn get_physical_device_features2(
         let unlinked = Unlinked::<Features<'_>>::new(&raw mut (*features).p_next);
         next(physical_device, features);
         drop(unlinked);
+        let can_store = (*features).features.vertex_pipeline_stores_and_atomics != vk::FALSE;
         if let Some(own) = find_mut::<Features<'_>>((*features).p_next) {
-            support::answer_features(own);
+            support::answer_features(own, can_store);
         }
     }
 }
@@ -272,45 +273,11 @@ unsafe fn test_queue(
     usable.map(|family| family.queue_family_index).find(computes)
 }
 
-/// A chain from which a structure is taken out that the next layer does not know. It is whole again when this is dropped.
-struct Unlinked<T> {
-    /// The member that names the structure, and the structure.
-    place: Option<(*mut *mut vk::BaseOutStructure<'static>, *mut vk::BaseOutStructure<'static>)>,
-    structure: PhantomData<T>,
-}
-
-impl<T: TaggedStructure> Unlinked<T> {
-    /// # Safety
-    /// `first` is the member that names the first structure of a valid chain, which nobody else uses while this lives.
-    unsafe fn new(first: *mut *mut c_void) -> Self {
-        let mut member = first.cast::<*mut vk::BaseOutStructure<'static>>();
-        // SAFETY: the caller's promise.
-        unsafe {
-            while let Some(structure) = (*member).as_mut() {
-                if structure.s_type == T::STRUCTURE_TYPE {
-                    let place = Some((member, std::ptr::from_mut(structure)));
-                    *member = structure.p_next;
-                    return Self { place, structure: PhantomData };
-                }
-                member = (&raw mut structure.p_next).cast();
-            }
-        }
-        Self { place: None, structure: PhantomData }
-    }
-}
-
-impl<T> Drop for Unlinked<T> {
-    fn drop(&mut self) {
-        if let Some((member, structure)) = self.place {
-            // SAFETY: the chain is as valid as before.
-            unsafe { *member = structure };
-        }
-    }
-}
-
 /// The features that the emulation needs, as structures that are chained where the application has none with them.
 #[derive(Default)]
 struct Needed<'a> {
+    features: vk::PhysicalDeviceFeatures,
+    rendering: vk::PhysicalDeviceDynamicRenderingFeatures<'a>,
     address: vk::PhysicalDeviceBufferDeviceAddressFeatures<'a>,
     demote: vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'a>,
 }
@@ -329,6 +296,8 @@ impl Changed {
     unsafe fn new<'a>(info: &mut vk::DeviceCreateInfo<'a>, needed: &'a mut Needed<'a>) -> Self {
         // SAFETY: the caller's promise. The structures are restored as soon as the device is created.
         unsafe {
+            let projects = find_mut::<Features<'_>>(info.p_next.cast_mut())
+                .is_some_and(|features| features.vertex_shader_projection != vk::FALSE);
             let unlinked = Unlinked::new((&raw mut info.p_next).cast());
             let mut own = Self { _unlinked: unlinked, enabled: Vec::new() };
             let first = info.p_next.cast_mut();
@@ -342,6 +311,28 @@ impl Changed {
                 None => find_mut::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(first)
                     .map(|one| &raw mut one.shader_demote_to_helper_invocation),
             };
+            if projects {
+                match find_mut::<vk::PhysicalDeviceFeatures2<'_>>(first) {
+                    Some(all) => {
+                        own.enable(Some(&raw mut all.features.vertex_pipeline_stores_and_atomics));
+                    }
+                    None => {
+                        needed.features = info.p_enabled_features.as_ref().copied().unwrap_or_default();
+                        needed.features.vertex_pipeline_stores_and_atomics = vk::TRUE;
+                        info.p_enabled_features = &raw const needed.features;
+                    }
+                }
+                let rendering = match find_mut::<vk::PhysicalDeviceVulkan13Features<'_>>(first) {
+                    Some(all) => Some(&raw mut all.dynamic_rendering),
+                    None => find_mut::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(first)
+                        .map(|one| &raw mut one.dynamic_rendering),
+                };
+                if !own.enable(rendering) {
+                    needed.rendering.dynamic_rendering = vk::TRUE;
+                    needed.rendering.p_next = info.p_next.cast_mut();
+                    info.p_next = (&raw const needed.rendering).cast();
+                }
+            }
             // The extension's features may have been the first, which the copied creation info names.
             if !own.enable(address) {
                 needed.address.buffer_device_address = vk::TRUE;

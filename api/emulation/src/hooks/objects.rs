@@ -4,7 +4,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST as State;
+use gaurast::vk::{
+    PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPoints,
+};
 use gaurast_layer_interface::{find_mut, slice};
 
 use crate::device::Device;
@@ -12,8 +15,10 @@ use crate::emulation::{Emulation, Objects};
 use crate::hooks::site::call;
 use crate::library::{self, Library};
 use crate::pipeline::{self, Context, Pipeline};
+use crate::projecting;
 use crate::render_pass;
 use crate::resolve;
+use crate::unlinked::Unlinked;
 
 pub(super) unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const vk::AllocationCallbacks<'_>) {
     // SAFETY: see the crate.
@@ -200,7 +205,7 @@ pub(super) unsafe extern "system" fn create_shader_module(
             let result = (own.next.fp_v1_0().create_shader_module)(device, info, allocator, module);
             if let (Some(emulation), vk::Result::SUCCESS) = (&own.emulation, result) {
                 let words = slice((*info).p_code, ((*info).code_size / 4) as u32);
-                if resolve::has_fragment_shader(words) {
+                if resolve::has_fragment_shader(words) || projecting::has_vertex_shader(words) {
                     emulation.objects_mut().shaders.insert(*module, words.into());
                 }
             }
@@ -290,7 +295,7 @@ pub(super) unsafe extern "system" fn destroy_render_pass(
     }
 }
 
-/// The words of the fragment shaders that a pipeline is created with.
+/// The words of the shaders that a pipeline is created with.
 ///
 /// # Safety
 /// The creation info is valid.
@@ -320,7 +325,21 @@ unsafe fn create_graphics_pipeline(
     unsafe {
         let pass_on = |place: &mut vk::Pipeline| {
             let allocator = allocator.map_or(std::ptr::null(), std::ptr::from_ref);
-            (own.next.fp_v1_0().create_graphics_pipelines)(own.next.handle(), cache, 1, info, allocator, place)
+            let mut known = *info;
+            let chain = &raw mut known.p_next;
+            let _unlinked = (
+                Unlinked::<State<'_>>::new(chain.cast()),
+                Unlinked::<Footprint<'_>>::new(chain.cast()),
+                Unlinked::<SigmaPoints<'_>>::new(chain.cast()),
+            );
+            (own.next.fp_v1_0().create_graphics_pipelines)(
+                own.next.handle(),
+                cache,
+                1,
+                &raw const known,
+                allocator,
+                place,
+            )
         };
         let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
         let libraries = library::linked(info);

@@ -1,6 +1,7 @@
 //! Vertex shaders that project: what they write, and what they read.
 
 use ash::vk;
+use ash::vk::GraphicsPipelineLibraryFlagsEXT as Parts;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianOrderGAURAST as Order,
     GaussianProjectionModeGAURAST as ProjectionMode, GaussianVertexOutputLocationsGAURAST as Locations,
@@ -18,6 +19,7 @@ use super::scenes::dense;
 use crate::draw::{SIZE, State};
 use crate::judge::{CONTRACT, Expected};
 use crate::program::{Answer, Program, colors};
+use crate::rendering::{Rendering, colors_by_layer, layers};
 
 /// The floats of a vertex: position, covariance and opacity, colour and key.
 type Vertex = [[f32; 4]; 3];
@@ -71,8 +73,54 @@ struct Projecting {
     _white: Buffer,
 }
 
+/// Makes a pipeline of its state.
+type Create = fn(&Gpu, Graphics<'_>) -> Pipeline;
+
+/// A whole pipeline.
+fn whole_pipeline(gpu: &Gpu, graphics: Graphics<'_>) -> Pipeline {
+    graphics.create(gpu).expect("a pipeline of a projecting shader")
+}
+
+/// A pipeline whose vertices are instances.
+fn by_instance(gpu: &Gpu, mut graphics: Graphics<'_>) -> Pipeline {
+    graphics.bindings[0].input_rate = vk::VertexInputRate::INSTANCE;
+    whole_pipeline(gpu, graphics)
+}
+
+/// The views that a shader tells apart.
+const VIEW_MASK: u32 = 0b101;
+
+/// A pipeline for views, with a shader that tells them apart.
+fn of_views(gpu: &Gpu, mut graphics: Graphics<'_>) -> Pipeline {
+    graphics.view_mask = VIEW_MASK;
+    graphics.shaders = vec![Shader::vertex(words(include_bytes!("../../shaders/projecting_views.vert.spv")))];
+    whole_pipeline(gpu, graphics)
+}
+
+/// A pipeline that is linked from libraries of its four parts.
+fn linked(gpu: &Gpu, graphics: Graphics<'_>) -> Pipeline {
+    let parts = [
+        Parts::VERTEX_INPUT_INTERFACE,
+        Parts::PRE_RASTERIZATION_SHADERS,
+        Parts::FRAGMENT_SHADER,
+        Parts::FRAGMENT_OUTPUT_INTERFACE,
+    ];
+    let libraries = parts.map(|part| {
+        let flags = graphics.flags | vk::PipelineCreateFlags::LIBRARY_KHR;
+        let has_shader = part == Parts::PRE_RASTERIZATION_SHADERS;
+        let shaders = if has_shader { graphics.shaders.clone() } else { Vec::new() };
+        whole_pipeline(gpu, Graphics { parts: Some(part), flags, shaders, ..graphics.clone() })
+    });
+    let libraries = libraries.each_ref().map(|library| library.raw).to_vec();
+    whole_pipeline(gpu, Graphics { parts: Some(Parts::empty()), libraries, shaders: Vec::new(), ..graphics })
+}
+
 impl Projecting {
     fn new(gpu: &Gpu, state: State, has_key: bool) -> Self {
+        Self::with(gpu, state, has_key, whole_pipeline)
+    }
+
+    fn with(gpu: &Gpu, state: State, has_key: bool, create: Create) -> Self {
         let target = Target::floats(gpu, SIZE);
         let white = Buffer::of(gpu, &[1.0_f32; 4]);
         let tint = Bindings::new(gpu, &[Resource::Uniform(white.raw)]);
@@ -89,9 +137,17 @@ impl Projecting {
             gaussian: Some(state.projection_mode(ProjectionMode::VERTEX_SHADER).vertex_output_locations(locations)),
             ..graphics.graphics()
         };
-        let pipeline = graphics.create(gpu).expect("a pipeline of a projecting shader");
+        let pipeline = create(gpu, graphics);
         gpu.run(|commands| commands.pass(&target, &Pass::clear([0.0; 4]), || {}));
         Self { target, pipeline, tint, _white: white }
+    }
+
+    /// Binds everything but vertices, with the viewport of the whole attachment.
+    fn bind(&self, commands: &Commands) {
+        commands.whole(&self.target);
+        commands.bind(&self.pipeline);
+        commands.bind_set(&self.tint, &[]);
+        commands.push(0, &[1.0_f32]);
     }
 
     /// Executes a pass over the attachment, in which everything but vertices is bound.
@@ -164,6 +220,7 @@ pub(super) fn projection(chapter: &mut Chapter<'_>) {
         });
     }
     inputs(chapter);
+    draws(chapter);
 }
 
 /// Push constants and descriptors, which may differ from draw to draw of a set.
@@ -210,5 +267,148 @@ fn inputs(chapter: &mut Chapter<'_>) {
             commands.vertex_buffer(0, buffer, 100 * size_of::<Vertex>() as u64);
             commands.draw(0..400);
         })
+    });
+}
+
+/// The vertices that a draw names, and how it names them.
+struct Named {
+    /// Vertices, in the order of the Gaussians.
+    vertices: Vec<u32>,
+    indices: Vec<u32>,
+    /// Words of the parameters of indirect commands.
+    parameters: Vec<u32>,
+    create: Create,
+    record: fn(&Commands, &Buffer),
+}
+
+/// A program that draws named vertices as one set.
+fn naming(named: impl Fn() -> Named + Send + Sync + 'static) -> Program {
+    let all = outputs(545);
+    let answers = named().vertices.iter().map(|&vertex| all[vertex as usize]).collect();
+    let given = vertices(&all);
+    let program = Program::of(vec![answer(answers, WHOLE, State::default())], move |gpu| {
+        let Named { indices, parameters, create, record, .. } = named();
+        let stage = Projecting::with(gpu, State::default(), true, create);
+        let buffer = Buffer::of(gpu, given.as_flattened());
+        let padded = |words: &[u32]| if words.is_empty() { vec![0; 4] } else { words.to_vec() };
+        let (indices, parameters) = (Buffer::of(gpu, &padded(&indices)), Buffer::of(gpu, &padded(&parameters)));
+        stage.run(gpu, WHOLE, |commands| {
+            commands.vertices(&buffer);
+            commands.indices(&indices, 0, vk::IndexType::UINT32);
+            commands.gaussian_set(|| record(commands, &parameters));
+        });
+        Ok(vec![colors(stage.target.read())])
+    });
+    program.needing("vertexShaderProjection").needing("mergedDraws")
+}
+
+/// Every vertex, drawn by one command.
+fn direct() -> Named {
+    Named {
+        vertices: (0..500).collect(),
+        indices: Vec::new(),
+        parameters: Vec::new(),
+        create: whole_pipeline,
+        record: |commands, _| commands.draw(0..500),
+    }
+}
+
+/// Vertices in another order than theirs, some of them twice.
+fn indexed() -> Named {
+    Named {
+        vertices: (0..300).map(|at| 50 + at * 7 % 200).collect(),
+        indices: (0..300).map(|at| at * 7 % 200).collect(),
+        record: |commands, _| commands.draw_indexed(0..300, 50),
+        ..direct()
+    }
+}
+
+/// Draw commands, secondary command buffers and libraries.
+fn draws(chapter: &mut Chapter<'_>) {
+    chapter.program("indexed", || naming(indexed));
+    chapter.program("instances", move || {
+        let record: fn(&Commands, &Buffer) = |commands, _| commands.draw_instances(0..2, 30..400);
+        let vertices = (30..400).flat_map(|vertex| [vertex; 2]).collect();
+        naming(move || Named { vertices: Vec::clone(&vertices), create: by_instance, record, ..direct() })
+    });
+    chapter.program("indirect", move || {
+        naming(move || Named {
+            vertices: (300..450).chain(20..220).collect(),
+            parameters: vec![150, 1, 300, 0, 0, 1, 7, 0, 200, 1, 20, 0],
+            record: |commands, parameters| commands.draw_indirect(parameters, 3),
+            ..direct()
+        })
+    });
+    chapter.program("indexed_indirect", move || {
+        naming(move || Named {
+            vertices: [110..300, 0..60].into_iter().flatten().map(|at| 50 + at * 7 % 200).collect(),
+            parameters: vec![190, 1, 110, 50, 0, 60, 1, 0, 50, 0],
+            record: |commands, parameters| {
+                let (device, raw) = commands.raw();
+                // SAFETY: the buffer has the parameters of two draws.
+                unsafe { device.cmd_draw_indexed_indirect(raw, parameters.raw, 0, 2, 20) };
+            },
+            ..indexed()
+        })
+    });
+    chapter.program("libraries", move || {
+        naming(move || Named { create: linked, ..direct() }).needing("VK_EXT_graphics_pipeline_library")
+    });
+    chapter.program("secondary", || {
+        let all = outputs(546);
+        let given = vertices(&all);
+        let program = Program::of(vec![answer(all, WHOLE, State::default())], move |gpu| {
+            let stage = Projecting::new(gpu, State::default(), true);
+            let buffer = Buffer::of(gpu, given.as_flattened());
+            let formats = stage.target.attachment_formats().colors;
+            let mut rendering = vk::CommandBufferInheritanceRenderingInfo::default()
+                .color_attachment_formats(&formats)
+                .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+            let inheritance = vk::CommandBufferInheritanceInfo::default().push_next(&mut rendering);
+            let secondary = gpu.record_secondary(&inheritance, |commands| {
+                stage.bind(commands);
+                commands.vertices(&buffer);
+                commands.draw(0..500);
+            });
+            gpu.run(|commands| {
+                let flags = vk::RenderingFlags::CONTENTS_SECONDARY_COMMAND_BUFFERS;
+                commands.pass(&stage.target, &Pass { flags, ..Pass::load() }, || {
+                    let (device, raw) = commands.raw();
+                    // SAFETY: the secondary command buffer is for this pass.
+                    unsafe { device.cmd_execute_commands(raw, &[secondary.raw]) };
+                });
+            });
+            Ok(vec![colors(stage.target.read())])
+        });
+        program.needing("vertexShaderProjection")
+    });
+    chapter.program("views", || {
+        let all = outputs(547);
+        let given = vertices(&all);
+        let seen = |view: u32| {
+            let seen = |one: &OracleOutputs| {
+                let [x, y, z, w] = one.position;
+                let color = if view == 2 { one.color.map(|c| 0.5 * c) } else { one.color };
+                OracleOutputs { position: [x + 0.25 * view as f32 * w, y, z, w], color, ..*one }
+            };
+            if VIEW_MASK >> view & 1 == 0 { Vec::new() } else { all.iter().map(seen).collect() }
+        };
+        let answers = (0..3).map(|view| answer(seen(view), WHOLE, State::default())).collect();
+        let program = Program::of(answers, move |gpu| {
+            let stage = Projecting::with(gpu, State::default(), true, of_views);
+            let buffer = Buffer::of(gpu, given.as_flattened());
+            let image = layers(gpu, SIZE, 3, [0.0; 4]);
+            let views = [image.view];
+            let rendering = Rendering { view_mask: VIEW_MASK, ..Rendering::over(&views, SIZE) };
+            gpu.run(|commands| {
+                rendering.record(commands, || {
+                    stage.bind(commands);
+                    commands.vertices(&buffer);
+                    commands.draw(0..500);
+                });
+            });
+            Ok(colors_by_layer(&image).into_iter().map(colors).collect())
+        });
+        program.needing("vertexShaderProjection").needing("gaussianMultiview")
     });
 }
