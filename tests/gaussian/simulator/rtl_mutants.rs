@@ -1,13 +1,14 @@
 //! Wrong rasterizer modules: each is a module's file with one change, and must be told from the right one by the results of
-//! its units, by the pixels that it draws, or by the properties of the controller.
+//! its units, by the pixels that it draws and the cycles that it takes, or by the properties of the controller.
 
 use super::rtl::{folder, pairs, results_of_model};
 use super::tiles;
 use gaurast_runner::{Case, Need, Variant, is_long};
 use std::path::Path;
 use std::process::Command;
+use std::sync::OnceLock;
 use timing_studies::number::Format;
-use timing_studies::rtl::{self, LATENCY, ModuleBench, Simulator, UnitBench};
+use timing_studies::rtl::{self, LATENCY, ModuleBench, Rasterized, Simulator, UnitBench};
 use timing_studies::rtl_cycles::Setting;
 
 /// A change of a file.
@@ -105,21 +106,31 @@ fn computes_right(folder: &Path) -> bool {
     })
 }
 
-/// True if the module of a folder draws generated tiles as the model does.
-fn draws_right(folder: &Path) -> bool {
+/// Runs of the module of a folder over generated tiles, one for each setting. `None` if it is not compiled, or does not end.
+fn runs(folder: &Path) -> Option<Vec<Rasterized>> {
     let format = Format::HALF;
-    let Ok(bench) = ModuleBench::compile(Simulator::Verilator, folder, format, &[]) else {
-        return false;
-    };
-    Setting::ALL.into_iter().all(|setting| {
-        let module = setting.module(format);
+    let bench = ModuleBench::compile(Simulator::Verilator, folder, format, &[]).ok()?;
+    let run = |setting: Setting| {
         let lists =
             tiles::generated(format, setting.groups, setting.masked, 2 * (tiles::KINDS.len() + 1), setting.seed);
-        bench.run(&lists, &module, LATENCY).is_ok_and(|rasterized| {
-            let expected: Vec<_> = lists.iter().map(|list| module.draw(list).pixels).collect();
-            rasterized.pixels == expected
-        })
+        bench.run(&lists, &setting.module(format), LATENCY).ok()
+    };
+    Setting::ALL.into_iter().map(run).collect()
+}
+
+/// Runs of the right module, whose pixels are held against the model's elsewhere.
+fn right_runs() -> &'static [Rasterized] {
+    static RUNS: OnceLock<Vec<Rasterized>> = OnceLock::new();
+    RUNS.get_or_init(|| {
+        let folder = folder().join("mutants").join("right");
+        rtl::write(&folder).expect("files");
+        runs(&folder).expect("a module that runs")
     })
+}
+
+/// True if the module of a folder draws generated tiles in as many cycles as the right one, with the same pixels.
+fn draws_right(folder: &Path) -> bool {
+    runs(folder).is_some_and(|runs| runs == right_runs())
 }
 
 /// True if yosys proves the properties of the controller of a folder.
