@@ -28,11 +28,20 @@ pub struct ColorOutput {
 
 /// The usual equations, source over destination, for which there are kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Over {
+pub enum Over {
     /// For a source whose colour is already multiplied by its alpha.
     Premultiplied,
     /// For a source that is not. Alpha is blended as the colours are.
     Straight,
+}
+
+/// A kernel that blends by one of the usual equations and writes all components.
+#[derive(Clone, Copy, Debug)]
+pub enum OverKernel {
+    /// For texels of four bytes.
+    Unorm8 { over: Over, bgra: bool },
+    /// For texels of four floats.
+    Words { over: Over },
 }
 
 /// The equation `source * factor + destination * (1 - alpha)`.
@@ -114,6 +123,19 @@ impl ColorOutput {
         self.equations.is_none() && self.logic.is_none() && self.written == written_bits(self.format, 0xF)
     }
 
+    /// The kernel that does what [`ColorOutput::write`] does, if there is one.
+    pub fn over_kernel(&self) -> Option<OverKernel> {
+        match (self.codec, self.over?) {
+            (Codec::Unorm8 { bgra }, over) if self.written as u32 == u32::MAX => {
+                Some(OverKernel::Unorm8 { over, bgra })
+            }
+            (Codec::Words, over) if self.written == u128::MAX && self.range.is_none() => {
+                Some(OverKernel::Words { over })
+            }
+            _ => None,
+        }
+    }
+
     /// True if blending uses the second source.
     pub fn is_dual_source(&self) -> bool {
         let dual = |factor| {
@@ -132,7 +154,7 @@ impl ColorOutput {
 
     /// Blends fragments into the texels of a tile buffer. `words` is its memory.
     #[inline(always)]
-    pub fn write<S: Simd>(
+    fn write<S: Simd>(
         &self,
         simd: S,
         source: &Colors<S>,
@@ -182,6 +204,23 @@ impl ColorOutput {
         }
     }
 
+    /// Blends fragments as [`ColorOutput::write`] does, which this compiles once a SIMD level.
+    #[inline(never)]
+    pub fn write_shared<S: Simd>(
+        &self,
+        simd: S,
+        source: &Colors<S>,
+        second: &Colors<S>,
+        lanes: u16,
+        quads: &QuadAddresses,
+        words: &mut [u32],
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.write(simd, source, second, lanes, quads, words),
+        );
+    }
+
     /// Blends the fragments of a fully covered tile into its texels, from number `first` on in a tile buffer. `words`
     /// is its memory.
     #[inline(always)]
@@ -214,7 +253,7 @@ impl ColorOutput {
                 second = load(simd, &sources[1], chunk);
             }
             let quads = QuadAddresses::block(first + 16 * chunk);
-            self.write(simd, &source, &second, u16::MAX, &quads, words);
+            self.write_shared(simd, &source, &second, u16::MAX, &quads, words);
         }
     }
 
@@ -356,7 +395,8 @@ impl ColorOutput {
 /// The components of 16 texels of four words.
 #[inline(always)]
 fn load_texels<S: Simd>(simd: S, words: &[u32], quads: &QuadAddresses) -> Colors<S> {
-    let load = |quad: usize| floats_of(u32x16::from_slice(simd, &words[4 * quads.first[quad]..][..16]));
+    let texels = words.as_chunks::<16>().0;
+    let load = |quad: usize| floats_of(u32x16::simd_from(simd, texels[quads.first[quad] / 4]));
     let (rb, ga) = load(0).deinterleave(load(1));
     let (rb_later, ga_later) = load(2).deinterleave(load(3));
     let ((r, b), (g, a)) = (rb.deinterleave(rb_later), ga.deinterleave(ga_later));
@@ -367,39 +407,74 @@ fn load_texels<S: Simd>(simd: S, words: &[u32], quads: &QuadAddresses) -> Colors
 #[inline(always)]
 fn store_texels<S: Simd>(
     simd: S,
-    [r, g, b, a]: &Colors<S>,
+    components: &Colors<S>,
     words: &mut [u32],
     quads: &QuadAddresses,
     lanes: u16,
     written: u128,
 ) {
-    let ((rb, rb_later), (ga, ga_later)) = (r.interleave(*b), g.interleave(*a));
-    let (first, second) = rb.interleave(ga);
-    let (third, fourth) = rb_later.interleave(ga_later);
-    for (quad, texels) in [first, second, third, fourth].into_iter().enumerate() {
-        let stored = &mut words[4 * quads.first[quad]..][..16];
+    let words = words.as_chunks_mut::<16>().0;
+    for (quad, texels) in texels_of(components).into_iter().enumerate() {
+        let stored = &mut words[quads.first[quad] / 4];
         let covered = lanes >> (4 * quad) & 15;
-        let texels = bits_of(texels);
         if covered == 15 && written == u128::MAX {
-            texels.store_slice(stored);
+            *stored = texels.into();
         } else if covered != 0 {
             // Another quad of the vector may have the same address and other lanes.
-            let mask = u32x16::simd_from(simd, written_words(covered, written));
-            ((texels & mask) | (u32x16::from_slice(simd, stored) & !mask)).store_slice(stored);
+            let mask = match written {
+                u128::MAX => TEXEL_MASKS[usize::from(covered)],
+                _ => written_words(covered, written),
+            };
+            let mask = u32x16::simd_from(simd, mask);
+            *stored = ((texels & mask) | (u32x16::simd_from(simd, *stored) & !mask)).into();
         }
     }
 }
 
+/// Stores texels of four words, in all lanes of those quads that have some of `lanes`.
+#[inline(always)]
+fn store_whole<S: Simd>(components: &Colors<S>, words: &mut [u32], quads: &QuadAddresses, lanes: u16) {
+    let words = words.as_chunks_mut::<16>().0;
+    for (quad, texels) in texels_of(components).into_iter().enumerate() {
+        if lanes >> (4 * quad) & 15 != 0 {
+            words[quads.first[quad] / 4] = texels.into();
+        }
+    }
+}
+
+/// The texels of four words of each quad.
+#[inline(always)]
+fn texels_of<S: Simd>([r, g, b, a]: &Colors<S>) -> [u32x16<S>; 4] {
+    let ((rb, rb_later), (ga, ga_later)) = (r.interleave(*b), g.interleave(*a));
+    let (first, second) = rb.interleave(ga);
+    let (third, fourth) = rb_later.interleave(ga_later);
+    [bits_of(first), bits_of(second), bits_of(third), bits_of(fourth)]
+}
+
 /// The bits that are written of the four words of each texel of a quad.
 #[inline(always)]
-fn written_words(covered: u16, written: u128) -> [u32; 16] {
+const fn written_words(covered: u16, written: u128) -> [u32; 16] {
     let mut words = [0; 16];
-    for (word, bits) in words.iter_mut().enumerate() {
-        let lane = 0_u32.wrapping_sub(u32::from(covered >> (word / 4) & 1));
-        *bits = lane & (written >> (32 * (word % 4))) as u32;
+    let mut word = 0;
+    while word < 16 {
+        if covered >> (word / 4) & 1 == 1 {
+            words[word] = (written >> (32 * (word % 4))) as u32;
+        }
+        word += 1;
     }
     words
 }
+
+/// A mask of four words a texel for each set of lanes of a quad: all ones in those lanes.
+const TEXEL_MASKS: [[u32; 16]; 16] = {
+    let mut masks = [[0; 16]; 16];
+    let mut set = 0;
+    while set < 16 {
+        masks[set] = written_words(set as u16, u128::MAX);
+        set += 1;
+    }
+    masks
+};
 
 /// A source of 16 fragments. Components that the program does not write are 0.
 #[inline(always)]
@@ -477,6 +552,51 @@ impl<S: Simd> Operands<S> {
             BlendFactor::Src1Alpha => self.second[3],
             BlendFactor::OneMinusSrc1Alpha => one - self.second[3],
         }
+    }
+}
+
+/// Blends fragments into texels of four bytes.
+#[inline(always)]
+pub fn blend_bytes_over<S: Simd>(
+    simd: S,
+    over: Over,
+    bgra: bool,
+    source: &Colors<S>,
+    lanes: u16,
+    quads: &QuadAddresses,
+    words: &mut [u32],
+) {
+    let stored = u32x16::simd_from(simd, quads.load(words));
+    let blended = blend_over_in_range(simd, over, source, &unpack_unorm8(simd, stored, bgra));
+    let packed = pack_unorm8_in_range(simd, &blended, bgra);
+    if quads.distinct {
+        let mask = simd.from_bitmask_mask32x16(lanes.into());
+        quads.store_whole(words, lanes, &mask.select(packed, stored).into());
+    } else {
+        quads.store(words, lanes, &packed.into());
+    }
+}
+
+/// Blends fragments into texels of four floats.
+#[inline(always)]
+pub fn blend_words_over<S: Simd>(
+    simd: S,
+    over: Over,
+    source: &Colors<S>,
+    lanes: u16,
+    quads: &QuadAddresses,
+    words: &mut [u32],
+) {
+    let destination = load_texels(simd, words, quads);
+    let mut blended = blend_over(simd, over, source, &destination);
+    if quads.distinct {
+        let mask = simd.from_bitmask_mask32x16(lanes.into());
+        for (component, stored) in blended.iter_mut().zip(destination) {
+            *component = mask.select(*component, stored);
+        }
+        store_whole(&blended, words, quads, lanes);
+    } else {
+        store_texels(simd, &blended, words, quads, lanes, u128::MAX);
     }
 }
 

@@ -447,16 +447,19 @@ fn set_each<const N: usize>(texels: &mut [u8], y: usize, first: usize, row: &[u8
 /// The addresses of the four quads of 16 lanes in a tile buffer, in texels from its beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadAddresses {
+    /// The first texel of each quad, a multiple of 4.
     pub first: [usize; 4],
     /// True if the quads are consecutive.
     pub consecutive: bool,
+    /// True if it is known that no two quads have the same address.
+    pub distinct: bool,
 }
 
 impl QuadAddresses {
     /// The addresses of a block whose first texel is `first`.
     #[inline(always)]
     pub fn block(first: usize) -> Self {
-        Self { first: [first, first + 4, first + 8, first + 12], consecutive: true }
+        Self { first: [first, first + 4, first + 8, first + 12], consecutive: true, distinct: true }
     }
 
     /// The texel of a lane.
@@ -486,6 +489,17 @@ impl QuadAddresses {
             }
         }
         out
+    }
+
+    /// Stores the texels of all lanes of those quads that have some of `lanes`.
+    #[inline(always)]
+    pub fn store_whole(&self, words: &mut [u32], lanes: u16, values: &[u32; 16]) {
+        let words = words.as_chunks_mut::<4>().0;
+        for (quad, (first, values)) in self.first.iter().zip(values.as_chunks::<4>().0).enumerate() {
+            if lanes >> (4 * quad) & 15 != 0 {
+                words[first / 4] = *values;
+            }
+        }
     }
 
     /// Stores the texels of some lanes.

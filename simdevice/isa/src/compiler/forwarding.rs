@@ -1,11 +1,12 @@
-//! Lets the caller read outputs from the registers that compute them, which saves a copy in each batch.
+//! Lets the caller read outputs from the registers that compute them, which saves a copy in each batch. Outputs of killed
+//! lanes are not read, so that a lane may be killed before.
 
 use crate::ir::{Block, Program, Reg, Role, Statement};
 
 /// Replaces each output that all lanes assign once by the varying value assigned to it. `varying` says which registers
 /// have a value for each lane.
 pub fn forward(program: &mut Program, varying: &[bool]) {
-    let stay = program.body.iter().position(leaves);
+    let stay = program.body.iter().position(returns);
     let stay = stay.unwrap_or(program.body.len());
     let mut copied = vec![false; program.body.len()];
     for output in &mut program.outputs {
@@ -31,9 +32,9 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
     program.body.retain(|_| copied.next() != Some(true));
 }
 
-/// Reports whether lanes may return or be killed in a statement.
-fn leaves(statement: &Statement) -> bool {
-    matches!(statement, Statement::Return | Statement::Kill) || statement.blocks().into_iter().flatten().any(leaves)
+/// Reports whether lanes may return in a statement.
+fn returns(statement: &Statement) -> bool {
+    matches!(statement, Statement::Return) || statement.blocks().into_iter().flatten().any(returns)
 }
 
 /// The number of statements that assign to a variable.
@@ -75,13 +76,16 @@ mod tests {
             b.assign(output, input);
         };
         assert!(!is_forwarded(Rate::Varying, twice));
-        let after_leaving = |b: &mut Builder, input, output| {
-            let condition = b.compute(crate::ir::op::Op::INe, &[input, input]);
-            b.begin_if(condition);
-            b.kill();
-            b.end();
-            b.assign(output, input);
+        let after = |leave: fn(&mut Builder)| {
+            move |b: &mut Builder, input, output| {
+                let condition = b.compute(crate::ir::op::Op::INe, &[input, input]);
+                b.begin_if(condition);
+                leave(b);
+                b.end();
+                b.assign(output, input);
+            }
         };
-        assert!(!is_forwarded(Rate::Varying, after_leaving));
+        assert!(!is_forwarded(Rate::Varying, after(|b| b.statement(Statement::Return))));
+        assert!(is_forwarded(Rate::Varying, after(Builder::kill)), "killed lanes have no output");
     }
 }

@@ -49,9 +49,9 @@ impl LaneMask {
         &self.words
     }
 
-    /// A set from its bits, 64 lanes to a word.
-    pub(super) fn from_words(words: &[Cell<u64>]) -> Self {
-        Self { words: words.iter().map(Cell::get).collect() }
+    /// A set from its bits, 64 lanes to a word, lane 0 lowest.
+    pub fn of_words(words: &[u64]) -> Self {
+        Self { words: SmallVec::from_slice(words) }
     }
 
     /// The number of lanes in the set.

@@ -147,7 +147,8 @@ impl Machine {
         }
     }
 
-    /// An output's lanes after a batch: 16 to a vector (8 for `B64`). Empty if the program has no such output.
+    /// An output's lanes after a batch: 16 to a vector (8 for `B64`). Empty if the program has no such output. Lanes that
+    /// the batch killed have any value.
     pub fn output_vectors(&self, slot: u32) -> &[Vector] {
         let output = self.executable.program.outputs.iter().find(|output| output.slot == slot);
         output.map_or(&[], |output| &self.registers[self.vectors_of(output.reg)])
@@ -179,10 +180,14 @@ impl Machine {
     }
 
     /// The lanes that the last batch killed or demoted.
-    pub fn killed(&mut self) -> LaneMask {
+    pub fn killed(&self) -> LaneMask {
+        LaneMask::of_words(self.killed_words())
+    }
+
+    /// The lanes that the last batch killed or demoted: 64 to a word, lane 0 lowest.
+    pub fn killed_words(&self) -> &[u64] {
         let width = self.executable.program.lanes.div_ceil(64);
-        let masks = Masks::new(Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(), width);
-        LaneMask::from_words(masks.get(MaskId::KILLED))
+        &self.masks[usize::from(MaskId::KILLED.0) * width..][..width]
     }
 
     /// The work counted since it was last taken; nothing, unless the executable counts.

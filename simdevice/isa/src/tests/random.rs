@@ -413,11 +413,13 @@ fn inputs(seed: u64, lane: usize) -> [u64; INPUTS] {
     [uniform.next() & 7, random.next() & 7, random.next() & 0xffff_ffff, (lane / 5) as u64]
 }
 
-/// The scalar interpreter's results for each lane: the outputs, and true if it was killed.
+/// The scalar interpreter's results for each lane: the outputs, none if it was killed, and true if it was killed or
+/// demoted.
 fn expected(program: &Program, seed: u64) -> Vec<(Vec<u64>, bool)> {
     let lane = |lane| {
         let mut scalar = Lane::new(program, &inputs(seed, lane));
-        (scalar.run(), scalar.killed)
+        let outputs = scalar.run();
+        (if scalar.ended { Vec::new() } else { outputs }, scalar.killed)
     };
     (0..ACTIVE).map(lane).collect()
 }

@@ -10,7 +10,10 @@ pub struct Lane<'a> {
     program: &'a Program,
     registers: Vec<u64>,
     private: HashMap<u64, u32>,
+    /// True if it was killed or demoted.
     pub killed: bool,
+    /// True if it was killed, so that it has no outputs.
+    pub ended: bool,
 }
 
 /// The continuation after a statement.
@@ -24,8 +27,8 @@ enum Flow {
 impl<'a> Lane<'a> {
     /// A lane that has these inputs, by slot.
     pub fn new(program: &'a Program, inputs: &[u64]) -> Self {
-        let mut lane =
-            Self { program, registers: vec![0; program.registers.len()], private: HashMap::new(), killed: false };
+        let registers = vec![0; program.registers.len()];
+        let mut lane = Self { program, registers, private: HashMap::new(), killed: false, ended: false };
         for constant in &program.constants {
             let is_bool = lane.type_of(constant.reg) == Type::Bool;
             lane.set(constant.reg, if is_bool { bool_bits(constant.bits != 0) } else { constant.bits });
@@ -125,7 +128,7 @@ impl<'a> Lane<'a> {
             Statement::Continue(label) => return Flow::Continue(*label),
             Statement::Return => return Flow::Done,
             Statement::Kill => {
-                self.killed = true;
+                (self.killed, self.ended) = (true, true);
                 return Flow::Done;
             }
             Statement::Demote => self.killed = true,

@@ -392,7 +392,7 @@ impl<'a> FragmentStageDraw<'a> {
             let plane = &mut buffers.color[index];
             let first = plane.start(tile.index, sample) + block * BLOCK_PIXELS;
             let quads = QuadAddresses::block(first);
-            output.write(simd, &source, &second, lanes, &quads, plane.words_mut());
+            output.write_shared(simd, &source, &second, lanes, &quads, plane.words_mut());
         }
     }
 }

@@ -380,7 +380,7 @@ fn blend<S: Simd>(
         let source = gaussian_tile.accumulators[accumulators[block]].fragments(simd, block);
         let first = start + block * BLOCK_PIXELS;
         let quads = QuadAddresses::block(first);
-        output.write(simd, &source, &no_second, lanes as u16, &quads, words);
+        output.write_shared(simd, &source, &no_second, lanes as u16, &quads, words);
     }
 }
 

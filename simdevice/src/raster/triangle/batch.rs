@@ -91,12 +91,12 @@ pub struct Batch {
     corner: [u32; 2],
     /// The macro-tile's side in tiles.
     side: u32,
-    /// True if some pixels of quads are not covered.
-    partial: bool,
     /// True if 1 / w is constant in each primitive, so that barycentrics need no perspective correction.
     affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
+    /// A bit for each lane: 1 if it has a covered sample.
+    covered: [u64; LANES / 64],
     /// A bit for each tile: 1 if the batch has quads of it.
     tiles: u64,
     pub records: Vec<Record>,
@@ -120,10 +120,10 @@ impl Default for Batch {
             needs: Needs::default(),
             corner: [0; 2],
             side: 1,
-            partial: false,
             affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
+            covered: [0; LANES / 64],
             tiles: 0,
             records: Vec::new(),
             attributes: Vec::new(),
@@ -204,7 +204,7 @@ impl Batch {
 
     /// Removes all quads and records.
     pub fn clear(&mut self) {
-        (self.affine, self.partial) = (true, false);
+        self.affine = true;
         (self.count, self.tiles) = (0, 0);
         self.records.clear();
         self.attributes.clear();
@@ -250,10 +250,37 @@ impl Batch {
         if self.needs.inverse_w {
             self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
         }
-        self.partial |= covered_lanes(quad.cover) != 15;
         self.tiles |= 1 << quad.tile;
         self.quads[self.count] = quad;
         self.count += 1;
+    }
+
+    /// Adds those quads of a block that have lanes of `lanes`, in a draw with one sample per pixel. The batch must have
+    /// space for all four. `quad` is the block's first quad. Returns the number of quads that are left out.
+    #[inline(always)]
+    pub fn add_part<S: Simd>(&mut self, quad: Quad, lanes: u16, values: &BlockValues<S>) -> usize {
+        let (first, mut count) = (self.count, self.count);
+        let mut places = [0; 4];
+        for (number, place) in places.iter_mut().enumerate() {
+            let cover = lanes >> (4 * number) & 15;
+            *place = count % QUADS;
+            // The next quad is stored over one without lanes.
+            self.quads[*place] = Quad { place: quad.place + 4 * number as u8, cover, ..quad };
+            count += usize::from(cover != 0);
+        }
+        self.count = count;
+        self.tiles |= 1 << quad.tile;
+        if self.needs.barycentrics {
+            scatter(values.barycentrics[0], &mut self.barycentrics[0], places);
+            scatter(values.barycentrics[1], &mut self.barycentrics[1], places);
+        }
+        if self.needs.depth {
+            scatter(values.depth, &mut self.depth, places);
+        }
+        if self.needs.inverse_w {
+            scatter(values.inverse_w, &mut self.inverse_w, places);
+        }
+        4 - (count - first)
     }
 
     /// Adds all four quads of a block. The batch must have space for them.
@@ -301,7 +328,24 @@ impl Batch {
             *first = tile * crate::raster::tile::AREA + usize::from(quad.place);
         }
         let [a, b, c, d] = first;
-        QuadAddresses { first, consecutive: b == a + 4 && c == a + 8 && d == a + 12 }
+        QuadAddresses {
+            first,
+            consecutive: b == a + 4 && c == a + 8 && d == a + 12,
+            // A primitive has each quad once. Quads that pad a chunk have the address of the last one.
+            distinct: samples == 1 && self.common[chunk].is_some() && 4 * chunk + 4 <= self.count,
+        }
+    }
+
+    /// The lanes of a chunk of the prepared batch that have a covered sample.
+    #[inline(always)]
+    pub fn covered(&self, chunk: usize) -> u16 {
+        lanes_of_chunk(&self.covered, chunk)
+    }
+
+    /// The number of covered lanes that are not in the set `killed`, whose words have 64 lanes each.
+    pub fn count_living(&self, killed: &[u64]) -> u64 {
+        let killed = killed.iter().copied().chain(std::iter::repeat(0));
+        self.covered.iter().zip(killed).map(|(covered, killed)| u64::from((covered & !killed).count_ones())).sum()
     }
 
     /// The lanes of a chunk in groups of consecutive quads. Within a group no two quads cover the same sample with lanes
@@ -333,32 +377,68 @@ impl Batch {
         turns
     }
 
-    /// Pads the last chunk, and determines the active lanes and the helper lanes for derivatives.
+    /// Pads the last chunk, and determines the covered lanes, the active ones, and the helper lanes for derivatives.
     pub fn prepare(&mut self) {
         let last = self.quads[self.count - 1];
         for quad in &mut self.quads[self.count..4 * self.count.div_ceil(4)] {
             *quad = Quad { cover: 0, ..last };
         }
-        for (quads, common) in self.quads.as_chunks().0.iter().zip(&mut self.common) {
+        self.covered = [0; LANES / 64];
+        let chunks = self.quads.as_chunks().0.iter().zip(&mut self.common).take(self.count.div_ceil(4));
+        for (chunk, (quads, common)) in chunks.enumerate() {
             let [a, b, c, d]: &[Quad; 4] = quads;
             let same = a.record == b.record && a.record == c.record && a.record == d.record;
             *common = same.then_some(a.record);
+            self.covered[chunk / 4] |= u64::from(Covered::of(quads).any()) << (16 * (chunk % 4));
         }
         self.active = LaneMask::first(4 * self.count);
-        self.helpers = LaneMask::none();
-        if !self.partial {
-            return;
+        let mut helpers = [0; LANES / 64];
+        for ((helpers, active), covered) in helpers.iter_mut().zip(self.active.words()).zip(&self.covered) {
+            *helpers = active & !covered;
         }
-        for (number, quad) in self.quads[..self.count].iter().enumerate() {
-            let covered = covered_lanes(quad.cover);
-            if covered != 15 {
-                for lane in 0..4 {
-                    if covered >> lane & 1 == 0 {
-                        self.helpers.set(4 * number + lane, true);
-                    }
-                }
-            }
-        }
+        self.helpers = LaneMask::of_words(&helpers);
+    }
+}
+
+/// The lanes of a chunk in a set whose words have 64 lanes each. Words beyond the end are 0.
+#[inline(always)]
+pub fn lanes_of_chunk(words: &[u64], chunk: usize) -> u16 {
+    (words.get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4))) as u16
+}
+
+/// The coverage of a chunk's quads: [`Quad::cover`] of each, from the lowest bits on.
+pub struct Covered(u64);
+
+impl Covered {
+    /// The coverage of four quads.
+    #[inline(always)]
+    pub fn of([a, b, c, d]: &[Quad; 4]) -> Self {
+        let at = |cover: u16, number: u32| u64::from(cover) << (16 * number);
+        Self(at(a.cover, 0) | at(b.cover, 1) | at(c.cover, 2) | at(d.cover, 3))
+    }
+
+    /// The lanes for which a sample is covered.
+    #[inline(always)]
+    pub fn lanes(&self, sample: usize) -> u16 {
+        let nibbles = self.0 >> (4 * sample) & 0x000F_000F_000F_000F;
+        (nibbles | nibbles >> 12 | nibbles >> 24 | nibbles >> 36) as u16
+    }
+
+    /// The lanes for which any sample is covered.
+    #[inline(always)]
+    fn any(&self) -> u16 {
+        let pairs = self.0 | self.0 >> 4;
+        Self(pairs | pairs >> 8).lanes(0)
+    }
+}
+
+/// Stores the values of a block's quads, each at the lanes of its place in a batch.
+#[inline(always)]
+fn scatter<S: Simd>(values: f32x16<S>, to: &mut [f32; LANES], places: [usize; 4]) {
+    let values: [f32; 16] = values.into();
+    let (quads, to) = (values.as_chunks::<4>().0, to.as_chunks_mut::<4>().0);
+    for (quad, place) in quads.iter().zip(places) {
+        to[place % QUADS] = *quad;
     }
 }
 
@@ -378,26 +458,19 @@ pub fn add_attributes(
     let [a, b, c] = three(primitive.vertices, |v| of_vertex(v).unwrap_or_default());
     let provoking = of_vertex(primitive.provoking).unwrap_or_default();
     let value = |vertex: &[u32], varying: u32| f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0));
-    for &(varying, interpolation) in &interface.varyings {
-        attributes.push(match interpolation {
-            Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
-            _ => {
-                let first = value(a, varying);
-                [first, value(b, varying) - first, value(c, varying) - first]
-            }
-        });
-    }
+    attributes.extend(interface.varyings.iter().map(|&(varying, interpolation)| match interpolation {
+        Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
+        _ => {
+            let first = value(a, varying);
+            [first, value(b, varying) - first, value(c, varying) - first]
+        }
+    }));
 }
 
 /// The offset of a sample from the pixel's centre along an axis, in pixels.
 #[inline(always)]
 pub fn offset(position: i32) -> f32 {
     (position - 128) as f32 / 256.0
-}
-
-/// The lanes of a quad that have a covered sample.
-pub fn covered_lanes(cover: u16) -> u16 {
-    (cover | cover >> 4 | cover >> 8 | cover >> 12) & 15
 }
 
 /// The values of a block at a sample position, derived from those at the centres.
@@ -489,6 +562,13 @@ impl Batch {
         perspective && !divides
     }
 
+    /// The records of the quads of each chunk: of all four, if they have the same, and each.
+    #[inline(always)]
+    fn records_of_chunks(&self) -> impl Iterator<Item = (Option<u16>, [u16; 4])> + '_ {
+        let quads = self.quads.as_chunks::<4>().0;
+        self.common.iter().zip(quads).map(|(common, [a, b, c, d])| (*common, [a.record, b.record, c.record, d.record]))
+    }
+
     /// Interpolates a varying for all chunks of `out`.
     #[inline(always)]
     fn interpolate<S: Simd>(
@@ -499,9 +579,19 @@ impl Batch {
         [b1, b2]: &[[f32; LANES]; 2],
         out: &mut [Vector],
     ) {
+        let attributes = &self.attributes[..];
+        let of_record = |record: u16| attributes[usize::from(record) * per_record + place];
         let (b1, b2) = (b1.as_chunks::<16>().0, b2.as_chunks::<16>().0);
-        for (chunk, ((out, b1), b2)) in out.iter_mut().zip(b1).zip(b2).enumerate() {
-            let attribute = self.attribute(simd, chunk, place, per_record);
+        for (((out, b1), b2), (common, each)) in out.iter_mut().zip(b1).zip(b2).zip(self.records_of_chunks()) {
+            let splat = |value: f32| f32x16::splat(simd, value);
+            let attribute = match common {
+                Some(record) => three(of_record(record), splat),
+                None => {
+                    let [a, b, c, d] = each;
+                    let [a, b, c, d] = [of_record(a), of_record(b), of_record(c), of_record(d)];
+                    three([0, 1, 2], |value: usize| spread(simd, [a[value], b[value], c[value], d[value]]))
+                }
+            };
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
             *out = Vector(bits_of(varying(attribute, [b1, b2])).into());
@@ -511,13 +601,14 @@ impl Batch {
     /// Copies a flat varying for all chunks of `out`.
     #[inline(always)]
     fn copy_flat<S: Simd>(&self, simd: S, place: usize, per_record: usize, out: &mut [Vector]) {
-        for (chunk, out) in out.iter_mut().enumerate() {
-            let value = |record: u16| self.attributes[usize::from(record) * per_record + place][0];
-            let lanes = match self.common[chunk] {
+        let attributes = &self.attributes[..];
+        let value = |record: u16| attributes[usize::from(record) * per_record + place][0];
+        for (out, (common, each)) in out.iter_mut().zip(self.records_of_chunks()) {
+            let lanes = match common {
                 Some(record) => f32x16::splat(simd, value(record)),
                 None => {
-                    let [a, b, c, d] = self.chunk_quads(chunk);
-                    spread(simd, [value(a.record), value(b.record), value(c.record), value(d.record)])
+                    let [a, b, c, d] = each;
+                    spread(simd, [value(a), value(b), value(c), value(d)])
                 }
             };
             *out = Vector(bits_of(lanes).into());
@@ -687,6 +778,9 @@ pub fn perspective_correct<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::token_of;
+    use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
 
     #[gaurast_runner::test]
     fn quads_that_cover_the_same_sample_are_written_in_turn() {
@@ -708,5 +802,51 @@ mod tests {
         assert_eq!(groups(pairs, 0xFFDF), [0xFFF, 0xF000]);
         // One primitive covers each sample once.
         assert_eq!(groups(all.map(|all| Quad { record: 0, ..all }), u16::MAX), [0xFFFF]);
+    }
+
+    #[gaurast_runner::test(each = simd_levels())]
+    fn parts_of_blocks_are_added_as_their_quads_are(case: &Case) {
+        let level = token_of(case);
+        let needs = Needs { barycentrics: true, depth: true, inverse_w: true, detects_affine: false };
+        let (mut parts, mut quads) = (Batch::default(), Batch::default());
+        for batch in [&mut parts, &mut quads] {
+            batch.begin(needs, [0, 0], 64);
+        }
+        let mut left_out = 0;
+        for (number, lanes) in [0x0F03, 0xFFFF, 0, 0x8000, 0x0100, 0xF0F0, 0x1248, 0x000C].into_iter().enumerate() {
+            let values: [[f32; 16]; 4] =
+                std::array::from_fn(|value| std::array::from_fn(|lane| (1000 * number + 100 * value + lane) as f32));
+            let first = Quad { record: number as u16, tile: 3, place: 16 * number as u8, ..Quad::default() };
+            dispatch!(level, simd => {
+                let [b1, b2, depth, inverse_w] = values.map(|value| f32x16::simd_from(simd, value));
+                let values = BlockValues { barycentrics: [b1, b2], depth, inverse_w };
+                left_out += parts.add_part(first, lanes, &values);
+            });
+            for quad in (0..4).filter(|quad| lanes >> (4 * quad) & 15 != 0) {
+                let place = first.place + 4 * quad as u8;
+                quads.add(Quad { place, cover: lanes >> (4 * quad) & 15, ..first }, quad, &values);
+            }
+        }
+        parts.prepare();
+        quads.prepare();
+        assert_eq!((parts.count, left_out), (17, 15));
+        let all = |batch: &Batch| {
+            let lanes = 4 * batch.count;
+            let values = [&batch.barycentrics[0], &batch.barycentrics[1], &batch.depth, &batch.inverse_w];
+            let helpers: Vec<_> = (0..lanes).filter(|lane| batch.helpers.contains(*lane)).collect();
+            let covered: Vec<_> = (0..batch.chunks()).map(|chunk| batch.covered(chunk)).collect();
+            let quads = format!("{:?}", &batch.quads[..batch.count]);
+            (values.map(|value| value[..lanes].to_vec()), helpers, covered, quads, batch.tiles)
+        };
+        assert_eq!(all(&parts), all(&quads));
+        let (_, helpers, covered, ..) = all(&parts);
+        for lane in 0..4 * parts.count {
+            let is_covered = covered[lane / 16] >> (lane % 16) & 1 == 1;
+            let quad = &parts.quads[lane / 4];
+            assert_eq!(is_covered, quad.cover >> (lane % 4) & 1 == 1);
+            assert_eq!(helpers.contains(&lane), !is_covered);
+        }
+        assert_eq!(parts.count_living(&[]), covered.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>());
+        assert_eq!(parts.count_living(&[u64::MAX, 0]), u64::from(covered[4].count_ones()));
     }
 }

@@ -55,6 +55,8 @@ pub struct TriangleTileDraw<'a> {
     pub(super) early: Option<Tests>,
     /// True if shading may remove samples.
     pub(super) removes: bool,
+    /// True if shading may remove some samples of a fragment.
+    pub(super) masks_samples: bool,
     /// True if samples are counted after shading.
     pub(super) counts_late: bool,
     pub(super) samples: Samples,
@@ -121,6 +123,7 @@ impl<'a> TriangleTileDraw<'a> {
             tests,
             early: if effects.tests_late { effects.filter } else { Some(tests).filter(Tests::any) },
             removes: effects.removes,
+            masks_samples: effects.masks_samples,
             counts_late: effects.counts_late,
             samples,
             area,
@@ -137,9 +140,26 @@ impl<'a> TriangleTileDraw<'a> {
         !self.tests.any() && !self.removes
     }
 
-    /// True if nothing happens to a fragment between shading and blending.
+    /// True if all covered blocks of a tile go to the batch: there is one sample per pixel, which nothing removes before
+    /// shading, and nobody records the work.
+    #[inline(always)]
+    pub(super) fn appends_untested(&self) -> bool {
+        self.early.is_none()
+            && self.stage.is_some()
+            && self.samples.positions.len() == 1
+            && self.draw.state.sample_mask & 1 == 1
+            && self.draw.record.is_none()
+            && self.optimizations.has(Optimization::MaskedQuads)
+    }
+
+    /// True if depth and stencil are tested after shading.
+    pub(super) fn tests_late(&self) -> bool {
+        self.path == Path::LateTests && self.tests.any()
+    }
+
+    /// True if nothing happens to a fragment between shading and blending, unless its program kills it.
     pub(super) fn blends_directly(&self) -> bool {
-        self.path != Path::LateTests && !self.removes && !self.draw.state.alpha_to_one
+        !self.tests_late() && !self.masks_samples && !self.draw.state.alpha_to_one
     }
 
     /// Marks the memory that its program may have written as changed.
@@ -155,6 +175,8 @@ impl<'a> TriangleTileDraw<'a> {
 struct ShadingEffects {
     /// True if samples may be removed.
     removes: bool,
+    /// True if only some samples of a fragment may be removed.
+    masks_samples: bool,
     /// True if depth and stencil must be tested after shading.
     tests_late: bool,
     /// The part of late tests that can be done early.
@@ -165,13 +187,15 @@ struct ShadingEffects {
 
 impl ShadingEffects {
     fn new(interface: &Interface, state: &DrawState, tests: &Tests) -> Self {
-        let removes = interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
+        let masks_samples = interface.sample_mask.is_some() || state.alpha_to_coverage;
+        let removes = interface.discards || masks_samples;
         let changes_tests =
             interface.depth.is_some() || interface.stencil_reference.is_some() && tests.stencil.is_some();
         let tests_late = !interface.early_tests
             && (changes_tests || interface.has_side_effects && tests.any() || removes && tests.writes());
         Self {
             removes,
+            masks_samples,
             tests_late,
             filter: tests.filter().filter(|_| !changes_tests && !interface.has_side_effects),
             counts_late: tests_late || removes && !interface.early_tests,

@@ -279,6 +279,39 @@ impl Renderer<'_, '_> {
         self.blocks(simd, raster, coverage, tile)
     }
 
+    /// Processes a primitive's covered blocks of a tile as [`Renderer::blocks`] does, in draws where they go to the batch as
+    /// they are.
+    #[inline(always)]
+    fn untested_blocks<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        raster: &mut RasterPrimitive<'_>,
+        coverage: &Coverage<N>,
+        tile: PlacedTile,
+    ) -> Result<(), Stopped> {
+        let needs = self.draw.needs;
+        let (mut samples, mut loaded) = (0, false);
+        for block in bits(coverage.blocks) {
+            let lanes = coverage.lanes[block][0];
+            if lanes == 0 {
+                self.quads_masked += 4;
+                continue;
+            }
+            samples += lanes.count_ones();
+            let values = BlockValues::new(simd, raster.setup, block_corner(tile.corner, block), needs);
+            if !loaded {
+                self.load_colors(tile.index, coverage);
+                loaded = true;
+            }
+            let quad = Quad { tile: tile.index as u8, place: (block * 16) as u8, ..Quad::default() };
+            self.append(raster, quad, &[lanes], &values)?;
+        }
+        if !self.draw.counts_late {
+            self.samples_passed += u64::from(samples);
+        }
+        Ok(())
+    }
+
     /// Processes a primitive's covered blocks of a tile: early tests, then the batch.
     #[inline(always)]
     fn blocks<S: Simd, const N: usize>(
@@ -289,6 +322,9 @@ impl Renderer<'_, '_> {
         tile: PlacedTile,
     ) -> Result<(), Stopped> {
         let draw = self.draw;
+        if N == 1 && draw.appends_untested() {
+            return self.untested_blocks(simd, raster, coverage, tile);
+        }
         let sample_mask = draw.draw.state.sample_mask;
         let masked = sample_mask & ((1 << N) - 1) != (1 << N) - 1;
         let skips_masked = draw.optimizations.has(Optimization::MaskedQuads);
@@ -377,19 +413,36 @@ impl Renderer<'_, '_> {
         lanes: &[u16; N],
         values: &BlockValues<S>,
     ) -> Result<(), Stopped> {
-        if N == 1 && lanes[0] == u16::MAX && self.batch.count + 4 <= QUADS {
+        let skips_masked = self.draw.optimizations.has(Optimization::MaskedQuads);
+        if N == 1 && (skips_masked || lanes[0] == u16::MAX) && self.batch.count + 4 <= QUADS {
             let record = match raster.record {
                 Some(record) => record,
                 None => self.record(raster),
             };
-            let mut quads = [Quad { record, cover: 15, ..quad }; 4];
-            for (number, quad) in quads.iter_mut().enumerate() {
-                quad.place += 4 * number as u8;
+            if lanes[0] == u16::MAX {
+                let mut quads = [Quad { record, cover: 15, ..quad }; 4];
+                for (number, quad) in quads.iter_mut().enumerate() {
+                    quad.place += 4 * number as u8;
+                }
+                self.batch.add_block(quads, values);
+            } else {
+                let left_out = self.batch.add_part(Quad { record, ..quad }, lanes[0], values);
+                self.quads_masked += left_out as u64;
             }
-            self.batch.add_block(quads, values);
             return Ok(());
         }
-        let values = values.lanes();
+        self.append_quads(raster, quad, lanes, &values.lanes())
+    }
+
+    /// Adds the quads of a block as [`Renderer::append`] does, one by one.
+    #[inline(never)]
+    fn append_quads<const N: usize>(
+        &mut self,
+        raster: &mut RasterPrimitive<'_>,
+        quad: Quad,
+        lanes: &[u16; N],
+        values: &[[f32; 16]; 4],
+    ) -> Result<(), Stopped> {
         let skips_masked = self.draw.optimizations.has(Optimization::MaskedQuads);
         for number in 0..4 {
             let mut cover = 0;
@@ -409,7 +462,7 @@ impl Renderer<'_, '_> {
                 None => self.record(raster),
             };
             let quad = Quad { place: quad.place + 4 * number as u8, record, cover, ..quad };
-            self.batch.add(quad, number, &values);
+            self.batch.add(quad, number, values);
         }
         Ok(())
     }
@@ -493,10 +546,10 @@ impl Renderer<'_, '_> {
         machine.run(&batch.active, &batch.helpers, &draw.bound.resources(), watchdog)?;
         let lanes = (4 * batch.count - batch.helpers.count()) as u64;
         self.counters.add(Counter::FragmentInvocations, lanes);
-        let killed = if stage.interface.discards { machine.killed() } else { isa::machine::LaneMask::none() };
+        let killed = if stage.interface.discards { machine.killed_words() } else { &[] };
         let buffers = &mut *self.buffers;
         let passed = dispatch!(level, simd => {
-            write(simd, draw, &stage.interface, batch, machine, &killed, buffers)
+            write(simd, draw, &stage.interface, batch, machine, killed, buffers)
         });
         self.samples_passed += passed;
         self.batch.clear();

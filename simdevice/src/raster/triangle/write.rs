@@ -1,15 +1,17 @@
 //! The output of shaded fragments: removal of samples, late tests, and writes to the colour attachments.
 
-use super::batch::{Batch, Turns, offset};
-use super::draw::{Path, TriangleTileDraw};
+use super::batch::{Batch, Covered, Turns, lanes_of_chunk, offset};
+use super::draw::TriangleTileDraw;
+use crate::format::unorm8::Colors;
 use crate::program::fragment::Interface;
-use crate::raster::color::load;
+use crate::raster::color::{OverKernel, blend_bytes_over, blend_words_over, load};
 use crate::raster::depth_stencil::Tests;
 use crate::raster::output::{Buffers, Sources, covered_by_alpha, lanes_of};
 use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
-use isa::machine::{LaneMask, Machine};
+use isa::Vector;
+use isa::machine::Machine;
 
 /// Runs the depth and stencil tests of 16 samples, updates the buffers, and returns the lanes that pass.
 #[inline(always)]
@@ -51,8 +53,8 @@ pub fn test<S: Simd>(
     passed
 }
 
-/// Writes a batch's results to the attachments, in order. Returns the number of samples that passed, if they are
-/// counted after shading, and 0 otherwise.
+/// Writes a batch's results to the attachments, in order. `killed` are the lanes that the program killed, 64 to a word.
+/// Returns the number of samples that passed, if they are counted after shading, and 0 otherwise.
 #[inline(always)]
 pub fn write<S: Simd>(
     simd: S,
@@ -60,20 +62,19 @@ pub fn write<S: Simd>(
     interface: &Interface,
     batch: &Batch,
     machine: &Machine,
-    killed: &LaneMask,
+    killed: &[u64],
     buffers: &mut Buffers,
 ) -> u64 {
     if draw.blends_directly() {
-        write_directly(simd, draw, interface, batch, machine, buffers);
-        return 0;
+        write_directly(simd, draw, interface, batch, machine, killed, buffers);
+        return if draw.counts_late { count_living(draw, batch, killed) } else { 0 };
     }
-    let late = draw.path == Path::LateTests && draw.tests.any();
+    let late = draw.tests_late();
     let sources: Vec<Sources<'_>> =
         interface.colors.iter().map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)))).collect();
     let mut passed = 0;
     for chunk in 0..batch.chunks() {
-        let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
-        let alive = !(killed as u16);
+        let alive = !lanes_of_chunk(killed, chunk);
         // Quads that cover the same sample are processed one after another, and so are quads that may have different
         // faces in a stencil test.
         let turns = if late && draw.tests.stencil.is_some() { Turns::QUADS } else { batch.turns(chunk, alive) };
@@ -112,7 +113,18 @@ fn stencil_references(interface: &Interface, machine: &Machine, chunk: usize) ->
     machine.output_vectors(slot).get(chunk).map(|references| references.0)
 }
 
-/// Writes a batch's results as [`write`] does, for draws without removal of samples or tests after shading.
+/// The number of covered samples of fragments that the program did not kill.
+fn count_living(draw: &TriangleTileDraw<'_>, batch: &Batch, killed: &[u64]) -> u64 {
+    if draw.samples.positions.len() == 1 {
+        return batch.count_living(killed);
+    }
+    let of_chunk = |chunk| sample_lanes(batch, chunk, !lanes_of_chunk(killed, chunk));
+    let samples = (0..batch.chunks()).flat_map(of_chunk);
+    samples.map(|lanes| u64::from(lanes.count_ones())).sum()
+}
+
+/// Writes a batch's results as [`write`] does, for draws in which shading removes whole fragments only, and without tests
+/// after it.
 #[inline(always)]
 fn write_directly<S: Simd>(
     simd: S,
@@ -120,6 +132,7 @@ fn write_directly<S: Simd>(
     interface: &Interface,
     batch: &Batch,
     machine: &Machine,
+    killed: &[u64],
     buffers: &mut Buffers,
 ) {
     let count = draw.samples.positions.len();
@@ -128,17 +141,39 @@ fn write_directly<S: Simd>(
             continue;
         };
         let sources = slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)));
-        let dual = output.is_dual_source();
         let words = buffers.color[index].words_mut();
+        // A loop of its own for each of the kernels, so that vectors stay in registers.
+        match output.over_kernel() {
+            Some(OverKernel::Words { over }) if count == 1 => {
+                write_chunks(simd, &sources[0], batch, killed, |source, lanes, quads| {
+                    blend_words_over(simd, over, source, lanes, quads, words);
+                });
+                continue;
+            }
+            Some(OverKernel::Unorm8 { over, bgra }) if count == 1 => {
+                write_chunks(simd, &sources[0], batch, killed, |source, lanes, quads| {
+                    blend_bytes_over(simd, over, bgra, source, lanes, quads, words);
+                });
+                continue;
+            }
+            _ => {}
+        }
+        let dual = output.is_dual_source();
         for chunk in 0..batch.chunks() {
+            let alive = !lanes_of_chunk(killed, chunk);
+            let living = batch.covered(chunk) & alive;
+            if living == 0 {
+                continue;
+            }
             let source = load(simd, &sources[0], chunk);
-            let covered = Covered::of(batch, chunk);
+            let lanes_of = |sample: usize| {
+                if count == 1 { living } else { Covered::of(batch.chunk_quads(chunk)).lanes(sample) & alive }
+            };
             if let Some(packed) = output.replacement(simd, &source) {
                 // Quads are stored in order, so that the last one with an address remains.
                 for sample in 0..count {
-                    let lanes = covered.lanes(sample);
                     let quads = batch.places(chunk, sample, count);
-                    quads.store(words, lanes, &packed);
+                    quads.store(words, lanes_of(sample), &packed);
                 }
                 continue;
             }
@@ -146,12 +181,12 @@ fn write_directly<S: Simd>(
             if dual {
                 second = load(simd, &sources[1], chunk);
             }
-            for turn in batch.turns(chunk, u16::MAX).groups() {
+            for turn in batch.turns(chunk, alive).groups() {
                 for sample in 0..count {
-                    let lanes = covered.lanes(sample) & turn;
+                    let lanes = lanes_of(sample) & turn;
                     if lanes != 0 {
                         let quads = batch.places(chunk, sample, count);
-                        output.write(simd, &source, &second, lanes, &quads, words);
+                        output.write_shared(simd, &source, &second, lanes, &quads, words);
                     }
                 }
             }
@@ -159,29 +194,35 @@ fn write_directly<S: Simd>(
     }
 }
 
-/// The coverage of a chunk's quads: [`Quad::cover`](super::batch::Quad::cover) of each, from the lowest bits on.
-struct Covered(u64);
-
-impl Covered {
-    #[inline(always)]
-    fn of(batch: &Batch, chunk: usize) -> Self {
-        let [a, b, c, d] = batch.chunk_quads(chunk);
-        let at = |cover: u16, number: u32| u64::from(cover) << (16 * number);
-        Self(at(a.cover, 0) | at(b.cover, 1) | at(c.cover, 2) | at(d.cover, 3))
-    }
-
-    /// The lanes for which a sample is covered.
-    #[inline(always)]
-    fn lanes(&self, sample: usize) -> u16 {
-        let nibbles = self.0 >> (4 * sample) & 0x000F_000F_000F_000F;
-        (nibbles | nibbles >> 12 | nibbles >> 24 | nibbles >> 36) as u16
+/// Calls `write` with the sources, lanes and addresses of all living fragments, in order. Pixels have one sample.
+#[inline(always)]
+fn write_chunks<S: Simd>(
+    simd: S,
+    source: &[&[Vector]; 4],
+    batch: &Batch,
+    killed: &[u64],
+    mut write: impl FnMut(&Colors<S>, u16, &QuadAddresses),
+) {
+    for chunk in 0..batch.chunks() {
+        let alive = !lanes_of_chunk(killed, chunk);
+        let living = batch.covered(chunk) & alive;
+        if living == 0 {
+            continue;
+        }
+        let quads = batch.places(chunk, 0, 1);
+        let source = load(simd, source, chunk);
+        for turn in batch.turns(chunk, alive).groups() {
+            if living & turn != 0 {
+                write(&source, living & turn, &quads);
+            }
+        }
     }
 }
 
 /// The covered lanes of a chunk, by sample, restricted to the lanes `among`.
 #[inline(always)]
 fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
-    let covered = Covered::of(batch, chunk);
+    let covered = Covered::of(batch.chunk_quads(chunk));
     let mut samples = [0; 4];
     for (sample, lanes) in samples.iter_mut().enumerate() {
         *lanes = covered.lanes(sample) & among;
@@ -285,6 +326,6 @@ fn write_colors<S: Simd>(
             second[3] = f32x16::splat(simd, 1.0);
         }
         let words = buffers.color[index].words_mut();
-        output.write(simd, &source, &second, lanes, quads, words);
+        output.write_shared(simd, &source, &second, lanes, quads, words);
     }
 }
