@@ -204,7 +204,9 @@ struct Workers {
 }
 
 impl Workers {
-    /// Starts `count` threads; 0 starts one per processor.
+    /// Starts `count` threads; 0 starts one per processor. It is never a part of its caller, so that sizes of functions do not depend on
+    /// what the compiler chooses.
+    #[inline(never)]
     fn new(count: usize) -> Result<Self, ThreadPoolBuildError> {
         let mut workers = Self { pool: None, threads: Vec::new() };
         let pool = ThreadPoolBuilder::new()
