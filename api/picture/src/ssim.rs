@@ -25,9 +25,21 @@ const C2: f64 = 0.03 * 0.03;
 pub struct Ssim {
     /// Over all pixels, with zeros beyond the border, as `metrics.py` of the original 3DGS code computes it.
     pub inria: f64,
-    /// Over the pixels whose window lies in the image, as torchmetrics (which gsplat uses) and pytorch-msssim (which
-    /// nerfstudio uses) compute it. None if there is no such pixel.
+    /// Over all pixels, with the image reflected at its border, as torchmetrics (which gsplat uses) computes it from version 1.4
+    /// on. None if a side has no pixels to be reflected, at most 5.
     pub torchmetrics: Option<f64>,
+    /// Over the pixels whose window lies in the image, as pytorch-msssim (which nerfstudio uses) and older torchmetrics compute
+    /// it. None if there is no such pixel.
+    pub valid: Option<f64>,
+}
+
+/// The values beyond an image's border.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Border {
+    /// Zeros.
+    Zeros,
+    /// The image reflected at its outermost pixels, which are not repeated.
+    Reflection,
 }
 
 impl Ssim {
@@ -38,23 +50,46 @@ impl Ssim {
     pub fn new(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> Self {
         assert_eq!(image.len(), reference.len(), "the sizes differ");
         if image.is_empty() {
-            return Self { inria: 1.0, torchmetrics: None };
+            return Self { inria: 1.0, torchmetrics: None, valid: None };
         }
         let width = width as usize;
         let (height, filter) = (image.len() / width, Filter { form: Form::Even, weights: window()[RADIUS..].to_vec() });
         let level = Level::new();
-        let sums_of =
-            |tile: Tile| dispatch!(level, simd => tile_sums(simd, image, reference, [width, height], tile, &filter));
-        let sums: Vec<Sums> = tiles(width, height).into_par_iter().map(sums_of).collect();
-        // Summed in the order of the tiles, so that threads change nothing.
-        let all: f64 = sums.iter().map(|sums| sums.all).sum();
-        let inside: f64 = sums.iter().map(|sums| sums.inside).sum();
+        let sums = |tiles: Vec<Tile>, border: Border| {
+            let sums_of = |tile: Tile| dispatch!(level, simd => tile_sums(simd, image, reference, [width, height], tile, &filter, border));
+            let sums: Vec<Sums> = tiles.into_par_iter().map(sums_of).collect();
+            // Summed in the order of the tiles, so that threads change nothing.
+            sums.iter()
+                .fold(Sums::default(), |sum, one| Sums { all: sum.all + one.all, inside: sum.inside + one.inside })
+        };
+        let zeros = sums(tiles(width, height), Border::Zeros);
         let count = width.saturating_sub(2 * RADIUS) * height.saturating_sub(2 * RADIUS);
-        Self { inria: all / (3 * image.len()) as f64, torchmetrics: (count > 0).then(|| inside / (3 * count) as f64) }
+        let mean = |sum: f64, pixels: usize| sum / (3 * pixels) as f64;
+        let torchmetrics = (width.min(height) > RADIUS).then(|| {
+            let reflected = if count > 0 { edges(width, height) } else { tiles(width, height) };
+            mean(zeros.inside + sums(reflected, Border::Reflection).all, image.len())
+        });
+        Self {
+            inria: mean(zeros.all, image.len()),
+            torchmetrics,
+            valid: (count > 0).then(|| mean(zeros.inside, count)),
+        }
     }
 }
 
+/// The pixels of an image whose window does not lie in it, as tiles. Both sides are longer than twice the radius.
+fn edges(width: usize, height: usize) -> Vec<Tile> {
+    let rows = height - 2 * RADIUS;
+    vec![
+        Tile { left: 0, top: 0, width, height: RADIUS },
+        Tile { left: 0, top: RADIUS, width: RADIUS, height: rows },
+        Tile { left: width - RADIUS, top: RADIUS, width: RADIUS, height: rows },
+        Tile { left: 0, top: height - RADIUS, width, height: RADIUS },
+    ]
+}
+
 /// Sums of a tile's values of three channels.
+#[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     all: f64,
     /// Of the pixels whose window lies in the image.
@@ -75,6 +110,7 @@ fn tile_sums<S: Simd>(
     [width, height]: [usize; 2],
     tile: Tile,
     filter: &Filter<f64>,
+    border: Border,
 ) -> Sums {
     simd.vectorize(
         #[inline(always)]
@@ -82,8 +118,8 @@ fn tile_sums<S: Simd>(
             let (rows, columns) = (inside(tile.top, tile.height, height), inside(tile.left, tile.width, width));
             let mut sums = Sums { all: 0.0, inside: 0.0 };
             for channel in 0..3 {
-                let a = channel_of(a, [width, height], tile, channel);
-                let b = channel_of(b, [width, height], tile, channel);
+                let a = channel_of(a, [width, height], tile, channel, border);
+                let b = channel_of(b, [width, height], tile, channel, border);
                 let (mut both, mut squares) = (vec![0.0; a.len()], vec![0.0; a.len()]);
                 for at in 0..a.len() {
                     both[at] = a[at] * b[at];
@@ -110,17 +146,29 @@ fn tile_sums<S: Simd>(
     )
 }
 
-/// A channel of a tile and its border, with zeros beyond the image.
+/// A channel of a tile and its border.
 #[inline(always)]
-fn channel_of(image: &[[f32; 4]], [width, height]: [usize; 2], tile: Tile, channel: usize) -> Vec<f64> {
+fn channel_of(image: &[[f32; 4]], [width, height]: [usize; 2], tile: Tile, channel: usize, border: Border) -> Vec<f64> {
     tile.bordered(
         RADIUS,
         #[inline(always)]
         |x, y| {
+            let (x, y) = match border {
+                Border::Zeros => (x, y),
+                Border::Reflection => (reflected(x, width), reflected(y, height)),
+            };
             let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
             if inside { f64::from(image[y as usize * width + x as usize][channel]) } else { 0.0 }
         },
     )
+}
+
+/// A coordinate reflected at the outermost ones of an image of `side` pixels, if it lies beyond.
+#[inline(always)]
+fn reflected(at: isize, side: usize) -> isize {
+    let last = side as isize - 1;
+    let at = at.abs();
+    if at > last { 2 * last - at } else { at }
 }
 
 fn window() -> [f64; 2 * RADIUS + 1] {
@@ -136,13 +184,18 @@ fn window() -> [f64; 2 * RADIUS + 1] {
 mod tests {
     use super::*;
 
-    /// Correlates rows, then columns, with zeros beyond the border.
-    fn filtered(values: &[f64], width: usize, window: &[f64]) -> Vec<f64> {
+    /// Correlates rows, then columns.
+    fn filtered(values: &[f64], width: usize, window: &[f64], border: Border) -> Vec<f64> {
         let height = values.len() / width;
         let correlate = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
             let taps = window.iter().enumerate();
             taps.filter_map(|(i, weight)| {
-                let position = (at + i).checked_sub(RADIUS).filter(|p| *p < count)?;
+                let position = match border {
+                    Border::Zeros => (at + i).checked_sub(RADIUS).filter(|p| *p < count)?,
+                    Border::Reflection if at + i < RADIUS => RADIUS - at - i,
+                    Border::Reflection if at + i - RADIUS >= count => 2 * (count - 1) - (at + i - RADIUS),
+                    Border::Reflection => at + i - RADIUS,
+                };
                 Some(weight * value(position))
             })
             .sum::<f64>()
@@ -157,10 +210,10 @@ mod tests {
     }
 
     /// A channel's values, one pixel after the other.
-    fn channel_values(a: &[f64], b: &[f64], width: usize) -> Vec<f64> {
+    fn channel_values(a: &[f64], b: &[f64], width: usize, border: Border) -> Vec<f64> {
         let window = window();
         let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
-        let smooth = |values: &[f64]| filtered(values, width, &window);
+        let smooth = |values: &[f64]| filtered(values, width, &window, border);
         let (mean_a, mean_b) = (smooth(a), smooth(b));
         let (square_a, square_b) = (smooth(&product(a, a)), smooth(&product(b, b)));
         let both = smooth(&product(a, b));
@@ -185,8 +238,10 @@ mod tests {
         let (a, b) = (image(31), image(37));
         let plane =
             |image: &[[f32; 4]], channel: usize| -> Vec<f64> { image.iter().map(|p| p[channel].into()).collect() };
-        let values: Vec<Vec<f64>> =
-            (0..3).map(|channel| channel_values(&plane(&a, channel), &plane(&b, channel), width)).collect();
+        let values_of = |border: Border| -> Vec<Vec<f64>> {
+            (0..3).map(|channel| channel_values(&plane(&a, channel), &plane(&b, channel), width, border)).collect()
+        };
+        let values = values_of(Border::Zeros);
         let expected = values.iter().flatten().sum::<f64>() / (3 * width * height) as f64;
         let found = Ssim::new(&a, &b, width as u32);
         assert!((found.inria - expected).abs() < 1e-12, "{found:?} {expected}");
@@ -194,17 +249,30 @@ mod tests {
         let inside =
             (0..width * height).filter(is_inside).map(|at| values.iter().map(|values| values[at]).sum::<f64>());
         let expected = inside.sum::<f64>() / (3 * (width - 10) * (height - 10)) as f64;
-        let torchmetrics = found.torchmetrics.expect("windows fit");
+        let valid = found.valid.expect("windows fit");
+        assert!((valid - expected).abs() < 1e-12, "{found:?} {expected}");
+        let reflected = values_of(Border::Reflection);
+        let expected = reflected.iter().flatten().sum::<f64>() / (3 * width * height) as f64;
+        let torchmetrics = found.torchmetrics.expect("pixels to be reflected");
         assert!((torchmetrics - expected).abs() < 1e-12, "{found:?} {expected}");
+        // A picture in which no window lies.
+        let (a, b) = (&a[..7 * 9], &b[..7 * 9]);
+        let values = channel_values(&plane(a, 0), &plane(b, 0), 7, Border::Reflection).into_iter();
+        let values = values.chain(channel_values(&plane(a, 1), &plane(b, 1), 7, Border::Reflection));
+        let values = values.chain(channel_values(&plane(a, 2), &plane(b, 2), 7, Border::Reflection));
+        let expected = values.sum::<f64>() / (3.0 * 7.0 * 9.0);
+        let torchmetrics = Ssim::new(a, b, 7).torchmetrics.expect("pixels to be reflected");
+        assert!((torchmetrics - expected).abs() < 1e-12, "{torchmetrics} {expected}");
     }
 
     #[test]
-    fn an_image_in_which_no_window_fits_has_one_value() {
+    fn an_image_in_which_no_window_fits_has_fewer_values() {
         let image = grey(|i| i as f32 / 120.0, 10 * 12);
-        assert_eq!(Ssim::new(&image, &image, 10), Ssim { inria: 1.0, torchmetrics: None });
-        assert_eq!(Ssim::new(&image, &image, 12).torchmetrics, None);
+        assert_eq!(Ssim::new(&image, &image, 10), Ssim { inria: 1.0, torchmetrics: Some(1.0), valid: None });
+        assert_eq!(Ssim::new(&image, &image, 12).valid, None);
+        assert_eq!(Ssim::new(&image, &image, 24), Ssim { inria: 1.0, torchmetrics: None, valid: None });
         let image = grey(|i| i as f32 / 121.0, 11 * 11);
-        assert_eq!(Ssim::new(&image, &image, 11), Ssim { inria: 1.0, torchmetrics: Some(1.0) });
+        assert_eq!(Ssim::new(&image, &image, 11), Ssim { inria: 1.0, torchmetrics: Some(1.0), valid: Some(1.0) });
     }
 
     fn grey(value: impl Fn(usize) -> f32, count: usize) -> Vec<[f32; 4]> {

@@ -7,10 +7,11 @@ It needs numpy and scipy. The columns are
 
 - PSNR: `20 * log10(1 / sqrt(mse))` of 3DGS's `utils/image_utils.py`, which is torchmetrics' with a range of 1;
 - SSIM of 3DGS's `utils/loss_utils.py`: convolutions of 11x11 with a padding of 5 zeros, the mean over all pixels;
-- SSIM of torchmetrics: the same without the 5 outermost pixels, whose windows it reflects and then cuts off.
+- SSIM of torchmetrics from version 1.4.2 on: the picture is reflected at its border, the mean over all pixels;
+- SSIM of pytorch-msssim: the mean over the pixels whose window lies in the picture.
 
-If scikit-image is there, the last column is also held against its `structural_similarity`, and if torch and torchmetrics are
-there, both are held against them.
+They are also held against those of these programs that are installed: torchmetrics, pytorch-msssim, and scikit-image, whose
+`structural_similarity` is the last column.
 """
 
 import numpy as np
@@ -43,9 +44,9 @@ def window():
     return np.outer(weights, weights)
 
 
-def ssim_map(a, b):
-    """SSIM of a channel at each pixel, with zeros beyond the border."""
-    smooth = lambda plane: convolve2d(plane, window(), mode="same", boundary="fill")
+def ssim_map(a, b, beyond):
+    """SSIM of a channel at each pixel; `beyond` is NumPy's mode for the 5 pixels beyond the border."""
+    smooth = lambda plane: convolve2d(np.pad(plane, 5, mode=beyond), window(), mode="valid")
     mean_a, mean_b = smooth(a), smooth(b)
     variance_a, variance_b = smooth(a * a) - mean_a**2, smooth(b * b) - mean_b**2
     covariance = smooth(a * b) - mean_a * mean_b
@@ -57,8 +58,9 @@ def ssim_map(a, b):
 
 def measures(a, b):
     psnr = 20 * np.log10(1 / np.sqrt(np.mean((a - b) ** 2)))
-    maps = np.stack([ssim_map(a[..., c], b[..., c]) for c in range(3)])
-    return psnr, maps.mean(), maps[:, 5:-5, 5:-5].mean()
+    maps = lambda beyond: np.stack([ssim_map(a[..., c], b[..., c], beyond) for c in range(3)])
+    zeros = maps("constant")
+    return psnr, zeros.mean(), maps("reflect").mean(), zeros[:, 5:-5, 5:-5].mean()
 
 
 def check(a, b, found):
@@ -68,7 +70,7 @@ def check(a, b, found):
         from skimage.metrics import structural_similarity
 
         options = dict(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1.0, channel_axis=-1)
-        assert abs(structural_similarity(a, b, **options) - found[2]) < 1e-9
+        assert abs(structural_similarity(a, b, **options) - found[3]) < 1e-9
         checked.append("scikit-image")
     except ImportError:
         pass
@@ -80,6 +82,15 @@ def check(a, b, found):
         assert abs(float(peak_signal_noise_ratio(x, y, data_range=1.0)) - found[0]) < 1e-4
         assert abs(float(structural_similarity_index_measure(x, y, data_range=1.0)) - found[2]) < 1e-4
         checked.append("torchmetrics")
+    except ImportError:
+        pass
+    try:
+        import torch
+        from pytorch_msssim import ssim
+
+        x, y = (torch.from_numpy(image).permute(2, 0, 1)[None].float() for image in (a, b))
+        assert abs(float(ssim(x, y, data_range=1.0)) - found[3]) < 1e-4
+        checked.append("pytorch-msssim")
     except ImportError:
         pass
     return checked

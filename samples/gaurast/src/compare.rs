@@ -68,8 +68,8 @@ impl Error {
     after_help = "PSNR is over red, green and blue, the peak being 1; SSIM is as 3DGS's own evaluation computes \
     it; FLIP is the mean error of the LDR evaluator, 0 to 1. Colours are compared as they are shown, over the background. \
     Folders are compared file by file, by their names without extensions. The PSNR of equal pictures is infinite, and so is a \
-    mean with one of them; JSON has null for it, and says how many pictures are equal. JSON also has torchmetrics' SSIM, which \
-    leaves out the border."
+    mean with one of them; JSON has null for it, and says how many pictures are equal. JSON also has torchmetrics' SSIM, \
+    which reflects the picture at its border, and pytorch-msssim's, which leaves the border out."
 )]
 pub struct CompareArguments {
     /// A picture, or a folder of pictures: .png, .jpg, .webp, .ppm or .exr
@@ -276,12 +276,13 @@ fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result
     let means = Means::of(compared.iter().map(|one| &one.measures));
     if arguments.json {
         let one = |one: &Compared| {
-            let Measures { psnr, ssim, ssim_torchmetrics, flip, largest, equal } = one.measures;
+            let Measures { psnr, ssim, ssim_torchmetrics, ssim_valid, flip, largest, equal } = one.measures;
             json!({
                 "name": one.name,
                 "psnr": psnr,
                 "ssim": ssim,
                 "ssim_torchmetrics": ssim_torchmetrics,
+                "ssim_valid": ssim_valid,
                 "flip": flip,
                 "largest": largest,
                 "equal": equal,

@@ -10,8 +10,10 @@ pub struct Measures {
     pub psnr: Option<f64>,
     /// As `metrics.py` of 3DGS computes it.
     pub ssim: f64,
-    /// As torchmetrics computes it; none if the picture is smaller than its window.
+    /// As torchmetrics computes it; none if a side is shorter than 6 pixels.
     pub ssim_torchmetrics: Option<f64>,
+    /// As pytorch-msssim computes it; none if the picture is smaller than its window.
+    pub ssim_valid: Option<f64>,
     /// The mean FLIP error, 0 to 1.
     pub flip: f64,
     /// The largest difference of a channel, 0 to 1.
@@ -24,11 +26,12 @@ impl Measures {
     pub fn of(picture: &Picture, reference: &Picture) -> Self {
         let (pixels, of_reference, width) = (&picture.pixels, &reference.pixels, picture.width);
         let Statistics { psnr, flip, max, .. } = Statistics::new(pixels, of_reference, width);
-        let Ssim { inria, torchmetrics } = Ssim::new(pixels, of_reference, width);
+        let Ssim { inria, torchmetrics, valid } = Ssim::new(pixels, of_reference, width);
         Self {
             psnr: psnr.is_finite().then_some(psnr),
             ssim: inria,
             ssim_torchmetrics: torchmetrics,
+            ssim_valid: valid,
             flip,
             largest: max,
             equal: max == 0.0,
@@ -48,6 +51,7 @@ pub struct Means {
     pub psnr: Option<f64>,
     pub ssim: f64,
     pub ssim_torchmetrics: Option<f64>,
+    pub ssim_valid: Option<f64>,
     pub flip: f64,
     /// The number of equal pictures.
     pub equal: usize,
@@ -63,6 +67,7 @@ impl Means {
             psnr: finite(mean(&Measures::decibels)),
             ssim: mean(&|one| one.ssim),
             ssim_torchmetrics: finite(mean(&|one| one.ssim_torchmetrics.unwrap_or(f64::NAN))),
+            ssim_valid: finite(mean(&|one| one.ssim_valid.unwrap_or(f64::NAN))),
             flip: mean(&|one| one.flip),
             equal: all.clone().filter(|one| one.equal).count(),
         }

@@ -13,7 +13,7 @@ use crate::args::{ModeArguments, Shard, positive};
 #[command(
     after_help = "The cameras, the photographs, their sizes, the views that are left out of training and the background are \
     those of 3DGS's, nerfstudio's or gsplat's training, as far as its files are there; each choice is printed. \
-    PSNR and SSIM are as 3DGS's metrics.py and as torchmetrics compute them, FLIP is the mean error of the LDR \
+    PSNR and SSIM are as 3DGS's metrics.py, torchmetrics and pytorch-msssim compute them, FLIP is the mean error of the LDR \
     evaluator. LPIPS is not computed: its networks' weights are not part of this program. Means are over views."
 )]
 pub struct EvalArguments {

@@ -139,15 +139,12 @@ impl Report<'_> {
         }
         let mut table = Table::new();
         table.load_style(UTF8_FULL_CONDENSED);
-        table.set_header(["view", "PSNR, dB", "SSIM, 3DGS", "SSIM, torchmetrics", "FLIP"]);
+        table.set_header(["view", "PSNR, dB", "SSIM, 3DGS", "SSIM, torchmetrics", "SSIM, pytorch-msssim", "FLIP"]);
         for Outcome { name, measures, .. } in self.outcomes {
-            let Measures { ssim, ssim_torchmetrics, flip, .. } = *measures;
-            table.add_row(cells(name, measures.decibels(), ssim, ssim_torchmetrics, flip));
+            table.add_row(cells(name, &Means::of(std::iter::once(measures))));
         }
-        let means = self.means();
-        let name = format!("mean of {}", self.outcomes.len());
-        table.add_row(cells(&name, means.decibels(), means.ssim, means.ssim_torchmetrics, means.flip));
-        for column in 1..5 {
+        table.add_row(cells(&format!("mean of {}", self.outcomes.len()), &self.means()));
+        for column in 1..6 {
             if let Some(column) = table.column_mut(column) {
                 column.set_cell_alignment(CellAlignment::Right);
             }
@@ -175,13 +172,15 @@ impl Report<'_> {
 
     /// A line for each view.
     fn csv(&self) -> String {
-        let mut csv = "view,width,height,psnr,ssim,ssim_torchmetrics,flip,largest\n".to_owned();
+        let mut csv = "view,width,height,psnr,ssim,ssim_torchmetrics,ssim_valid,flip,largest\n".to_owned();
         for Outcome { name, width, height, measures } in self.outcomes {
-            let Measures { ssim, ssim_torchmetrics, flip, largest, .. } = measures;
+            let Measures { ssim, ssim_torchmetrics, ssim_valid, flip, largest, .. } = measures;
             let name =
                 if name.contains([',', '"']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.clone() };
-            let inside = ssim_torchmetrics.map_or_else(String::new, |ssim| ssim.to_string());
-            let _ = writeln!(csv, "{name},{width},{height},{},{ssim},{inside},{flip},{largest}", measures.decibels());
+            let psnr = measures.decibels();
+            let [reflected, valid] =
+                [ssim_torchmetrics, ssim_valid].map(|ssim| ssim.map_or_else(String::new, |ssim| ssim.to_string()));
+            let _ = writeln!(csv, "{name},{width},{height},{psnr},{ssim},{reflected},{valid},{flip},{largest}");
         }
         csv
     }
@@ -203,14 +202,13 @@ impl Report<'_> {
         for note in &self.dataset.notes {
             let _ = writeln!(page, "<p>{}</p>", text(note));
         }
-        let means = self.means();
-        let mean = sentence(means.decibels(), means.ssim, means.ssim_torchmetrics, means.flip);
+        let mean = sentence(&self.means());
         let _ = writeln!(page, "<h2>Mean of {}</h2>\n<p>{mean}</p>", self.outcomes.len());
         let mut outcomes: Vec<&Outcome> = self.outcomes.iter().collect();
         outcomes.sort_by(|a, b| a.measures.decibels().total_cmp(&b.measures.decibels()));
         for Outcome { name, measures, .. } in outcomes {
-            let Measures { ssim, ssim_torchmetrics, flip, largest, .. } = *measures;
-            let line = sentence(measures.decibels(), ssim, ssim_torchmetrics, flip);
+            let line = sentence(&Means::of(std::iter::once(measures)));
+            let largest = measures.largest;
             let _ = writeln!(page, "<h2>{}</h2>\n<p>{line}</p>", text(name));
             let captions = ["picture", "photograph", &format!("difference, {:.0} of 255 being white", 255.0 * largest)];
             for (folder, caption) in PICTURES.iter().zip(captions) {
@@ -239,12 +237,16 @@ impl Report<'_> {
     }
 }
 
-fn cells(name: &str, psnr: f64, ssim: f64, ssim_torchmetrics: Option<f64>, flip: f64) -> [String; 5] {
-    let inside = ssim_torchmetrics.map_or_else(String::new, |ssim| format!("{ssim:.4}"));
-    [name.to_owned(), format!("{psnr:.2}"), format!("{ssim:.4}"), inside, format!("{flip:.4}")]
+/// The cells of a table's row. Measures that a small picture lacks are empty.
+fn cells(name: &str, means: &Means) -> [String; 6] {
+    let four = |value: f64| format!("{value:.4}");
+    let [reflected, valid] =
+        [means.ssim_torchmetrics, means.ssim_valid].map(|ssim| ssim.map_or_else(String::new, four));
+    [name.to_owned(), format!("{:.2}", means.decibels()), four(means.ssim), reflected, valid, four(means.flip)]
 }
 
-fn sentence(psnr: f64, ssim: f64, ssim_torchmetrics: Option<f64>, flip: f64) -> String {
-    let inside = ssim_torchmetrics.map_or_else(String::new, |ssim| format!(", torchmetrics' {ssim:.4}"));
-    format!("PSNR {psnr:.2} dB, SSIM {ssim:.4}{inside}, FLIP {flip:.4}")
+fn sentence(means: &Means) -> String {
+    let reflected = means.ssim_torchmetrics.map_or_else(String::new, |ssim| format!(", torchmetrics' {ssim:.4}"));
+    let valid = means.ssim_valid.map_or_else(String::new, |ssim| format!(", pytorch-msssim's {ssim:.4}"));
+    format!("PSNR {:.2} dB, SSIM {:.4}{reflected}{valid}, FLIP {:.4}", means.decibels(), means.ssim, means.flip)
 }
