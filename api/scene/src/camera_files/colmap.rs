@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::unified::UnifiedLens;
 use super::view::{CameraFile, CameraFileError, CameraFileOptions, FileDistortion, Numbers, View, ViewError};
 use crate::camera::Model;
 use crate::distortion::{Distortion, DistortionModel};
@@ -43,6 +44,9 @@ const MODELS: [CameraModel; 18] = [
     model("EUCM", 6),
     CameraModel { earlier: Some(3), ..model("EQUIRECTANGULAR", 2) },
 ];
+
+/// The greatest distance in pixels of a place from that of a lens which a polynomial stands for.
+const FITTED_PIXELS: f64 = 0.01;
 
 /// Bytes of a point of an image: its position and the number of the point in space.
 const POINT: usize = 24;
@@ -93,7 +97,12 @@ impl Intrinsics {
         let full = ([p(0), p(1)], [p(2), p(3)], 4);
         let (model, (focal, principal, first)) = match self.model.as_str() {
             "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "SIMPLE_DIVISION" => (Model::Pinhole, simple),
-            "PINHOLE" | "OPENCV" | "FULL_OPENCV" | "FOV" | "DIVISION" | "EUCM" => (Model::Pinhole, full),
+            "PINHOLE" | "OPENCV" | "FULL_OPENCV" | "FOV" | "DIVISION" => (Model::Pinhole, full),
+            "EUCM" => {
+                let (focal, principal, _) = full;
+                let (model, distortion) = self.unified(&UnifiedLens { alpha: p(4), beta: p(5) }, focal, principal);
+                return Ok(Lens { model, focal, principal, distortion });
+            }
             "SIMPLE_FISHEYE" | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" => (Model::Fisheye, simple),
             "FISHEYE" | "OPENCV_FISHEYE" | "THIN_PRISM_FISHEYE" | "RAD_TAN_THIN_PRISM_FISHEYE" => {
                 (Model::Fisheye, full)
@@ -114,6 +123,24 @@ impl Intrinsics {
         Ok(Lens { model, focal, principal, distortion: self.distortion(|index| p(first + index)) })
     }
 
+    /// The projection and distortion of a lens of the unified model: a pinhole if alpha is zero, whatever beta is; a fisheye's
+    /// polynomial, if it is within [`FITTED_PIXELS`] of the lens all over the picture.
+    fn unified(&self, lens: &UnifiedLens, focal: [f64; 2], principal: [f64; 2]) -> (Model, FileDistortion) {
+        if lens.alpha == 0.0 {
+            return (Model::Pinhole, FileDistortion::Drawn(Distortion::default()));
+        }
+        let side = |axis: usize| {
+            let farthest = principal[axis].abs().max((self.size[axis] - principal[axis]).abs());
+            farthest / focal[axis].abs()
+        };
+        let fitted = lens.fitted(side(0).hypot(side(1)));
+        if fitted.error * focal[0].abs().max(focal[1].abs()) <= FITTED_PIXELS {
+            (Model::Fisheye, FileDistortion::Drawn(fitted.distortion))
+        } else {
+            (Model::Pinhole, FileDistortion::Other(format!("alpha = {}, beta = {}", lens.alpha, lens.beta)))
+        }
+    }
+
     /// The distortion of the lens, whose coefficients follow the principal point.
     fn distortion(&self, c: impl Fn(usize) -> f64) -> FileDistortion {
         let of = |model, radial| Distortion { model, radial, ..Distortion::default() };
@@ -127,8 +154,6 @@ impl Intrinsics {
             // The angle's sign does not matter.
             "FOV" => one(DistortionModel::FieldOfView, c(0).abs()),
             "SIMPLE_DIVISION" | "DIVISION" => one(DistortionModel::Division, c(0)),
-            // A pinhole if alpha is zero, whatever beta is.
-            "EUCM" if c(0) != 0.0 => return FileDistortion::Other(format!("alpha = {}, beta = {}", c(0), c(1))),
             "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "OPENCV_FISHEYE" => {
                 of(DistortionModel::Polynomial, [c(0), c(1), c(2), c(3), 0.0, 0.0])
             }
@@ -542,6 +567,8 @@ mod tests {
     fn every_model_is_read_with_its_lens() {
         let simple = [0, 2, 3, 8, 9, 12, 14];
         let fisheyes = [5, 8, 9, 10, 11, 14, 15];
+        // Its coefficients are not those of the file.
+        let unified = 16;
         for (number, entry) in (0..).zip(&MODELS) {
             for count in [Some(entry.parameters), entry.earlier].into_iter().flatten() {
                 let first: &[f64] =
@@ -565,10 +592,15 @@ mod tests {
                     assert_eq!((camera.focal, camera.principal), (focal, [90.0, 60.0]), "{}", entry.name);
                 }
                 if count > first.len() && number < 17 {
-                    if number == 16 {
-                        parameters[4] = 0.125;
+                    if number == unified {
+                        parameters[4] = 0.6;
+                        let camera = read(&parameters).expect(entry.name).views.remove(0).camera;
+                        assert_eq!(camera.model, Model::Fisheye);
+                        assert!(!camera.distortion.is_none());
+                        // The picture reaches far beyond what a polynomial of a nearly ideal lens serves.
+                        parameters[4] = 0.001;
                         let refused = read(&parameters).expect_err(entry.name).to_string();
-                        assert!(refused.contains("the lens distorts (alpha = 0.125, beta = 1)"), "{refused}");
+                        assert!(refused.contains("the lens distorts (alpha = 0.001, beta = 1)"), "{refused}");
                     } else {
                         parameters[count - 1] = 0.125;
                         let lens = read(&parameters).expect(entry.name).views[0].camera.distortion;

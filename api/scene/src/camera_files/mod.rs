@@ -3,6 +3,7 @@
 
 mod colmap;
 mod nerfstudio;
+mod unified;
 mod view;
 
 use std::fs;

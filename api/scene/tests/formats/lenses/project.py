@@ -52,10 +52,21 @@ COLMAP = {
         [0.399, -0.356, 0.172, 0.021, -0.047, 0.0108, 0.0009, -0.0004, 0.0016, -0.0003, -0.0007, 0.0002],
         lambda s, k: 1 + s * np.polyval(k[5::-1], s),
     ),
+    # The angle is the ideal radius.
+    "EUCM": (WIDE, [0.58, 1.12], lambda s, k: unified(np.sqrt(s), *k) / np.sqrt(s)),
 }
+
+# The models of fisheyes.
+FISHEYES = {name for name in COLMAP if "FISHEYE" in name or name == "EUCM"}
 
 # OpenCV's twelve coefficients, of which COLMAP's models have eight at most, in its order: k1, k2, p1, p2, k3 to k6, s1 to s4.
 TWELVE = [0.31, -0.09, 0.0011, -0.0007, 0.008, 0.52, -0.03, 0.015, 0.0021, -0.0006, -0.0014, 0.0004]
+
+
+def unified(angle, alpha, beta):
+    """The radius of EUCM at an angle."""
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return sine / (alpha * np.sqrt(beta * sine**2 + cosine**2) + (1 - alpha) * cosine)
 
 
 def first_fold(factor, coefficients, greatest):
@@ -98,7 +109,7 @@ def case(name, program, camera, fold, points, places):
 
 def cases(directions, radii):
     for name, (head, coefficients, factor) in COLMAP.items():
-        is_fisheye = "FISHEYE" in name
+        is_fisheye = name in FISHEYES
         greatest = GREATEST[is_fisheye]
         fold = first_fold(factor, coefficients, greatest)
         points = points_up_to(fold or greatest, is_fisheye, directions, radii)
