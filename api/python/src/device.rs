@@ -99,16 +99,35 @@ fn to_array<T: Element, const N: usize>(
     Ok(array.map_err(|error| PyValueError::new_err(error.to_string()))?.into_pyarray(py))
 }
 
+impl Device {
+    fn with_options(py: Python<'_>, entry: ash::Entry, options: &DeviceOptions) -> PyResult<Self> {
+        let renderer = py.detach(|| Renderer::with_options(entry, options)).map_err(|error| of_render(&error))?;
+        let name = renderer.device_name().to_owned();
+        Ok(Self { name, state: Mutex::new(State { renderer, uploaded: None, arrays: None }) })
+    }
+}
+
+/// The names of the devices that draw Gaussians, of those that the Vulkan loader in the library at `loader` finds.
+#[pyfunction]
+pub fn device_names(py: Python<'_>, loader: PathBuf) -> PyResult<Vec<String>> {
+    let entry = driver::loader_entry(&loader)?;
+    py.detach(|| gaurast_render::device_names(entry)).map_err(|error| of_render(&error))
+}
+
 #[pymethods]
 impl Device {
     /// A device of the driver in the library at `driver`, with `threads` threads; 0 is one for each processor.
     #[new]
     fn new(py: Python<'_>, driver: PathBuf, threads: u32) -> PyResult<Self> {
-        let entry = driver::entry(&driver)?;
         let options = DeviceOptions { threads, ..DeviceOptions::default() };
-        let renderer = py.detach(|| Renderer::with_options(entry, &options)).map_err(|error| of_render(&error))?;
-        let name = renderer.device_name().to_owned();
-        Ok(Self { name, state: Mutex::new(State { renderer, uploaded: None, arrays: None }) })
+        Self::with_options(py, driver::entry(&driver)?, &options)
+    }
+
+    /// The first device with `name` in its name, of those that the Vulkan loader in the library at `loader` finds.
+    #[staticmethod]
+    fn named(py: Python<'_>, loader: PathBuf, name: String) -> PyResult<Self> {
+        let options = DeviceOptions { device: name, ..DeviceOptions::default() };
+        Self::with_options(py, driver::loader_entry(&loader)?, &options)
     }
 
     #[getter]

@@ -1,4 +1,4 @@
-//! The driver's shared library.
+//! The package's driver, and the Vulkan loader, which finds other drivers.
 
 use std::ffi::{c_char, c_void};
 use std::mem::transmute;
@@ -41,4 +41,16 @@ pub fn entry(path: &Path) -> PyResult<ash::Entry> {
     let get_instance_proc_addr = unsafe { transmute::<*const c_void, Get>(get) };
     // SAFETY: the function behaves as Vulkan specifies and stays loaded.
     Ok(unsafe { ash::Entry::from_static_fn(ash::StaticFn { get_instance_proc_addr }) })
+}
+
+/// The entry of the Vulkan loader in the library at `path`. Its devices draw Gaussians by compute kernels where they lack the
+/// extension.
+///
+/// # Errors
+/// `OSError` if the library can't be loaded.
+pub fn loader_entry(path: &Path) -> PyResult<ash::Entry> {
+    // SAFETY: the library is the Vulkan loader.
+    let loader = unsafe { ash::Entry::load_from(path) };
+    let loader = loader.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))?;
+    Ok(gaurast_emulation::entry(loader))
 }

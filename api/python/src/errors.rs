@@ -42,10 +42,9 @@ pub fn of_render(error: &RenderError) -> PyErr {
         RenderError::Vulkan { result: Code::ERROR_OUT_OF_HOST_MEMORY | Code::ERROR_OUT_OF_DEVICE_MEMORY, .. } => {
             PyMemoryError::new_err(sentence)
         }
-        RenderError::Vulkan { .. }
-        | RenderError::NoDevice { .. }
-        | RenderError::NoSuchDevice { .. }
-        | RenderError::NoMemory(_) => PyRuntimeError::new_err(sentence),
+        RenderError::Vulkan { .. } | RenderError::NoDevice { .. } | RenderError::NoMemory(_) => {
+            PyRuntimeError::new_err(sentence)
+        }
         _ => PyValueError::new_err(sentence),
     }
 }

@@ -19,7 +19,7 @@ mod _gaurast {
     #[pymodule_export]
     use super::camera::{frame, look_at, read_cameras};
     #[pymodule_export]
-    use super::device::Device;
+    use super::device::{Device, device_names};
     #[pymodule_export]
     use super::scene::{NativeScene, from_arrays, garden, open};
 }

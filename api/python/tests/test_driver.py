@@ -47,6 +47,51 @@ def test_the_command_draws(tmp_path):
     assert gaurast.icd_path() in run(sys.executable, "-m", "gaurast", "icd")
 
 
+@pytest.fixture
+def lavapipe():
+    """A part of the name of Mesa's device for processors."""
+    try:
+        names = gaurast.devices()
+    except (OSError, RuntimeError) as error:
+        pytest.skip(f"no Vulkan devices: {error}")
+    if not any("llvmpipe" in name for name in names):
+        pytest.skip("lavapipe is missing")
+    return "llvmpipe"
+
+
+def same_pictures(first, second):
+    """True if all but few pixels are equal. Those others may be undecidable in binary32."""
+    differences = np.abs(np.asarray(first) - np.asarray(second)).max(axis=-1)
+    return (differences > 1e-5).mean() <= 0.001 and (differences <= 0.02).all()
+
+
+def test_another_device_draws_scenes(lavapipe):
+    scene = gaurast.garden(1, 500)
+    camera = scene.frame((96, 54))
+    own = gaurast.render(scene, camera, depth=True, ids=True)
+    other = gaurast.render(scene, camera, depth=True, ids=True, device=lavapipe)
+    assert own.alpha.max() > 0.5 and same_pictures(own, other)
+    assert (own.ids == other.ids).mean() > 0.995
+    seen = np.isfinite(own.median_depth)
+    assert np.allclose(own.median_depth[seen], other.median_depth[seen], rtol=1e-3)
+
+
+def test_another_device_draws_arrays(arrays, lavapipe):
+    given = arrays(7, 300)
+    words = (given.means, given.quats, given.scales, given.opacities, given.harmonics, given.viewmat[None], given.K[None])
+    own, own_alphas, _ = gaurast.rasterization(*words, *given.size, sh_degree=3, render_mode="RGB+ED")
+    other, alphas, _ = gaurast.rasterization(*words, *given.size, sh_degree=3, render_mode="RGB+ED", device=lavapipe)
+    assert same_pictures(own[..., :3], other[..., :3]) and same_pictures(own_alphas, alphas)
+
+
+def test_devices_that_are_not_there_are_refused():
+    scene = gaurast.garden(1, 10)
+    with pytest.raises((ValueError, OSError), match="nobody's device|libvulkan"):
+        gaurast.render(scene, size=(8, 8), device="nobody's device")
+    with pytest.raises(ValueError, match="threads=2"):
+        gaurast.render(scene, size=(8, 8), device="llvmpipe", threads=2)
+
+
 def draw(_):
     return np.asarray(gaurast.render(gaurast.garden(1, 500), size=(32, 18)))
 

@@ -170,8 +170,6 @@ def test_settings_have_effects_and_are_checked(garden):
         gaurast.render(garden, camera, order="none")
     with pytest.raises(ValueError, match="panoramas are not drawn in binary16|fp16"):
         gaurast.render(garden, camera, order="per-pixel", precision="fp16")
-    with pytest.raises(NotImplementedError, match="device"):
-        gaurast.render(garden, camera, device="GPU")
     over = gaurast.render(garden, camera, background=(0.0, 0.0, 1.0))
     expected = plain[..., 2] + (1.0 - plain.alpha)
     assert np.allclose(over[..., 2], expected, atol=1e-6) and (over.alpha == 1.0).all()

@@ -9,6 +9,7 @@ make any Vulkan program run on the driver.
 """
 
 from ._camera import Camera, Distortion, cameras
+from ._device import devices
 from ._env import environment, icd_path, layer_path, use_driver
 from ._gsplat import rasterization
 from ._render import Pictures, render
@@ -22,6 +23,7 @@ __all__ = [
     "Pictures",
     "Scene",
     "cameras",
+    "devices",
     "environment",
     "garden",
     "icd_path",

@@ -29,6 +29,11 @@ def loader_folder() -> str:
     return str(_LIBRARIES / "loader")
 
 
+def loader_path() -> str:
+    """The Vulkan loader: the system's, or the package's if the system has none."""
+    return "libvulkan.so.1" if has_loader() else os.path.join(loader_folder(), "libvulkan.so.1")
+
+
 def has_loader() -> bool:
     """True if the system has a Vulkan loader."""
     try:
@@ -60,4 +65,4 @@ def use_driver() -> None:
     variables.pop("LD_LIBRARY_PATH", None)
     os.environ.update(variables)
     if not has_loader():
-        ctypes.CDLL(os.path.join(loader_folder(), "libvulkan.so.1"), mode=ctypes.RTLD_GLOBAL)
+        ctypes.CDLL(loader_path(), mode=ctypes.RTLD_GLOBAL)

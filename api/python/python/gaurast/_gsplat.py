@@ -199,6 +199,7 @@ def rasterization(
     *,
     version: str = "1.6",
     threads: int = 0,
+    device: Optional[str] = None,
 ) -> tuple[Any, Any, dict[str, Any]]:
     """Rasterizes N Gaussians to C pictures, as gsplat's function of this name does. The pass forward alone: what needs a gradient
     is refused.
@@ -232,6 +233,7 @@ def rasterization(
         covars: Covariances `[..., N, 3, 3]`, instead of `quats` and `scales`.
         version: "1.6" (alpha is at most 0.99, and antialiasing leaves at least 0.005 of the opacity) or "1.5" (0.999, and 0).
         threads: The number of the device's threads; 0 is one for each processor.
+        device: A part of the name of another Vulkan device, such as one of `devices()`; without it, the driver of this package draws.
 
     `packed`, `segmented` and `channel_chunk` change nothing.
 
@@ -342,7 +344,7 @@ def rasterization(
         "sigma_points": sigma_points(ut_params) if with_ut else None,
     }
     model = _MODELS[camera_model]
-    device = device_of(threads)
+    drawing = device_of(threads, device)
     pictures, alphas = [], []
     for index in range(batches):
         arrays = Gaussians(**{name: values[index] for name, values in gaussians.items()})
@@ -351,7 +353,7 @@ def rasterization(
             for view, K, lens in zip(views[index], intrinsics[index], lenses[index * seen :])
         ]
         for channels, some in _Batch(by_batch[index], cameras).by_camera():
-            frame, alpha = _draw(device, scene, arrays, channels, some, settings, sh_degree, render_mode)
+            frame, alpha = _draw(drawing, scene, arrays, channels, some, settings, sh_degree, render_mode)
             pictures.append(frame)
             alphas.append(alpha)
 

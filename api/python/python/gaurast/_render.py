@@ -134,14 +134,11 @@ def render(
         features: `[N, D]` numbers of the Gaussians, to be composited as colours are.
         out: An array `[C, H, W, 4]` of binary32 that receives the pictures. The result looks into it.
         threads: The number of the device's threads; 0 is one for each processor.
-        device: None: the driver of this package.
+        device: A part of the name of another Vulkan device, such as one of `devices()`; without it, the driver of this package draws.
 
     Raises:
-        ValueError: An argument is outside its range, or modes can't be combined.
-        NotImplementedError: Another device is asked for.
+        ValueError: An argument is outside its range, modes can't be combined, or no device has such a name.
     """
-    if device is not None:
-        raise NotImplementedError(f"device={device!r}: only the driver of this package draws here (device=None)")
     cameras = [scene.frame(size or (1280, 720))] if camera is None else camera
     cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
     if size is not None:
@@ -182,7 +179,7 @@ def render(
             # gsplat draws lenses that distort by the unscented transform alone.
             settings["sigma_points"] = sigma_points(None)
 
-    drawing = device_of(threads)
+    drawing = device_of(threads, device)
     first = {**settings, "linear_depth": True} if depth else settings
     frames = drawing.render(scene._native, cameras, json.dumps(first))
     pictures = _stacked([colors for colors, _, _ in frames], out).view(Pictures)
