@@ -6,7 +6,7 @@ use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
-    BlendEquation, BlendEquations, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, CompareOp, LineMode, LogicOp, PolygonMode, Rect, ResolveMode,
     StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
@@ -56,6 +56,19 @@ pub(crate) fn polygon_mode(mode: vk::PolygonMode) -> Result<PolygonMode, Error> 
         vk::PolygonMode::LINE => Ok(PolygonMode::Line),
         vk::PolygonMode::POINT => Ok(PolygonMode::Point),
         other => Err(lacking(&other, "fillRectangleNV")),
+    }
+}
+
+/// The device's rasterization of lines. The default is that of rectangles, since `strictLines` is true.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
+pub(crate) fn line_mode(mode: vk::LineRasterizationModeKHR, vuid: &'static str) -> Result<LineMode, Error> {
+    match mode {
+        vk::LineRasterizationModeKHR::DEFAULT | vk::LineRasterizationModeKHR::RECTANGULAR => Ok(LineMode::Rectangular),
+        vk::LineRasterizationModeKHR::BRESENHAM => Ok(LineMode::Bresenham),
+        vk::LineRasterizationModeKHR::RECTANGULAR_SMOOTH => Ok(LineMode::Smooth),
+        other => Err(unknown(vuid, &other)),
     }
 }
 

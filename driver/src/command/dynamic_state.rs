@@ -9,7 +9,7 @@ use crate::physical_device::limits;
 use crate::pipeline::dynamic_state::{DynamicState, Face, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-use simdevice::state::DepthBias;
+use simdevice::state::{DepthBias, LineStipple};
 
 /// Records a state.
 ///
@@ -113,10 +113,24 @@ pub(crate) fn cmd_set_sample_mask(recorder: &mut Recorder, sample_mask: Option<&
     set(recorder, DynamicState::SampleMask { mask })
 }
 
-/// Does nothing: the pattern has no effect, because lines are never stippled.
+#[doc(alias = "vkCmdSetLineRasterizationModeEXT")]
+pub(crate) fn cmd_set_line_rasterization_mode(
+    recorder: &mut Recorder,
+    line_rasterization_mode: vk::LineRasterizationModeEXT,
+) -> Result<(), Error> {
+    let vuid = "VUID-vkCmdSetLineRasterizationModeEXT-lineRasterizationMode-parameter";
+    let mode = convert::line_mode(line_rasterization_mode, vuid)?;
+    set(recorder, DynamicState::LineRasterizationMode { mode })
+}
+
 #[doc(alias = "vkCmdSetLineStippleEXT")]
-pub(crate) fn cmd_set_line_stipple(_recorder: &mut Recorder) -> Result<(), Error> {
-    Ok(())
+pub(crate) fn cmd_set_line_stipple(
+    recorder: &mut Recorder,
+    line_stipple_factor: u32,
+    line_stipple_pattern: u16,
+) -> Result<(), Error> {
+    let stipple = LineStipple { factor: line_stipple_factor, pattern: line_stipple_pattern };
+    set(recorder, DynamicState::LineStipple { stipple })
 }
 
 #[doc(alias = "vkCmdSetColorBlendEnableEXT")]

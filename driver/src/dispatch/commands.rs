@@ -3893,7 +3893,7 @@ unsafe extern "system" fn vkCmdSetLineRasterizationModeEXT(
     // SAFETY: the application follows Vulkan's valid usage.
     unsafe {
         record(command_buffer, "vkCmdSetLineRasterizationModeEXT", |recorder| {
-            set(recorder, DynamicState::LineRasterizationMode { mode: line_rasterization_mode })
+            command::dynamic_state::cmd_set_line_rasterization_mode(recorder, line_rasterization_mode)
         })
     }
 }
@@ -3935,11 +3935,15 @@ unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
     })
 }
 
-unsafe extern "system" fn vkCmdSetLineStippleEXT(command_buffer: vk::CommandBuffer, _: u32, _: u16) {
+unsafe extern "system" fn vkCmdSetLineStippleEXT(
+    command_buffer: vk::CommandBuffer,
+    line_stipple_factor: u32,
+    line_stipple_pattern: u16,
+) {
     // SAFETY: the application follows Vulkan's valid usage.
     unsafe {
         record(command_buffer, "vkCmdSetLineStippleEXT", |recorder| {
-            command::dynamic_state::cmd_set_line_stipple(recorder)
+            command::dynamic_state::cmd_set_line_stipple(recorder, line_stipple_factor, line_stipple_pattern)
         })
     }
 }

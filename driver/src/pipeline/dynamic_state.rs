@@ -5,7 +5,9 @@ use super::state::FixedFunctionState as Fixed;
 use crate::convert::StencilOps;
 use ash::vk;
 use simdevice::state::gaussian::GaussianOrder;
-use simdevice::state::{BlendEquations, CompareOp, DepthBias, LogicOp, PolygonMode, Topology};
+use simdevice::state::{
+    BlendEquations, CompareOp, DepthBias, LineMode, LineStipple, LogicOp, PolygonMode, Topology,
+};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
@@ -235,12 +237,15 @@ dynamic_states! {
     RASTERIZATION_STREAM_EXT => RasterizationStream(stream: u32),
         part PRE_RASTERIZATION_SHADERS,
         set |state| state.draw.rasterized_stream = stream, needed Fixed::rasterizes, gaussians Ignored;
-    LINE_RASTERIZATION_MODE_EXT => LineRasterizationMode(mode: vk::LineRasterizationModeEXT),
+    LINE_RASTERIZATION_MODE_EXT => LineRasterizationMode(mode: LineMode),
         part PRE_RASTERIZATION_SHADERS,
-        set |_| { let _ = mode; }, needed |_| false, gaussians Ignored;
+        set |state| state.draw.line_mode = mode, needed Fixed::draws_lines, gaussians Ignored;
     LINE_STIPPLE_ENABLE_EXT => LineStippleEnable(enable: bool),
         part PRE_RASTERIZATION_SHADERS,
-        set |_| { let _ = enable; }, needed |_| false, gaussians Ignored;
+        set |state| state.draw.stipples_lines = enable, needed Fixed::draws_lines, gaussians Ignored;
+    LINE_STIPPLE_KHR => LineStipple(stipple: LineStipple),
+        part PRE_RASTERIZATION_SHADERS,
+        set |state| state.draw.line_stipple = stipple, needed Fixed::stipples_lines, gaussians Ignored;
     SAMPLE_MASK_EXT => SampleMask(mask: u32),
         part FRAGMENT_OUTPUT_INTERFACE,
         set |state| state.draw.sample_mask = mask, needed Fixed::rasterizes, gaussians Taken;
@@ -275,8 +280,8 @@ dynamic_states! {
 }
 
 /// The dynamic states that are looked up for each draw, and for which no row has a value: viewports, scissors, strides
-/// and vertex input; and the stipple of lines, which is unused. For Gaussians all but vertex input are allowed.
-const LOOKED_UP: [(vk::DynamicState, Parts); 7] = {
+/// and vertex input. For Gaussians all but vertex input are allowed.
+const LOOKED_UP: [(vk::DynamicState, Parts); 6] = {
     use vk::DynamicState as S;
     const VERTEX_INPUT: Parts = Parts::VERTEX_INPUT_INTERFACE;
     const PRE_RASTERIZATION: Parts = Parts::PRE_RASTERIZATION_SHADERS;
@@ -287,7 +292,6 @@ const LOOKED_UP: [(vk::DynamicState, Parts); 7] = {
         (S::SCISSOR_WITH_COUNT, PRE_RASTERIZATION),
         (S::VERTEX_INPUT_BINDING_STRIDE, VERTEX_INPUT),
         (S::VERTEX_INPUT_EXT, VERTEX_INPUT),
-        (S::LINE_STIPPLE_KHR, PRE_RASTERIZATION),
     ]
 };
 

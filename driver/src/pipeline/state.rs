@@ -11,7 +11,7 @@ use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{
     BlendEquation, BlendEquations, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest,
-    DrawState, LogicOp, PolygonMode, StencilFace, StencilOp, Topology,
+    DrawState, LineMode, LineStipple, LogicOp, PolygonMode, StencilFace, StencilOp, Topology,
 };
 
 /// The source of an attribute.
@@ -280,29 +280,13 @@ impl FixedFunctionState {
                 state: "depthBiasClamp",
             },
             FeatureNeed {
-                is_needed: !matches!(
-                    graphics.pre_rasterization.lines.line_rasterization_mode,
-                    vk::LineRasterizationModeKHR::DEFAULT | vk::LineRasterizationModeKHR::RECTANGULAR
-                ),
-                feature: DeviceFeature {
-                    is_supported: SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines,
-                    name: "bresenhamLines or smoothLines",
-                },
-                state: "a line rasterization mode but DEFAULT and RECTANGULAR",
-            },
-            FeatureNeed {
-                is_needed: graphics.pre_rasterization.lines.stippled_line_enable != vk::FALSE
-                    && !graphics.is_dynamic(vk::DynamicState::LINE_STIPPLE_ENABLE_EXT),
-                feature: supported!(stippled_rectangular_lines),
-                state: "stippledLineEnable",
-            },
-            FeatureNeed {
                 is_needed: graphics.line_width() != 1.0,
                 feature: supported!(wide_lines),
                 state: "a line width but 1",
             },
         ];
         require_all(&needs)?;
+        let lines = &graphics.pre_rasterization.lines;
         let draw = DrawState {
             topology,
             primitive_restart: graphics.vertex_input.primitive_restart,
@@ -319,6 +303,16 @@ impl FixedFunctionState {
             front_clockwise: false,
             depth_bias: None,
             line_width: graphics.line_width(),
+            line_mode: if graphics.is_dynamic(vk::DynamicState::LINE_RASTERIZATION_MODE_EXT) {
+                LineMode::Rectangular
+            } else {
+                convert::line_mode(
+                    lines.line_rasterization_mode,
+                    "VUID-VkPipelineRasterizationLineStateCreateInfo-lineRasterizationMode-parameter",
+                )?
+            },
+            stipples_lines: lines.stippled_line_enable != vk::FALSE,
+            line_stipple: LineStipple { factor: lines.line_stipple_factor, pattern: lines.line_stipple_pattern },
             provoking_last: graphics.pre_rasterization.provoking_last,
             rasterized_stream: graphics.pre_rasterization.rasterized_stream,
             lower_left_domain: graphics.pre_rasterization.lower_left_domain,
@@ -515,6 +509,11 @@ impl FixedFunctionState {
         let draw = &self.draw;
         let are_lines = draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines;
         self.rasterizes() && are_lines
+    }
+
+    /// Reports whether lines are drawn by a pattern.
+    pub(super) fn stipples_lines(&self) -> bool {
+        self.draws_lines() && self.draw.stipples_lines
     }
 
     /// Reports whether patches are drawn.

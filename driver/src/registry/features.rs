@@ -250,11 +250,11 @@ features! {
     }
     structure vk::PhysicalDeviceLineRasterizationFeaturesKHR: c"VK_EXT_line_rasterization" {
         rectangularLines => rectangular_lines: true;
-        bresenhamLines => bresenham_lines: false;
-        smoothLines => smooth_lines: false;
-        stippledRectangularLines => stippled_rectangular_lines: false;
-        stippledBresenhamLines => stippled_bresenham_lines: false;
-        stippledSmoothLines => stippled_smooth_lines: false;
+        bresenhamLines => bresenham_lines: true;
+        smoothLines => smooth_lines: true;
+        stippledRectangularLines => stippled_rectangular_lines: true;
+        stippledBresenhamLines => stippled_bresenham_lines: true;
+        stippledSmoothLines => stippled_smooth_lines: true;
     }
     structure vk::PhysicalDeviceMultiDrawFeaturesEXT: c"VK_EXT_multi_draw" {
         multiDraw => multi_draw: true;

@@ -1,6 +1,7 @@
 //! Draws after the front end: segments of binned primitives, which are the input of the rasterizer.
 
 use crate::geometry::Bins;
+use crate::geometry::line::StyledLine;
 use crate::geometry::primitive::{Primitive, Varyings};
 use crate::packet::Draw;
 use crate::program::bindings::Bindings;
@@ -38,6 +39,9 @@ pub struct PrimitiveSegment {
     pub varyings: Varyings,
     /// The list of primitives of each macro-tile.
     pub bins: Bins,
+    /// The lines that are no plain rectangles, in the order of the draw. Those that have no primitive stand before the next one
+    /// that has, with its number.
+    pub lines: Vec<StyledLine>,
 }
 
 impl PrimitiveDraw {
@@ -70,6 +74,13 @@ impl PrimitiveSegment {
     pub(super) fn memory_bytes(&self) -> u64 {
         let primitives = size_of_val(&*self.primitives);
         let varyings = size_of_val(&*self.varyings.values);
-        (primitives + varyings + self.bins.memory_bytes()) as u64
+        let lines = size_of_val(&*self.lines);
+        (primitives + varyings + self.bins.memory_bytes() + lines) as u64
+    }
+
+    /// The place among the lines of a primitive that is one.
+    pub(crate) fn line(&self, primitive: u32) -> Option<usize> {
+        let end = self.lines.partition_point(|line| line.primitive <= primitive);
+        end.checked_sub(1).filter(|place| self.lines[*place].primitive == primitive)
     }
 }

@@ -18,6 +18,7 @@ mod depth_bias;
 mod draw;
 mod fetch;
 mod geometry_shader;
+mod line;
 mod order;
 mod pieces;
 pub(crate) mod points;
@@ -35,6 +36,7 @@ mod viewport;
 
 pub use bins::Bins;
 pub use draw::{PrimitiveDraw, PrimitiveSegment};
+pub use line::StyledLine;
 pub use primitive::{Primitive, PrimitiveKind, Varyings};
 
 use crate::format::Format;
@@ -43,7 +45,7 @@ use crate::program::bindings::BoundResources;
 use crate::program::interface::VertexInput;
 use crate::program::outputs::VertexOutputs;
 use crate::runtime::Runtime;
-use crate::state::{PolygonMode, Rect};
+use crate::state::{PolygonMode, Rect, Topology};
 use crate::stats::counters::{Counter, Counters};
 use assemble::corner_count;
 use bins::Grid;
@@ -121,6 +123,8 @@ pub(crate) struct FrontEnd<'a> {
     presented: Option<AtomicU32>,
     /// The capture by transform feedback, if it is active.
     capture: Option<Capture<'a>>,
+    /// The stipple counter at the end of the last line.
+    stipple_counter: f64,
 }
 
 impl<'a> FrontEnd<'a> {
@@ -167,6 +171,7 @@ impl<'a> FrontEnd<'a> {
             next: 0,
             presented: draw.pipeline.numbers_primitives().then(AtomicU32::default),
             capture: Capture::new(draw, corners_drawn(draw)),
+            stipple_counter: 0.0,
         }
     }
 
@@ -185,13 +190,19 @@ impl<'a> FrontEnd<'a> {
         };
         self.draw.vertex_bindings.bump_generations();
         self.bound_stages.bump_generations();
-        let part = done.map(|segments| PrimitiveDraw {
-            segments,
-            regions: self.regions.clone(),
-            ..PrimitiveDraw::empty(self.draw)
+        let part = done.map(|mut segments| {
+            self.count_stipples(&mut segments);
+            PrimitiveDraw { segments, regions: self.regions.clone(), ..PrimitiveDraw::empty(self.draw) }
         });
         counters.add(Counter::GeometryTime, started.elapsed().as_nanos() as u64);
         part.map(Some)
+    }
+
+    /// Sets the stipple counters of all lines, which go on from one to the next of a strip, in order.
+    fn count_stipples(&mut self, segments: &mut [PrimitiveSegment]) {
+        for line in segments.iter_mut().flat_map(|segment| &mut segment.lines) {
+            self.stipple_counter = line.count(self.stipple_counter);
+        }
     }
 
     /// Processes segments until they hold enough memory, since nothing tells before how many primitives they become.
@@ -231,6 +242,7 @@ impl<'a> FrontEnd<'a> {
             layers: self.surface.layers,
             view: self.surface.view,
             depth_unit: DepthUnit::of(self.surface.depth),
+            has_strips: has_strips(self.draw),
         };
         let resources = self.bound.resources();
         let stage_resources = self.bound_stages.resources();
@@ -304,6 +316,12 @@ fn mixes_instances(draw: &Draw) -> bool {
     };
     let inputs = &draw.pipeline.vertex.inputs;
     !inputs.iter().any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
+}
+
+/// True if a line may go on where the one before it ends.
+fn has_strips(draw: &Draw) -> bool {
+    let is_strip = matches!(draw.state.topology, Topology::LineStrip | Topology::LineStripWithAdjacency);
+    is_strip || draw.pipeline.geometry.is_some() || draw.pipeline.tessellation.is_some()
 }
 
 /// The number of corners of the primitives that are drawn: 1 for points, 2 for lines, 3 for triangles.

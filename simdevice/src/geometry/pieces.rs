@@ -89,11 +89,14 @@ impl<'a> Pieces<'a> {
         let started = Instant::now();
         let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
         let per_vertex = setup.outputs.interpolation.len();
-        let (primitives, values) = order::in_order(output, per_vertex, &mut bins, order::FEW);
+        let lines = host::copied(&output.lines);
+        // Lines name their primitives by number.
+        let few = if lines.is_empty() { order::FEW } else { usize::MAX };
+        let (primitives, values) = order::in_order(output, per_vertex, &mut bins, few);
         counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;
         counters.add(Counter::BinningTime, elapsed);
-        let piece = PrimitiveSegment { primitives, varyings: Varyings { values, per_vertex }, bins };
+        let piece = PrimitiveSegment { primitives, varyings: Varyings { values, per_vertex }, bins, lines };
         host::push(&mut self.segments, (number, piece));
     }
 }

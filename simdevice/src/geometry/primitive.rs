@@ -16,6 +16,8 @@ pub enum PrimitiveKind {
     Triangle,
     /// A line: the parallelogram of corners 0 to 2; corners 0 and 1 are at its first vertex, corner 2 at its second.
     Line,
+    /// A line whose pixels a [`StyledLine`](super::StyledLine) decides, of which this parallelogram has all samples.
+    StyledLine,
     /// A point: the axis-aligned square of corners 0 (top left), 1 (top right) and 2 (bottom right).
     Point,
 }

@@ -3,6 +3,7 @@
 use super::assemble::corners;
 use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
+use super::line::StyledLine;
 use super::depth_bias::{self, DepthUnit};
 use super::primitive::Primitive;
 use super::primitive_list::ListedPrimitive;
@@ -16,7 +17,7 @@ use crate::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 use crate::program::interface::Interpolation;
 use crate::program::outputs::VertexOutputs;
 use crate::simd::{both, three};
-use crate::state::{DrawState, PolygonMode, Rect};
+use crate::state::{DrawState, LineMode, PolygonMode, Rect};
 use devmem::host;
 
 /// The result of a segment. Vertices and primitives are numbered from 0.
@@ -25,6 +26,8 @@ pub(super) struct Output {
     pub primitives: Vec<Primitive>,
     pub varyings: Vec<u32>,
     pub pairs: Vec<Pair>,
+    /// The lines that are no plain rectangles.
+    pub lines: Vec<StyledLine>,
     /// The number of vertices, even if they have no varyings.
     pub vertices: u32,
     /// The number of primitives that were assembled.
@@ -39,6 +42,7 @@ impl Output {
         self.primitives.clear();
         self.varyings.clear();
         self.pairs.clear();
+        self.lines.clear();
         (self.vertices, self.assembled, self.clipped) = (0, 0, 0);
     }
 }
@@ -59,6 +63,8 @@ pub(super) struct Setup<'a> {
     /// The layer to which everything is drawn, if the program does not choose it.
     pub view: Option<u32>,
     pub depth_unit: DepthUnit,
+    /// True if a line may go on where the one before it ends.
+    pub has_strips: bool,
 }
 
 /// A segment being set up.
@@ -68,6 +74,8 @@ pub(super) struct SegmentSetup<'a> {
     /// The number in the output of the vertex in each slot, or [`NONE`].
     pub(super) numbers: &'a mut Vec<u32>,
     pub(super) out: &'a mut Output,
+    /// True if the line that is set up goes on where the one before it ends.
+    continues: bool,
 }
 
 /// Marks a vertex that has no number yet.
@@ -111,7 +119,7 @@ impl<'a> SegmentSetup<'a> {
     ) -> Self {
         numbers.clear();
         numbers.resize(shaded.vertices.len(), NONE);
-        Self { setup, shaded, numbers, out }
+        Self { setup, shaded, numbers, out, continues: false }
     }
 
     /// Sets up all primitives of a segment.
@@ -131,6 +139,9 @@ impl<'a> SegmentSetup<'a> {
                     front: true,
                 };
                 self.choose_target(&mut primitive);
+                if count == 2 {
+                    self.continues = self.setup.has_strips && number > 0;
+                }
                 self.primitive(count, &mut primitive);
             }
             self.out.assembled += u64::from(piece.end - piece.first);
@@ -140,6 +151,7 @@ impl<'a> SegmentSetup<'a> {
     /// Sets up listed primitives.
     pub(super) fn run_list<'p>(mut self, primitives: impl Iterator<Item = &'p ListedPrimitive>) {
         let names_primitives = self.setup.outputs.primitive_id.is_some();
+        let mut end = NONE;
         for listed in primitives {
             let mut primitive = AssembledPrimitive {
                 id: if names_primitives { self.optional(listed.provoking).primitive_id } else { listed.id },
@@ -150,6 +162,8 @@ impl<'a> SegmentSetup<'a> {
                 front: true,
             };
             self.choose_target(&mut primitive);
+            self.continues = self.setup.has_strips && listed.slots[0] == end;
+            end = listed.slots[1];
             self.primitive(self.setup.corners, &mut primitive);
             self.out.assembled += 1;
         }
@@ -349,6 +363,8 @@ impl<'a> SegmentSetup<'a> {
     /// Draws the edges of a polygon that belong to its outline, or the first vertex of each.
     fn outline(&mut self, primitive: &AssembledPrimitive, corners: &[CornerVertex], edge: impl Fn(usize) -> bool) {
         let bias = self.bias([corners[0], corners[1], corners[2]]);
+        // The pattern of stippled lines begins anew with each edge.
+        self.continues = false;
         let next = |number: usize| (number + 1) % corners.len();
         for number in (0..corners.len()).filter(|&number| edge(number)) {
             if self.setup.state.polygon_mode == PolygonMode::Line {
@@ -440,7 +456,13 @@ impl SegmentSetup<'_> {
         if length.is_nan() || length <= 0.0 {
             return;
         }
-        let scale = 0.5 * self.setup.state.line_width.clamp(0.0, MAX_LINE_WIDTH) / length;
+        let state = self.setup.state;
+        let mut width = state.line_width.clamp(0.0, MAX_LINE_WIDTH);
+        if state.line_mode == LineMode::Bresenham {
+            // A whole width, rounded.
+            width = ((width + 0.5) as u32).max(1) as f32;
+        }
+        let scale = 0.5 * width / length;
         let side = [snap_length(-dy * scale), snap_length(dx * scale)];
         let (a, b) = (a.map(snap_away), b.map(snap_away));
         let corners =
@@ -448,19 +470,34 @@ impl SegmentSetup<'_> {
         if cross(corners) <= 0 {
             return;
         }
-        let last = [b[0] - side[0], b[1] - side[1]];
-        let [c0, c1, c2] = corners;
-        if let Some(pixels) = self.pixels(primitive, &[c0, c1, c2, last]) {
-            let vertices = [from, from, to];
-            let shape = Shape {
-                kind: PrimitiveKind::Line,
-                corners,
-                offsets: UNMOVED,
-                depth: vertices.map(|vertex| vertex.window_vertex.depth + bias),
-                pixels,
-            };
-            self.push(primitive, &shape, vertices);
+        let is_plain = state.line_mode == LineMode::Rectangular && !state.stipples_lines;
+        let mut line = None;
+        if !is_plain {
+            let stipple = state.stipples_lines.then_some(state.line_stipple);
+            line = StyledLine::new([a, b], corners, state.line_mode, stipple, width);
+            if line.is_none() {
+                return;
+            }
         }
+        let [c0, c1, c2] = line.as_ref().map_or(corners, StyledLine::outline);
+        if let Some(line) = line {
+            // A line beyond the region has no primitive, but the pattern goes on behind it.
+            let number = self.out.primitives.len() as u32;
+            host::push(&mut self.out.lines, line.placed(number, self.continues));
+        }
+        let last = [c0[0] + c2[0] - c1[0], c0[1] + c2[1] - c1[1]];
+        let Some(pixels) = self.pixels(primitive, &[c0, c1, c2, last]) else {
+            return;
+        };
+        let vertices = [from, from, to];
+        let shape = Shape {
+            kind: if is_plain { PrimitiveKind::Line } else { PrimitiveKind::StyledLine },
+            corners: [c0, c1, c2],
+            offsets: UNMOVED,
+            depth: vertices.map(|vertex| vertex.window_vertex.depth + bias),
+            pixels,
+        };
+        self.push(primitive, &shape, vertices);
     }
 
     pub(super) fn push_point(&mut self, primitive: &AssembledPrimitive, vertex: CornerVertex, size: f32, bias: f32) {

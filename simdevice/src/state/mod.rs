@@ -170,6 +170,26 @@ pub enum PolygonMode {
     Point,
 }
 
+/// The rasterization of lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LineMode {
+    /// A rectangle, sample by sample.
+    Rectangular,
+    /// Pixels by the diamond-exit rule, each with all its samples.
+    Bresenham,
+    /// The pixels that the rectangle meets. Alpha is multiplied by the share of the pixel.
+    Smooth,
+}
+
+/// The pattern of stippled lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LineStipple {
+    /// The number of units of length, or of pixels of a Bresenham line, for which each bit of the pattern is used.
+    pub factor: u32,
+    /// The bits, from the least significant one on. What has a 0 is not drawn.
+    pub pattern: u16,
+}
+
 /// A comparison of a reference with the stored value: `reference op stored`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
@@ -321,6 +341,12 @@ pub struct DrawState {
     pub depth_bias: Option<DepthBias>,
     /// The width of lines in pixels.
     pub line_width: f32,
+    /// The rasterization of lines.
+    pub line_mode: LineMode,
+    /// True if lines are stippled.
+    pub stipples_lines: bool,
+    /// The pattern, if lines are stippled.
+    pub line_stipple: LineStipple,
     /// True if the provoking vertex is the last; else it is the first.
     pub provoking_last: bool,
     /// The vertex stream that is rasterized.
@@ -375,6 +401,9 @@ impl DrawState {
             front_clockwise: true,
             depth_bias: None,
             line_width: 1.0,
+            line_mode: LineMode::Rectangular,
+            stipples_lines: false,
+            line_stipple: LineStipple { factor: 1, pattern: u16::MAX },
             provoking_last: false,
             rasterized_stream: 0,
             lower_left_domain: false,

@@ -139,7 +139,8 @@ fn features_of_extensions_that_are_not_enabled(case: &Case) {
             unsafe { device.destroy_device(None) };
         }
         // What the device lacks is refused by any.
-        let mut lacking = vk::PhysicalDeviceLineRasterizationFeaturesEXT::default().stippled_smooth_lines(true);
+        let mut lacking = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
+            .extended_dynamic_state3_color_blend_advanced(true);
         let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut lacking);
         // SAFETY: see the crate.
         let refused = unsafe { gpu.instance().create_device(gpu.physical_device(), &info, None) };

@@ -495,36 +495,3 @@ fn lists_restart() {
     });
     assert!(restarted == second);
 }
-
-/// Lines are rectangular, whether requested or not; other line modes are not supported.
-#[gaurast_runner::test(needs = [GLSLANG])]
-fn lines_are_rectangles() {
-    let device = Device::new();
-    let vertices = triangles();
-    let lines = |mode| {
-        let mut options = PipelineOptions { topology: vk::PrimitiveTopology::LINE_LIST, ..PipelineOptions::default() };
-        let state = vk::PipelineRasterizationLineStateCreateInfoKHR::default();
-        chained(&mut options, state.line_rasterization_mode(mode));
-        options
-    };
-    let [default, rectangular] = [vk::LineRasterizationModeKHR::DEFAULT, vk::LineRasterizationModeKHR::RECTANGULAR]
-        .map(|mode| device.draw(1, &lines(mode), &vertices, |commands| commands.draw(2..4)));
-    assert!(default == rectangular);
-    let nothing = device.draw(1, &PipelineOptions::default(), &vertices, |_| {});
-    assert!(default != nothing);
-    let mut features = vk::PhysicalDeviceLineRasterizationFeaturesKHR::default();
-    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
-    // SAFETY: the physical device is the instance's.
-    unsafe {
-        let physical = device.gpu.physical_device();
-        device.gpu.instance().get_physical_device_features2(physical, &mut all);
-    }
-    let others = [
-        features.bresenham_lines,
-        features.smooth_lines,
-        features.stippled_rectangular_lines,
-        features.stippled_bresenham_lines,
-        features.stippled_smooth_lines,
-    ];
-    assert_eq!((features.rectangular_lines, others), (vk::TRUE, [vk::FALSE; 5]));
-}

@@ -3,4 +3,5 @@
 mod coverage;
 mod extremes;
 mod interpolation;
+mod lines;
 pub mod models;

@@ -78,7 +78,7 @@ fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
         let [a, b, c] = primitive.vertices.map(index);
         let vertices = match primitive.kind {
             super::super::PrimitiveKind::Point => vec![a],
-            super::super::PrimitiveKind::Line => vec![a, c],
+            super::super::PrimitiveKind::Line | super::super::PrimitiveKind::StyledLine => vec![a, c],
             // Front faces are clockwise in this state, and their corners keep their order.
             super::super::PrimitiveKind::Triangle if primitive.front => vec![a, b, c],
             super::super::PrimitiveKind::Triangle => vec![a, c, b],

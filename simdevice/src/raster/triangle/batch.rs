@@ -52,6 +52,8 @@ pub struct Record {
     pub front: bool,
     pub viewport: u8,
     is_point: bool,
+    /// The number of the segment of a line that is no plain rectangle, and of its primitive.
+    pub line: Option<(usize, u32)>,
     /// The values of 1 / w at corners 1 and 2; see [`TriangleSetup::weights`].
     weights: [f32; 2],
     /// The unit of [`BlockValues::inverse_w`].
@@ -225,6 +227,7 @@ impl Batch {
             front: primitive.front,
             viewport: primitive.viewport,
             is_point: primitive.kind == PrimitiveKind::Point,
+            line: None,
             weights: setup.weights,
             scale: setup.scale,
             slopes: setup.slopes,
@@ -708,7 +711,7 @@ impl Batch {
     }
 
     /// The column or row of a lane of a quad in the framebuffer.
-    fn pixel(&self, quad: &Quad, lane: usize, axis: usize) -> u32 {
+    pub fn pixel(&self, quad: &Quad, lane: usize, axis: usize) -> u32 {
         let tile = u32::from(quad.tile);
         let tile = [tile % self.side, tile / self.side][axis];
         // See `tile::place`.

@@ -113,6 +113,24 @@ impl<const N: usize> Coverage<N> {
         self.blocks == 0xFFFF && self.lanes.as_flattened().iter().all(|&lanes| lanes == u16::MAX)
     }
 
+    /// Removes the samples of the tile at pixel (x, y) for which `covers`, given pixel and sample, is false.
+    #[cold]
+    pub fn restrict(&mut self, [x, y]: [i32; 2], covers: impl Fn([i32; 2], usize) -> bool) {
+        for block in bits(self.blocks) {
+            let mut any = 0;
+            for (sample, lanes) in self.lanes[block].iter_mut().enumerate() {
+                for lane in bits((*lanes).into()) {
+                    let pixel = [x + BLOCK_X[block] + LANE_X[lane], y + BLOCK_Y[block] + LANE_Y[lane]];
+                    if !covers(pixel, sample) {
+                        *lanes &= !(1 << lane);
+                    }
+                }
+                any |= *lanes;
+            }
+            self.blocks &= !(u32::from(any == 0) << block);
+        }
+    }
+
     /// Removes lanes outside of these columns and rows.
     #[inline(always)]
     fn cut(&mut self, [left, right]: [i32; 2], [top, bottom]: [i32; 2]) {

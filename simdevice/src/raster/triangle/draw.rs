@@ -14,7 +14,7 @@ use crate::raster::output::{Targets, color_outputs};
 use crate::raster::tile::{CENTER, SAMPLES_4};
 use crate::raster::tile_buffer::Target;
 use crate::runtime::Runtime;
-use crate::state::{DrawState, Rect, Viewport};
+use crate::state::{DrawState, LineMode, Rect, Viewport};
 use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::Level;
 use std::time::Duration;
@@ -102,6 +102,7 @@ impl<'a> TriangleTileDraw<'a> {
             && state.sample_mask & 1 == 1
             && !effects.removes
             && !state.alpha_to_one
+            && state.line_mode != LineMode::Smooth
             // A recording describes hardware that processes quads.
             && draw.record.is_none();
         let path = match interface {
@@ -159,7 +160,12 @@ impl<'a> TriangleTileDraw<'a> {
 
     /// True if nothing happens to a fragment between shading and blending, unless its program kills it.
     pub(super) fn blends_directly(&self) -> bool {
-        !self.tests_late() && !self.masks_samples && !self.draw.state.alpha_to_one
+        !self.tests_late() && !self.masks_samples && !self.draw.state.alpha_to_one && !self.smooths_lines()
+    }
+
+    /// True if the alpha of lines is multiplied by their coverage.
+    pub(super) fn smooths_lines(&self) -> bool {
+        self.draw.state.line_mode == LineMode::Smooth
     }
 
     /// Marks the memory that its program may have written as changed.

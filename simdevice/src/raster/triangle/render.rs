@@ -7,7 +7,7 @@ use super::recording::{self, MacroTileWork};
 use super::setup::{Needs, TriangleSetup};
 use super::whole_tile::{DeferredTiles, FullTile};
 use super::write::{test, write};
-use crate::geometry::{Primitive, Varyings};
+use crate::geometry::{Primitive, PrimitiveKind, StyledLine, Varyings};
 use crate::limits::TILE_SIZE;
 use crate::program::fragment::{FragmentMachines, FragmentStage};
 use crate::program::interface::FragmentInput;
@@ -141,6 +141,8 @@ struct RasterPrimitive<'p> {
     setup: &'p TriangleSetup,
     /// The number of the primitive's segment in the draw, and the primitive's number in the segment.
     place: (usize, u32),
+    /// The line that decides its pixels.
+    line: Option<&'p StyledLine>,
     /// The primitive's record in the batch, if it has one.
     record: Option<u16>,
     /// The primitive's slot among deferred primitives, if a tile is deferred for it.
@@ -175,7 +177,18 @@ impl Renderer<'_, '_> {
                     };
                     clip = (primitive.viewport, pixels.intersect(whole));
                 }
-                if !setup.prepare(simd, primitive, draw.samples.positions, clip.1, needs) {
+                let positions = draw.samples.positions;
+                let mut line = None;
+                let is_prepared = if primitive.kind == PrimitiveKind::StyledLine {
+                    let Some(styled) = segment.line(index).and_then(|place| segment.lines.get(place)) else {
+                        continue;
+                    };
+                    line = Some(styled);
+                    setup.prepare_line(simd, primitive, styled, positions, clip.1, needs)
+                } else {
+                    setup.prepare(simd, primitive, positions, clip.1, needs)
+                };
+                if !is_prepared {
                     continue;
                 }
                 let mut raster = RasterPrimitive {
@@ -183,6 +196,7 @@ impl Renderer<'_, '_> {
                     varyings: &segment.varyings,
                     setup: &setup,
                     place: (number, index),
+                    line,
                     record: None,
                     slot: None,
                     range: self.depth_range(primitive),
@@ -228,7 +242,12 @@ impl Renderer<'_, '_> {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
                 let tile = (row as u32 * side + column as u32) as usize;
-                let found = coverage.find(simd, raster.setup, x, y);
+                let mut found = coverage.find(simd, raster.setup, x, y);
+                if let Some(line) = raster.line.filter(|_| found) {
+                    let positions = self.draw.samples.positions;
+                    coverage.restrict([x, y], |pixel, sample| line.covers(pixel, positions[sample]));
+                    found = coverage.blocks != 0;
+                }
                 if let Some(work) = &mut self.work {
                     let blocks = if found { coverage.blocks.count_ones() } else { 0 };
                     work.list(tile, blocks);
@@ -472,6 +491,9 @@ impl Renderer<'_, '_> {
             return 0;
         };
         let record = self.batch.add_primitive(raster.primitive, raster.setup, &stage.interface, raster.varyings);
+        if raster.line.is_some() {
+            self.batch.records[usize::from(record)].line = Some(raster.place);
+        }
         raster.record = Some(record);
         record
     }
@@ -702,6 +724,8 @@ impl Renderer<'_, '_> {
             varyings: &segment.varyings,
             setup: &waiting.setup,
             place: (waiting.segment, waiting.primitive),
+            // Its pixels are known, and it is not smooth.
+            line: None,
             record: None,
             slot: None,
             range: self.depth_range(primitive),

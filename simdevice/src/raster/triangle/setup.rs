@@ -1,6 +1,6 @@
 //! Triangle set-up for tiles: edges as exact integer functions, and interpolated values as planes.
 
-use crate::geometry::{Primitive, PrimitiveKind};
+use crate::geometry::{Primitive, PrimitiveKind, StyledLine};
 use crate::raster::tile::{LANE_X, LANE_Y};
 use crate::simd::{both, three};
 use crate::state::Rect;
@@ -116,6 +116,27 @@ impl TriangleSetup {
         clip: Rect,
         needs: Needs,
     ) -> bool {
+        self.set_edges(simd, primitive, positions, clip) && self.set_planes(simd, primitive, needs)
+    }
+
+    /// Sets up a line within the outline that is its primitive's. The values are those of its rectangle.
+    #[cold]
+    pub fn prepare_line<S: Simd>(
+        &mut self,
+        simd: S,
+        primitive: &Primitive,
+        line: &StyledLine,
+        positions: &[[i32; 2]],
+        clip: Rect,
+        needs: Needs,
+    ) -> bool {
+        let of_rectangle = Primitive { corners: line.rectangle, ..*primitive };
+        self.set_edges(simd, primitive, positions, clip) && self.set_planes(simd, &of_rectangle, needs)
+    }
+
+    /// Sets the edges and the bounds. Returns false if no sample lies in `clip`.
+    #[inline(always)]
+    fn set_edges<S: Simd>(&mut self, simd: S, primitive: &Primitive, positions: &[[i32; 2]], clip: Rect) -> bool {
         let [p0, p1, p2] = primitive.corners;
         let parallelogram = primitive.kind != PrimitiveKind::Triangle;
         let mut corners = [p0, p1, p2, p2];
@@ -139,14 +160,22 @@ impl TriangleSetup {
             return false;
         }
         let wide = |p: [i32; 2]| both(p, i64::from);
-        let (w0, w1, w2) = (wide(p0), wide(p1), wide(p2));
-        let area = (w1[0] - w0[0]) * (w2[1] - w0[1]) - (w1[1] - w0[1]) * (w2[0] - w0[0]);
-        if area <= 0 {
-            return false;
-        }
         for (index, edge) in self.edges.iter_mut().enumerate().take(edge_count) {
             let next = if index + 1 == edge_count { 0 } else { index + 1 };
             *edge = Edge::new(simd, wide(corners[index]), wide(corners[next]), positions);
+        }
+        self.edge_count = edge_count;
+        self.bounds = bounds;
+        true
+    }
+
+    /// Sets the interpolated values. Returns false if the primitive has no area.
+    #[inline(always)]
+    fn set_planes<S: Simd>(&mut self, simd: S, primitive: &Primitive, needs: Needs) -> bool {
+        let [w0, w1, w2] = three(primitive.corners, |corner| both(corner, i64::from));
+        let area = (w1[0] - w0[0]) * (w2[1] - w0[1]) - (w1[1] - w0[1]) * (w2[0] - w0[0]);
+        if area <= 0 {
+            return false;
         }
         let numerators = [[w2[1] - w0[1], w0[0] - w2[0]], [w0[1] - w1[1], w1[0] - w0[0]]];
         let correction =
@@ -172,8 +201,6 @@ impl TriangleSetup {
         let w_slopes = [along(0), along(1)];
         let slopes = both(slopes, |slope| both(slope, |slope| slope as f32));
         let lanes = |[dx, dy]: [f32; 2]| lane_offsets(simd, dx, dy);
-        self.edge_count = edge_count;
-        self.bounds = bounds;
         self.origin = w0;
         self.numerators = numerators;
         self.correction = correction;

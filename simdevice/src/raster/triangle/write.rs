@@ -100,7 +100,7 @@ pub fn write<S: Simd>(
                     };
                 }
                 passed += u64::from(lanes.count_ones());
-                write_colors(simd, draw, &sources, chunk, *lanes, &quads, buffers);
+                write_colors(simd, draw, &sources, batch, chunk, *lanes, &quads, buffers);
             }
         }
     }
@@ -300,12 +300,33 @@ fn late_depth<S: Simd>(
     u32x16::simd_from(simd, codes)
 }
 
+/// The share of the pixel of each lane of a chunk that its line covers; 1 for other primitives.
+#[cold]
+fn line_coverage(draw: &TriangleTileDraw<'_>, batch: &Batch, chunk: usize) -> [f32; 16] {
+    let mut coverage = [1.0; 16];
+    for (number, quad) in batch.chunk_quads(chunk).iter().enumerate() {
+        let line = batch.records.get(usize::from(quad.record)).and_then(|record| record.line);
+        let line = line.and_then(|(segment, primitive)| {
+            let segment = draw.draw.segments.get(segment)?;
+            segment.lines.get(segment.line(primitive)?)
+        });
+        if let Some(line) = line {
+            for lane in 0..4 {
+                let pixel = [0, 1].map(|axis| batch.pixel(quad, lane, axis) as i32);
+                coverage[4 * number + lane] = line.coverage(pixel);
+            }
+        }
+    }
+    coverage
+}
+
 /// Writes 16 fragments to one sample of the colour attachments.
 #[inline(always)]
 fn write_colors<S: Simd>(
     simd: S,
     draw: &TriangleTileDraw<'_>,
     sources: &[Sources<'_>],
+    batch: &Batch,
     chunk: usize,
     lanes: u16,
     quads: &QuadAddresses,
@@ -319,6 +340,9 @@ fn write_colors<S: Simd>(
             continue;
         };
         let mut source = load(simd, &sources[0], chunk);
+        if index == 0 && draw.smooths_lines() {
+            source[3] *= f32x16::simd_from(simd, line_coverage(draw, batch, chunk));
+        }
         let mut second =
             if output.is_dual_source() { load(simd, &sources[1], chunk) } else { [f32x16::splat(simd, 0.0); 4] };
         if draw.draw.state.alpha_to_one {

@@ -154,6 +154,7 @@ fn draw(
             bins: Bins::everywhere(&primitives, area, device.runtime().config().macro_tile_size, layers.unwrap_or(1)),
             primitives,
             varyings: Varyings { values, per_vertex },
+            lines: Vec::new(),
         }],
         counts_fragments: false,
         record: None,
