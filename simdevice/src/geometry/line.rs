@@ -57,11 +57,19 @@ impl Axis {
         let [a, b, c] = three(rectangle, |corner| both(corner, |at| f64::from(at) / ONE as f64));
         let along = [c[0] - b[0], c[1] - b[1]];
         let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
-        Self {
-            from: [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])],
-            direction: both(along, |part| part / length),
-            length,
-        }
+        Self { from: [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])], direction: both(along, |part| part / length), length }
+    }
+
+    /// The corners of a parallelogram along the line, moved outwards on all sides by `reach`, in 1/256 pixels.
+    fn grown(&self, [a, b, c]: [[i32; 2]; 3], reach: f64) -> [[i32; 2]; 3] {
+        let along = self.direction;
+        let across = [along[1], -along[0]];
+        let moved = |corner: [i32; 2], by_across: f64, by_along: f64| {
+            [0, 1].map(|axis| {
+                (f64::from(corner[axis]) + reach * (by_across * across[axis] + by_along * along[axis])) as i32
+            })
+        };
+        [moved(a, -1.0, -1.0), moved(b, 1.0, -1.0), moved(c, 1.0, 1.0)]
     }
 
     /// The distance along the line of a point in pixels.
@@ -107,25 +115,14 @@ impl StyledLine {
 
     /// The corners of a parallelogram that has all samples of its pixels.
     pub(super) fn outline(&self) -> [[i32; 2]; 3] {
-        let (axis, reach) = match &self.form {
-            Form::Rectangle(_) => return self.rectangle,
-            Form::Smooth(axis) => (axis, REACH),
-            Form::Bresenham(pixels) => (&pixels.axis, REACH + 0.5 * (pixels.width * ONE) as f64),
-        };
-        let sides = match &self.form {
-            Form::Bresenham(pixels) => [pixels.ends[0]; 2],
-            _ => [self.rectangle[0], self.rectangle[1]],
-        };
-        let [across, along] = [[axis.direction[1], -axis.direction[0]], axis.direction];
-        let end = match &self.form {
-            Form::Bresenham(pixels) => pixels.ends[1],
-            _ => self.rectangle[2],
-        };
-        let moved = |corner: [i32; 2], by_across: f64, by_along: f64| {
-            let part = |axis: usize| reach * (by_across * across[axis] + by_along * along[axis]);
-            [0, 1].map(|axis| (f64::from(corner[axis]) + part(axis)) as i32)
-        };
-        [moved(sides[0], -1.0, -1.0), moved(sides[1], 1.0, -1.0), moved(end, 1.0, 1.0)]
+        match &self.form {
+            Form::Rectangle(_) => self.rectangle,
+            Form::Smooth(axis) => axis.grown(self.rectangle, REACH),
+            Form::Bresenham(pixels) => {
+                let [from, to] = pixels.ends;
+                pixels.axis.grown([from, from, to], REACH + 0.5 * (pixels.width * ONE) as f64)
+            }
+        }
     }
 
     /// True if it covers the sample at `position` of a pixel, which is within the outline.
@@ -205,13 +202,9 @@ impl PixelLine {
         };
         let along = both(by, |part| part as f64 / ONE as f64);
         let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
-        let axis = Axis {
-            from: both(a, |at| at as f64 / ONE as f64),
-            direction: both(along, |part| part / length),
-            length,
-        };
-        let mut line =
-            Self { axis, ends, from: moved(a), to: moved(b), major, width, first: 0, last: 0 };
+        let axis =
+            Axis { from: both(a, |at| at as f64 / ONE as f64), direction: both(along, |part| part / length), length };
+        let mut line = Self { axis, ends, from: moved(a), to: moved(b), major, width, first: 0, last: 0 };
         // The pixels of the ends, and those next to them, are all in doubt.
         let step = line.step();
         let pixel = |end: [i64; 2]| end[major].div_euclid(ONE);
@@ -469,8 +462,7 @@ mod tests {
                     let mut count = 0;
                     for sample in 0..SAMPLES * SAMPLES {
                         let within = [sample % SAMPLES, sample / SAMPLES].map(|at| at * 256 / SAMPLES + 2);
-                        let point =
-                            [0, 1].map(|axis: usize| f64::from([x, y][axis]) + f64::from(within[axis]) / 256.0);
+                        let point = [0, 1].map(|axis: usize| f64::from([x, y][axis]) + f64::from(within[axis]) / 256.0);
                         count += u32::from(in_rectangle(smooth.rectangle, point) && sharp.covers([x, y], within));
                     }
                     let expected = f64::from(count) / f64::from(SAMPLES * SAMPLES);

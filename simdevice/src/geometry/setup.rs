@@ -3,8 +3,8 @@
 use super::assemble::corners;
 use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
-use super::line::StyledLine;
 use super::depth_bias::{self, DepthUnit};
+use super::line::StyledLine;
 use super::primitive::Primitive;
 use super::primitive_list::ListedPrimitive;
 use super::shade::{NO_OPTIONAL_OUTPUTS, OptionalOutputs, Shaded, Vertex};

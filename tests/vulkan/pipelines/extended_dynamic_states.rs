@@ -17,6 +17,7 @@ struct Device {
     writes: ash::ext::color_write_enable::Device,
     input: ash::ext::vertex_input_dynamic_state::Device,
     multi: ash::ext::multi_draw::Device,
+    lines: ash::ext::line_rasterization::Device,
 }
 
 impl Device {
@@ -33,7 +34,10 @@ impl Device {
         let mut provoking = vk::PhysicalDeviceProvokingVertexFeaturesEXT::default().provoking_vertex_last(true);
         let mut restart =
             vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::default().primitive_topology_list_restart(true);
-        let mut lines = vk::PhysicalDeviceLineRasterizationFeaturesKHR::default().rectangular_lines(true);
+        let mut lines = vk::PhysicalDeviceLineRasterizationFeaturesKHR::default()
+            .rectangular_lines(true)
+            .bresenham_lines(true)
+            .stippled_rectangular_lines(true);
         let mut states = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
             .extended_dynamic_state3_alpha_to_coverage_enable(true)
             .extended_dynamic_state3_alpha_to_one_enable(true)
@@ -44,6 +48,7 @@ impl Device {
             .extended_dynamic_state3_depth_clip_enable(true)
             .extended_dynamic_state3_depth_clip_negative_one_to_one(true)
             .extended_dynamic_state3_line_rasterization_mode(true)
+            .extended_dynamic_state3_line_stipple_enable(true)
             .extended_dynamic_state3_logic_op_enable(true)
             .extended_dynamic_state3_polygon_mode(true)
             .extended_dynamic_state3_provoking_vertex_mode(true)
@@ -77,6 +82,7 @@ impl Device {
             writes: ash::ext::color_write_enable::Device::new(instance, device),
             input: ash::ext::vertex_input_dynamic_state::Device::new(instance, device),
             multi: ash::ext::multi_draw::Device::new(instance, device),
+            lines: ash::ext::line_rasterization::Device::new(instance, device),
             gpu,
         }
     }
@@ -152,6 +158,25 @@ fn logic(on: bool) -> vk::LogicOp {
 
 fn provoking(on: bool) -> vk::ProvokingVertexModeEXT {
     if on { vk::ProvokingVertexModeEXT::LAST_VERTEX } else { vk::ProvokingVertexModeEXT::FIRST_VERTEX }
+}
+
+fn line_mode(on: bool) -> vk::LineRasterizationModeEXT {
+    if on { vk::LineRasterizationModeEXT::BRESENHAM } else { vk::LineRasterizationModeEXT::RECTANGULAR }
+}
+
+fn pattern(on: bool) -> u16 {
+    if on { 0x3333 } else { 0x00FF }
+}
+
+/// Polygons of which the edges are drawn, in this mode, and by a pattern if there is one.
+fn edges(options: &mut PipelineOptions<'_>, mode: vk::LineRasterizationModeEXT, pattern: Option<u16>) {
+    options.raster.polygon_mode = vk::PolygonMode::LINE;
+    let state = vk::PipelineRasterizationLineStateCreateInfoKHR::default()
+        .line_rasterization_mode(mode)
+        .stippled_line_enable(pattern.is_some())
+        .line_stipple_factor(1)
+        .line_stipple_pattern(pattern.unwrap_or(0x3333));
+    chained(options, state);
 }
 
 /// Chains a structure to a pipeline's rasterization state. It is never freed.
@@ -314,6 +339,33 @@ fn cases() -> Vec<Case> {
             // SAFETY: see above.
             |device, c, on| unsafe {
                 device.states.cmd_set_color_write_mask(c, 0, &[mask(on)]);
+            },
+        ),
+        case(
+            S::LINE_RASTERIZATION_MODE_EXT,
+            1,
+            |options, on| edges(options, line_mode(on), None),
+            // SAFETY: see above.
+            |device, c, on| unsafe {
+                device.states.cmd_set_line_rasterization_mode(c, line_mode(on));
+            },
+        ),
+        case(
+            S::LINE_STIPPLE_ENABLE_EXT,
+            1,
+            |options, on| edges(options, line_mode(false), on.then_some(0x3333)),
+            // SAFETY: see above.
+            |device, c, on| unsafe {
+                device.states.cmd_set_line_stipple_enable(c, on);
+            },
+        ),
+        case(
+            S::LINE_STIPPLE_EXT,
+            1,
+            |options, on| edges(options, line_mode(false), Some(pattern(on))),
+            // SAFETY: see above.
+            |device, c, on| unsafe {
+                device.lines.cmd_set_line_stipple(c, 1, pattern(on));
             },
         ),
         case(

@@ -87,7 +87,15 @@ pub(super) fn create_pipeline(run: &mut Run, bytes: &mut Bytes<'_>) {
         .topology(vk::PrimitiveTopology::from_raw(bytes.one(&[3, 3, 0, 1, 2, 4, 5])))
         .primitive_restart_enable(bytes.rarely(4));
     let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-    let raster = raster(bytes);
+    let mut raster = raster(bytes);
+    let mut lines = vk::PipelineRasterizationLineStateCreateInfoKHR::default()
+        .line_rasterization_mode(vk::LineRasterizationModeKHR::from_raw(bytes.below(4) as i32))
+        .stippled_line_enable(bytes.rarely(2))
+        .line_stipple_factor(bytes.number(300))
+        .line_stipple_pattern(bytes.number(0xFFFF) as u16);
+    if bytes.rarely(3) {
+        raster.p_next = (&raw mut lines).cast();
+    }
     let samples = bytes.one(&[1, 1, 1, 4]);
     let multisample = vk::PipelineMultisampleStateCreateInfo::default()
         .rasterization_samples(vk::SampleCountFlags::from_raw(samples))
