@@ -1,5 +1,6 @@
 //! Draws, sorted sets of Gaussians and dispatches, and the streams that they read.
 
+use super::decoding::{DecodingTables, Decodings};
 use crate::format::Format;
 use crate::program::bindings::Bindings;
 use crate::program::compute::ComputeProgram;
@@ -190,14 +191,16 @@ pub struct GaussianBegin {
     pub scissor: Rect,
 }
 
-/// The functions that are applied to attributes as they are read. They are computed in binary64 and rounded once to
-/// binary32.
+/// The functions that are applied to attributes as they are read: decodings first. They are computed in binary64 and rounded
+/// once to binary32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Activations {
     /// True if standard deviations are exponentials of the stored values.
     pub log_scale: bool,
     /// True if opacities are `1 / (1 + exp(-x))` of the stored values `x`.
     pub logit_opacity: bool,
+    /// The decodings of the stored values.
+    pub decodings: Decodings,
 }
 
 /// The vertex attributes of fixed-function projection.
@@ -213,8 +216,10 @@ pub struct GaussianAttributes {
     pub opacity: AttributeStream,
     /// The `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
     pub spherical_harmonics: Vec<AttributeStream>,
-    /// The functions from stored values to standard deviations and opacities.
+    /// The functions from stored values to attributes.
     pub activations: Activations,
+    /// The tables of the decodings, if there are any.
+    pub tables: Option<Box<DecodingTables>>,
     /// The transform of the Gaussians, usually by instance.
     pub model: ModelAttributes,
 }

@@ -2,12 +2,14 @@
 //! by [`Arc`](std::sync::Arc).
 
 mod command;
+mod decoding;
 mod display;
 mod draw;
 mod rendering;
 mod transfer;
 
 pub use command::Packet;
+pub use decoding::{Decoding, DecodingTables, Decodings, HarmonicsCodes, HarmonicsDecoding, RotationDecoding};
 pub use draw::{
     Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
     GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
