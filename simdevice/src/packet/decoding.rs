@@ -1,6 +1,4 @@
-//! The decoding of Gaussians' attributes: what integers in memory stand for, by tables in memory.
-
-use super::draw::AttributeStream;
+//! The decoding of Gaussians' attributes: what integers in memory stand for.
 
 /// The way in which an attribute's values are computed from integers. `is_binary64` tells the numbers of its table:
 /// binary64, or binary32 if it is false.
@@ -77,30 +75,4 @@ pub struct Decodings {
     pub base_color: bool,
     /// That of the other coefficients.
     pub harmonics: HarmonicsDecoding,
-}
-
-/// The tables that decodings read. A table of bounds has an element for each chunk: the minima of all components, then
-/// their maxima. A codebook has one element, of 256 numbers. What lies outside of a table's buffer reads as zeros.
-#[derive(Clone, Debug, Default)]
-pub struct DecodingTables {
-    /// That of positions, if they are decoded.
-    pub position: Option<AttributeStream>,
-    /// That of scales, if they are decoded.
-    pub scale: Option<AttributeStream>,
-    /// That of opacities, if they are decoded.
-    pub opacity: Option<AttributeStream>,
-    /// That of coefficient 0, if it is decoded.
-    pub color: Option<AttributeStream>,
-    /// The codebook of the other coefficients, if they are decoded.
-    pub harmonics: Option<AttributeStream>,
-    /// The numbers of vertices' entries in a palette, 16 bits each, if there is one.
-    pub labels: Option<AttributeStream>,
-}
-
-impl DecodingTables {
-    /// All tables that there are.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &AttributeStream> {
-        let Self { position, scale, opacity, color, harmonics, labels } = self;
-        [position, scale, opacity, color, harmonics, labels].into_iter().flatten()
-    }
 }

@@ -162,6 +162,15 @@ impl<'a> GroupVertices<'a> {
         }
     }
 
+    /// The first three components of the element of `stream` that lane `lane` reads.
+    pub(super) fn triple(&self, stream: &AttributeStream, lane: usize) -> [f32; 3] {
+        let mut bytes = [0u8; 16];
+        let bytes = &mut bytes[..stream.format.texel_size().min(16)];
+        stream.read(self.element(stream, lane), bytes);
+        let [first, second, third, _] = stream.format.decode(bytes);
+        [first, second, third]
+    }
+
     /// True if all lanes read one element of `stream`.
     pub(super) fn is_uniform(&self, stream: &AttributeStream) -> bool {
         match (stream.instance_divisor, &self.instances) {

@@ -73,18 +73,9 @@ impl<'a> CoefficientReader<'a> {
             return decoder.read(self.streams, group, lane, out);
         }
         for (stream, out) in self.streams.iter().zip(out.as_chunks_mut().0) {
-            *out = coefficient(stream, group, lane);
+            *out = group.triple(stream, lane);
         }
     }
-}
-
-/// The coefficient that lane `lane` reads from a stream that is not decoded.
-pub(super) fn coefficient(stream: &AttributeStream, group: &GroupVertices<'_>, lane: usize) -> [f32; 3] {
-    let mut bytes = [0u8; 16];
-    let bytes = &mut bytes[..stream.format.texel_size().min(16)];
-    stream.read(group.element(stream, lane), bytes);
-    let [red, green, blue, _] = stream.format.decode(bytes);
-    [red, green, blue]
 }
 
 /// Spherical harmonics in host memory: those of all lanes, one lane after the other, or none.

@@ -2,7 +2,6 @@
 
 use super::attributes::GroupVertices;
 use super::decoding::{CODEBOOK, codebook};
-use super::harmonics::coefficient;
 use crate::packet::{AttributeStream, Decodings, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
 
 /// The most bytes from the first to the last code of a vertex that are read with one copy.
@@ -57,7 +56,7 @@ impl<'a> HarmonicsDecoder<'a> {
             Some(codes) => codes.read(rest, group, lane, others),
             None => {
                 for (stream, out) in rest.iter().zip(others) {
-                    *out = coefficient(stream, group, lane);
+                    *out = group.triple(stream, lane);
                 }
             }
         }
@@ -65,7 +64,7 @@ impl<'a> HarmonicsDecoder<'a> {
 
     fn color(&self, stream: &AttributeStream, group: &GroupVertices<'_>, lane: usize) -> [f32; 3] {
         let Some(mut decoder) = self.decodings.colors(stream, self.colors) else {
-            return coefficient(stream, group, lane);
+            return group.triple(stream, lane);
         };
         let mut element = [0; 8];
         let size = stream.format.texel_size().min(8);
