@@ -18,6 +18,9 @@ use crate::stage::Stage;
 
 const NUMBERS: [(&str, Numbers); 2] = [("binary32", Numbers::Binary32), ("binary64", Numbers::Binary64)];
 
+/// A function that makes the codes of a file.
+type MakeCodes = fn() -> Coded;
+
 fn identity(value: f64) -> f64 {
     value
 }
@@ -201,7 +204,7 @@ fn harmonics(chapter: &mut Chapter<'_>) {
 
 /// The codes of files, by all ways of drawing vertices.
 fn files(chapter: &mut Chapter<'_>) {
-    let files: [(&str, fn() -> Coded); 2] = [("ply", || as_in_ply(487, 1, 64)), ("sog", || as_in_sog(488, 1))];
+    let files: [(&str, MakeCodes); 2] = [("ply", || as_in_ply(487, 1, 64)), ("sog", || as_in_sog(488, 1))];
     for (name, file) in files {
         let draw = || of_degree(of_file(), 1);
         chapter.program(format!("first_vertex.{name}"), move || {
