@@ -39,6 +39,8 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997006)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST ((VkStructureType)1000997007)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997008)
+#define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997009)
+#define VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST ((VkStructureType)1000997010)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
 #define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
@@ -118,6 +120,27 @@ typedef enum VkGaussianCutOffGAURAST {
     VK_GAUSSIAN_CUT_OFF_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkGaussianCutOffGAURAST;
 
+typedef enum VkGaussianDecodingGAURAST {
+    VK_GAUSSIAN_DECODING_NONE_GAURAST = 0,
+    VK_GAUSSIAN_DECODING_CHUNK_GAURAST = 1,
+    VK_GAUSSIAN_DECODING_CODEBOOK_GAURAST = 2,
+    VK_GAUSSIAN_DECODING_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianDecodingGAURAST;
+
+typedef enum VkGaussianRotationDecodingGAURAST {
+    VK_GAUSSIAN_ROTATION_DECODING_NONE_GAURAST = 0,
+    VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_10_GAURAST = 1,
+    VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_8_GAURAST = 2,
+    VK_GAUSSIAN_ROTATION_DECODING_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianRotationDecodingGAURAST;
+
+typedef enum VkGaussianHarmonicsDecodingGAURAST {
+    VK_GAUSSIAN_HARMONICS_DECODING_NONE_GAURAST = 0,
+    VK_GAUSSIAN_HARMONICS_DECODING_CODEBOOK_GAURAST = 1,
+    VK_GAUSSIAN_HARMONICS_DECODING_PALETTE_GAURAST = 2,
+    VK_GAUSSIAN_HARMONICS_DECODING_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianHarmonicsDecodingGAURAST;
+
 typedef enum VkPipelineGaussianStateCreateFlagBitsGAURAST {
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST = 0x00000001,
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST = 0x00000002,
@@ -157,6 +180,7 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           opacityCompensationFloor;
     VkBool32           gaussianDistortion;
     VkBool32           unscentedParameters;
+    VkBool32           attributeDecoding;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -244,6 +268,19 @@ typedef struct VkPipelineGaussianUnscentedStateCreateInfoGAURAST {
     VkBool32           allSigmaPoints;
 } VkPipelineGaussianUnscentedStateCreateInfoGAURAST;
 
+typedef struct VkPipelineGaussianDecodingStateCreateInfoGAURAST {
+    VkStructureType                       sType;
+    const void*                           pNext;
+    VkGaussianDecodingGAURAST             position;
+    VkBool32                              signedLogPosition;
+    VkGaussianDecodingGAURAST             scale;
+    VkGaussianRotationDecodingGAURAST     rotation;
+    VkGaussianDecodingGAURAST             opacity;
+    VkGaussianDecodingGAURAST             color;
+    VkBool32                              baseColor;
+    VkGaussianHarmonicsDecodingGAURAST    sphericalHarmonics;
+} VkPipelineGaussianDecodingStateCreateInfoGAURAST;
+
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;
     const void*                     pNext;
@@ -276,6 +313,40 @@ typedef struct VkGaussianSphericalHarmonicsBufferGAURAST {
     VkDeviceSize       coefficientStride;
 } VkGaussianSphericalHarmonicsBufferGAURAST;
 
+typedef struct VkGaussianDecodingTableGAURAST {
+    VkDeviceAddress    deviceAddress;
+    VkDeviceSize       size;
+    VkFormat           format;
+    uint32_t           stride;
+    uint32_t           chunkSize;
+} VkGaussianDecodingTableGAURAST;
+
+typedef struct VkGaussianHarmonicsCodesGAURAST {
+    VkDeviceAddress    deviceAddress;
+    VkDeviceSize       size;
+    uint32_t           stride;
+    uint32_t           coefficientStride;
+    uint32_t           componentStride;
+} VkGaussianHarmonicsCodesGAURAST;
+
+typedef struct VkGaussianHarmonicsLabelsGAURAST {
+    VkDeviceAddress    deviceAddress;
+    VkDeviceSize       size;
+    uint32_t           stride;
+} VkGaussianHarmonicsLabelsGAURAST;
+
+typedef struct VkGaussianDecodingTablesGAURAST {
+    VkStructureType                     sType;
+    const void*                         pNext;
+    VkGaussianDecodingTableGAURAST      position;
+    VkGaussianDecodingTableGAURAST      scale;
+    VkGaussianDecodingTableGAURAST      opacity;
+    VkGaussianDecodingTableGAURAST      color;
+    VkGaussianDecodingTableGAURAST      sphericalHarmonics;
+    VkGaussianHarmonicsCodesGAURAST     codes;
+    VkGaussianHarmonicsLabelsGAURAST    labels;
+} VkGaussianDecodingTablesGAURAST;
+
 typedef struct VkGaussianCameraDataGAURAST {
     double                          eye[3];
     VkGaussianCameraModelGAURAST    model;
@@ -302,6 +373,7 @@ typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST)(Vk
 typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianExponentialErrorGAURAST)(VkCommandBuffer commandBuffer, float exponentialError);
 typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianContributionBudgetGAURAST)(VkCommandBuffer commandBuffer, float contributionBudget);
 typedef void (VKAPI_PTR *PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
+typedef void (VKAPI_PTR *PFN_vkCmdBindGaussianDecodingTablesGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianDecodingTablesGAURAST* pTables);
 
 #ifndef VK_NO_PROTOTYPES
 /* Not exported by the loader: get it with vkGetDeviceProcAddr. */
@@ -343,6 +415,9 @@ VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianContributionBudgetGAURAST(
 VKAPI_ATTR void VKAPI_CALL vkCmdBindGaussianSphericalHarmonicsGAURAST(
     VkCommandBuffer                             commandBuffer,
     const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
+VKAPI_ATTR void VKAPI_CALL vkCmdBindGaussianDecodingTablesGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    const VkGaussianDecodingTablesGAURAST*      pTables);
 #endif
 
 #define VK_GAURAST_driver_options 1

@@ -53,6 +53,18 @@ impl Addresses {
         given.table = None;
     }
 
+    /// The `size` bytes at an address, if a buffer has them.
+    pub(crate) fn range(&self, address: u64, size: u64) -> Option<BufferRange> {
+        let table = self.table();
+        let (range, start) = table.find(address)?;
+        let offset = address - start;
+        (size <= range.size - offset).then(|| BufferRange {
+            memory: Arc::clone(&range.memory),
+            offset: range.offset + offset,
+            size,
+        })
+    }
+
     /// The table of the present buffers.
     pub(crate) fn table(&self) -> Arc<AddressTable> {
         let mut given = self.lock();

@@ -105,6 +105,7 @@ fn append(gaussians: &[Gaussian], degree: u32) -> GaussianAppend {
             opacity: stream(10, Format::R32Sfloat),
             model: ModelAttributes::default(),
             activations: Default::default(),
+            tables: None,
             spherical_harmonics: (0..(degree + 1).pow(2))
                 .map(|k| stream(11 + 3 * k, Format::R32G32B32Sfloat))
                 .collect(),

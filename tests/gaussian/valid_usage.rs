@@ -3,11 +3,13 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianDistortionModelGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianDecodingGAURAST, GaussianDistortionModelGAURAST,
+    GaussianGeometryGAURAST, GaussianHarmonicsDecodingGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, GaussianRotationDecodingGAURAST,
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+    PipelineGaussianDecodingStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use gaurast_runner::Case;
 use gaurast_testkit::devices::{gaussian, open, with_features_of_gaussians, without_modes};
@@ -106,6 +108,16 @@ fn pointing(
     Graphics { unscented: Some(unscented), ..with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)) }
 }
 
+type Decoding = PipelineGaussianDecodingStateCreateInfoGAURAST<'static>;
+
+/// A pipeline with decodings, whose attribute at a location has a format.
+fn decoded(location: u32, format: vk::Format, change: impl FnOnce(Decoding) -> Decoding) -> Graphics<'static> {
+    let mut request = splats();
+    let attributes = request.attributes.iter_mut().filter(|attribute| attribute.location == location);
+    attributes.for_each(|attribute| attribute.format = format);
+    Graphics { decoding: Some(change(Decoding::default())), ..request }
+}
+
 /// Pipelines that break one statement each.
 fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let missing = |index: usize| {
@@ -125,6 +137,25 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
         (
             "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-pictureMargin-90094",
             pointing(|p| p.picture_margin(-0.5)),
+        ),
+        (
+            "VUID-VkPipelineGaussianDecodingStateCreateInfoGAURAST-position-90096",
+            decoded(0, vk::Format::R32G32B32_SFLOAT, |d| d.position(GaussianDecodingGAURAST::CHUNK)),
+        ),
+        (
+            "VUID-VkPipelineGaussianDecodingStateCreateInfoGAURAST-position-90096",
+            decoded(3, vk::Format::R16_UINT, |d| d.opacity(GaussianDecodingGAURAST::CODEBOOK)),
+        ),
+        (
+            "VUID-VkPipelineGaussianDecodingStateCreateInfoGAURAST-rotation-90097",
+            decoded(2, vk::Format::R32_UINT, |d| d.rotation(GaussianRotationDecodingGAURAST::SMALLEST_THREE_8)),
+        ),
+        (
+            "VUID-VkPipelineGaussianDecodingStateCreateInfoGAURAST-color-90098",
+            Graphics {
+                decoding: Some(Decoding::default().spherical_harmonics(GaussianHarmonicsDecodingGAURAST::CODEBOOK)),
+                ..with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER))
+            },
         ),
         ("VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081", Graphics { viewports: 2, ..splats() }),
         (
@@ -234,6 +265,10 @@ fn modes() -> Vec<(&'static str, Graphics<'static>)> {
         (
             "sphericalHarmonicsBuffer",
             with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER)),
+        ),
+        (
+            "attributeDecoding",
+            decoded(2, vk::Format::R32_UINT, |d| d.rotation(GaussianRotationDecodingGAURAST::SMALLEST_THREE_10)),
         ),
         (
             "gaussianDynamicState",

@@ -5,13 +5,14 @@ use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
     DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianOrderGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST, GaussianDecodingGAURAST,
+    GaussianDecodingTableGAURAST, GaussianDecodingTablesGAURAST, GaussianOrderGAURAST,
     GaussianSphericalHarmonicsBufferGAURAST, PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianDecodingStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
 };
 use gaurast_testkit::devices::{gaussian, open, without_modes};
 use gaurast_testkit::scene::{Scene, camera, splat, splats};
-use gaurast_testkit::{Gpu, Graphics};
+use gaurast_testkit::{Addressed, Gpu, Graphics};
 
 /// The messages when ending a recording fails.
 fn unrecorded(gpu: &Gpu, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> String {
@@ -47,7 +48,49 @@ pub fn broken() -> Vec<(&'static str, String)> {
     broken.extend(sets());
     broken.extend(dynamic_states());
     broken.extend(harmonics_buffers());
+    broken.extend(decoding_tables());
     broken
+}
+
+fn decoding_tables() -> Vec<(&'static str, String)> {
+    let gpu = open();
+    let buffer = Addressed::of(&gpu, &[0_u8; 256]);
+    let table = GaussianDecodingTableGAURAST::default()
+        .device_address(buffer.address)
+        .size(24)
+        .format(vk::Format::R32_SFLOAT)
+        .stride(24)
+        .chunk_size(256);
+    let bound = |table: GaussianDecodingTableGAURAST| {
+        unrecorded(&gpu, |_, commands| {
+            let tables = GaussianDecodingTablesGAURAST::default().scale(table);
+            // SAFETY: see the crate.
+            unsafe { gaussian(&gpu).cmd_bind_gaussian_decoding_tables(commands, &tables) };
+        })
+    };
+    let mut request = splats();
+    let positions = request.attributes.iter_mut().filter(|attribute| attribute.location == 0);
+    positions.for_each(|attribute| attribute.format = vk::Format::R32_UINT);
+    let decoding = PipelineGaussianDecodingStateCreateInfoGAURAST::default().position(GaussianDecodingGAURAST::CHUNK);
+    let request = Graphics { decoding: Some(decoding), ..request };
+    let unbound = draws_nothing(&request, |_, device, commands| {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
+    });
+    let no_chunk = draws_nothing(&request, |scene, device, commands| {
+        let tables = GaussianDecodingTablesGAURAST::default();
+        // SAFETY: see the crate.
+        unsafe {
+            gaussian(&scene.gpu).cmd_bind_gaussian_decoding_tables(commands, &tables);
+            device.cmd_draw(commands, 1, 1, 0, 0);
+        }
+    });
+    vec![
+        ("VUID-VkGaussianDecodingTableGAURAST-deviceAddress-90099", bound(table.size(257))),
+        ("VUID-VkGaussianDecodingTableGAURAST-format-90100", bound(table.format(vk::Format::R16_SFLOAT))),
+        ("VUID-vkCmdDraw-attributeDecoding-90101", unbound),
+        ("VUID-vkCmdDraw-attributeDecoding-90101", no_chunk),
+    ]
 }
 
 fn harmonics_buffers() -> Vec<(&'static str, String)> {

@@ -4,6 +4,7 @@ use gaurast::vk::{GaussianCameraSourceGAURAST, PipelineGaussianStateCreateFlagsG
 use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Message, Pass, Recorded, Resource, Target};
 
 use crate::contents::bytes;
+use crate::decoding;
 use crate::harmonics::Addressed;
 use crate::stage::{Mistake, SIZE, SPLAT, camera, gaussian, mistake, with};
 
@@ -70,6 +71,20 @@ pub fn mistakes() -> Vec<Mistake> {
                     commands.camera(&camera());
                     // SAFETY: see the crate.
                     unsafe { gaussian(gpu).cmd_bind_gaussian_spherical_harmonics(commands.raw, &buffer.bound(256)) };
+                });
+                drop(buffer);
+                held.submit(gpu)
+            },
+        ),
+        mistake(
+            "a buffer of tables is destroyed before the submission",
+            "VUID-VkGaussianDecodingTableGAURAST-deviceAddress-90099",
+            |stage| {
+                let gpu = &stage.full;
+                let buffer = Addressed::new(gpu, 256);
+                let held = record(gpu, &decoding::words(), |commands| {
+                    commands.camera(&camera());
+                    decoding::bind(gpu, commands.raw, &decoding::tables(&buffer));
                 });
                 drop(buffer);
                 held.submit(gpu)

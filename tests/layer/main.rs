@@ -7,6 +7,7 @@
 mod before;
 mod cameras;
 mod contents;
+mod decoding;
 mod depth;
 mod devices;
 mod draws;
@@ -60,6 +61,7 @@ pub fn chapters() -> Vec<(&'static str, Vec<Mistake>)> {
         ("Dynamic states", dynamic_states::mistakes()),
         ("Sorted sets", sets::mistakes()),
         ("Harmonics in a buffer", harmonics::mistakes()),
+        ("Decoded attributes", decoding::mistakes()),
         ("Draws", draws::mistakes()),
         ("Depths", depth::mistakes()),
         ("Numbers in buffers", indirect::mistakes()),

@@ -9,6 +9,7 @@ use gaurast::vk::{
 use gaurast_testkit::{Bindings, Buffer, Gpu, Graphics, Message, Pass, PassObject, Resource, Target, opaque};
 
 use crate::contents::{bytes, grid};
+use crate::decoding;
 use crate::depth::{Deep, RIGHT};
 use crate::harmonics::Addressed;
 use crate::indirect::{by_compute, strided};
@@ -215,6 +216,14 @@ fn sources() -> Vec<Use> {
                 unsafe {
                     gaussian(gpu).cmd_bind_gaussian_spherical_harmonics(commands.raw, &buffer.bound(256));
                 }
+                commands.camera(&camera());
+                commands.draw(0..1);
+            })
+        }),
+        right("positions that are decoded", |gpu| {
+            let buffer = Addressed::new(gpu, 256);
+            drawing(gpu, &decoding::words(), &[SPLAT], |commands| {
+                decoding::bind(gpu, commands.raw, &decoding::tables(&buffer));
                 commands.camera(&camera());
                 commands.draw(0..1);
             })

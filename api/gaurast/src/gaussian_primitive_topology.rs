@@ -10,9 +10,10 @@ use ash::vk;
 
 use crate::ash_compat;
 use crate::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianSphericalHarmonicsBufferGAURAST,
-    PFN_vkCmdBeginGaussianSetGAURAST, PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST, PFN_vkCmdEndGaussianSetGAURAST,
-    PFN_vkCmdSetGaussianAlphaCeilingGAURAST, PFN_vkCmdSetGaussianAlphaFloorGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianDecodingTablesGAURAST, GaussianOrderGAURAST,
+    GaussianSphericalHarmonicsBufferGAURAST, PFN_vkCmdBeginGaussianSetGAURAST,
+    PFN_vkCmdBindGaussianDecodingTablesGAURAST, PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
+    PFN_vkCmdEndGaussianSetGAURAST, PFN_vkCmdSetGaussianAlphaCeilingGAURAST, PFN_vkCmdSetGaussianAlphaFloorGAURAST,
     PFN_vkCmdSetGaussianAntialiasingGAURAST, PFN_vkCmdSetGaussianCamerasGAURAST,
     PFN_vkCmdSetGaussianContributionBudgetGAURAST, PFN_vkCmdSetGaussianExponentialErrorGAURAST,
     PFN_vkCmdSetGaussianLowPassVarianceGAURAST, PFN_vkCmdSetGaussianOrderGAURAST,
@@ -293,6 +294,27 @@ impl Device {
             (self.fp.cmd_bind_gaussian_spherical_harmonics_gaurast)(command_buffer, buffer);
         }
     }
+    /// Binds the tables by which the attributes of the Gaussian draws that follow are decoded, for
+    /// pipelines with a
+    /// [`PipelineGaussianDecodingStateCreateInfoGAURAST`](crate::vk::PipelineGaussianDecodingStateCreateInfoGAURAST).
+    /// They are command buffer state, as vertex buffers are.
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdBindGaussianDecodingTablesGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdBindGaussianDecodingTablesGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_bind_gaussian_decoding_tables(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        tables: &GaussianDecodingTablesGAURAST<'_>,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_bind_gaussian_decoding_tables_gaurast)(command_buffer, tables);
+        }
+    }
 }
 
 /// Raw VK_GAURAST_gaussian_primitive_topology device-level function pointers.
@@ -324,6 +346,8 @@ pub struct DeviceFn {
     pub cmd_set_gaussian_contribution_budget_gaurast: PFN_vkCmdSetGaussianContributionBudgetGAURAST,
     /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
     pub cmd_bind_gaussian_spherical_harmonics_gaurast: PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
+    /// `vkCmdBindGaussianDecodingTablesGAURAST`.
+    pub cmd_bind_gaussian_decoding_tables_gaurast: PFN_vkCmdBindGaussianDecodingTablesGAURAST,
 }
 
 impl DeviceFn {
@@ -534,6 +558,23 @@ impl DeviceFn {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
                         core::mem::transmute::<*const c_void, PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST>(function)
+                    }
+                }
+            },
+            cmd_bind_gaussian_decoding_tables_gaurast: {
+                unsafe extern "system" fn cmd_bind_gaussian_decoding_tables_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _p_tables: *const GaussianDecodingTablesGAURAST<'_>,
+                ) {
+                    panic!("Unable to load cmd_bind_gaussian_decoding_tables_gaurast")
+                }
+                let function = load(c"vkCmdBindGaussianDecodingTablesGAURAST");
+                if function.is_null() {
+                    cmd_bind_gaussian_decoding_tables_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdBindGaussianDecodingTablesGAURAST>(function)
                     }
                 }
             },

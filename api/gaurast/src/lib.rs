@@ -48,6 +48,39 @@
 //! # }
 //! ```
 //!
+//! A compressed scene can be drawn as its file holds it. This is a compressed PLY of degree 0: four words for each Gaussian,
+//! and the bounds of every 256.
+//!
+//! ```
+//! use gaurast::vk::{self, GaussianDecodingGAURAST as Decoding};
+//!
+//! // Beside `PipelineGaussianStateCreateInfoGAURAST`, whose flags have `LOG_SCALE`. Positions, rotations, scales and
+//! // colours are attributes of format `R32_UINT`, at offsets 0, 4, 8 and 12, and opacities of `R8_UNORM` at 12.
+//! let decoding = vk::PipelineGaussianDecodingStateCreateInfoGAURAST::default()
+//!     .position(Decoding::CHUNK)
+//!     .rotation(vk::GaussianRotationDecodingGAURAST::SMALLEST_THREE_10)
+//!     .scale(Decoding::CHUNK)
+//!     .color(Decoding::CHUNK)
+//!     .base_color(true);
+//!
+//! // The file's element `chunk` is in a buffer: minima and maxima of positions, then of scales, then of colours.
+//! fn tables(address: ash::vk::DeviceAddress, chunks: u64) -> vk::GaussianDecodingTablesGAURAST<'static> {
+//!     const CHUNK: u64 = 72;
+//!     let from = |byte: u64| {
+//!         vk::GaussianDecodingTableGAURAST::default()
+//!             .device_address(address + byte)
+//!             .size(chunks * CHUNK - byte)
+//!             .format(ash::vk::Format::R32_SFLOAT)
+//!             .stride(CHUNK as u32)
+//!             .chunk_size(256)
+//!     };
+//!     vk::GaussianDecodingTablesGAURAST::default().position(from(0)).scale(from(24)).color(from(48))
+//! }
+//! let tables = tables(1 << 32, 100); // for `cmd_bind_gaussian_decoding_tables`, before the draw
+//! assert_eq!(tables.color.size, 7152);
+//! # assert_eq!(decoding.position, Decoding::CHUNK);
+//! ```
+//!
 //! `VK_GAURAST_driver_options` is beside it: [`DriverOptionsGAURAST`](vk::DriverOptionsGAURAST) in the `pNext` chain of
 //! `VkInstanceCreateInfo` sets the driver's threads, its instruction set, and a receiver of traces of work.
 //!

@@ -45,13 +45,19 @@ plain!(
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
     GaussianCameraGAURAST,
-    GaussianSphericalHarmonicsBufferGAURAST
+    GaussianSphericalHarmonicsBufferGAURAST,
+    GaussianDecodingTablesGAURAST,
+    PipelineGaussianDecodingStateCreateInfoGAURAST
 );
 
 /// The features of the extension that are enabled.
 pub(crate) type Features = Plain<gvk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>>;
 /// The Gaussian state of a pipeline.
 pub(crate) type GaussianState = Plain<gvk::PipelineGaussianStateCreateInfoGAURAST<'static>>;
+/// The decodings of a pipeline's attributes.
+pub(crate) type Decoding = Plain<gvk::PipelineGaussianDecodingStateCreateInfoGAURAST<'static>>;
+/// The tables by which attributes are decoded.
+pub(crate) type DecodingTables = Plain<gvk::GaussianDecodingTablesGAURAST<'static>>;
 /// A camera.
 #[derive(Clone, Copy)]
 pub(crate) struct Camera {

@@ -117,6 +117,7 @@ macro_rules! device_commands {
             cmd_set_gaussian_exponential_error
             cmd_set_gaussian_contribution_budget
             cmd_bind_gaussian_spherical_harmonics
+            cmd_bind_gaussian_decoding_tables
         }
     };
 }

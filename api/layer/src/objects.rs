@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::facts::GaussianState;
+use crate::facts::{Decoding, GaussianState};
 
 /// Memory.
 #[derive(Clone, Copy, Debug)]
@@ -132,6 +132,8 @@ pub(crate) struct Pipeline {
     pub(crate) gaussian: Option<GaussianState>,
     /// The exponential error and the contribution budget.
     pub(crate) approximation: Option<[f32; 2]>,
+    /// The decodings of attributes.
+    pub(crate) decoding: Option<Decoding>,
     pub(crate) has_fragment: bool,
     /// The states that are dynamic.
     pub(crate) dynamic: Vec<vk::DynamicState>,

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use ash::vk;
 
-use crate::facts::{Camera, GaussianState, Harmonics};
+use crate::facts::{Camera, DecodingTables, GaussianState, Harmonics};
 use crate::objects::{BufferDescriptor, Pipeline, RenderPass, Subpass};
 
 /// A bound vertex buffer.
@@ -35,12 +35,21 @@ pub(crate) struct BoundHarmonics {
     pub(crate) buffer: Option<(vk::Buffer, u64)>,
 }
 
+/// Tables by which attributes are decoded, and the buffers in which their addresses were.
+#[derive(Clone)]
+pub(crate) struct BoundTables {
+    pub(crate) tables: DecodingTables,
+    /// The buffers and their numbers.
+    pub(crate) buffers: Vec<(vk::Buffer, u64)>,
+}
+
 /// All that attributes and indices come from.
 #[derive(Clone, Default)]
 pub(crate) struct Inputs {
     pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
     pub(crate) index_buffer: Option<IndexBuffer>,
     pub(crate) harmonics: Option<BoundHarmonics>,
+    pub(crate) decoding_tables: Option<BoundTables>,
 }
 
 /// A bound descriptor set.

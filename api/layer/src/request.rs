@@ -7,11 +7,12 @@ use ash::vk;
 use ash::vk::GraphicsPipelineLibraryFlagsEXT as Parts;
 use gaurast::vk::{
     GaussianCutOffGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianDecodingStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 
-use crate::facts::GaussianState;
+use crate::facts::{Decoding, GaussianState};
 use crate::objects::{Attribute, DepthTest, Layout, Objects, Subpass, VertexBinding};
 use crate::spirv::reads_constants;
 use gaurast_layer_interface::{find, slice, string};
@@ -77,6 +78,7 @@ pub(crate) struct Request {
     pub(crate) approximation: Option<[f32; 2]>,
     pub(crate) footprint: Option<Footprint>,
     pub(crate) sigma_points: Option<SigmaPoints>,
+    pub(crate) decoding: Option<Decoding>,
     pub(crate) stages: Vec<Stage>,
     /// By binding and by location; `None` where the vertex input is dynamic.
     pub(crate) vertex_input: Option<(BTreeMap<u32, VertexBinding>, BTreeMap<u32, Attribute>)>,
@@ -110,6 +112,7 @@ impl Request {
             approximation: None,
             footprint: None,
             sigma_points: None,
+            decoding: None,
             stages: Vec::new(),
             vertex_input: None,
             subpass: Subpass::default(),
@@ -215,6 +218,8 @@ impl Request {
                 compensation_floor: state.compensation_floor,
             });
             self.sigma_points = sigma_points.map(SigmaPoints::of);
+            let decoding = find::<PipelineGaussianDecodingStateCreateInfoGAURAST<'_>>(info.p_next);
+            self.decoding = decoding.map(Decoding::of);
             if let Some(raster) = info.p_rasterization_state.as_ref() {
                 self.cull_mode = raster.cull_mode;
                 self.polygon_mode = raster.polygon_mode;
@@ -287,6 +292,7 @@ impl Request {
             self.approximation = library.approximation;
             self.footprint = library.footprint;
             self.sigma_points = library.sigma_points;
+            self.decoding = library.decoding;
             self.cull_mode = library.cull_mode;
             self.polygon_mode = library.polygon_mode;
             self.discards = library.discards;

@@ -32,16 +32,7 @@ pub(crate) fn cmd_bind_gaussian_spherical_harmonics(
 /// The bytes at an address and of a size.
 fn range(addresses: &Addresses, buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>) -> Result<BufferRange, Error> {
     let (address, size) = (buffer.device_address, buffer.size);
-    let table = addresses.table();
-    let found = table.find(address).and_then(|(range, start)| {
-        let offset = address - start;
-        (size <= range.size - offset).then(|| BufferRange {
-            memory: range.memory.clone(),
-            offset: range.offset + offset,
-            size,
-        })
-    });
-    found.ok_or_else(|| {
+    addresses.range(address, size).ok_or_else(|| {
         Error::usage(
             "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016",
             format!("no buffer with an address holds {size} bytes at {address:#x}"),

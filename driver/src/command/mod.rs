@@ -11,6 +11,7 @@ pub(crate) mod camera;
 pub(crate) mod conditional;
 pub(crate) mod draw;
 pub(crate) mod dynamic_state;
+pub(crate) mod gaussian_decoding;
 pub(crate) mod gaussian_harmonics;
 pub(crate) mod gaussian_set;
 pub(crate) mod gaussian_state;
@@ -34,6 +35,7 @@ use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
 use simdevice::BufferRange;
+use simdevice::packet::AttributeStream;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{Rect, Viewport};
 use simdevice::transform_feedback::CounterBuffers;
@@ -51,6 +53,84 @@ pub(crate) struct HarmonicsBuffer {
     pub(crate) stride: u32,
     /// Bytes from a coefficient to the next.
     pub(crate) coefficient_stride: u64,
+}
+
+impl HarmonicsBuffer {
+    /// The stream of a coefficient.
+    pub(crate) fn coefficient(&self, number: u64) -> AttributeStream {
+        let range = &self.range;
+        let start = number.saturating_mul(self.coefficient_stride);
+        // Streams that begin at the same place are read together.
+        let (moved, offset) = match u32::try_from(start) {
+            Ok(offset) => (0, offset),
+            Err(_) => (start.min(range.size), 0),
+        };
+        AttributeStream {
+            buffer: BufferRange {
+                memory: Arc::clone(&range.memory),
+                offset: range.offset + moved,
+                size: range.size - moved,
+            },
+            stride: self.stride,
+            offset,
+            format: self.format,
+            instance_divisor: None,
+        }
+    }
+}
+
+/// A bound table of bounds or values, by which an attribute is decoded.
+#[derive(Clone, Debug)]
+pub(crate) struct DecodingTable {
+    /// The bytes that may be read, if there are any.
+    pub(crate) range: Option<BufferRange>,
+    /// True if numbers are binary64, false if they are binary32.
+    pub(crate) is_binary64: bool,
+    /// Bytes from a chunk to the next.
+    pub(crate) stride: u32,
+    /// The Gaussians of a chunk.
+    pub(crate) chunk_size: u32,
+}
+
+/// The bound codes of spherical harmonics.
+#[derive(Clone, Debug)]
+pub(crate) struct HarmonicsCodes {
+    /// The bytes that may be read, if there are any.
+    pub(crate) range: Option<BufferRange>,
+    /// Bytes from a Gaussian, or an entry of a palette, to the next.
+    pub(crate) stride: u32,
+    /// Bytes from a coefficient to the next.
+    pub(crate) coefficient_stride: u32,
+    /// Bytes from a component to the next.
+    pub(crate) component_stride: u32,
+}
+
+/// The bound labels of a palette.
+#[derive(Clone, Debug)]
+pub(crate) struct HarmonicsLabels {
+    /// The bytes that may be read, if there are any.
+    pub(crate) range: Option<BufferRange>,
+    /// Bytes from a Gaussian to the next.
+    pub(crate) stride: u32,
+}
+
+/// The bound tables by which attributes are decoded.
+#[derive(Clone, Debug)]
+pub(crate) struct DecodingTables {
+    /// That of positions.
+    pub(crate) position: DecodingTable,
+    /// That of scales.
+    pub(crate) scale: DecodingTable,
+    /// That of opacities.
+    pub(crate) opacity: DecodingTable,
+    /// That of coefficient 0 of the spherical harmonics.
+    pub(crate) color: DecodingTable,
+    /// That of the other coefficients.
+    pub(crate) harmonics: DecodingTable,
+    /// The codes of the other coefficients.
+    pub(crate) codes: HarmonicsCodes,
+    /// The labels of a palette.
+    pub(crate) labels: HarmonicsLabels,
 }
 
 /// A recorded command.
@@ -94,6 +174,8 @@ pub(crate) enum Command {
     SetCameras(Box<[Camera]>),
     /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
     BindHarmonics(Box<HarmonicsBuffer>),
+    /// `vkCmdBindGaussianDecodingTablesGAURAST`.
+    BindDecodingTables(Box<DecodingTables>),
     /// `vkCmdBeginGaussianSetGAURAST`.
     BeginGaussianSet,
     /// `vkCmdEndGaussianSetGAURAST`.

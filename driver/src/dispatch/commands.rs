@@ -377,6 +377,7 @@ static ROWS: &[Command] = rows! {
         vkCmdBeginGaussianSetGAURAST: gaurast::vk::PFN_vkCmdBeginGaussianSetGAURAST;
         vkCmdEndGaussianSetGAURAST: gaurast::vk::PFN_vkCmdEndGaussianSetGAURAST;
         vkCmdBindGaussianSphericalHarmonicsGAURAST: gaurast::vk::PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST;
+        vkCmdBindGaussianDecodingTablesGAURAST: gaurast::vk::PFN_vkCmdBindGaussianDecodingTablesGAURAST;
         vkCmdSetGaussianOrderGAURAST: gaurast::vk::PFN_vkCmdSetGaussianOrderGAURAST;
         vkCmdSetGaussianAntialiasingGAURAST: gaurast::vk::PFN_vkCmdSetGaussianAntialiasingGAURAST;
         vkCmdSetGaussianLowPassVarianceGAURAST: gaurast::vk::PFN_vkCmdSetGaussianLowPassVarianceGAURAST;
@@ -4172,6 +4173,19 @@ unsafe extern "system" fn vkCmdBindGaussianSphericalHarmonicsGAURAST(
         command::gaussian_harmonics::cmd_bind_gaussian_spherical_harmonics(
             handle::get(command_buffer)?,
             valid::input(p_buffer)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkCmdBindGaussianDecodingTablesGAURAST(
+    command_buffer: vk::CommandBuffer,
+    p_tables: *const gaurast::vk::GaussianDecodingTablesGAURAST<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(command_buffer, "vkCmdBindGaussianDecodingTablesGAURAST", || unsafe {
+        command::gaussian_decoding::cmd_bind_gaussian_decoding_tables(
+            handle::get(command_buffer)?,
+            valid::input(p_tables)?,
         )
     })
 }

@@ -212,6 +212,22 @@ unsafe fn read_rasterization(
                     }
                 )
             });
+        own.decoding = valid::find_in_chain::<gvk::PipelineGaussianDecodingStateCreateInfoGAURAST<'_>>(info.p_next)
+            .map(|state| {
+                unchained!(
+                    state,
+                    gvk::PipelineGaussianDecodingStateCreateInfoGAURAST {
+                        position,
+                        signed_log_position,
+                        scale,
+                        rotation,
+                        opacity,
+                        color,
+                        base_color,
+                        spherical_harmonics,
+                    }
+                )
+            });
         if tessellates && let Some(state) = valid::optional(info.p_tessellation_state) {
             own.patch_control_points = state.patch_control_points;
             let origin = valid::find_in_chain::<vk::PipelineTessellationDomainOriginStateCreateInfo<'_>>(state.p_next);

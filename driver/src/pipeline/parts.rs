@@ -6,8 +6,9 @@ use crate::abi::error::Error;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianDecodingStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 use std::sync::Arc;
 
@@ -115,6 +116,8 @@ pub(crate) struct PreRasterizationState {
     pub(crate) footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
     /// The extension's structure of sigma points.
     pub(crate) unscented: Option<PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>>,
+    /// The extension's structure of decodings.
+    pub(crate) decoding: Option<PipelineGaussianDecodingStateCreateInfoGAURAST<'static>>,
 }
 
 /// The fragment stage, and the depth and stencil tests.

@@ -39,25 +39,37 @@ pub(crate) fn attribute(
     location: u32,
     components: u32,
 ) -> Result<AttributeSource, Error> {
-    let refuse = |what: String| {
-        Error::usage(
-            "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
-            if location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
-                format!("{name} is unused, but the pipeline reads it")
-            } else {
-                format!("{name} is location {location}, {what}")
-            },
-        )
-    };
-    let source = source(&graphics.vertex_input.input, location).map_err(refuse)?;
+    let source = find_attribute(graphics, name, location)?;
     let format = source.format;
     if format.is_integer() {
-        return Err(refuse(format!("whose format {format:?} does not convert to floating point")));
+        let what = format!("whose format {format:?} does not convert to floating point");
+        return Err(unsuitable(name, location, &what));
     }
     if (format.components().len() as u32) < components {
-        return Err(refuse(format!("whose format {format:?} has fewer than {components} components")));
+        let what = format!("whose format {format:?} has fewer than {components} components");
+        return Err(unsuitable(name, location, &what));
     }
     Ok(source)
+}
+
+/// Finds the attribute at `location`, which the extension calls `name`, of whatever format.
+///
+/// # Errors
+/// An [`Error`] if the location or its binding is unsuitable, or its format is none of vertex attributes.
+pub(crate) fn find_attribute(graphics: &GraphicsState, name: &str, location: u32) -> Result<AttributeSource, Error> {
+    source(&graphics.vertex_input.input, location).map_err(|what| unsuitable(name, location, &what))
+}
+
+/// The error that the attribute `name` cannot be read from `location`, because of `what`.
+fn unsuitable(name: &str, location: u32, what: &str) -> Error {
+    Error::usage(
+        "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
+        if location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            format!("{name} is unused, but the pipeline reads it")
+        } else {
+            format!("{name} is location {location}, {what}")
+        },
+    )
 }
 
 /// Finds the attribute at `location`.

@@ -352,6 +352,7 @@ features! {
         opacityCompensationFloor => opacity_compensation_floor: true;
         gaussianDistortion => gaussian_distortion: true;
         unscentedParameters => unscented_parameters: true;
+        attributeDecoding => attribute_decoding: true;
     }
     structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
         performanceCounterQueryPools => performance_counter_query_pools: true;

@@ -164,7 +164,7 @@ impl ReuseCache {
     }
 }
 
-/// All attributes that an append reads from memory, positions first.
+/// All attributes and tables that an append reads from memory, positions first.
 fn attributes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
     let attributes = &append.attributes;
     let model = &attributes.model;
@@ -174,4 +174,5 @@ fn attributes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream>
         .chain(&attributes.spherical_harmonics)
         .chain(model.matrix.iter().flat_map(|rows| rows.iter()))
         .chain(&model.opacity)
+        .chain(attributes.tables.iter().flat_map(|tables| tables.iter()))
 }

@@ -1,5 +1,6 @@
 //! Draws, sorted sets of Gaussians and dispatches, and the streams that they read.
 
+use super::decoding::Decodings;
 use crate::format::Format;
 use crate::program::bindings::Bindings;
 use crate::program::compute::ComputeProgram;
@@ -190,14 +191,16 @@ pub struct GaussianBegin {
     pub scissor: Rect,
 }
 
-/// The functions that are applied to attributes as they are read. They are computed in binary64 and rounded once to
-/// binary32.
+/// The functions that are applied to attributes as they are read: decodings first. They are computed in binary64 and rounded
+/// once to binary32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Activations {
     /// True if standard deviations are exponentials of the stored values.
     pub log_scale: bool,
     /// True if opacities are `1 / (1 + exp(-x))` of the stored values `x`.
     pub logit_opacity: bool,
+    /// The decodings of the stored values.
+    pub decodings: Decodings,
 }
 
 /// The vertex attributes of fixed-function projection.
@@ -213,10 +216,38 @@ pub struct GaussianAttributes {
     pub opacity: AttributeStream,
     /// The `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
     pub spherical_harmonics: Vec<AttributeStream>,
-    /// The functions from stored values to standard deviations and opacities.
+    /// The functions from stored values to attributes.
     pub activations: Activations,
+    /// The tables of the decodings, if there are any.
+    pub tables: Option<Box<DecodingTables>>,
     /// The transform of the Gaussians, usually by instance.
     pub model: ModelAttributes,
+}
+
+/// The tables that decodings read. A table of bounds has an element for each chunk: the minima of all components, then
+/// their maxima. A codebook has one element, of 256 numbers. What lies outside of a table's buffer reads as zeros.
+#[derive(Clone, Debug, Default)]
+pub struct DecodingTables {
+    /// That of positions, if they are decoded.
+    pub position: Option<AttributeStream>,
+    /// That of scales, if they are decoded.
+    pub scale: Option<AttributeStream>,
+    /// That of opacities, if they are decoded.
+    pub opacity: Option<AttributeStream>,
+    /// That of coefficient 0, if it is decoded.
+    pub color: Option<AttributeStream>,
+    /// The codebook of the other coefficients, if they are decoded.
+    pub harmonics: Option<AttributeStream>,
+    /// The numbers of vertices' entries in a palette, 16 bits each, if there is one.
+    pub labels: Option<AttributeStream>,
+}
+
+impl DecodingTables {
+    /// All tables that there are.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &AttributeStream> {
+        let Self { position, scale, opacity, color, harmonics, labels } = self;
+        [position, scale, opacity, color, harmonics, labels].into_iter().flatten()
+    }
 }
 
 /// The vertex attributes that place a copy of Gaussians in the world.

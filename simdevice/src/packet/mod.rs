@@ -2,14 +2,16 @@
 //! by [`Arc`](std::sync::Arc).
 
 mod command;
+mod decoding;
 mod display;
 mod draw;
 mod rendering;
 mod transfer;
 
 pub use command::Packet;
+pub use decoding::{Decoding, Decodings, HarmonicsCodes, HarmonicsDecoding, RotationDecoding};
 pub use draw::{
-    Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
+    Activations, AttributeStream, DecodingTables, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
     GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
 };
 pub use rendering::{Attachment, AttachmentClear, AttachmentResolve, ClearAttachments, LoadOp, Rendering, StoreOp};

@@ -102,6 +102,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
             opacity: stream(10, Format::R32Sfloat),
             model: ModelAttributes::default(),
             activations: Default::default(),
+            tables: None,
             spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
         },
         indices: None,

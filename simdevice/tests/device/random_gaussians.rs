@@ -362,7 +362,8 @@ fn gaussians(rng: &mut ChaCha8Rng, degree: u32) -> GaussianAppend {
     let coefficients = (degree + 1) * (degree + 1);
     let stride = 4 * (11 + 3 * coefficients);
     let count = rng.random_range(20..700);
-    let activations = Activations { log_scale: rng.random_bool(0.3), logit_opacity: rng.random_bool(0.3) };
+    let activations =
+        Activations { log_scale: rng.random_bool(0.3), logit_opacity: rng.random_bool(0.3), ..Activations::default() };
     let size_of_all = *[0.3, 1.0, 3.0f32].choose(rng).unwrap();
     let mut floats: Vec<f32> = Vec::new();
     for _ in 0..count {
@@ -409,6 +410,7 @@ fn gaussians(rng: &mut ChaCha8Rng, degree: u32) -> GaussianAppend {
             opacity: stream(10, Format::R32Sfloat),
             model,
             activations,
+            tables: None,
             spherical_harmonics: (0..coefficients).map(|k| stream(11 + 3 * k, Format::R32G32B32Sfloat)).collect(),
         },
         indices: None,

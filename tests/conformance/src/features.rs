@@ -14,7 +14,7 @@ use crate::draw::Draw;
 pub type Feature = (&'static str, fn(&Features<'_>) -> vk::Bool32);
 
 /// All features of the extension, in the order of the structure.
-pub const FEATURES: [Feature; 28] = [
+pub const FEATURES: [Feature; 29] = [
     ("gaussianPrimitiveTopology", |has| has.gaussian_primitive_topology),
     ("vertexShaderProjection", |has| has.vertex_shader_projection),
     ("resolveFragmentShader", |has| has.resolve_fragment_shader),
@@ -43,6 +43,7 @@ pub const FEATURES: [Feature; 28] = [
     ("opacityCompensationFloor", |has| has.opacity_compensation_floor),
     ("gaussianDistortion", |has| has.gaussian_distortion),
     ("unscentedParameters", |has| has.unscented_parameters),
+    ("attributeDecoding", |has| has.attribute_decoding),
 ];
 
 /// The names of the features that a draw needs.

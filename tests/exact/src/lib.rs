@@ -163,12 +163,13 @@ fn attachments(device: &gaurast_conformance::Device, case: &gaurast_conformance:
 const NOT_SUPPORTED: [&str; 2] = ["samples_2.", "samples_8."];
 
 /// The chapters of conformance cases that are about commands, and whose pixels are those of others.
-const OF_COMMANDS: [&str; 15] = [
+const OF_COMMANDS: [&str; 16] = [
     "draws",
     "sets",
     "vertex_input",
     "activation",
     "harmonics_buffer",
+    "decoding",
     "dynamic_state",
     "views",
     "projection",

@@ -465,7 +465,12 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
             rotation: stream(bytes, Format::R32G32B32A32Sfloat),
             opacity: stream(bytes, Format::R32Sfloat),
             model,
-            activations: Activations { log_scale: bytes.rarely(8), logit_opacity: bytes.rarely(8) },
+            activations: Activations {
+                log_scale: bytes.rarely(8),
+                logit_opacity: bytes.rarely(8),
+                ..Activations::default()
+            },
+            tables: None,
             spherical_harmonics: vec![stream(bytes, triple)],
         },
         indices: bytes.rarely(4).then(|| IndexStream {

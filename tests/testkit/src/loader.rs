@@ -170,6 +170,7 @@ fn unregistered_structures() -> String {
         GaussianCameraGAURAST as Camera, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
         PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
         PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+        PipelineGaussianDecodingStateCreateInfoGAURAST as Decoding,
         PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
     };
     let separator = if cfg!(windows) { ";" } else { ":" };
@@ -179,6 +180,7 @@ fn unregistered_structures() -> String {
         (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
         (Approximation::STRUCTURE_TYPE, size_of::<Approximation<'_>>()),
         (Footprint::STRUCTURE_TYPE, size_of::<Footprint<'_>>()),
+        (Decoding::STRUCTURE_TYPE, size_of::<Decoding<'_>>()),
         (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
     ]
     .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))

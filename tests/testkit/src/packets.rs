@@ -58,6 +58,7 @@ pub fn attributes(scene: &SceneBuffers) -> GaussianAttributes {
         opacity: stream(&buffer(&scene.opacities), 4, 0, Format::R32Sfloat),
         model: ModelAttributes::default(),
         activations: Default::default(),
+        tables: None,
         spherical_harmonics: vec![triples(&scene.sh)],
     }
 }

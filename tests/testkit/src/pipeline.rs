@@ -2,8 +2,9 @@
 
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST, PipelineGaussianUnscentedStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianDecodingStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
 
 use crate::descriptors::{Binding, Bindings, Sets, write};
@@ -115,6 +116,8 @@ pub struct Graphics<'a> {
     pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
     /// The sigma points of the unscented transform.
     pub unscented: Option<PipelineGaussianUnscentedStateCreateInfoGAURAST<'static>>,
+    /// The decodings of attributes.
+    pub decoding: Option<PipelineGaussianDecodingStateCreateInfoGAURAST<'static>>,
 }
 
 impl Default for Graphics<'_> {
@@ -156,6 +159,7 @@ impl Default for Graphics<'_> {
             approximation: None,
             footprint: None,
             unscented: None,
+            decoding: None,
         }
     }
 }
@@ -284,6 +288,7 @@ impl Graphics<'_> {
         let mut approximation = self.approximation.unwrap_or_default();
         let mut footprint = self.footprint.unwrap_or_default();
         let mut unscented = self.unscented.unwrap_or_default();
+        let mut decoding = self.decoding.unwrap_or_default();
         let mut parts = vk::GraphicsPipelineLibraryCreateInfoEXT::default().flags(self.parts.unwrap_or_default());
         let mut libraries = vk::PipelineLibraryCreateInfoKHR::default().libraries(&self.libraries);
         let mut info = vk::GraphicsPipelineCreateInfo::default().flags(self.flags).dynamic_state(&dynamic);
@@ -329,6 +334,9 @@ impl Graphics<'_> {
         }
         if self.unscented.is_some() {
             info = info.push_next(&mut unscented);
+        }
+        if self.decoding.is_some() {
+            info = info.push_next(&mut decoding);
         }
         let cache = vk::PipelineCache::null();
         // SAFETY: see the crate.

@@ -64,6 +64,16 @@ pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_DISTORTION_GAURAST: vk::StructureType =
 pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_008);
 
+/// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST")]
+pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_009);
+
+/// `VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST")]
+pub const STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_010);
+
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
 pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_000);
@@ -303,6 +313,57 @@ vk_enum! {
     }
 }
 
+vk_enum! {
+    /// The way in which an attribute's values are computed from integers.
+    #[doc(alias = "VkGaussianDecodingGAURAST")]
+    pub struct GaussianDecodingGAURAST {
+        /// None: the attribute has the values.
+        #[doc(alias = "VK_GAUSSIAN_DECODING_NONE_GAURAST")]
+        NONE = 0,
+        /// A fraction of the way from the least to the greatest value of a chunk of Gaussians.
+        #[doc(alias = "VK_GAUSSIAN_DECODING_CHUNK_GAURAST")]
+        CHUNK = 1,
+        /// The number of a value in a codebook of 256.
+        #[doc(alias = "VK_GAUSSIAN_DECODING_CODEBOOK_GAURAST")]
+        CODEBOOK = 2,
+    }
+}
+
+vk_enum! {
+    /// The way in which quaternions are computed from integers: of their four components the
+    /// largest is left out.
+    #[doc(alias = "VkGaussianRotationDecodingGAURAST")]
+    pub struct GaussianRotationDecodingGAURAST {
+        /// None: the attribute is the quaternion.
+        #[doc(alias = "VK_GAUSSIAN_ROTATION_DECODING_NONE_GAURAST")]
+        NONE = 0,
+        /// A word: the index of the largest component in 2 bits, then the others in 10 bits each, as
+        /// in compressed PLY.
+        #[doc(alias = "VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_10_GAURAST")]
+        SMALLEST_THREE_10 = 1,
+        /// Four bytes: the smaller components, then 252 more than the index of the largest, as in SOG.
+        #[doc(alias = "VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_8_GAURAST")]
+        SMALLEST_THREE_8 = 2,
+    }
+}
+
+vk_enum! {
+    /// The way in which the coefficients of spherical harmonics from degree 1 on are computed from
+    /// bytes.
+    #[doc(alias = "VkGaussianHarmonicsDecodingGAURAST")]
+    pub struct GaussianHarmonicsDecodingGAURAST {
+        /// None: they are attributes, or in a buffer.
+        #[doc(alias = "VK_GAUSSIAN_HARMONICS_DECODING_NONE_GAURAST")]
+        NONE = 0,
+        /// Each Gaussian has bytes, which are numbers of values in a codebook of 256.
+        #[doc(alias = "VK_GAUSSIAN_HARMONICS_DECODING_CODEBOOK_GAURAST")]
+        CODEBOOK = 1,
+        /// Each Gaussian has the number of an entry of a palette, which has such bytes.
+        #[doc(alias = "VK_GAUSSIAN_HARMONICS_DECODING_PALETTE_GAURAST")]
+        PALETTE = 2,
+    }
+}
+
 vk_flags! {
     /// The functions that are applied to attributes before anything else, and the place of
     /// spherical harmonics. Fixed-function projection only.
@@ -401,6 +462,9 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     /// [`PipelineGaussianUnscentedStateCreateInfoGAURAST`] with other values than those without
     /// it.
     pub unscented_parameters: vk::Bool32,
+    /// [`PipelineGaussianDecodingStateCreateInfoGAURAST`] with a decoding other than none:
+    /// attributes that are stored as the codes of compressed files.
+    pub attribute_decoding: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -446,6 +510,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             opacity_compensation_floor: vk::Bool32::default(),
             gaussian_distortion: vk::Bool32::default(),
             unscented_parameters: vk::Bool32::default(),
+            attribute_decoding: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -481,6 +546,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         opacity_compensation_floor,
         gaussian_distortion,
         unscented_parameters,
+        attribute_decoding,
     }
 }
 
@@ -933,6 +999,88 @@ impl PipelineGaussianUnscentedStateCreateInfoGAURAST<'_> {
     }
 }
 
+/// The decodings of a pipeline's attributes, so that compressed scenes are drawn as their
+/// files hold them.
+///
+/// Chain it to `VkGraphicsPipelineCreateInfo`, beside
+/// [`PipelineGaussianStateCreateInfoGAURAST`]. An attribute with a decoding has integers, and
+/// its values are computed from them and from the tables that
+/// `vkCmdBindGaussianDecodingTablesGAURAST` binds. Without the structure nothing is decoded.
+/// Decodings need `attributeDecoding`.
+#[doc(alias = "VkPipelineGaussianDecodingStateCreateInfoGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct PipelineGaussianDecodingStateCreateInfoGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The decoding of positions.
+    pub position: GaussianDecodingGAURAST,
+    /// True if decoded positions are signed logarithms, as in SOG: the coordinate is sign(x)
+    /// (exp(|x|) - 1). Ignored without a decoding of positions.
+    pub signed_log_position: vk::Bool32,
+    /// The decoding of scales. [`PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE`] applies to
+    /// what is decoded.
+    pub scale: GaussianDecodingGAURAST,
+    /// The decoding of rotations.
+    pub rotation: GaussianRotationDecodingGAURAST,
+    /// The decoding of opacities. [`PipelineGaussianStateCreateFlagsGAURAST::LOGIT_OPACITY`]
+    /// applies to what is decoded.
+    pub opacity: GaussianDecodingGAURAST,
+    /// The decoding of coefficient 0 of the spherical harmonics.
+    pub color: GaussianDecodingGAURAST,
+    /// True if decoded values c are colours, as in compressed PLY: the coefficient is (c - 0.5) /
+    /// 0.28209479177387814. Ignored without a decoding of coefficient 0.
+    pub base_color: vk::Bool32,
+    /// The decoding of all other coefficients, which are then no attributes.
+    pub spherical_harmonics: GaussianHarmonicsDecodingGAURAST,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    PipelineGaussianDecodingStateCreateInfoGAURAST =
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST,
+    vk::ExtendsGraphicsPipelineCreateInfo
+);
+
+impl Default for PipelineGaussianDecodingStateCreateInfoGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            position: GaussianDecodingGAURAST::default(),
+            signed_log_position: vk::Bool32::default(),
+            scale: GaussianDecodingGAURAST::default(),
+            rotation: GaussianRotationDecodingGAURAST::default(),
+            opacity: GaussianDecodingGAURAST::default(),
+            color: GaussianDecodingGAURAST::default(),
+            base_color: vk::Bool32::default(),
+            spherical_harmonics: GaussianHarmonicsDecodingGAURAST::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl PipelineGaussianDecodingStateCreateInfoGAURAST<'_> {
+    bool_setters! {
+        signed_log_position,
+        base_color,
+    }
+    setters! {
+        position: GaussianDecodingGAURAST,
+        scale: GaussianDecodingGAURAST,
+        rotation: GaussianRotationDecodingGAURAST,
+        opacity: GaussianDecodingGAURAST,
+        color: GaussianDecodingGAURAST,
+        spherical_harmonics: GaussianHarmonicsDecodingGAURAST,
+    }
+}
+
 /// A camera, for `vkCmdSetGaussianCamerasGAURAST`.
 ///
 /// A world-space point p has camera coordinates t = `rotation` (p - `eye`), with +x right, +y
@@ -1116,6 +1264,194 @@ impl GaussianSphericalHarmonicsBufferGAURAST<'_> {
     }
 }
 
+/// The bounds of chunks of Gaussians, or a codebook.
+///
+/// Bounds are the minima of an attribute's components and then their maxima, chunk after
+/// chunk. A codebook is 256 values. What does not lie within `size` bytes reads as 0. A table
+/// that no decoding uses may have a size of 0, and nothing else of it matters then.
+#[doc(alias = "VkGaussianDecodingTableGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianDecodingTableGAURAST {
+    /// The address of the first byte, in a buffer that was created for
+    /// `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` and is bound to memory.
+    pub device_address: vk::DeviceAddress,
+    /// The number of bytes that may be read.
+    pub size: vk::DeviceSize,
+    /// The format of a value: `VK_FORMAT_R32_SFLOAT` or `VK_FORMAT_R64_SFLOAT`.
+    pub format: vk::Format,
+    /// The number of bytes from a chunk's bounds to the next. Codebooks ignore it.
+    pub stride: u32,
+    /// The number of Gaussians of a chunk. Codebooks ignore it.
+    pub chunk_size: u32,
+}
+
+impl Default for GaussianDecodingTableGAURAST {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            device_address: vk::DeviceAddress::default(),
+            size: vk::DeviceSize::default(),
+            format: vk::Format::default(),
+            stride: u32::default(),
+            chunk_size: u32::default(),
+        }
+    }
+}
+
+impl GaussianDecodingTableGAURAST {
+    setters! {
+        device_address: vk::DeviceAddress,
+        size: vk::DeviceSize,
+        format: vk::Format,
+        stride: u32,
+        chunk_size: u32,
+    }
+}
+
+/// The codes of spherical harmonics, a byte for each component.
+///
+/// Component c of coefficient k, which is at least 1, of the Gaussian (or the entry of a
+/// palette) i is the byte i `stride` + (k - 1) `coefficient_stride` + c `component_stride`
+/// from `device_address` on. A component whose byte does not lie within `size` bytes is 0.
+#[doc(alias = "VkGaussianHarmonicsCodesGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianHarmonicsCodesGAURAST {
+    /// The address of the first byte, as in [`GaussianDecodingTableGAURAST`].
+    pub device_address: vk::DeviceAddress,
+    /// The number of bytes that may be read.
+    pub size: vk::DeviceSize,
+    /// The number of bytes from a Gaussian, or an entry of a palette, to the next.
+    pub stride: u32,
+    /// The number of bytes from a coefficient to the next.
+    pub coefficient_stride: u32,
+    /// The number of bytes from red to green, and from green to blue.
+    pub component_stride: u32,
+}
+
+impl Default for GaussianHarmonicsCodesGAURAST {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            device_address: vk::DeviceAddress::default(),
+            size: vk::DeviceSize::default(),
+            stride: u32::default(),
+            coefficient_stride: u32::default(),
+            component_stride: u32::default(),
+        }
+    }
+}
+
+impl GaussianHarmonicsCodesGAURAST {
+    setters! {
+        device_address: vk::DeviceAddress,
+        size: vk::DeviceSize,
+        stride: u32,
+        coefficient_stride: u32,
+        component_stride: u32,
+    }
+}
+
+/// The entries of a palette that Gaussians have: an integer of 16 bits for each.
+///
+/// A label that does not lie within `size` bytes whole names no entry.
+#[doc(alias = "VkGaussianHarmonicsLabelsGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianHarmonicsLabelsGAURAST {
+    /// The address of the first byte, as in [`GaussianDecodingTableGAURAST`].
+    pub device_address: vk::DeviceAddress,
+    /// The number of bytes that may be read.
+    pub size: vk::DeviceSize,
+    /// The number of bytes from a label to the next.
+    pub stride: u32,
+}
+
+impl Default for GaussianHarmonicsLabelsGAURAST {
+    #[inline]
+    fn default() -> Self {
+        Self { device_address: vk::DeviceAddress::default(), size: vk::DeviceSize::default(), stride: u32::default() }
+    }
+}
+
+impl GaussianHarmonicsLabelsGAURAST {
+    setters! {
+        device_address: vk::DeviceAddress,
+        size: vk::DeviceSize,
+        stride: u32,
+    }
+}
+
+/// The tables by which attributes are decoded, for `vkCmdBindGaussianDecodingTablesGAURAST`.
+///
+/// Only those are read that the pipeline's decodings use.
+#[doc(alias = "VkGaussianDecodingTablesGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct GaussianDecodingTablesGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The table of positions.
+    pub position: GaussianDecodingTableGAURAST,
+    /// The table of scales.
+    pub scale: GaussianDecodingTableGAURAST,
+    /// The table of opacities.
+    pub opacity: GaussianDecodingTableGAURAST,
+    /// The table of coefficient 0.
+    pub color: GaussianDecodingTableGAURAST,
+    /// The codebook of all other coefficients.
+    pub spherical_harmonics: GaussianDecodingTableGAURAST,
+    /// The codes of all other coefficients.
+    pub codes: GaussianHarmonicsCodesGAURAST,
+    /// The labels of a palette.
+    pub labels: GaussianHarmonicsLabelsGAURAST,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(GaussianDecodingTablesGAURAST = STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST);
+
+impl Default for GaussianDecodingTablesGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            position: GaussianDecodingTableGAURAST::default(),
+            scale: GaussianDecodingTableGAURAST::default(),
+            opacity: GaussianDecodingTableGAURAST::default(),
+            color: GaussianDecodingTableGAURAST::default(),
+            spherical_harmonics: GaussianDecodingTableGAURAST::default(),
+            codes: GaussianHarmonicsCodesGAURAST::default(),
+            labels: GaussianHarmonicsLabelsGAURAST::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl GaussianDecodingTablesGAURAST<'_> {
+    setters! {
+        position: GaussianDecodingTableGAURAST,
+        scale: GaussianDecodingTableGAURAST,
+        opacity: GaussianDecodingTableGAURAST,
+        color: GaussianDecodingTableGAURAST,
+        spherical_harmonics: GaussianDecodingTableGAURAST,
+        codes: GaussianHarmonicsCodesGAURAST,
+        labels: GaussianHarmonicsLabelsGAURAST,
+    }
+}
+
 /// A camera as a uniform buffer holds it, 128 bytes: an element of the array of a pipeline's
 /// cameras.
 ///
@@ -1234,6 +1570,11 @@ pub type PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST = unsafe extern "system"
     command_buffer: vk::CommandBuffer,
     p_buffer: *const GaussianSphericalHarmonicsBufferGAURAST<'_>,
 );
+
+/// The type of `vkCmdBindGaussianDecodingTablesGAURAST`.
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
+pub type PFN_vkCmdBindGaussianDecodingTablesGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, p_tables: *const GaussianDecodingTablesGAURAST<'_>);
 
 /// `VK_STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST`.
 #[doc(alias = "VK_STRUCTURE_TYPE_DRIVER_OPTIONS_GAURAST")]

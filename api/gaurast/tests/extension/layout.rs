@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[gaurast_runner::test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 128, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 136, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -48,6 +48,53 @@ fn features() {
         opacity_compensation_floor: 116,
         gaussian_distortion: 120,
         unscented_parameters: 124,
+        attribute_decoding: 128,
+    });
+}
+
+#[gaurast_runner::test]
+fn decodings() {
+    assert_layout!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, 48, 8, {
+        s_type: 0,
+        p_next: 8,
+        position: 16,
+        signed_log_position: 20,
+        scale: 24,
+        rotation: 28,
+        opacity: 32,
+        color: 36,
+        base_color: 40,
+        spherical_harmonics: 44,
+    });
+    assert_layout!(GaussianDecodingTableGAURAST, 32, 8, {
+        device_address: 0,
+        size: 8,
+        format: 16,
+        stride: 20,
+        chunk_size: 24,
+    });
+    assert_layout!(GaussianHarmonicsCodesGAURAST, 32, 8, {
+        device_address: 0,
+        size: 8,
+        stride: 16,
+        coefficient_stride: 20,
+        component_stride: 24,
+    });
+    assert_layout!(GaussianHarmonicsLabelsGAURAST, 24, 8, {
+        device_address: 0,
+        size: 8,
+        stride: 16,
+    });
+    assert_layout!(GaussianDecodingTablesGAURAST<'_>, 232, 8, {
+        s_type: 0,
+        p_next: 8,
+        position: 16,
+        scale: 48,
+        opacity: 80,
+        color: 112,
+        spherical_harmonics: 144,
+        codes: 176,
+        labels: 208,
     });
 }
 

@@ -132,6 +132,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, unscented_parameters),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, attributeDecoding)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, attribute_decoding),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -389,6 +393,50 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkPipelineGaussianUnscentedStateCreateInfoGAURAST, allSigmaPoints)",
         offset_of!(PipelineGaussianUnscentedStateCreateInfoGAURAST<'_>, all_sigma_points),
     ),
+    (
+        "sizeof(VkPipelineGaussianDecodingStateCreateInfoGAURAST)",
+        size_of::<PipelineGaussianDecodingStateCreateInfoGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, sType)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, pNext)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, position)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, position),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, signedLogPosition)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, signed_log_position),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, scale)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, scale),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, rotation)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, rotation),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, opacity)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, opacity),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, color)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, color),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, baseColor)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, base_color),
+    ),
+    (
+        "offsetof(VkPipelineGaussianDecodingStateCreateInfoGAURAST, sphericalHarmonics)",
+        offset_of!(PipelineGaussianDecodingStateCreateInfoGAURAST<'_>, spherical_harmonics),
+    ),
     ("sizeof(VkGaussianCameraGAURAST)", size_of::<GaussianCameraGAURAST<'_>>()),
     ("offsetof(VkGaussianCameraGAURAST, sType)", offset_of!(GaussianCameraGAURAST<'_>, s_type)),
     ("offsetof(VkGaussianCameraGAURAST, pNext)", offset_of!(GaussianCameraGAURAST<'_>, p_next)),
@@ -442,6 +490,50 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, coefficientStride)",
         offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, coefficient_stride),
     ),
+    ("sizeof(VkGaussianDecodingTableGAURAST)", size_of::<GaussianDecodingTableGAURAST>()),
+    (
+        "offsetof(VkGaussianDecodingTableGAURAST, deviceAddress)",
+        offset_of!(GaussianDecodingTableGAURAST, device_address),
+    ),
+    ("offsetof(VkGaussianDecodingTableGAURAST, size)", offset_of!(GaussianDecodingTableGAURAST, size)),
+    ("offsetof(VkGaussianDecodingTableGAURAST, format)", offset_of!(GaussianDecodingTableGAURAST, format)),
+    ("offsetof(VkGaussianDecodingTableGAURAST, stride)", offset_of!(GaussianDecodingTableGAURAST, stride)),
+    ("offsetof(VkGaussianDecodingTableGAURAST, chunkSize)", offset_of!(GaussianDecodingTableGAURAST, chunk_size)),
+    ("sizeof(VkGaussianHarmonicsCodesGAURAST)", size_of::<GaussianHarmonicsCodesGAURAST>()),
+    (
+        "offsetof(VkGaussianHarmonicsCodesGAURAST, deviceAddress)",
+        offset_of!(GaussianHarmonicsCodesGAURAST, device_address),
+    ),
+    ("offsetof(VkGaussianHarmonicsCodesGAURAST, size)", offset_of!(GaussianHarmonicsCodesGAURAST, size)),
+    ("offsetof(VkGaussianHarmonicsCodesGAURAST, stride)", offset_of!(GaussianHarmonicsCodesGAURAST, stride)),
+    (
+        "offsetof(VkGaussianHarmonicsCodesGAURAST, coefficientStride)",
+        offset_of!(GaussianHarmonicsCodesGAURAST, coefficient_stride),
+    ),
+    (
+        "offsetof(VkGaussianHarmonicsCodesGAURAST, componentStride)",
+        offset_of!(GaussianHarmonicsCodesGAURAST, component_stride),
+    ),
+    ("sizeof(VkGaussianHarmonicsLabelsGAURAST)", size_of::<GaussianHarmonicsLabelsGAURAST>()),
+    (
+        "offsetof(VkGaussianHarmonicsLabelsGAURAST, deviceAddress)",
+        offset_of!(GaussianHarmonicsLabelsGAURAST, device_address),
+    ),
+    ("offsetof(VkGaussianHarmonicsLabelsGAURAST, size)", offset_of!(GaussianHarmonicsLabelsGAURAST, size)),
+    ("offsetof(VkGaussianHarmonicsLabelsGAURAST, stride)", offset_of!(GaussianHarmonicsLabelsGAURAST, stride)),
+    ("sizeof(VkGaussianDecodingTablesGAURAST)", size_of::<GaussianDecodingTablesGAURAST<'_>>()),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, sType)", offset_of!(GaussianDecodingTablesGAURAST<'_>, s_type)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, pNext)", offset_of!(GaussianDecodingTablesGAURAST<'_>, p_next)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, position)", offset_of!(GaussianDecodingTablesGAURAST<'_>, position)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, scale)", offset_of!(GaussianDecodingTablesGAURAST<'_>, scale)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, opacity)", offset_of!(GaussianDecodingTablesGAURAST<'_>, opacity)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, color)", offset_of!(GaussianDecodingTablesGAURAST<'_>, color)),
+    (
+        "offsetof(VkGaussianDecodingTablesGAURAST, sphericalHarmonics)",
+        offset_of!(GaussianDecodingTablesGAURAST<'_>, spherical_harmonics),
+    ),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, codes)", offset_of!(GaussianDecodingTablesGAURAST<'_>, codes)),
+    ("offsetof(VkGaussianDecodingTablesGAURAST, labels)", offset_of!(GaussianDecodingTablesGAURAST<'_>, labels)),
     ("sizeof(VkGaussianCameraDataGAURAST)", size_of::<GaussianCameraDataGAURAST>()),
     ("offsetof(VkGaussianCameraDataGAURAST, eye)", offset_of!(GaussianCameraDataGAURAST, eye)),
     ("offsetof(VkGaussianCameraDataGAURAST, model)", offset_of!(GaussianCameraDataGAURAST, model)),
@@ -508,6 +600,14 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
     ),
+    (
+        "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST",
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST",
+        STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST.as_raw() as i64,
+    ),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),
     (
@@ -573,6 +673,21 @@ pub const VALUES: &[(&str, i64)] = &[
     ("VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST", GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST", GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64),
     ("VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST", GaussianCutOffGAURAST::TILE_RECTANGLE.as_raw() as i64),
+    ("VK_GAUSSIAN_DECODING_NONE_GAURAST", GaussianDecodingGAURAST::NONE.as_raw() as i64),
+    ("VK_GAUSSIAN_DECODING_CHUNK_GAURAST", GaussianDecodingGAURAST::CHUNK.as_raw() as i64),
+    ("VK_GAUSSIAN_DECODING_CODEBOOK_GAURAST", GaussianDecodingGAURAST::CODEBOOK.as_raw() as i64),
+    ("VK_GAUSSIAN_ROTATION_DECODING_NONE_GAURAST", GaussianRotationDecodingGAURAST::NONE.as_raw() as i64),
+    (
+        "VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_10_GAURAST",
+        GaussianRotationDecodingGAURAST::SMALLEST_THREE_10.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_ROTATION_DECODING_SMALLEST_THREE_8_GAURAST",
+        GaussianRotationDecodingGAURAST::SMALLEST_THREE_8.as_raw() as i64,
+    ),
+    ("VK_GAUSSIAN_HARMONICS_DECODING_NONE_GAURAST", GaussianHarmonicsDecodingGAURAST::NONE.as_raw() as i64),
+    ("VK_GAUSSIAN_HARMONICS_DECODING_CODEBOOK_GAURAST", GaussianHarmonicsDecodingGAURAST::CODEBOOK.as_raw() as i64),
+    ("VK_GAUSSIAN_HARMONICS_DECODING_PALETTE_GAURAST", GaussianHarmonicsDecodingGAURAST::PALETTE.as_raw() as i64),
     (
         "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST",
         PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE.as_raw() as i64,

@@ -175,6 +175,8 @@ commands! {
     cmd_end_gaussian_set: ::gaurast::vk::PFN_vkCmdEndGaussianSetGAURAST = [c"vkCmdEndGaussianSetGAURAST"];
     cmd_bind_gaussian_spherical_harmonics: ::gaurast::vk::PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST =
         [c"vkCmdBindGaussianSphericalHarmonicsGAURAST"];
+    cmd_bind_gaussian_decoding_tables: ::gaurast::vk::PFN_vkCmdBindGaussianDecodingTablesGAURAST =
+        [c"vkCmdBindGaussianDecodingTablesGAURAST"];
     cmd_set_gaussian_order: ::gaurast::vk::PFN_vkCmdSetGaussianOrderGAURAST = [c"vkCmdSetGaussianOrderGAURAST"];
     cmd_set_gaussian_antialiasing: ::gaurast::vk::PFN_vkCmdSetGaussianAntialiasingGAURAST =
         [c"vkCmdSetGaussianAntialiasingGAURAST"];

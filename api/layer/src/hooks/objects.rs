@@ -427,6 +427,7 @@ fn pipeline_of(request: Request, serial: u64) -> Pipeline {
         serial,
         gaussian: request.gaussian.filter(|_| request.draws_gaussians),
         approximation: request.approximation,
+        decoding: request.decoding,
         has_fragment,
         dynamic: request.dynamic,
         bindings,

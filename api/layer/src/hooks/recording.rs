@@ -6,11 +6,12 @@ use ash::vk;
 use gaurast::vk as gvk;
 
 use crate::device::Device;
-use crate::facts::Harmonics;
+use crate::facts::{DecodingTables, Harmonics};
 use crate::hooks::objects::{is_storage, written_buffers};
 use crate::objects::{BufferDescriptor, Objects, Subpass};
 use crate::recording::{
-    BoundHarmonics, BoundSet, Call, IndexBuffer, Indirect, Operation, Recording, SubpassIndex, VertexBuffer,
+    BoundHarmonics, BoundSet, BoundTables, Call, IndexBuffer, Indirect, Operation, Recording, SubpassIndex,
+    VertexBuffer,
 };
 use crate::report::Faults;
 use crate::rules::{self, dynamic};
@@ -492,6 +493,17 @@ records! {
         rules::harmonics::check(bound, objects, fetches, faults);
         let buffer = objects.buffer_at(bound.device_address).map(|(handle, buffer)| (handle, buffer.serial));
         recording.inputs.harmonics = Some(BoundHarmonics { harmonics: Harmonics::of(bound), buffer });
+    }
+    cmd_bind_gaussian_decoding_tables(
+        tables: *const gvk::GaussianDecodingTablesGAURAST<'_>
+    ) |state, faults| {
+        let (recording, objects) = state;
+        let Some(bound) = tables.as_ref() else { return };
+        rules::decoding::check_tables(bound, objects, faults);
+        let ranges = rules::decoding::ranges(bound).into_iter();
+        let buffers = ranges.filter_map(|(_, address, _)| objects.buffer_at(address));
+        let buffers = buffers.map(|(handle, buffer)| (handle, buffer.serial)).collect();
+        recording.inputs.decoding_tables = Some(BoundTables { tables: DecodingTables::of(bound), buffers });
     }
 }
 

@@ -35,6 +35,7 @@ impl Look<'_> {
     pub(crate) fn check(&self, draw: &Draw, faults: &mut Faults) {
         let before = faults.0.len();
         self.check_harmonics(draw, faults);
+        self.check_tables(draw, faults);
         let cameras = self.cameras(draw, faults);
         // What a wrong camera sees says nothing of the Gaussians.
         let cameras = cameras.filter(|_| faults.0.len() == before);
@@ -62,6 +63,17 @@ impl Look<'_> {
         let lives = buffer.is_none_or(|(buffer, serial)| self.reader.lives(buffer, serial));
         faults.require(lives, "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016", || {
             "the buffer of the harmonics was destroyed before the submission".to_owned()
+        });
+    }
+
+    fn check_tables(&self, draw: &Draw, faults: &mut Faults) {
+        if draw.pipeline.decoding.is_none() {
+            return;
+        }
+        let mut buffers = draw.inputs.decoding_tables.iter().flat_map(|bound| &bound.buffers);
+        let live = buffers.all(|&(buffer, serial)| self.reader.lives(buffer, serial));
+        faults.require(live, "VUID-VkGaussianDecodingTableGAURAST-deviceAddress-90099", || {
+            "a buffer of tables was destroyed before the submission".to_owned()
         });
     }
 

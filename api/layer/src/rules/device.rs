@@ -8,7 +8,7 @@ use crate::facts::Features;
 use crate::report::Faults;
 
 /// The features by name.
-pub(crate) fn named(features: &Features) -> [(&'static str, bool); 28] {
+pub(crate) fn named(features: &Features) -> [(&'static str, bool); 29] {
     let f = features;
     [
         ("gaussianPrimitiveTopology", f.gaussian_primitive_topology),
@@ -39,6 +39,7 @@ pub(crate) fn named(features: &Features) -> [(&'static str, bool); 28] {
         ("opacityCompensationFloor", f.opacity_compensation_floor),
         ("gaussianDistortion", f.gaussian_distortion),
         ("unscentedParameters", f.unscented_parameters),
+        ("attributeDecoding", f.attribute_decoding),
     ]
     .map(|(name, is_on)| (name, is_on != 0))
 }

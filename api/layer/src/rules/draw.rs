@@ -15,7 +15,7 @@ use crate::objects::{Objects, Pipeline};
 use crate::recording::{Call, DepthUse, Draw, Operation, Recording, Sources};
 use crate::report::Faults;
 use crate::rules::ranges::Ranges;
-use crate::rules::{depth, indirect, set, state};
+use crate::rules::{decoding, depth, indirect, set, state};
 
 /// Checks a draw command, and notes it for the check of its contents.
 pub(crate) fn check(recording: &mut Recording, call: Call, objects: &Objects, facts: &Facts, faults: &mut Faults) {
@@ -30,6 +30,9 @@ pub(crate) fn check(recording: &mut Recording, call: Call, objects: &Objects, fa
         let depth = depth::of(recording, &pipeline);
         check_cameras(recording, &gaussian, viewport, depth.as_ref(), faults);
         check_harmonics(recording, &gaussian, faults);
+        if let Some(decoded) = &pipeline.decoding {
+            decoding::check_draw(&gaussian, decoded, &recording.inputs, faults);
+        }
         check_constants(recording, &pipeline, faults);
         if let Call::Indirect(call) = &call {
             indirect::check_command(call, facts, faults);

@@ -74,7 +74,7 @@ impl Gaussians {
             total: count * instances,
         };
         let mut places = BTreeMap::new();
-        for (_, location, _) in used_locations(&draw.state) {
+        for (_, location, _) in used_locations(&draw.state, draw.pipeline.decoding.as_ref()) {
             let attribute = draw.pipeline.attributes.get(&location)?;
             let format = Format::of(attribute.format);
             let binding = draw.pipeline.bindings.get(&attribute.binding)?;

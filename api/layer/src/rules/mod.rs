@@ -3,6 +3,7 @@
 pub(crate) mod camera;
 pub(crate) mod contents;
 pub(crate) mod counts;
+pub(crate) mod decoding;
 pub(crate) mod depth;
 pub(crate) mod device;
 pub(crate) mod draw;

@@ -7,16 +7,16 @@ use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
     GaussianCameraSourceGAURAST as CameraSource, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
-    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianHarmonicsDecodingGAURAST as HarmonicsDecoding, GaussianLinearizationGAURAST as Linearization,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
-use crate::facts::{Facts, GaussianState};
+use crate::facts::{Decoding, Facts, GaussianState};
 use crate::formats::{Format, is_integer};
 use crate::objects::Attribute;
 use crate::report::Faults;
 use crate::request::{Footprint, Request, SigmaPoints};
-use crate::rules::{shaders, state};
+use crate::rules::{decoding, shaders, state};
 use crate::spirv::{INPUT, Interface, OUTPUT};
 
 /// The dynamic states of the extension.
@@ -73,6 +73,11 @@ pub(crate) fn check(request: &Request, facts: &Facts, faults: &mut Faults) {
     if state::is_fixed(&gaussian) {
         let before = faults.0.len();
         check_degree(&gaussian, facts, faults);
+        if let Some(decoded) = &request.decoding {
+            let attributes = request.vertex_input.as_ref().map(|(_, attributes)| attributes);
+            let format = |location| attributes?.get(&location).map(|attribute: &Attribute| attribute.format);
+            decoding::check(&gaussian, decoded, format, facts, faults);
+        }
         if faults.0.len() == before {
             check_attributes(&gaussian, request, faults);
         }
@@ -309,7 +314,7 @@ fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {
 }
 
 /// The locations of an attribute with their names and the components that each needs.
-pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)> {
+pub(crate) fn used_locations(gaussian: &GaussianState, decoding: Option<&Decoding>) -> Vec<(String, u32, u32)> {
     let locations = &gaussian.attribute_locations;
     let scales = if gaussian.geometry == Geometry::GAUSSIAN_2D { 2 } else { 3 };
     let mut used = vec![
@@ -325,7 +330,8 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
         }));
     };
     if !gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
-        let coefficients = (gaussian.spherical_harmonics_degree.min(16) + 1).pow(2);
+        let are_codes = decoding.is_some_and(|decoding| decoding.spherical_harmonics != HarmonicsDecoding::NONE);
+        let coefficients = if are_codes { 1 } else { (gaussian.spherical_harmonics_degree.min(16) + 1).pow(2) };
         rows("firstSphericalHarmonics", locations.first_spherical_harmonics, coefficients, 3);
     }
     if locations.first_model_matrix != UNUSED {
@@ -338,7 +344,8 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
 }
 
 fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
-    let used = used_locations(gaussian);
+    let decoded = request.decoding.as_ref();
+    let used = used_locations(gaussian, decoded);
     for (index, (name, location, _)) in used.iter().enumerate() {
         let same = used[..index].iter().find(|(_, other, _)| other == location && *other != UNUSED);
         if let Some((other, ..)) = same {
@@ -365,7 +372,8 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
             return faults.error(id, text);
         };
         let format = Format::of(attribute.format);
-        if format.components < components || format.is_integer {
+        let is_decoded = decoded.is_some_and(|decoded| decoding::is_decoded(gaussian, decoded, location));
+        if !is_decoded && (format.components < components || format.is_integer) {
             return faults.error(
                 id,
                 format!(
@@ -450,10 +458,10 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     }
     if let Some((bindings, attributes)) = &request.vertex_input {
         if state::is_fixed(gaussian) {
-            warn_of_formats(gaussian, attributes, faults);
+            warn_of_formats(gaussian, request, attributes, faults);
         }
         let is_dynamic = request.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE);
-        for (name, location, _) in used_locations(gaussian) {
+        for (name, location, _) in used_locations(gaussian, request.decoding.as_ref()) {
             let Some(attribute) = attributes.get(&location) else {
                 continue;
             };
@@ -476,14 +484,23 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
 }
 
 /// Warns of attributes that can't be what their members want, by their formats and offsets.
-fn warn_of_formats(gaussian: &GaussianState, attributes: &BTreeMap<u32, Attribute>, faults: &mut Faults) {
+fn warn_of_formats(
+    gaussian: &GaussianState,
+    request: &Request,
+    attributes: &BTreeMap<u32, Attribute>,
+    faults: &mut Faults,
+) {
+    let decoded = request.decoding.as_ref();
     let has_matrix = gaussian.attribute_locations.first_model_matrix != UNUSED;
     // The bytes that are read, by member.
     let mut read: Vec<(String, u32, Range<u32>)> = Vec::new();
-    for (name, location, components) in used_locations(gaussian) {
+    for (name, location, components) in used_locations(gaussian, decoded) {
         let Some(attribute) = attributes.get(&location) else {
             continue;
         };
+        if decoded.is_some_and(|decoded| decoding::is_decoded(gaussian, decoded, location)) {
+            continue;
+        }
         let format = Format::of(attribute.format);
         // A matrix may take positions from 0 to 1 to where they are.
         let is_signed =

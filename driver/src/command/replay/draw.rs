@@ -108,6 +108,15 @@ pub(crate) enum DrawError {
          (VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018)"
     )]
     Harmonics,
+    /// No tables of decodings are bound.
+    #[error(
+        "no tables are bound by which the pipeline's attributes are decoded \
+         (VUID-vkCmdDraw-attributeDecoding-90101)"
+    )]
+    DecodingTables,
+    /// A chunk of Gaussians has none.
+    #[error("chunkSize is 0 in the table of an attribute (VUID-vkCmdDraw-attributeDecoding-90101)")]
+    ChunkSize,
     /// The vertex input doesn't fit the vertex program.
     #[error("vertex input: {0}")]
     VertexInput(String),

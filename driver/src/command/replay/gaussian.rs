@@ -1,9 +1,10 @@
 //! Conversion of Gaussian draws to the packets of a sorted set.
 
+use super::decoding::DrawDecodings;
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
-use crate::command::{DrawParameters, HarmonicsBuffer, camera};
+use crate::command::{DrawParameters, camera};
 use crate::physical_device::limits::MAX_GAUSSIANS;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::gaussian::stages::{ResolveStage, VertexProjection};
@@ -14,7 +15,7 @@ use crate::pipeline::state::AttributeSource;
 use simdevice::BufferRange;
 use simdevice::Packet;
 use simdevice::packet::{
-    AttributeStream, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
+    Activations, Decodings, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
     PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
@@ -263,28 +264,6 @@ fn upright(viewport: Viewport) -> Viewport {
     Viewport { y: viewport.y + viewport.height, height: -viewport.height, ..viewport }
 }
 
-/// The stream of a coefficient of a buffer of spherical harmonics.
-fn coefficient(buffer: &HarmonicsBuffer, number: u64) -> AttributeStream {
-    let range = &buffer.range;
-    let start = number.saturating_mul(buffer.coefficient_stride);
-    // Streams that begin at the same place are read together.
-    let (moved, offset) = match u32::try_from(start) {
-        Ok(offset) => (0, offset),
-        Err(_) => (start.min(range.size), 0),
-    };
-    AttributeStream {
-        buffer: BufferRange {
-            memory: Arc::clone(&range.memory),
-            offset: range.offset + moved,
-            size: range.size - moved,
-        },
-        stride: buffer.stride,
-        offset,
-        format: buffer.format,
-        instance_divisor: None,
-    }
-}
-
 /// The streams that fixed-function projection reads, with the harmonics of a degree.
 fn attributes(
     state: &State,
@@ -294,19 +273,32 @@ fn attributes(
 ) -> Result<GaussianAttributes, DrawError> {
     let count = (degree as usize + 1).pow(2);
     let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
+    let position = stream(&sources.position)?;
+    let decodings = DrawDecodings::new(&sources.decoding, state.decoding_tables.as_deref(), &position.buffer)?;
     Ok(GaussianAttributes {
-        position: stream(&sources.position)?,
+        position,
         scale: stream(&sources.scale)?,
         rotation: stream(&sources.rotation)?,
         opacity: stream(&sources.opacity)?,
         spherical_harmonics: match &sources.spherical_harmonics {
-            HarmonicsSource::Attributes(sources) => sources.iter().take(count).map(stream).collect::<Result<_, _>>()?,
+            HarmonicsSource::Attributes(sources) => {
+                let mut streams = sources.iter().take(count).map(stream).collect::<Result<Vec<_>, _>>()?;
+                streams.extend(decodings.iter().flat_map(|decodings| decodings.codes(count)));
+                streams
+            }
             HarmonicsSource::Buffer => {
                 let bound = state.harmonics.as_ref().ok_or(DrawError::Harmonics)?;
-                (0..count as u64).map(|k| coefficient(bound, k)).collect()
+                (0..count as u64).map(|k| bound.coefficient(k)).collect()
             }
         },
-        activations: sources.activations,
+        activations: Activations {
+            decodings: decodings.as_ref().map_or_else(
+                || Decodings { rotation: sources.decoding.rotation, ..Decodings::default() },
+                DrawDecodings::decodings,
+            ),
+            ..sources.activations
+        },
+        tables: decodings.map(|decodings| Box::new(decodings.tables())),
         model: ModelAttributes {
             matrix: match &sources.model_matrix {
                 None => None,

@@ -1,5 +1,6 @@
 //! Replay of recorded commands: one match converts a recording to the packets that the device executes.
 
+mod decoding;
 mod descriptors;
 mod draw;
 mod gaussian;
@@ -115,6 +116,7 @@ fn execute(command: &Command, state: &mut State, execution: &mut Execution<'_>) 
         }
         Command::SetCameras(cameras) => state.cameras.clone_from(cameras),
         Command::BindHarmonics(buffer) => state.harmonics = Some(HarmonicsBuffer::clone(buffer)),
+        Command::BindDecodingTables(tables) => state.decoding_tables = Some(tables.clone()),
         Command::BeginGaussianSet => state.gaussian_set = Some(SharedSet::default()),
         Command::EndGaussianSet => {
             let set = state.gaussian_set.take();

@@ -1,7 +1,7 @@
 //! The state that draws of a command buffer read, as set by the commands replayed so far.
 
 use crate::abi::error::Error;
-use crate::command::{BindPoint, BoundSet, HarmonicsBuffer, IndexBuffer, VertexBuffer};
+use crate::command::{BindPoint, BoundSet, DecodingTables, HarmonicsBuffer, IndexBuffer, VertexBuffer};
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::descriptor::set::{DescriptorSet, Write};
 use crate::pipeline::GraphicsPipeline;
@@ -51,6 +51,8 @@ pub(crate) struct State {
     pub(crate) cameras: Box<[Camera]>,
     /// The buffer of spherical harmonics.
     pub(crate) harmonics: Option<HarmonicsBuffer>,
+    /// The tables by which attributes are decoded.
+    pub(crate) decoding_tables: Option<Box<DecodingTables>>,
     /// The buffers that transform feedback writes.
     pub(crate) captured_buffers: CounterBuffers,
     /// Transform feedback, while it is active.

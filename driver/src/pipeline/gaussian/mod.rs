@@ -1,9 +1,11 @@
 //! Pipelines of the Gaussian list topology.
 
+pub(crate) mod decoding;
 pub(crate) mod stages;
 mod valid_usage;
 pub(crate) mod values;
 
+use self::decoding::{Decoded, DecodingState, Method};
 use self::stages::{ResolveStage, VertexProjection};
 use self::valid_usage::*;
 use super::dynamic_state::{GaussianStates, is_taken_by_gaussians};
@@ -20,7 +22,7 @@ use gaurast::vk::{
     GaussianLinearizationGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
     PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::Activations;
+use simdevice::packet::{Activations, Decodings};
 use simdevice::state::gaussian::{
     GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization, GaussianPrecision,
     GaussianState, UnscentedTransform,
@@ -57,7 +59,7 @@ pub(crate) struct GaussianPipeline {
 #[derive(Debug)]
 pub(crate) enum GaussianSource {
     /// Vertex attributes, which the device projects.
-    Attributes(GaussianAttributeSources),
+    Attributes(Box<GaussianAttributeSources>),
     /// A vertex shader, which projects them itself.
     VertexShader(VertexProjection),
 }
@@ -77,6 +79,8 @@ pub(crate) struct GaussianAttributeSources {
     pub(crate) spherical_harmonics: HarmonicsSource,
     /// The activation functions of scales and opacities.
     pub(crate) activations: Activations,
+    /// The decodings of attributes.
+    pub(crate) decoding: DecodingState,
     /// The sources of the rows of model matrices, if it has them.
     pub(crate) model_matrix: Option<[AttributeSource; 3]>,
     /// The source of opacity factors, if it has one.
@@ -201,30 +205,48 @@ fn source(
         let what = "flags has SPHERICAL_HARMONICS_BUFFER";
         require(device.enabled(), &HARMONICS_BUFFER, what)?;
     }
-    distinct_locations(locations, if in_buffer { 0 } else { coefficients })?;
+    let decoding = DecodingState::new(graphics, gaussian, device.enabled())?;
+    let coefficients = if in_buffer { 0 } else { decoding.harmonics_attributes(coefficients) };
+    distinct_locations(locations, coefficients)?;
     let first = locations.first_spherical_harmonics;
     let scales = match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_2D => 2,
         _ => 3,
     };
-    Ok(GaussianSource::Attributes(GaussianAttributeSources {
-        position: attribute(graphics, "position", locations.position, 3)?,
-        scale: attribute(graphics, "scale", locations.scale, scales)?,
-        rotation: attribute(graphics, "rotation", locations.rotation, 4)?,
-        opacity: attribute(graphics, "opacity", locations.opacity, 1)?,
+    let decoded = |name, method, components| Decoded {
+        name,
+        method,
+        components,
+        plain_components: components,
+        may_be_word: method == Method::Chunk && components == 3,
+    };
+    let position = decoded("position", decoding.position, 3);
+    let scale = Decoded { plain_components: scales, ..decoded("scale", decoding.scale, 3) };
+    let opacity = decoded("opacity", decoding.opacity, 1);
+    let color = Decoded { may_be_word: true, ..decoded("spherical harmonics coefficient 0", decoding.color, 3) };
+    let sources = GaussianAttributeSources {
+        position: position.source(graphics, locations.position)?,
+        scale: scale.source(graphics, locations.scale)?,
+        rotation: decoding.rotation_source(graphics, locations.rotation)?,
+        opacity: opacity.source(graphics, locations.opacity)?,
         spherical_harmonics: if in_buffer {
             HarmonicsSource::Buffer
         } else {
-            let all = (0..coefficients).map(|k| {
-                let name = format!("spherical harmonics coefficient {k}");
-                attribute(graphics, &name, first.saturating_add(k), 3)
+            let all = (0..coefficients).map(|k| match k {
+                0 => color.source(graphics, first),
+                _ => {
+                    let name = format!("spherical harmonics coefficient {k}");
+                    attribute(graphics, &name, first.saturating_add(k), 3)
+                }
             });
             HarmonicsSource::Attributes(all.collect::<Result<_, _>>()?)
         },
         activations: Activations {
             log_scale: gaussian.flags.contains(Flags::LOG_SCALE),
             logit_opacity: gaussian.flags.contains(Flags::LOGIT_OPACITY),
+            decodings: Decodings::default(),
         },
+        decoding,
         model_matrix: match locations.first_model_matrix {
             GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
             first => {
@@ -236,7 +258,8 @@ fn source(
             GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
             location => Some(attribute(graphics, "modelOpacity", location, 1)?),
         },
-    }))
+    };
+    Ok(GaussianSource::Attributes(Box::new(sources)))
 }
 
 /// The first element of a static state; None if the state is dynamic.

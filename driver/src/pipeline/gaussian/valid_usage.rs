@@ -144,6 +144,11 @@ pub(super) const UNSCENTED_PARAMETERS: Feature = Feature {
     name: "unscentedParameters",
     vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedParameters-90090",
 };
+pub(super) const DECODING: Feature = Feature {
+    is_enabled: |features| features.attribute_decoding,
+    name: "attributeDecoding",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeDecoding-90095",
+};
 pub(super) const DYNAMIC_STATE: Feature = Feature {
     is_enabled: |features| features.gaussian_dynamic_state,
     name: "gaussianDynamicState",

@@ -1,8 +1,9 @@
 //! Attributes: vertex fetch for Gaussians, from streams to structures of arrays.
 
+use super::decoding::{Decoder, quaternion, signed_exponential};
 use crate::format::Format;
 use crate::gaussian::lanes::F32_LANES;
-use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
+use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding};
 
 /// The attributes of a group's Gaussians as they are read from the streams: an array per component, an element per
 /// lane.
@@ -147,13 +148,27 @@ impl<'a> GroupVertices<'a> {
                 };
                 u64::from(self.first_instance) + u64::from((instance - self.first_instance) / divisor)
             }
-            None => match &self.vertices {
-                VertexNumbers::From(first) => first + lane as u64,
-                VertexNumbers::Run(first, run) => first + u64::from(run.place(lane)),
-                VertexNumbers::Listed(list) => list[lane],
-                VertexNumbers::Cluster(first, numbers) => first + u64::from(numbers[lane]),
-            },
+            None => self.vertex(lane),
         }
+    }
+
+    /// The vertex of lane `lane`.
+    pub(super) fn vertex(&self, lane: usize) -> u64 {
+        match &self.vertices {
+            VertexNumbers::From(first) => first + lane as u64,
+            VertexNumbers::Run(first, run) => first + u64::from(run.place(lane)),
+            VertexNumbers::Listed(list) => list[lane],
+            VertexNumbers::Cluster(first, numbers) => first + u64::from(numbers[lane]),
+        }
+    }
+
+    /// The first three components of the element of `stream` that lane `lane` reads.
+    pub(super) fn triple(&self, stream: &AttributeStream, lane: usize) -> [f32; 3] {
+        let mut bytes = [0u8; 16];
+        let bytes = &mut bytes[..stream.format.texel_size().min(16)];
+        stream.read(self.element(stream, lane), bytes);
+        let [first, second, third, _] = stream.format.decode(bytes);
+        [first, second, third]
     }
 
     /// True if all lanes read one element of `stream`.
@@ -233,15 +248,110 @@ impl Fetcher {
         }
     }
 
-    /// Reads a group's positions, scales, rotations and opacities, without the model's transform, and applies the
-    /// activations.
+    /// Reads a group's positions, scales, rotations and opacities, without the model's transform. Decodes them and applies
+    /// the activations.
     pub(crate) fn read_own(&mut self, streams: &GaussianAttributes, group: &GroupVertices<'_>, out: &mut Attributes) {
+        if streams.activations != Activations::default() {
+            return self.read_activated(streams, group, out);
+        }
         self.read(&streams.position, group, out.position.each_mut());
         self.read(&streams.scale, group, out.scale.each_mut());
         self.read(&streams.rotation, group, out.rotation.each_mut());
         self.read(&streams.opacity, group, [&mut out.opacity]);
-        if streams.activations != Activations::default() {
-            activate(streams.activations, group.len, out);
+    }
+
+    /// Reads a group's positions, and decodes them.
+    pub(super) fn read_positions(
+        &mut self,
+        streams: &GaussianAttributes,
+        group: &GroupVertices<'_>,
+        out: &mut [[f32; F32_LANES]; 3],
+    ) {
+        let decodings = &streams.activations.decodings;
+        let table = streams.tables.as_ref().and_then(|tables| tables.position.as_ref());
+        match decodings.positions(&streams.position, table) {
+            None => self.read(&streams.position, group, out.each_mut()),
+            Some(decoder) => {
+                let function = if decodings.signed_log_position { signed_exponential } else { |value| value };
+                self.decode(decoder, &streams.position, group, out.each_mut(), function);
+            }
+        }
+    }
+
+    /// The same as [`Self::read_own`] where decodings or activations are applied: `exp` to logarithms of scales, the logistic
+    /// function to logits of opacities.
+    #[cold]
+    fn read_activated(&mut self, streams: &GaussianAttributes, group: &GroupVertices<'_>, out: &mut Attributes) {
+        let Activations { log_scale, logit_opacity, decodings } = &streams.activations;
+        let tables = streams.tables.as_deref();
+        self.read_positions(streams, group, &mut out.position);
+        let of_scale: fn(f64) -> f64 = if *log_scale { libm::exp } else { |scale| scale };
+        match decodings.scales(&streams.scale, tables.and_then(|tables| tables.scale.as_ref())) {
+            Some(decoder) => self.decode(decoder, &streams.scale, group, out.scale.each_mut(), of_scale),
+            None => {
+                self.read(&streams.scale, group, out.scale.each_mut());
+                out.scale.iter_mut().for_each(|lanes| apply(of_scale, &mut lanes[..group.len]));
+            }
+        }
+        match decodings.rotation {
+            RotationDecoding::None => self.read(&streams.rotation, group, out.rotation.each_mut()),
+            decoding => self.decode_rotations(decoding, &streams.rotation, group, &mut out.rotation),
+        }
+        let of_opacity: fn(f64) -> f64 =
+            if *logit_opacity { |logit| 1.0 / (1.0 + libm::exp(-logit)) } else { |opacity| opacity };
+        match decodings.opacities(&streams.opacity, tables.and_then(|tables| tables.opacity.as_ref())) {
+            Some(decoder) => self.decode(decoder, &streams.opacity, group, [&mut out.opacity], of_opacity),
+            None => {
+                self.read(&streams.opacity, group, [&mut out.opacity]);
+                apply(of_opacity, &mut out.opacity[..group.len]);
+            }
+        }
+    }
+
+    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`: what the decoder makes of the elements, and then
+    /// the function.
+    fn decode<const COMPONENTS: usize>(
+        &mut self,
+        mut decoder: Decoder<'_, COMPONENTS>,
+        stream: &AttributeStream,
+        group: &GroupVertices<'_>,
+        mut out: [&mut [f32; F32_LANES]; COMPONENTS],
+        function: fn(f64) -> f64,
+    ) {
+        self.each_element(stream, group, |lane, element| {
+            let values = decoder.decode(group.vertex(lane), element);
+            for (out, value) in out.iter_mut().zip(values) {
+                out[lane] = function(value) as f32;
+            }
+        });
+    }
+
+    /// Reads lanes `0..group.len` of quaternions. Those that lie beyond their buffer are zeros.
+    fn decode_rotations(
+        &mut self,
+        decoding: RotationDecoding,
+        stream: &AttributeStream,
+        group: &GroupVertices<'_>,
+        out: &mut [[f32; F32_LANES]; 4],
+    ) {
+        let size = stream.format.texel_size() as u64;
+        self.each_element(stream, group, |lane, element| {
+            let is_beyond = element == 0 && stream.place(group.element(stream, lane), size).is_none();
+            let quaternion = if is_beyond { [0.0; 4] } else { quaternion(decoding, element) };
+            for (out, component) in out.iter_mut().zip(quaternion) {
+                out[lane] = component as f32;
+            }
+        });
+    }
+
+    /// Calls `take` with each lane in use and its element of `stream`, which has at most 8 bytes.
+    fn each_element(&mut self, stream: &AttributeStream, group: &GroupVertices<'_>, mut take: impl FnMut(usize, u64)) {
+        let size = stream.format.texel_size().min(8);
+        let step = self.read_bytes(stream, group, size);
+        for (lane, bytes) in self.bytes.chunks(step).take(group.len).enumerate() {
+            let mut element = [0; 8];
+            element[..size].copy_from_slice(&bytes[..size]);
+            take(lane, u64::from_le_bytes(element));
         }
     }
 
@@ -292,20 +402,9 @@ impl Fetcher {
     }
 }
 
-/// Applies the activations to the first `len` lanes: `exp` to logarithms of scales, the logistic function to logits of
-/// opacities.
-#[cold]
-fn activate(activations: Activations, len: usize, out: &mut Attributes) {
-    let apply = |lanes: &mut [f32; F32_LANES], function: fn(f64) -> f64| {
-        for value in lanes.iter_mut().take(len) {
-            *value = function(f64::from(*value)) as f32;
-        }
-    };
-    if activations.log_scale {
-        let scales = out.scale.iter_mut();
-        scales.for_each(|lanes| apply(lanes, libm::exp));
-    }
-    if activations.logit_opacity {
-        apply(&mut out.opacity, |logit| 1.0 / (1.0 + libm::exp(-logit)));
+/// Applies a function to all values.
+fn apply(function: fn(f64) -> f64, lanes: &mut [f32]) {
+    for value in lanes {
+        *value = function(f64::from(*value)) as f32;
     }
 }

@@ -23,7 +23,8 @@ const MAX_ENTRIES: usize = 256;
 /// A draw that was recorded, and its clusters.
 #[derive(Debug)]
 struct Entry {
-    /// The fingerprints of positions, scales, rotations, opacities and, if the clusters hold them, spherical harmonics.
+    /// The fingerprints of positions, scales, rotations, opacities, tables and, if the clusters hold them, spherical
+    /// harmonics.
     streams: Vec<SourceFingerprint>,
     /// The activations that are applied to the attributes.
     activations: Activations,
@@ -56,8 +57,7 @@ impl Entry {
     fn new(append: &GaussianAppend, is_surfel: bool, with_harmonics: bool) -> Self {
         let attributes = &append.attributes;
         let harmonics = attributes.spherical_harmonics.iter();
-        let shapes = shapes(append).into_iter();
-        let streams = shapes.chain(harmonics.filter(|_| with_harmonics));
+        let streams = shapes(append).chain(harmonics.filter(|_| with_harmonics));
         Self {
             streams: streams.map(SourceFingerprint::new).collect(),
             activations: attributes.activations,
@@ -246,10 +246,11 @@ pub(crate) fn find(
     found
 }
 
-/// The attributes that every cluster holds.
-fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
+/// What is read for every cluster: the attributes that it holds, and the tables.
+fn shapes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
     let attributes = &append.attributes;
-    [&attributes.position, &attributes.scale, &attributes.rotation, &attributes.opacity]
+    let shapes = [&attributes.position, &attributes.scale, &attributes.rotation, &attributes.opacity];
+    shapes.into_iter().chain(attributes.tables.iter().flat_map(|tables| tables.iter()))
 }
 
 /// True if a stream lies in memory that only the device writes and is read per vertex.
@@ -259,7 +260,7 @@ fn is_fixed(stream: &AttributeStream) -> bool {
 
 /// True if an append's Gaussians can have clusters.
 fn is_eligible(append: &GaussianAppend) -> bool {
-    let fixed = shapes(append).into_iter().all(is_fixed);
+    let fixed = shapes(append).all(is_fixed);
     let model = &append.attributes.model;
     // Model attributes per vertex would have to be in the clusters.
     let mut of_model = model.matrix.iter().flat_map(|rows| rows.iter());

@@ -60,7 +60,7 @@ fn max_occluders(count: usize) -> usize {
 
 /// The bytes of host memory that clusters of `append`'s Gaussians take, with or without spherical harmonics.
 pub(crate) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
-    let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+    let reader = CoefficientReader::new(&append.attributes);
     let floats = if with_harmonics { reader.floats() } else { 0 };
     let cluster = size_of::<Cluster>() + 4 * GROUP * (1 + floats);
     let occluder = size_of::<Cluster>() + 4 * GROUP;
@@ -217,7 +217,7 @@ impl Cluster {
         }
         let mut harmonics = Vec::new();
         if with_harmonics {
-            let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+            let reader = CoefficientReader::new(&append.attributes);
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
             host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {
@@ -291,6 +291,7 @@ mod tests {
                 opacity: stream(10, Format::R32Sfloat),
                 model: ModelAttributes::default(),
                 activations: Default::default(),
+                tables: None,
                 spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
             },
             indices: None,

@@ -102,7 +102,7 @@ impl<'a> GroupSource<'a> {
                 (&*attributes, false)
             }
         };
-        let reader = CoefficientReader::new(&streams.spherical_harmonics);
+        let reader = CoefficientReader::new(streams);
         GroupAttributes { reader, vertices, attributes, matrices, is_sound, harmonics }
     }
 

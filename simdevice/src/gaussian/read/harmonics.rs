@@ -1,9 +1,10 @@
 //! Spherical harmonics of single lanes: read from memory, or held by a cluster.
 
 use super::attributes::GroupVertices;
+use super::harmonics_decoding::HarmonicsDecoder;
 use crate::format::Format;
 use crate::gaussian::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
-use crate::packet::AttributeStream;
+use crate::packet::{AttributeStream, GaussianAttributes};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -17,11 +18,14 @@ pub(crate) struct CoefficientReader<'a> {
     streams: &'a [AttributeStream],
     /// True if the coefficients of a vertex follow one another in memory as 32-bit floats.
     packed: bool,
+    /// The decoder of the coefficients, if some are decoded.
+    decoder: Option<Box<HarmonicsDecoder<'a>>>,
 }
 
 impl<'a> CoefficientReader<'a> {
-    /// A reader of these streams, one stream per coefficient.
-    pub(crate) fn new(streams: &'a [AttributeStream]) -> Self {
+    /// A reader of these attributes' spherical harmonics, which have a stream per coefficient.
+    pub(crate) fn new(attributes: &'a GaussianAttributes) -> Self {
+        let streams = &attributes.spherical_harmonics[..];
         let follows = |a: &AttributeStream, b: &AttributeStream| {
             Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
                 && a.buffer.offset == b.buffer.offset
@@ -33,7 +37,7 @@ impl<'a> CoefficientReader<'a> {
         };
         let packed = streams.first().is_some_and(|s| s.format == Format::R32G32B32Sfloat)
             && streams.windows(2).all(|pair| follows(&pair[0], &pair[1]));
-        Self { streams, packed }
+        Self { streams, packed, decoder: HarmonicsDecoder::new(attributes) }
     }
 
     /// The number of floats in a vertex's coefficients: three for each coefficient.
@@ -65,11 +69,11 @@ impl<'a> CoefficientReader<'a> {
                 return;
             }
         }
-        for (stream, out) in self.streams.iter().zip(out.chunks_exact_mut(3)) {
-            let mut bytes = [0u8; 16];
-            let bytes = &mut bytes[..stream.format.texel_size().min(16)];
-            stream.read(group.element(stream, lane), bytes);
-            out.copy_from_slice(&stream.format.decode(bytes)[..3]);
+        if let Some(decoder) = &self.decoder {
+            return decoder.read(self.streams, group, lane, out);
+        }
+        for (stream, out) in self.streams.iter().zip(out.as_chunks_mut().0) {
+            *out = group.triple(stream, lane);
         }
     }
 }

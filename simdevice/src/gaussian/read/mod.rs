@@ -3,8 +3,10 @@
 pub(crate) mod attributes;
 pub(crate) mod cluster_cache;
 pub(crate) mod clusters;
+mod decoding;
 pub(crate) mod fingerprint;
 pub(crate) mod group;
 pub(crate) mod harmonics;
+mod harmonics_decoding;
 pub(crate) mod models;
 mod morton;

@@ -17,8 +17,7 @@ pub(crate) fn morton_order(append: &GaussianAppend) -> Vec<u32> {
         || (Fetcher::default(), Attributes::default()),
         |(fetcher, attributes), (positions, start)| {
             let group = GroupVertices::new(append, append.first_instance, start, positions.len());
-            let streams = &append.attributes;
-            fetcher.read(&streams.position, &group, attributes.position.each_mut());
+            fetcher.read_positions(&append.attributes, &group, &mut attributes.position);
             let [x, y, z] = &attributes.position;
             for (at, position) in positions.iter_mut().enumerate() {
                 *position = [x[at], y[at], z[at]];

@@ -94,6 +94,7 @@ fn draw_with_depth(
             opacity: stream(40, Format::R32Sfloat),
             model: ModelAttributes::default(),
             activations: Default::default(),
+            tables: None,
             spherical_harmonics: vec![stream(44, Format::R32G32B32Sfloat)],
         },
         indices: None,

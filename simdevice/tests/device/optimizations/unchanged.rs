@@ -4,7 +4,9 @@ use super::drawing::{draw_as_without_skips, programs};
 use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
 use simdevice::BufferRange;
 use simdevice::format::ClearValue;
-use simdevice::packet::{AttributeStream, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp};
+use simdevice::packet::{
+    AttributeStream, Decoding, DecodingTables, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp,
+};
 use simdevice::program::bindings::Bindings;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::resolve;
@@ -100,6 +102,69 @@ fn every_change_is_seen() {
     let mut expected = vec![0; changes.len()];
     expected.push(1);
     assert_eq!(reused(&mut few(), changes), expected);
+}
+
+/// Bytes in memory that only the device writes, as a stream.
+fn stream(bytes: &[u8], stride: u32) -> AttributeStream {
+    let size = bytes.len() as u64;
+    let memory = Allocation::new(size, false).unwrap();
+    memory.write(0, bytes).unwrap();
+    let buffer = BufferRange { memory, offset: 0, size };
+    AttributeStream { buffer, stride, offset: 0, format: Format::R8Uint, instance_divisor: None }
+}
+
+/// Gaussians whose opacities are numbers of values in a codebook.
+fn with_codebook(count: u32) -> Vec<Packet> {
+    let mut packets = gaussians_in(false, 45, count, OVER);
+    let Packet::GaussianAppend(append) = &mut packets[1] else {
+        panic!("what follows the beginning of a set");
+    };
+    let codes: Vec<u8> = (0..count).map(|vertex| (vertex * 37 % 256) as u8).collect();
+    let book: Vec<u8> = (0..=255_u8).flat_map(|number| (f32::from(number) / 256.0).to_le_bytes()).collect();
+    let attributes = &mut append.attributes;
+    attributes.opacity = stream(&codes, 1);
+    attributes.activations.decodings.opacity = Decoding::Codebook { is_binary64: false };
+    attributes.tables = Some(Box::new(DecodingTables { opacity: Some(stream(&book, 8)), ..DecodingTables::default() }));
+    packets
+}
+
+/// A change of the codebook of opacities.
+fn of_table(mut change: impl FnMut(&mut AttributeStream) + 'static) -> Edit {
+    of_append(move |append| {
+        let table = append.attributes.tables.as_mut().and_then(|tables| tables.opacity.as_mut());
+        change(table.expect("a codebook of opacities"));
+    })
+}
+
+/// A change of the numbers in the codebook.
+fn of_numbers() -> Edit {
+    of_table(|table| {
+        let memory = &table.buffer.memory;
+        memory.write(100, &[0.9f32; 50]).unwrap();
+        memory.bump_generation();
+    })
+}
+
+#[gaurast_runner::test]
+fn every_change_of_a_table_is_seen() {
+    let chunks = |size| {
+        of_append(move |append| {
+            append.attributes.activations.decodings.opacity = Decoding::Chunk { size, is_binary64: false };
+        })
+    };
+    let changes = vec![
+        nothing(),
+        of_numbers(),
+        of_table(|table| table.buffer.size -= 512),
+        chunks(100),
+        chunks(50),
+        of_table(|table| table.stride = 16),
+        nothing(),
+    ];
+    assert_eq!(reused(&mut with_codebook(300), changes), [0, 1, 0, 0, 0, 0, 0, 1]);
+    // Chunks of Gaussians hold what was decoded.
+    let changes = vec![nothing(), nothing(), of_numbers(), nothing(), nothing()];
+    assert_eq!(reused(&mut with_codebook(3000), changes), [0, 0, 1, 0, 0, 1]);
 }
 
 #[gaurast_runner::test]

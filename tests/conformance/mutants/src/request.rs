@@ -4,6 +4,7 @@ use ash::vk;
 use ash::vk::TaggedStructure;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+    PipelineGaussianDecodingStateCreateInfoGAURAST as Decoding,
     PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateInfoGAURAST as State,
     PipelineGaussianUnscentedStateCreateInfoGAURAST as Unscented,
 };
@@ -30,6 +31,7 @@ pub(crate) struct Request {
     pub(crate) approximation: Option<Approximation<'static>>,
     pub(crate) footprint: Option<Footprint<'static>>,
     pub(crate) unscented: Option<Unscented<'static>>,
+    pub(crate) decoding: Option<Decoding<'static>>,
     rendering: Option<vk::PipelineRenderingCreateInfo<'static>>,
     pub(crate) parts: Option<vk::GraphicsPipelineLibraryCreateInfoEXT<'static>>,
     pub(crate) libraries: Option<vk::PipelineLibraryCreateInfoKHR<'static>>,
@@ -92,6 +94,7 @@ impl Request {
                     Approximation::STRUCTURE_TYPE => self.approximation = copy(structure.cast()),
                     Footprint::STRUCTURE_TYPE => self.footprint = copy(structure.cast()),
                     Unscented::STRUCTURE_TYPE => self.unscented = copy(structure.cast()),
+                    Decoding::STRUCTURE_TYPE => self.decoding = copy(structure.cast()),
                     vk::PipelineRenderingCreateInfo::STRUCTURE_TYPE => self.rendering = copy(structure.cast()),
                     vk::GraphicsPipelineLibraryCreateInfoEXT::STRUCTURE_TYPE => self.parts = copy(structure.cast()),
                     vk::PipelineLibraryCreateInfoKHR::STRUCTURE_TYPE => self.libraries = copy(structure.cast()),
@@ -152,7 +155,7 @@ impl Request {
                 })*
             };
         }
-        chain!(gaussian, approximation, footprint, unscented, rendering, parts, libraries);
+        chain!(gaussian, approximation, footprint, unscented, decoding, rendering, parts, libraries);
         *info
     }
 }

@@ -70,6 +70,7 @@ mutants! {
         SET_CLEARED = "What is cleared within a set is cleared after it",
         SET_EMPTY = "A set ends at a draw without Gaussians",
         SET_HARMONICS = "A set is drawn from its first draw's harmonics buffer",
+        SET_DECODING_TABLES = "A set is decoded by its first draw's tables",
     }
     "vertex_input": {
         BUFFER_OFFSET = "Vertex buffers are read from their beginnings",
@@ -107,6 +108,23 @@ mutants! {
         HARMONICS_STRIDE = "A Gaussian has 48 bytes of harmonics, whatever the stride",
         HARMONICS_COEFFICIENT_STRIDE = "A coefficient has 12 bytes, whatever the stride",
         HARMONICS_REBOUND = "The harmonics buffer is the one that was bound first",
+    }
+    "decoding": {
+        DECODING_SIGNED_LOG = "Decoded signed logarithms are positions",
+        DECODING_BASE_COLOR = "Decoded colours are coefficients",
+        DECODING_PALETTE = "Each Gaussian has the palette's entry of its own number",
+        DECODING_ADDRESS = "Tables of positions begin 64 bytes before their address",
+        DECODING_SIZE = "Tables of positions end 64 bytes after their size",
+        DECODING_SIZE_PARTIAL = "Values that lie in a table in part are read",
+        DECODING_STRIDE = "Bounds of chunks are packed, whatever their stride",
+        DECODING_CHUNK_SIZE = "A chunk has 256 Gaussians, whatever its size",
+        DECODING_CODES_SIZE = "The codes of harmonics have no end",
+        DECODING_LABELS_SIZE = "Labels have no end",
+        DECODING_CODES_STRIDE = "The codes of Gaussians are packed",
+        DECODING_COEFFICIENT_STRIDE = "The codes of a coefficient follow those of the one before",
+        DECODING_COMPONENT_STRIDE = "The codes of red, green and blue follow one another",
+        DECODING_LABELS_STRIDE = "Labels are packed",
+        DECODING_REBOUND = "The tables are those that were bound first",
     }
     "dynamic_state": {
         DYNAMIC_ORDER = "The dynamic order is the pipeline's",

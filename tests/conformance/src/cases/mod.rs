@@ -3,6 +3,8 @@
 mod activation;
 mod attachments;
 mod chapter;
+mod coded;
+mod decoding;
 mod descriptors;
 mod distortion;
 mod draws;
@@ -31,7 +33,7 @@ pub use chapter::{Case, Subject};
 type Write = fn(&mut Chapter<'_>);
 
 /// The chapters in their order.
-const CHAPTERS: [(&str, Write); 33] = [
+const CHAPTERS: [(&str, Write); 34] = [
     ("topology", input::topology),
     ("attributes", input::attributes),
     ("instances", input::instances),
@@ -55,6 +57,7 @@ const CHAPTERS: [(&str, Write); 33] = [
     ("vertex_input", vertex_input::vertex_input),
     ("activation", activation::activation),
     ("harmonics_buffer", harmonics_buffer::harmonics_buffer),
+    ("decoding", decoding::decoding),
     ("dynamic_state", dynamic_state::dynamic_state),
     ("views", views::views),
     ("projection", projection::projection),

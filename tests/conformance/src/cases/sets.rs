@@ -50,6 +50,7 @@ pub(super) fn sets(chapter: &mut Chapter<'_>) {
     several(chapter);
     between(chapter);
     super::harmonics_buffer::in_a_set(chapter);
+    super::decoding::in_a_set(chapter);
 }
 
 /// Sets whose draws are different commands.

@@ -6,6 +6,7 @@
 //! | step | what | where |
 //! |---|---|---|
 //! | before | attributes from logarithms and logits | [`activation`] |
+//! | before | attributes from the integers of compressed files | [`decoding`] |
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
 //! | 3 | the distortion of a lens | [`lens`] |
@@ -54,6 +55,7 @@
 pub mod activation;
 mod binary16;
 mod cut_off;
+pub mod decoding;
 pub mod error_model;
 mod inputs;
 mod instance;

@@ -44,6 +44,7 @@ fn append() -> GaussianAppend {
             spherical_harmonics: vec![stream()],
             model: ModelAttributes::default(),
             activations: Default::default(),
+            tables: None,
         },
         indices: None,
         first: 0,
@@ -129,7 +130,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 let frustum = Frustum::new(&constants, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let group = GroupAttributes {
-                    reader: CoefficientReader::new(&append.attributes.spherical_harmonics),
+                    reader: CoefficientReader::new(&append.attributes),
                     vertices: GroupVertices::new(&append, 0, 0, GROUP),
                     attributes: &attributes,
                     matrices: None,

@@ -4,7 +4,8 @@ use ash::vk;
 use ash::vk::TaggedStructure;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraDistortionGAURAST as Distortion, GaussianCameraGAURAST as Camera,
-    GaussianCameraModelGAURAST as Model, GaussianDistortionModelGAURAST as DistortionModel, GaussianOrderGAURAST,
+    GaussianCameraModelGAURAST as Model, GaussianDecodingTablesGAURAST as Tables,
+    GaussianDistortionModelGAURAST as DistortionModel, GaussianOrderGAURAST,
     GaussianSphericalHarmonicsBufferGAURAST as Harmonics,
 };
 
@@ -160,6 +161,45 @@ dynamic! {
     cmd_set_gaussian_spherical_harmonics_degree(u32);
     cmd_set_gaussian_exponential_error(f32);
     cmd_set_gaussian_contribution_budget(f32);
+}
+
+pub(super) unsafe extern "system" fn cmd_bind_gaussian_decoding_tables(
+    commands: vk::CommandBuffer,
+    tables: *const Tables<'_>,
+) {
+    let is_lost = of(commands, |recording| {
+        let is_later = recording.count("decoding tables") > 0;
+        let is_late = recording.in_set && recording.draws_of_set > 0;
+        DECODING_REBOUND.strikes(is_later) || SET_DECODING_TABLES.strikes(is_late)
+    });
+    if is_lost {
+        return;
+    }
+    // SAFETY: see the crate.
+    unsafe {
+        let mut tables = *tables;
+        let position = &mut tables.position;
+        let number = if position.format == vk::Format::R64_SFLOAT { 8 } else { 4 };
+        if position.size > 0 {
+            DECODING_ADDRESS.changes(&mut position.device_address, |address| address - 64);
+            DECODING_SIZE.changes(&mut position.size, |size| size + 64);
+            DECODING_SIZE_PARTIAL.changes(&mut position.size, |size| size.next_multiple_of(position.stride.into()));
+            DECODING_STRIDE.replaces(&mut position.stride, 6 * number);
+            DECODING_CHUNK_SIZE.replaces(&mut position.chunk_size, 256);
+        }
+        let (codes, labels) = (&mut tables.codes, &mut tables.labels);
+        if codes.size > 0 {
+            DECODING_CODES_SIZE.changes(&mut codes.size, |size| size + 64);
+            DECODING_CODES_STRIDE.changes(&mut codes.stride, |stride| stride / codes.coefficient_stride.max(3) * 3);
+            DECODING_COEFFICIENT_STRIDE.replaces(&mut codes.coefficient_stride, 3);
+            DECODING_COMPONENT_STRIDE.replaces(&mut codes.component_stride, 1);
+        }
+        if labels.size > 0 {
+            DECODING_LABELS_SIZE.changes(&mut labels.size, |size| size + 64);
+            DECODING_LABELS_STRIDE.replaces(&mut labels.stride, 2);
+        }
+        (next().cmd_bind_gaussian_decoding_tables)(commands, &raw const tables);
+    }
 }
 
 pub(super) unsafe extern "system" fn cmd_bind_gaussian_spherical_harmonics(

@@ -8,10 +8,10 @@ use gaurast::vk::{
     DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST, DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST,
     DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST, GAUSSIAN_LOCATION_UNUSED_GAURAST,
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
-    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
-    GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
-    PipelineGaussianUnscentedStateCreateInfoGAURAST as Unscented,
+    GaussianHarmonicsDecodingGAURAST as HarmonicsDecoding, GaussianLinearizationGAURAST as Linearization,
+    GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
+    GaussianProjectionModeGAURAST as ProjectionMode, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    PipelineGaussianStateCreateInfoGAURAST as State, PipelineGaussianUnscentedStateCreateInfoGAURAST as Unscented,
 };
 
 use crate::mutant::Mutant;
@@ -47,6 +47,7 @@ fn change(request: &mut Request) {
     }
     change_approximations(request);
     change_sigma_points(request);
+    change_decodings(request);
     change_vertex_input(request);
     change_dynamic_states(request);
     change_tests(request);
@@ -111,6 +112,16 @@ fn change_state(request: &Request, state: &mut State<'_>) {
         let own = (state.low_pass_variance, state.alpha_ceiling);
         if LIBRARY_STATE.strikes(own != (default.low_pass_variance, default.alpha_ceiling)) {
             (state.low_pass_variance, state.alpha_ceiling) = (default.low_pass_variance, default.alpha_ceiling);
+        }
+    }
+}
+
+fn change_decodings(request: &mut Request) {
+    if let Some(decoding) = &mut request.decoding {
+        DECODING_SIGNED_LOG.replaces(&mut decoding.signed_log_position, vk::FALSE);
+        DECODING_BASE_COLOR.replaces(&mut decoding.base_color, vk::FALSE);
+        if decoding.spherical_harmonics == HarmonicsDecoding::PALETTE {
+            DECODING_PALETTE.replaces(&mut decoding.spherical_harmonics, HarmonicsDecoding::CODEBOOK);
         }
     }
 }

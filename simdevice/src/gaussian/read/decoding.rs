@@ -1,0 +1,225 @@
+//! Decoding: the values that integers in memory stand for, in binary64.
+
+use crate::format::Format;
+use crate::packet::{AttributeStream, Decoding, Decodings, RotationDecoding};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The numbers of a codebook.
+pub(super) const CODEBOOK: usize = 256;
+
+/// The value of the constant spherical harmonic.
+const Y_0: f64 = 0.28209479177387814;
+
+/// What the fourth byte of a quaternion has beyond the number of its largest component.
+const LARGEST_BYTE: u64 = 252;
+
+/// The place of an integer in an element of at most 8 bytes.
+#[derive(Clone, Copy)]
+pub(super) struct Field {
+    /// The number of its lowest bit.
+    shift: u32,
+    bits: u32,
+}
+
+impl Field {
+    const fn new(shift: u32, bits: u32) -> Self {
+        Self { shift, bits }
+    }
+
+    const fn max(self) -> u64 {
+        (1 << self.bits) - 1
+    }
+
+    fn code(self, element: u64) -> u64 {
+        element >> self.shift & self.max()
+    }
+
+    /// The integer's part of the greatest one.
+    fn fraction(self, element: u64) -> f64 {
+        self.code(element) as f64 / self.max() as f64
+    }
+}
+
+/// The integers of positions and scales in words.
+const WORD_OF_LENGTHS: [Field; 3] = [Field::new(21, 11), Field::new(11, 10), Field::new(0, 11)];
+
+/// The integers of colours in words.
+const WORD_OF_COLORS: [Field; 3] = [Field::new(24, 8), Field::new(16, 8), Field::new(8, 8)];
+
+/// The places of an attribute's integers in elements of a format, with those of a word if it is one.
+fn fields<const COMPONENTS: usize>(format: Format, of_word: [Field; COMPONENTS]) -> [Field; COMPONENTS] {
+    if format == Format::R32Uint {
+        return of_word;
+    }
+    let bits = format.components().first().map_or(8, |component| component.bits);
+    std::array::from_fn(|component| Field::new(bits * component as u32, bits))
+}
+
+/// The number in the first bytes, of which there are as many as it has.
+fn number(bytes: &[u8], is_binary64: bool) -> f64 {
+    match (is_binary64, bytes) {
+        (true, &[a, b, c, d, e, f, g, h, ..]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        (false, &[a, b, c, d, ..]) => f32::from_le_bytes([a, b, c, d]).into(),
+        _ => 0.0,
+    }
+}
+
+const fn number_size(is_binary64: bool) -> usize {
+    if is_binary64 { 8 } else { 4 }
+}
+
+/// The numbers of a codebook. Those that its buffer does not have are zero.
+pub(super) fn codebook(table: &AttributeStream, is_binary64: bool) -> Box<[f64; CODEBOOK]> {
+    let size = number_size(is_binary64);
+    let count = usize::try_from(table.buffer.size / size as u64).unwrap_or(CODEBOOK).min(CODEBOOK);
+    let mut bytes = [0; 8 * CODEBOOK];
+    table.read(0, &mut bytes[..size * count]);
+    let mut numbers = Box::new([0.0; CODEBOOK]);
+    for (value, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(size)).take(count) {
+        *value = number(bytes, is_binary64);
+    }
+    numbers
+}
+
+/// The numbers that an attribute's integers select or lie between.
+enum Values<'a, const COMPONENTS: usize> {
+    Chunks {
+        table: &'a AttributeStream,
+        is_binary64: bool,
+        /// The vertices of a chunk.
+        size: u32,
+        /// The chunk whose bounds were read last, and these.
+        last: Option<(u64, [[f64; COMPONENTS]; 2])>,
+    },
+    Codebook(Box<[f64; CODEBOOK]>),
+}
+
+/// Decodes an attribute.
+pub(super) struct Decoder<'a, const COMPONENTS: usize> {
+    fields: [Field; COMPONENTS],
+    values: Values<'a, COMPONENTS>,
+}
+
+impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
+    /// A decoder of elements of `format`; `None` if nothing is decoded.
+    fn new(
+        decoding: Decoding,
+        table: Option<&'a AttributeStream>,
+        format: Format,
+        of_word: [Field; COMPONENTS],
+    ) -> Option<Self> {
+        let values = match (decoding, table) {
+            (Decoding::None, _) | (_, None) => return None,
+            (Decoding::Chunk { size, is_binary64 }, Some(table)) => {
+                Values::Chunks { table, is_binary64, size: size.max(1), last: None }
+            }
+            (Decoding::Codebook { is_binary64 }, Some(table)) => Values::Codebook(codebook(table, is_binary64)),
+        };
+        Some(Self { fields: fields(format, of_word), values })
+    }
+
+    /// The values of the element of `vertex`.
+    pub(super) fn decode(&mut self, vertex: u64, element: u64) -> [f64; COMPONENTS] {
+        let fields = self.fields;
+        match &mut self.values {
+            Values::Codebook(numbers) => fields.map(|field| numbers[field.code(element) as usize % CODEBOOK]),
+            Values::Chunks { table, is_binary64, size, last } => {
+                let chunk = vertex / u64::from(*size);
+                let bounds = match last {
+                    Some((number, bounds)) if *number == chunk => *bounds,
+                    _ => bounds(table, *is_binary64, chunk),
+                };
+                *last = Some((chunk, bounds));
+                let [low, high] = bounds;
+                std::array::from_fn(|at| {
+                    let t = fields[at].fraction(element);
+                    low[at] * (1.0 - t) + high[at] * t
+                })
+            }
+        }
+    }
+}
+
+/// The minima and the maxima of a chunk; zeros if the table does not have all of them.
+fn bounds<const COMPONENTS: usize>(table: &AttributeStream, is_binary64: bool, chunk: u64) -> [[f64; COMPONENTS]; 2] {
+    let size = number_size(is_binary64);
+    let mut bytes = [0; 8 * 2 * 3];
+    let bytes = &mut bytes[..(2 * COMPONENTS * size).min(8 * 2 * 3)];
+    table.read(chunk, bytes);
+    let at = |index: usize| bytes.get(index * size..).map_or(0.0, |bytes| number(bytes, is_binary64));
+    [0, COMPONENTS].map(|first| std::array::from_fn(|component| at(first + component)))
+}
+
+impl Decodings {
+    /// The decoder of positions from elements of `stream`, if they are decoded.
+    pub(super) fn positions<'a>(
+        &self,
+        stream: &AttributeStream,
+        table: Option<&'a AttributeStream>,
+    ) -> Option<Decoder<'a, 3>> {
+        Decoder::new(self.position, table, stream.format, WORD_OF_LENGTHS)
+    }
+
+    /// The decoder of scales.
+    pub(super) fn scales<'a>(
+        &self,
+        stream: &AttributeStream,
+        table: Option<&'a AttributeStream>,
+    ) -> Option<Decoder<'a, 3>> {
+        Decoder::new(self.scale, table, stream.format, WORD_OF_LENGTHS)
+    }
+
+    /// The decoder of opacities.
+    pub(super) fn opacities<'a>(
+        &self,
+        stream: &AttributeStream,
+        table: Option<&'a AttributeStream>,
+    ) -> Option<Decoder<'a, 1>> {
+        Decoder::new(self.opacity, table, stream.format, [Field::new(0, 8)])
+    }
+
+    /// The decoder of coefficient 0.
+    pub(super) fn colors<'a>(
+        &self,
+        stream: &AttributeStream,
+        table: Option<&'a AttributeStream>,
+    ) -> Option<Decoder<'a, 3>> {
+        Decoder::new(self.color, table, stream.format, WORD_OF_COLORS)
+    }
+
+    /// The coefficient that a decoded component of coefficient 0 stands for.
+    pub(super) fn coefficient(&self, component: f64) -> f64 {
+        if self.base_color { (component - 0.5) / Y_0 } else { component }
+    }
+}
+
+/// The number whose signed logarithm is `value`.
+pub(super) fn signed_exponential(value: f64) -> f64 {
+    libm::expm1(value.abs()).copysign(value)
+}
+
+/// The quaternion w, x, y, z that an element stands for.
+pub(super) fn quaternion(decoding: RotationDecoding, element: u64) -> [f64; 4] {
+    let (largest, smaller) = match decoding {
+        RotationDecoding::SmallestThree8 => {
+            let fields = [Field::new(0, 8), Field::new(8, 8), Field::new(16, 8)];
+            match Field::new(24, 8).code(element).checked_sub(LARGEST_BYTE) {
+                Some(largest) => (largest, fields),
+                None => return [1.0, 0.0, 0.0, 0.0],
+            }
+        }
+        RotationDecoding::None | RotationDecoding::SmallestThree10 => {
+            let fields = [Field::new(20, 10), Field::new(10, 10), Field::new(0, 10)];
+            (Field::new(30, 2).code(element), fields)
+        }
+    };
+    let smaller = smaller.map(|field| (2.0 * field.fraction(element) - 1.0) * FRAC_1_SQRT_2);
+    let [a, b, c] = smaller;
+    let greatest = (1.0 - (a * a + b * b + c * c)).max(0.0).sqrt();
+    match largest {
+        0 => [greatest, a, b, c],
+        1 => [a, greatest, b, c],
+        2 => [a, b, greatest, c],
+        _ => [a, b, c, greatest],
+    }
+}

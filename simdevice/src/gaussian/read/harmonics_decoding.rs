@@ -1,0 +1,134 @@
+//! Decoding of spherical harmonics of single lanes.
+
+use super::attributes::GroupVertices;
+use super::decoding::{CODEBOOK, codebook};
+use crate::packet::{AttributeStream, Decodings, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
+
+/// The most bytes from the first to the last code of a vertex that are read with one copy.
+const SPAN: usize = 256;
+
+/// Decodes the spherical harmonics of a draw.
+pub(super) struct HarmonicsDecoder<'a> {
+    decodings: &'a Decodings,
+    /// The table of coefficient 0.
+    colors: Option<&'a AttributeStream>,
+    codes: Option<CodeReader<'a>>,
+}
+
+/// Reads the coefficients after the first from their codes.
+struct CodeReader<'a> {
+    component_stride: u64,
+    /// The codebook in binary32.
+    values: Box<[f32; CODEBOOK]>,
+    /// The labels of a palette's entries, if there is one.
+    labels: Option<&'a AttributeStream>,
+}
+
+impl<'a> HarmonicsDecoder<'a> {
+    /// The decoder of these attributes' harmonics; `None` if none is decoded.
+    pub(super) fn new(attributes: &'a GaussianAttributes) -> Option<Box<Self>> {
+        let tables = attributes.tables.as_deref()?;
+        let decodings = &attributes.activations.decodings;
+        let reader = |codes: HarmonicsCodes, labels| {
+            let numbers = codebook(tables.harmonics.as_ref()?, codes.is_binary64);
+            let values = Box::new(numbers.map(|number| number as f32));
+            Some(CodeReader { component_stride: codes.component_stride.into(), values, labels })
+        };
+        let codes = match decodings.harmonics {
+            HarmonicsDecoding::None => None,
+            HarmonicsDecoding::Codebook(codes) => reader(codes, None),
+            HarmonicsDecoding::Palette(codes) => reader(codes, tables.labels.as_ref()),
+        };
+        let colors = tables.color.as_ref();
+        (codes.is_some() || colors.is_some()).then(|| Box::new(Self { decodings, colors, codes }))
+    }
+
+    /// Reads the coefficients of `lane` from the streams: red, green and blue of each in turn.
+    pub(super) fn read(&self, streams: &[AttributeStream], group: &GroupVertices<'_>, lane: usize, out: &mut [f32]) {
+        let Some((color, rest)) = streams.split_first() else {
+            return;
+        };
+        let [first, others @ ..] = out.as_chunks_mut().0 else {
+            return;
+        };
+        *first = self.color(color, group, lane);
+        match &self.codes {
+            Some(codes) => codes.read(rest, group, lane, others),
+            None => {
+                for (stream, out) in rest.iter().zip(others) {
+                    *out = group.triple(stream, lane);
+                }
+            }
+        }
+    }
+
+    fn color(&self, stream: &AttributeStream, group: &GroupVertices<'_>, lane: usize) -> [f32; 3] {
+        let Some(mut decoder) = self.decodings.colors(stream, self.colors) else {
+            return group.triple(stream, lane);
+        };
+        let mut element = [0; 8];
+        let size = stream.format.texel_size().min(8);
+        stream.read(group.element(stream, lane), &mut element[..size]);
+        let decoded = decoder.decode(group.vertex(lane), u64::from_le_bytes(element));
+        decoded.map(|component| self.decodings.coefficient(component) as f32)
+    }
+}
+
+impl CodeReader<'_> {
+    /// Reads coefficients from streams of their codes of red.
+    fn read(&self, streams: &[AttributeStream], group: &GroupVertices<'_>, lane: usize, out: &mut [[f32; 3]]) {
+        let vertex = group.vertex(lane);
+        let entry = match self.labels {
+            None => Some(vertex),
+            Some(labels) => label(labels, vertex),
+        };
+        let ([first, ..], [.., last], Some(entry)) = (streams, streams, entry) else {
+            return out.fill([0.0; 3]);
+        };
+        // All codes lie between the first and the last of red, and those of blue after them.
+        let start = u64::from(first.offset);
+        let length = u64::from(last.offset)
+            .checked_sub(start)
+            .map_or(u64::MAX, |between| between + 2 * self.component_stride + 1);
+        let mut span = [0_u8; SPAN];
+        let is_one_buffer = first.buffer.offset == last.buffer.offset;
+        if is_one_buffer
+            && length <= SPAN as u64
+            && let Some(place) = first.place(entry, length)
+            && first.buffer.memory.read(place, &mut span[..length as usize]).is_ok()
+        {
+            for (stream, out) in streams.iter().zip(out) {
+                let at = (u64::from(stream.offset) - start) as usize;
+                let stride = self.component_stride as usize;
+                *out = [0, 1, 2].map(|component| self.values[usize::from(span[at + component * stride])]);
+            }
+            return;
+        }
+        for (stream, out) in streams.iter().zip(out) {
+            *out = [0, 1, 2].map(|component| match code(stream, entry, component * self.component_stride) {
+                Some(code) => self.values[usize::from(code)],
+                None => 0.0,
+            });
+        }
+    }
+}
+
+/// The entry of a palette that `vertex` has; `None` if its label lies beyond the buffer.
+fn label(labels: &AttributeStream, vertex: u64) -> Option<u64> {
+    let mut bytes = [0; 2];
+    let place = labels.place(vertex, 2)?;
+    labels.buffer.memory.read(place, &mut bytes).ok()?;
+    Some(u16::from_le_bytes(bytes).into())
+}
+
+/// The byte `further` bytes after an element of a stream begins; `None` if it lies beyond the buffer.
+fn code(stream: &AttributeStream, element: u64, further: u64) -> Option<u8> {
+    let mut byte = [0; 1];
+    let start = element.checked_mul(stream.stride.into())?.checked_add(stream.offset.into())?;
+    let at = start.checked_add(further)?;
+    if at >= stream.buffer.size {
+        return None;
+    }
+    stream.buffer.memory.read(stream.buffer.offset.checked_add(at)?, &mut byte).ok()?;
+    Some(byte[0])
+}
