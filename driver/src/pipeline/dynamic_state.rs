@@ -5,9 +5,7 @@ use super::state::FixedFunctionState as Fixed;
 use crate::convert::StencilOps;
 use ash::vk;
 use simdevice::state::gaussian::GaussianOrder;
-use simdevice::state::{
-    BlendEquations, CompareOp, DepthBias, LineMode, LineStipple, LogicOp, PolygonMode, Topology,
-};
+use simdevice::state::{BlendEquations, CompareOp, DepthBias, LineMode, LineStipple, LogicOp, PolygonMode, Topology};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
