@@ -616,6 +616,9 @@ mod tests {
         }
     }
 
+    /// The bits of the components of eight texels and of those beside them.
+    type PairBits = [[[u32; 8]; 4]; 2];
+
     /// Asserts that texels and those beside them are found as one by one, wherever the latter are.
     fn beside<T: Texels>(case: &Case, words: &[u32]) {
         let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
@@ -629,7 +632,7 @@ mod tests {
                 1 => right[round as usize % 8] = left[round as usize % 8],
                 _ => {}
             }
-            let (both, each): ([[[u32; 8]; 4]; 2], [[[u32; 8]; 4]; 2]) = dispatch!(token_of(case), simd => {
+            let (both, each): (PairBits, PairBits) = dispatch!(token_of(case), simd => {
                 let (left, right) = (u32x8::simd_from(simd, left), u32x8::simd_from(simd, right));
                 let both = neighbours::<_, T>(simd, &atomics, left, right).map(|words| T::decode(simd, words));
                 let each = [left, right].map(|index| texels::<_, T>(simd, &atomics, index));
