@@ -17,6 +17,6 @@ mod runs;
 #[doc(hidden)]
 pub use fearless_simd;
 pub use hints::prefetch;
-pub use lookup::{gather, look_up};
+pub use lookup::{gather, gather_2, gather_4, gather_each, look_up, look_up_16};
 pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds, PAGE_SIZE};
 pub use runs::{load_4, load_16, store_16};

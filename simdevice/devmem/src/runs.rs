@@ -14,6 +14,17 @@ pub fn load_4<S: Simd>(simd: S, words: &[AtomicU32; 4]) -> u32x4<S> {
     u32x4::simd_from(simd, load(simd, words))
 }
 
+/// The two words from each of two places on.
+///
+/// # Safety
+/// They must lie in `words`.
+#[inline(always)]
+pub(crate) unsafe fn load_2x2<S: Simd>(simd: S, words: &[AtomicU32], places: [u32; 2]) -> u32x4<S> {
+    debug_assert!(places.iter().all(|place| (*place as usize) + 2 <= words.len()));
+    // SAFETY: as this function's.
+    u32x4::simd_from(simd, unsafe { load_pairs(simd, words, places) })
+}
+
 /// Sixteen consecutive words.
 #[inline(always)]
 pub fn load_16<S: Simd>(simd: S, words: &[AtomicU32; 16]) -> u32x16<S> {
@@ -47,6 +58,39 @@ fn load<S: Simd>(simd: S, words: &[AtomicU32; 4]) -> [u32; 4] {
     bytemuck::cast(loaded)
 }
 
+/// The two words from each of two places on.
+///
+/// # Safety
+/// They must lie in `words`.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+unsafe fn load_pairs<S: Simd>(simd: S, words: &[AtomicU32], [first, second]: [u32; 2]) -> [u32; 4] {
+    use std::arch::{asm, x86_64::__m128i};
+    let words = words.as_ptr();
+    let (first, second) = (first as usize, second as usize);
+    let loaded: __m128i;
+    // SAFETY: the instructions read eight bytes each, all of them words of the slice. A level with AVX2 has their forms
+    // for AVX.
+    unsafe {
+        if simd.level().as_avx2().is_some() {
+            asm!(
+                "vmovq {loaded}, qword ptr [{words} + 4 * {first}]",
+                "vmovhps {loaded}, {loaded}, qword ptr [{words} + 4 * {second}]",
+                words = in(reg) words, first = in(reg) first, second = in(reg) second, loaded = out(xmm_reg) loaded,
+                options(nostack, preserves_flags, readonly)
+            );
+        } else {
+            asm!(
+                "movq {loaded}, qword ptr [{words} + 4 * {first}]",
+                "movhps {loaded}, qword ptr [{words} + 4 * {second}]",
+                words = in(reg) words, first = in(reg) first, second = in(reg) second, loaded = out(xmm_reg) loaded,
+                options(nostack, preserves_flags, readonly)
+            );
+        }
+    }
+    bytemuck::cast(loaded)
+}
+
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn store<S: Simd>(simd: S, words: &[AtomicU32; 4], values: &[u32; 4]) {
@@ -67,6 +111,17 @@ fn store<S: Simd>(simd: S, words: &[AtomicU32; 4], values: &[u32; 4]) {
 #[inline(always)]
 fn load<S: Simd>(_: S, words: &[AtomicU32; 4]) -> [u32; 4] {
     words.each_ref().map(|word| word.load(std::sync::atomic::Ordering::Relaxed))
+}
+
+/// The two words from each of two places on.
+///
+/// # Safety
+/// They must lie in `words`.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+unsafe fn load_pairs<S: Simd>(_: S, words: &[AtomicU32], [first, second]: [u32; 2]) -> [u32; 4] {
+    let (first, second) = (first as usize, second as usize);
+    [first, first + 1, second, second + 1].map(|place| words[place].load(std::sync::atomic::Ordering::Relaxed))
 }
 
 #[cfg(not(target_arch = "x86_64"))]

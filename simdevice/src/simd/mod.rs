@@ -5,6 +5,7 @@
 //! they are compiled without the SIMD level's instructions, and pass vectors through memory.
 
 pub(crate) mod exp2;
+pub(crate) mod half;
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
 use isa::Vector;

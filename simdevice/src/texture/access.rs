@@ -3,14 +3,14 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use devmem::store_16;
+use devmem::{load_16, look_up_16, store_16};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, mask32x16, u32x16};
+use fearless_simd::{Simd, f32x8, mask32x16, u32x8, u32x16};
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
 use super::surface::Surface;
-use super::texels::{PackedLevel, TexelCodec, Texels, VectorLayout, for_codec};
+use super::texels::{PackedLevel, TexelCodec, Texels, VectorLayout, for_codec, texels};
 use crate::format::unorm8::pack_unorm8;
 use crate::simd::floats_of;
 use isa::ir::{Dimension, VECTOR_LANES};
@@ -76,11 +76,67 @@ fn places<S: Simd>(simd: S, surface: &Surface, level: &PackedLevel, request: &Te
 #[inline(always)]
 pub(super) fn read<S: Simd>(simd: S, surface: &Surface, request: &TexelRequest) -> Option<[LaneWords; 4]> {
     let (layout, level) = level(surface, request)?;
-    Some(for_codec!(simd, layout.codec, read_level(surface, layout, level, request)))
+    Some(simd.vectorize(
+        #[inline(always)]
+        || read_level(simd, surface, layout, level, request),
+    ))
 }
 
+/// The stored components of 16 texels.
 #[inline(always)]
-fn read_level<S: Simd, T: Texels>(
+fn stored<S: Simd, T: Texels>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [u32x16<S>; 4] {
+    if T::SIZE == 4
+        && let Some(words) = run(simd, words, index)
+    {
+        let zero = u32x8::splat(simd, 0);
+        let (first, second) = words.split();
+        let (first, second) = (T::decode(simd, [first, zero, zero, zero]), T::decode(simd, [second, zero, zero, zero]));
+        return joined::<S, T>(simd, first, second);
+    }
+    let (first, second) = index.split();
+    let (first, second) = (texels::<S, T>(simd, words, first), texels::<S, T>(simd, words, second));
+    joined::<S, T>(simd, first, second)
+}
+
+/// The bits of the components of two times eight texels.
+#[inline(always)]
+fn joined<S: Simd, T: Texels>(simd: S, first: [f32x8<S>; 4], second: [f32x8<S>; 4]) -> [u32x16<S>; 4] {
+    let mut joined = [u32x16::splat(simd, 0); 4];
+    for c in 0..T::COMPONENTS {
+        joined[c] = first[c].combine(second[c]).bitcast();
+    }
+    joined
+}
+
+/// The words at 16 indices, if these are consecutive, or in any order within an aligned run of 16 words.
+#[inline(always)]
+fn run<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> Option<u32x16<S>> {
+    const RUN: u32 = VECTOR_LANES as u32;
+    let first = index[0];
+    let consecutive = u32x16::simd_from(simd, CONSECUTIVE);
+    let is_consecutive = (index - first).simd_eq(consecutive).all_true();
+    let begin = if is_consecutive { first } else { first & !(RUN - 1) };
+    let place = index - begin;
+    if !is_consecutive && !place.simd_lt(RUN).all_true() {
+        return None;
+    }
+    let run = load_16(simd, words.get(begin as usize..)?.first_chunk()?);
+    Some(if is_consecutive { run } else { look_up_16(simd, run, place) })
+}
+
+/// The numbers of lanes.
+const CONSECUTIVE: LaneWords = {
+    let mut numbers = [0; VECTOR_LANES];
+    let mut lane = 0;
+    while lane < VECTOR_LANES {
+        numbers[lane] = lane as u32;
+        lane += 1;
+    }
+    numbers
+};
+
+#[inline(always)]
+fn read_level<S: Simd>(
     simd: S,
     surface: &Surface,
     layout: &VectorLayout,
@@ -89,26 +145,23 @@ fn read_level<S: Simd, T: Texels>(
 ) -> [LaneWords; 4] {
     let words = layout.words(&surface.memory);
     let Places { inside, index } = places(simd, surface, level, request);
-    let (first, second) = index.split();
-    let (first, second) = (T::load(simd, words, first), T::load(simd, words, second));
+    let stored = for_codec!(layout.codec, stored(simd, words, index));
+    if inside == u16::MAX {
+        return layout.arrange(stored, surface.one());
+    }
     let zero = u32x16::splat(simd, 0);
     let one = u32x16::splat(simd, surface.one());
-    let mut stored = [zero; 4];
-    for c in 0..T::COMPONENTS {
-        stored[c] = first[c].combine(second[c]).bitcast();
-    }
+    let components = layout.codec.components();
     let mut texel = [zero, zero, zero, one];
     for c in 0..4 {
-        if layout.order[c] < T::COMPONENTS {
+        if layout.order[c] < components {
             texel[c] = stored[layout.order[c]];
         }
     }
-    if inside != u16::MAX {
-        let is_inside = simd.from_bitmask_mask32x16(u64::from(inside));
-        let outside = surface.outside();
-        for c in 0..4 {
-            texel[c] = is_inside.select(texel[c], u32x16::splat(simd, outside[c]));
-        }
+    let is_inside = simd.from_bitmask_mask32x16(u64::from(inside));
+    let outside = surface.outside();
+    for c in 0..4 {
+        texel[c] = is_inside.select(texel[c], u32x16::splat(simd, outside[c]));
     }
     let mut out = [[0; VECTOR_LANES]; 4];
     for (out, from) in out.iter_mut().zip(surface.swizzle) {

@@ -7,6 +7,7 @@
 use super::sampler::{AddressMode, Filter};
 use super::texels::Floats;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
+use isa::float;
 use isa::ir::VECTOR_LANES;
 use isa::resources::LaneWords;
 
@@ -143,7 +144,8 @@ fn vector_axis<S: Simd>(
 ) -> Axis {
     let size = u32x16::simd_from(simd, *size).bitcast::<i32x16<S>>();
     let size = f32x16::float_from(size);
-    let u = texel_coordinates(simd, mode, normalized, *coordinate, size);
+    let coordinate = u32x16::simd_from(simd, *coordinate).bitcast();
+    let u = texel_coordinates(simd, mode, normalized, coordinate, size);
     let shifted = match filter {
         Filter::Nearest => u,
         Filter::Linear => u - 0.5,
@@ -179,14 +181,19 @@ pub(super) struct VectorTaps<S: Simd> {
 
 /// The results of [`axis`], for normalized coordinates and a linear filter.
 #[inline(always)]
-pub(super) fn taps<S: Simd>(simd: S, mode: AddressMode, coordinate: &LaneWords, size: f32x16<S>) -> VectorTaps<S> {
-    let shifted = texel_coordinates(simd, mode, true, *coordinate, size) - 0.5;
+pub(super) fn taps<S: Simd>(simd: S, mode: AddressMode, coordinate: f32x16<S>, size: f32x16<S>) -> VectorTaps<S> {
+    let shifted = texel_coordinates(simd, mode, true, coordinate, size) - 0.5;
     let whole = floor_lanes(simd, shifted);
-    VectorTaps {
-        first: wrap_lanes(simd, mode, whole, size, false),
-        second: wrap_lanes(simd, mode, whole + 1.0, size, false),
-        weight: shifted - whole,
+    let (next, weight) = (whole + 1.0, shifted - whole);
+    if mode == AddressMode::Repeat {
+        // Within a period only the first can be before it, by one texel, and only the second after it.
+        let zero = f32x16::splat(simd, 0.0);
+        let first = i32x16::truncate_from(whole.simd_lt(zero).select(size - 1.0, whole)).bitcast();
+        let second = i32x16::truncate_from(next.simd_ge(size).select(zero, next)).bitcast();
+        return VectorTaps { first, second, weight };
     }
+    let (first, second) = (wrap_lanes(simd, mode, whole, size, false), wrap_lanes(simd, mode, next, size, false));
+    VectorTaps { first, second, weight }
 }
 
 /// The results of [`texel_coordinate`] for 16 lanes.
@@ -195,11 +202,10 @@ fn texel_coordinates<S: Simd>(
     simd: S,
     mode: AddressMode,
     normalized: bool,
-    coordinate: LaneWords,
+    s: f32x16<S>,
     size: f32x16<S>,
 ) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);
-    let s: f32x16<S> = u32x16::simd_from(simd, coordinate).bitcast();
     let s = s.simd_eq(s).select(s, zero);
     match mode {
         _ if !normalized => clamp_lanes(s, FAR),
@@ -251,6 +257,9 @@ fn lanes_within<S: Simd>(simd: S, i: f32x16<S>, size: f32x16<S>) -> u16 {
 /// The greatest integers that are not greater, for numbers within 2^30.
 #[inline(always)]
 fn floor_lanes<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+    if float::has_instructions(simd) {
+        return float::floor(x);
+    }
     let truncated = f32x16::float_from(i32x16::truncate_from(x));
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     truncated - truncated.simd_gt(x).select(one, zero)

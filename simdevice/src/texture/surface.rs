@@ -3,7 +3,7 @@
 use devmem::Allocation;
 use std::sync::Arc;
 
-use super::texels::{PackedLevel, TexelCodec, VectorLayout};
+use super::texels::{PackedLevel, TexelCodec, VectorLayout, ZERO};
 use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
 use crate::format::{Aspect, Channel, Format, MAX_TEXEL_SIZE};
 use crate::image::{ImageKind, ImageView};
@@ -58,6 +58,9 @@ impl Surface {
     pub fn sampled(image: &SampledImage) -> Option<Self> {
         let mut surface = Self::image(&image.view, image.aspect)?;
         surface.swizzle = image.swizzle;
+        if let Some(layout) = &mut surface.layout {
+            layout.set_swizzle(image.swizzle);
+        }
         Some(surface)
     }
 
@@ -149,13 +152,16 @@ impl Surface {
                 layer_pitch: texels(level.layer_pitch)?,
             })
         });
-        Some(VectorLayout {
+        let mut layout = VectorLayout {
             codec,
             words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
             levels: levels.collect::<Option<_>>()?,
             order: self.stored_order(),
+            sources: [ZERO; 4],
             is_filterable: !self.is_integer(),
-        })
+        };
+        layout.set_swizzle(IDENTITY);
+        Some(layout)
     }
 
     /// The index of the stored component for red, green, blue and alpha.
@@ -183,13 +189,16 @@ impl Surface {
             return None;
         }
         let size = PackedLevel { extent: level.extent, base: 0, row_pitch: 0, depth_pitch: 0, layer_pitch: 0 };
-        Some(VectorLayout {
+        let mut layout = VectorLayout {
             codec,
             words: begin as usize..(begin + words) as usize,
             levels: vec![size],
             order: self.stored_order(),
+            sources: [ZERO; 4],
             is_filterable: false,
-        })
+        };
+        layout.set_swizzle(IDENTITY);
+        Some(layout)
     }
 
     /// The surface of a texel buffer: one row. `None` if the range does not lie within its memory.

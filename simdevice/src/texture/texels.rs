@@ -7,13 +7,15 @@ use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicU32;
 
-use devmem::{Allocation, gather};
+use devmem::{Allocation, gather, gather_2, gather_4, gather_each};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, f32x16, i32x8, u32x8, u32x16};
+use fearless_simd::{Simd, f32x8, f32x16, i32x8, mask32x8, mask32x16, u32x8, u32x16};
 
 use crate::format::Format;
 use crate::format::unorm8::unorm8_fraction_8;
+use crate::simd::half::halves;
 use crate::state::CompareOp;
+use crate::texture::view::Swizzle;
 use isa::ir::VECTOR_LANES;
 use isa::resources::LaneWords;
 
@@ -53,11 +55,53 @@ pub(super) struct VectorLayout {
     pub levels: Vec<PackedLevel>,
     /// The index of the stored component for red, green, blue and alpha.
     pub order: [usize; 4],
+    /// The index of the stored component for each component that a program reads, after swizzling; [`ZERO`] or [`ONE`] if
+    /// there is none.
+    pub sources: [usize; 4],
     /// False if texels are only read and written one by one: those of integers, and those of buffers.
     pub is_filterable: bool,
 }
 
+/// The source of a component that is 0.
+pub(super) const ZERO: usize = 4;
+
+/// The source of a component that is 1.
+pub(super) const ONE: usize = 5;
+
 impl VectorLayout {
+    /// Sets the sources of components for a swizzle.
+    pub fn set_swizzle(&mut self, swizzle: Swizzle) {
+        let components = self.codec.components();
+        let mut found = [ZERO, ZERO, ZERO, ONE];
+        for (found, stored) in found.iter_mut().zip(self.order) {
+            if stored < components {
+                *found = stored;
+            }
+        }
+        self.sources = swizzle.map(|from| from.pick(&found, ZERO, ONE));
+    }
+
+    /// The result registers for the stored components of 16 texels, given the bits of 1.
+    #[inline(always)]
+    pub fn arrange<S: Simd>(&self, stored: [u32x16<S>; 4], one: u32) -> [LaneWords; 4] {
+        let mut out = [[0; VECTOR_LANES]; 4];
+        if self.sources == [0, 1, 2, 3] {
+            for c in 0..4 {
+                out[c] = stored[c].into();
+            }
+            return out;
+        }
+        let mut found = [[0; VECTOR_LANES]; 6];
+        for c in 0..4 {
+            found[c] = stored[c].into();
+        }
+        found[ONE] = [one; VECTOR_LANES];
+        for c in 0..4 {
+            out[c] = found[self.sources[c]];
+        }
+        out
+    }
+
     /// The words of the surface's memory from which texels are read.
     #[inline]
     pub fn words<'a>(&self, memory: &'a Allocation) -> &'a [AtomicU32] {
@@ -95,29 +139,24 @@ pub(super) struct Rows<'a> {
     pub y: &'a [LaneWords; 2],
 }
 
-/// Calls a kernel for a [`TexelCodec`]. Each is compiled on its own.
+/// Calls a kernel for a [`TexelCodec`].
 macro_rules! for_codec {
-    ($simd:expr, $codec:expr, $kernel:ident($($argument:expr),*)) => {
+    ($codec:expr, $kernel:ident($($argument:expr),*)) => {{
+        use $crate::texture::texels::{self, TexelCodec};
         match $codec {
-            $crate::texture::texels::TexelCodec::Unorm8 => for_codec!($simd, $kernel, Unorm8, $($argument),*),
-            $crate::texture::texels::TexelCodec::Unorm8x2 => for_codec!($simd, $kernel, Unorm8x2, $($argument),*),
-            $crate::texture::texels::TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
-            $crate::texture::texels::TexelCodec::Srgb8x4 => for_codec!($simd, $kernel, Srgb8x4, $($argument),*),
-            $crate::texture::texels::TexelCodec::Unorm16 => for_codec!($simd, $kernel, Unorm16, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float16 => for_codec!($simd, $kernel, Float16, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float16x2 => for_codec!($simd, $kernel, Float16x2, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float16x4 => for_codec!($simd, $kernel, Float16x4, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float32 => for_codec!($simd, $kernel, Float32, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float32x2 => for_codec!($simd, $kernel, Float32x2, $($argument),*),
-            $crate::texture::texels::TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
+            TexelCodec::Unorm8 => $kernel::<S, texels::Unorm8>($($argument),*),
+            TexelCodec::Unorm8x2 => $kernel::<S, texels::Unorm8x2>($($argument),*),
+            TexelCodec::Unorm8x4 => $kernel::<S, texels::Unorm8x4>($($argument),*),
+            TexelCodec::Srgb8x4 => $kernel::<S, texels::Srgb8x4>($($argument),*),
+            TexelCodec::Unorm16 => $kernel::<S, texels::Unorm16>($($argument),*),
+            TexelCodec::Float16 => $kernel::<S, texels::Float16>($($argument),*),
+            TexelCodec::Float16x2 => $kernel::<S, texels::Float16x2>($($argument),*),
+            TexelCodec::Float16x4 => $kernel::<S, texels::Float16x4>($($argument),*),
+            TexelCodec::Float32 => $kernel::<S, texels::Float32>($($argument),*),
+            TexelCodec::Float32x2 => $kernel::<S, texels::Float32x2>($($argument),*),
+            TexelCodec::Float32x4 => $kernel::<S, texels::Float32x4>($($argument),*),
         }
-    };
-    ($simd:expr, $kernel:ident, $codec:ident, $($argument:expr),*) => {
-        $simd.vectorize(
-            #[inline(always)]
-            || $kernel::<S, $crate::texture::texels::$codec>($simd, $($argument),*),
-        )
-    };
+    }};
 }
 pub(super) use for_codec;
 
@@ -131,13 +170,21 @@ impl TexelCodec {
         }
     }
 
-    /// The stored components of the texels in column `i` and row `j`, each 0 or 1.
-    #[inline(always)]
-    pub fn load<S: Simd>(self, simd: S, words: &[AtomicU32], rows: &Rows<'_>, i: usize, j: usize) -> [Floats; 4] {
-        for_codec!(simd, self, load(words, rows, i, j))
+    /// True if depths are stored so.
+    pub fn is_depth(self) -> bool {
+        matches!(self, Self::Unorm16 | Self::Float32)
     }
 
-    /// The weighted mean of all four texels.
+    /// The stored components of the texels in column `i` and row `j`, each 0 or 1. The kernel is compiled on its own.
+    #[inline(always)]
+    pub fn load<S: Simd>(self, simd: S, words: &[AtomicU32], rows: &Rows<'_>, i: usize, j: usize) -> [Floats; 4] {
+        simd.vectorize(
+            #[inline(always)]
+            || for_codec!(self, load(simd, words, rows, i, j)),
+        )
+    }
+
+    /// The weighted mean of all four texels. The kernel is compiled on its own.
     #[inline(always)]
     pub fn bilinear<S: Simd>(
         self,
@@ -147,7 +194,10 @@ impl TexelCodec {
         weight_x: &Floats,
         weight_y: &Floats,
     ) -> [Floats; 4] {
-        for_codec!(simd, self, bilinear(words, rows, weight_x, weight_y))
+        simd.vectorize(
+            #[inline(always)]
+            || for_codec!(self, bilinear(simd, words, rows, weight_x, weight_y)),
+        )
     }
 }
 
@@ -155,8 +205,8 @@ impl TexelCodec {
 fn load<S: Simd, T: Texels>(simd: S, words: &[AtomicU32], rows: &Rows<'_>, i: usize, j: usize) -> [Floats; 4] {
     let index = row_start(simd, rows, j) + u32x16::simd_from(simd, rows.x[i]);
     let (first, second) = index.split();
-    let first = T::load(simd, words, first);
-    let second = T::load(simd, words, second);
+    let first = texels::<S, T>(simd, words, first);
+    let second = texels::<S, T>(simd, words, second);
     let mut out = [[0.0; VECTOR_LANES]; 4];
     for c in 0..T::COMPONENTS {
         out[c] = first[c].combine(second[c]).into();
@@ -204,6 +254,14 @@ pub(super) struct Comparison<S: Simd> {
 }
 
 impl<S: Simd> Footprint2x2<S> {
+    /// The points of which two columns or rows are the same one, as at edges to which coordinates are clamped.
+    #[inline(always)]
+    pub fn at_edges(&self) -> u16 {
+        let ([top, bottom], [left, right]) = (self.rows, self.columns);
+        let at_edges: mask32x16<S> = left.simd_eq(right) | top.simd_eq(bottom);
+        at_edges.to_bitmask() as u16
+    }
+
     /// The weighted mean. If a comparison is given, the first component of each texel is its result, 1 or 0.
     #[inline(always)]
     pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32], comparison: Option<Comparison<S>>) -> [f32x16<S>; 4] {
@@ -239,31 +297,32 @@ struct Half<S: Simd> {
 }
 
 impl<S: Simd> Half<S> {
-    /// Texels, compared if that is requested.
+    /// The weighted means of a row's texels, compared before if that is requested.
     #[inline(always)]
-    fn load<T: Texels>(&self, simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
-        let mut texels = T::load(simd, words, index);
-        if let Some((op, reference)) = self.comparison {
-            texels[0] = compare(simd, op, reference, texels[0]);
+    fn row<T: Texels>(&self, simd: S, words: &[AtomicU32], row: usize) -> [f32x8<S>; 4] {
+        let begin = self.rows[row];
+        let [left, right] = neighbours::<S, T>(simd, words, begin + self.columns[0], begin + self.columns[1]);
+        let (mut mean, mut other) = (T::decode(simd, left), T::decode(simd, right));
+        if T::IS_DEPTH
+            && let Some((op, reference)) = self.comparison
+        {
+            mean[0] = compare(simd, op, reference, mean[0]);
+            other[0] = compare(simd, op, reference, other[0]);
         }
-        texels
+        for c in 0..T::COMPONENTS {
+            mean[c] = mean[c] + self.weights[0] * (other[c] - mean[c]);
+        }
+        mean
     }
 
     #[inline(always)]
     fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x8<S>; 4] {
-        let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
-        let mut upper = self.load::<T>(simd, words, top + left);
-        let other = self.load::<T>(simd, words, top + right);
+        let mut mean = self.row::<T>(simd, words, 0);
+        let lower = self.row::<T>(simd, words, 1);
         for c in 0..T::COMPONENTS {
-            upper[c] = upper[c] + x * (other[c] - upper[c]);
+            mean[c] = mean[c] + self.weights[1] * (lower[c] - mean[c]);
         }
-        let mut lower = self.load::<T>(simd, words, bottom + left);
-        let other = self.load::<T>(simd, words, bottom + right);
-        for c in 0..T::COMPONENTS {
-            lower[c] = lower[c] + x * (other[c] - lower[c]);
-            upper[c] = upper[c] + y * (lower[c] - upper[c]);
-        }
-        upper
+        mean
     }
 }
 
@@ -292,21 +351,71 @@ fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
 
 /// A [`TexelCodec`] as a type.
 pub(super) trait Texels {
+    /// The bytes of a texel: 1, 2, 4, 8 or 16.
+    const SIZE: usize;
     /// The number of components that are stored.
     const COMPONENTS: usize;
-    /// True if no component is an infinity or NaN.
-    const FINITE: bool;
+    /// True if depths are stored so.
+    const IS_DEPTH: bool = false;
 
-    /// The stored components of texels. Those beyond [`Texels::COMPONENTS`] are zero.
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4];
+    /// The stored components of texels, given their words. A texel smaller than a word is at the low end of one. Components
+    /// beyond [`Texels::COMPONENTS`] are zero.
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4];
 }
 
-/// Gathers the bits of texels smaller than a word, and shifts them to the low end.
+/// The stored components of texels.
 #[inline(always)]
-fn gather_narrow<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>, texels_per_word: u32) -> u32x8<S> {
-    let word = gather(simd, words, index >> texels_per_word.trailing_zeros());
-    let shift = (index & (texels_per_word - 1)) * (32 / texels_per_word);
-    word >> shift
+pub(super) fn texels<S: Simd, T: Texels>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    let mut found = [u32x8::splat(simd, 0); 4];
+    match T::SIZE {
+        16 => found = gather_4(simd, words, index * 4),
+        8 => [found[0], found[1]] = gather_2(simd, words, index * 2),
+        _ => found[0] = at_low_end::<S, T>(gather(simd, words, word_of::<S, T>(index)), index),
+    }
+    T::decode(simd, found)
+}
+
+/// The words of texels and of those beside them, of which most are one further. Both are as [`Texels::decode`] takes them.
+#[inline(always)]
+fn neighbours<S: Simd, T: Texels>(simd: S, words: &[AtomicU32], left: u32x8<S>, right: u32x8<S>) -> [[u32x8<S>; 4]; 2] {
+    let zero = u32x8::splat(simd, 0);
+    match T::SIZE {
+        16 => [gather_4(simd, words, left * 4), gather_4(simd, words, right * 4)],
+        8 => {
+            let step = right - left;
+            let is_same: mask32x8<S> = step.simd_eq(0);
+            let [a, b, c, d] = gather_4(simd, words, left * 2);
+            let mut next = [is_same.select(a, c), is_same.select(b, d)];
+            if step.simd_gt(1).any_true() {
+                let [c, d] = gather_each(words, &(right * 2).into());
+                next = [u32x8::simd_from(simd, c), u32x8::simd_from(simd, d)];
+            }
+            [[a, b, zero, zero], [next[0], next[1], zero, zero]]
+        }
+        _ => {
+            let (place, other) = (word_of::<S, T>(left), word_of::<S, T>(right));
+            let step = other - place;
+            let [word, next] = gather_2(simd, words, place);
+            let mut next = step.simd_eq(0).select(word, next);
+            if step.simd_gt(1).any_true() {
+                let [each] = gather_each(words, &other.into());
+                next = u32x8::simd_from(simd, each);
+            }
+            [[at_low_end::<S, T>(word, left), zero, zero, zero], [at_low_end::<S, T>(next, right), zero, zero, zero]]
+        }
+    }
+}
+
+/// The indices of the words that contain texels of at most a word.
+#[inline(always)]
+fn word_of<S: Simd, T: Texels>(index: u32x8<S>) -> u32x8<S> {
+    if T::SIZE == 4 { index } else { index >> (4 / T::SIZE as u32).trailing_zeros() }
+}
+
+/// Words of which texels of at most a word are shifted to the low end.
+#[inline(always)]
+fn at_low_end<S: Simd, T: Texels>(word: u32x8<S>, index: u32x8<S>) -> u32x8<S> {
+    if T::SIZE == 4 { word } else { word >> ((index & (4 / T::SIZE as u32 - 1)) * (8 * T::SIZE as u32)) }
 }
 
 /// The linear values of sRGB codes.
@@ -316,40 +425,38 @@ static LINEAR: LazyLock<[f32; 256]> =
 pub(super) struct Unorm8;
 
 impl Texels for Unorm8 {
+    const SIZE: usize = 1;
     const COMPONENTS: usize = 1;
-    const FINITE: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        let word = gather_narrow(simd, words, index, 4);
-        [unorm8_fraction_8(word, 0), zero, zero, zero]
+        [unorm8_fraction_8(words[0], 0), zero, zero, zero]
     }
 }
 
 pub(super) struct Unorm8x2;
 
 impl Texels for Unorm8x2 {
+    const SIZE: usize = 2;
     const COMPONENTS: usize = 2;
-    const FINITE: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        let word = gather_narrow(simd, words, index, 2);
-        [unorm8_fraction_8(word, 0), unorm8_fraction_8(word, 8), zero, zero]
+        [unorm8_fraction_8(words[0], 0), unorm8_fraction_8(words[0], 8), zero, zero]
     }
 }
 
 pub(super) struct Unorm8x4;
 
 impl Texels for Unorm8x4 {
+    const SIZE: usize = 4;
     const COMPONENTS: usize = 4;
-    const FINITE: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
-        let word = gather(simd, words, index);
+    fn decode<S: Simd>(_: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
+        let word = words[0];
         [
             unorm8_fraction_8(word, 0),
             unorm8_fraction_8(word, 8),
@@ -362,13 +469,13 @@ impl Texels for Unorm8x4 {
 pub(super) struct Srgb8x4;
 
 impl Texels for Srgb8x4 {
+    const SIZE: usize = 4;
     const COMPONENTS: usize = 4;
-    const FINITE: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let linear = &*LINEAR;
-        let word = gather(simd, words, index);
+        let word = words[0];
         let codes: [u32; 8] = word.into();
         let mut values = [[0.0; 8]; 3];
         for lane in 0..8 {
@@ -385,13 +492,14 @@ impl Texels for Srgb8x4 {
 pub(super) struct Unorm16;
 
 impl Texels for Unorm16 {
+    const SIZE: usize = 2;
     const COMPONENTS: usize = 1;
-    const FINITE: bool = true;
+    const IS_DEPTH: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        let code = gather_narrow(simd, words, index, 2) & 0xFFFF;
+        let code = words[0] & 0xFFFF;
         let code = f32x8::float_from(code.bitcast::<i32x8<S>>());
         [code / 65_535.0, zero, zero, zero]
     }
@@ -399,109 +507,80 @@ impl Texels for Unorm16 {
 
 pub(super) struct Float16;
 
-/// The low 16 bits of words as binary16 numbers.
-#[inline(always)]
-fn float16<S: Simd>(simd: S, bits: u32x8<S>) -> f32x8<S> {
-    let splat = |word: u32| u32x8::splat(simd, word);
-    let sign = (bits & 0x8000) << 16;
-    let half = bits & 0x7FFF;
-    // The exponent is in binary32's position, still with binary16's bias.
-    let shifted = half << 13;
-    let normal = shifted + ((127 - 15) << 23);
-    // A denormal number gets a leading one, which is then subtracted. No operand is denormal, because those are slow.
-    let least = splat((127 - 14) << 23);
-    let denormal = (shifted + least).bitcast::<f32x8<S>>() - least.bitcast::<f32x8<S>>();
-    let infinity = splat(0x7C00);
-    // The mantissa of a NaN is kept, and the NaN made quiet.
-    let quiet = half.simd_gt(infinity).select(splat(1 << 22), splat(0));
-    let special = shifted | splat(0x7F80_0000) | quiet;
-    let magnitude = half.simd_ge(infinity).select(special, normal);
-    let is_denormal = half.simd_lt(splat(0x0400));
-    let magnitude = is_denormal.select(denormal.bitcast::<u32x8<S>>(), magnitude);
-    (magnitude | sign).bitcast()
-}
-
 impl Texels for Float16 {
+    const SIZE: usize = 2;
     const COMPONENTS: usize = 1;
-    const FINITE: bool = false;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        [float16(simd, gather_narrow(simd, words, index, 2)), zero, zero, zero]
+        [halves(simd, words[0])[0], zero, zero, zero]
     }
 }
 
 pub(super) struct Float16x2;
 
 impl Texels for Float16x2 {
+    const SIZE: usize = 4;
     const COMPONENTS: usize = 2;
-    const FINITE: bool = false;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        let word = gather(simd, words, index);
-        [float16(simd, word), float16(simd, word >> 16), zero, zero]
+        let [r, g] = halves(simd, words[0]);
+        [r, g, zero, zero]
     }
 }
 
 pub(super) struct Float16x4;
 
 impl Texels for Float16x4 {
+    const SIZE: usize = 8;
     const COMPONENTS: usize = 4;
-    const FINITE: bool = false;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
-        let low = gather(simd, words, index * 2);
-        let high = gather(simd, words, index * 2 + 1);
-        [float16(simd, low), float16(simd, low >> 16), float16(simd, high), float16(simd, high >> 16)]
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
+        let ([r, g], [b, a]) = (halves(simd, words[0]), halves(simd, words[1]));
+        [r, g, b, a]
     }
 }
 
 pub(super) struct Float32;
 
 impl Texels for Float32 {
+    const SIZE: usize = 4;
     const COMPONENTS: usize = 1;
-    const FINITE: bool = false;
+    const IS_DEPTH: bool = true;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        [gather(simd, words, index).bitcast(), zero, zero, zero]
+        [words[0].bitcast(), zero, zero, zero]
     }
 }
 
 pub(super) struct Float32x2;
 
 impl Texels for Float32x2 {
+    const SIZE: usize = 8;
     const COMPONENTS: usize = 2;
-    const FINITE: bool = false;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+    fn decode<S: Simd>(simd: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
         let zero = f32x8::splat(simd, 0.0);
-        let first = index * 2;
-        [gather(simd, words, first).bitcast(), gather(simd, words, first + 1).bitcast(), zero, zero]
+        [words[0].bitcast(), words[1].bitcast(), zero, zero]
     }
 }
 
 pub(super) struct Float32x4;
 
 impl Texels for Float32x4 {
+    const SIZE: usize = 16;
     const COMPONENTS: usize = 4;
-    const FINITE: bool = false;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
-        let first = index * 4;
-        [
-            gather(simd, words, first).bitcast(),
-            gather(simd, words, first + 1).bitcast(),
-            gather(simd, words, first + 2).bitcast(),
-            gather(simd, words, first + 3).bitcast(),
-        ]
+    fn decode<S: Simd>(_: S, words: [u32x8<S>; 4]) -> [f32x8<S>; 4] {
+        [words[0].bitcast(), words[1].bitcast(), words[2].bitcast(), words[3].bitcast()]
     }
 }
 
@@ -524,7 +603,7 @@ mod tests {
         for first in (0..bytes.len() / size).step_by(8) {
             let found: [[f32; 8]; 4] = dispatch!(level, simd => {
                 let index: [u32; 8] = std::array::from_fn(|lane| (first + lane) as u32);
-                T::load(simd, &atomics, u32x8::simd_from(simd, index)).map(Into::into)
+                texels::<_, T>(simd, &atomics, u32x8::simd_from(simd, index)).map(Into::into)
             });
             for lane in 0..8.min(bytes.len() / size - first) {
                 let texel = &bytes[size * (first + lane)..][..size];
@@ -535,6 +614,51 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The bits of the components of eight texels and of those beside them.
+    type PairBits = [[[u32; 8]; 4]; 2];
+
+    /// Asserts that texels and those beside them are found as one by one, wherever the latter are.
+    fn beside<T: Texels>(case: &Case, words: &[u32]) {
+        let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
+        let texels_in_all = (4 * words.len() / T::SIZE) as u32;
+        let mut left: [u32; 8] = std::array::from_fn(|lane| 7 * lane as u32);
+        for round in 0..200 {
+            left = left.map(|left| (left * 5 + 1 + round) % texels_in_all);
+            let mut right = left.map(|left| (left + 1).min(texels_in_all - 1));
+            match round % 4 {
+                0 => right[round as usize % 8] = 0,
+                1 => right[round as usize % 8] = left[round as usize % 8],
+                _ => {}
+            }
+            let (both, each): (PairBits, PairBits) = dispatch!(token_of(case), simd => {
+                let (left, right) = (u32x8::simd_from(simd, left), u32x8::simd_from(simd, right));
+                let both = neighbours::<_, T>(simd, &atomics, left, right).map(|words| T::decode(simd, words));
+                let each = [left, right].map(|index| texels::<_, T>(simd, &atomics, index));
+                let bits = |texels: [[f32x8<_>; 4]; 2]| {
+                    texels.map(|texels| texels.map(|component| <[f32; 8]>::from(component).map(f32::to_bits)))
+                };
+                (bits(both), bits(each))
+            });
+            assert_eq!(both, each, "{left:?} {right:?}");
+        }
+    }
+
+    #[gaurast_runner::test(each = simd_levels())]
+    fn texels_beside_others_are_those_found_alone(case: &Case) {
+        let words: Vec<u32> = (0..96u32).map(|word| word.wrapping_mul(0x9E37_79B9) & 0x7BFF_7BFF).collect();
+        beside::<Unorm8>(case, &words);
+        beside::<Unorm8x2>(case, &words);
+        beside::<Unorm8x4>(case, &words);
+        beside::<Srgb8x4>(case, &words);
+        beside::<Unorm16>(case, &words);
+        beside::<Float16>(case, &words);
+        beside::<Float16x2>(case, &words);
+        beside::<Float16x4>(case, &words);
+        beside::<Float32>(case, &words);
+        beside::<Float32x2>(case, &words);
+        beside::<Float32x4>(case, &words);
     }
 
     #[gaurast_runner::test(each = simd_levels())]

@@ -1,9 +1,9 @@
 //! Samples of 16 lanes at once. The bits are those of [`super::scalar`], which handles requests that this module does
 //! not. No operations are fused, so that every SIMD level gives the same bits.
 //!
-//! [`bilinear`] handles plain samples, by far the most frequent: of 2D images with four bytes per texel, linear within
-//! levels, with the same level for each lane of a quad. All values stay in vectors, from the coordinates to the
-//! results.
+//! [`bilinear`] handles plain samples, by far the most frequent: of 2D images and of cubes, linear within levels, with the
+//! same level for each lane of a quad. All values stay in vectors, from the coordinates to the results. Lanes that read
+//! across an edge of a cube are then sampled one by one.
 //!
 //! [`general`] works in phases that pass arrays to each other: levels of detail, the texels along each axis, the
 //! texels' contents and their mean. Only the first phase depends on all parameters, so that few kernels are compiled
@@ -17,11 +17,11 @@ use super::addressing::{self, Axis, axis, taps};
 use super::cube;
 use super::lod::{self, QUADS, Selection};
 use super::sampler::{AddressMode, Filter, Reduction, Sampler};
-use super::scalar::{border_texel, reference_value};
+use super::scalar::{self, border_texel, reference_value};
 use super::surface::Surface;
-use super::texels::{Comparison, Footprint2x2, PackedLevel, Rows, TexelCodec, Texels, VectorLayout, for_codec};
+use super::texels::{Comparison, Footprint2x2, PackedLevel, Rows, Texels, VectorLayout, for_codec};
 use crate::format::Numeric;
-use crate::simd::{bits_of, spread};
+use crate::simd::{bits_of, floats_of, spread};
 use crate::state::CompareOp;
 use crate::texture::texels::Floats;
 use isa::ir::{Dimension, VECTOR_LANES};
@@ -387,34 +387,44 @@ pub(super) fn bilinear<S: Simd>(
     request: &SampleRequest,
 ) -> Option<[LaneWords; 4]> {
     let layout = surface.layout.as_ref().filter(|layout| layout.is_filterable)?;
-    if !is_plain(sampler, request) {
+    if !is_plain(surface, sampler, request) {
         return None;
     }
-    if let (Some(op), Some(bits)) = (sampler.compare_op, &request.compare) {
-        let reference = Some((op, references(surface, bits)));
-        return match layout.codec {
-            TexelCodec::Unorm16 => {
-                Some(for_codec!(simd, filter, Unorm16, surface, layout, sampler, request, reference))
+    let comparison = match (sampler.compare_op, &request.compare) {
+        (Some(_), Some(_)) if !layout.codec.is_depth() => return None,
+        (Some(op), Some(bits)) => Some((op, references(surface, bits))),
+        _ => None,
+    };
+    let (mut texels, edges) = simd.vectorize(
+        #[inline(always)]
+        || filter(simd, surface, layout, sampler, request, comparison),
+    );
+    if edges != 0 {
+        let across = scalar::sample(surface, sampler, &SampleRequest { mask: edges, ..*request });
+        for lane in (0..VECTOR_LANES).filter(|lane| edges >> lane & 1 != 0) {
+            for (texel, across) in texels.iter_mut().zip(&across) {
+                texel[lane] = across[lane];
             }
-            TexelCodec::Float32 => {
-                Some(for_codec!(simd, filter, Float32, surface, layout, sampler, request, reference))
-            }
-            _ => None,
-        };
+        }
     }
-    Some(for_codec!(simd, layout.codec, filter(surface, layout, sampler, request, None)))
+    Some(texels)
 }
 
 /// True if a request needs nothing but bilinear filtering and mip levels per quad.
 #[inline(always)]
-fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
+fn is_plain(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> bool {
     let shape = request.shape;
     let [x, y, _] = sampler.address_modes;
     let mut moved = 0;
     for offset in request.offset[..2].as_flattened() {
         moved |= offset;
     }
-    shape.dimension == Dimension::D2
+    let in_plane = shape.dimension == Dimension::D2
+        && x != AddressMode::ClampToBorder
+        && y != AddressMode::ClampToBorder
+        && moved == 0;
+    let on_cube = shape.dimension == Dimension::Cube && surface.levels.len() == 1 && surface.layers >= 6;
+    (in_plane || on_cube)
         && !shape.arrayed
         && !shape.multisampled
         && request.lod == LodRequest::Automatic
@@ -422,84 +432,119 @@ fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
         && (sampler.mag_filter, sampler.min_filter) == (Filter::Linear, Filter::Linear)
         && !sampler.unnormalized_coordinates
         && sampler.reduction == Reduction::WeightedAverage
-        && x != AddressMode::ClampToBorder
-        && y != AddressMode::ClampToBorder
-        && moved == 0
 }
 
+/// The place in a level that each lane samples.
+struct Points<S: Simd> {
+    coordinates: [f32x16<S>; 2],
+    modes: [AddressMode; 2],
+    /// The face of a cube.
+    face: Option<u32x16<S>>,
+}
+
+impl<S: Simd> Points<S> {
+    #[inline(always)]
+    fn new(simd: S, sampler: &Sampler, request: &SampleRequest) -> Self {
+        let [x, y, z, _] = request.coordinate;
+        if request.shape.dimension == Dimension::Cube {
+            let (face, s, t) = cube::faces(simd, [x, y, z]);
+            return Self { coordinates: [s, t], modes: [AddressMode::ClampToEdge; 2], face: Some(face) };
+        }
+        let [x, y] = [floats_of(u32x16::simd_from(simd, x)), floats_of(u32x16::simd_from(simd, y))];
+        let [along_x, along_y, _] = sampler.address_modes;
+        Self { coordinates: [x, y], modes: [along_x, along_y], face: None }
+    }
+
+    /// The texels around the points in a level for each quad.
+    #[inline(always)]
+    fn around(&self, simd: S, layout: &VectorLayout, levels: &[u32; QUADS]) -> Footprint2x2<S> {
+        let first = &layout.levels[levels[0] as usize];
+        let (width, height, mut base, row_pitch);
+        if *levels == [levels[0]; QUADS] {
+            width = f32x16::splat(simd, first.extent[0] as f32);
+            height = f32x16::splat(simd, first.extent[1] as f32);
+            base = u32x16::splat(simd, first.base);
+            row_pitch = u32x16::splat(simd, first.row_pitch);
+        } else {
+            let mut each = [first; QUADS];
+            for quad in 1..QUADS {
+                each[quad] = &layout.levels[levels[quad] as usize];
+            }
+            width = spread(simd, of_each(each, |level| level.extent[0] as f32));
+            height = spread(simd, of_each(each, |level| level.extent[1] as f32));
+            base = spread_words(simd, of_each(each, |level| level.base));
+            row_pitch = spread_words(simd, of_each(each, |level| level.row_pitch));
+        }
+        // A cube has a single level here.
+        if let Some(face) = self.face {
+            base += face * first.layer_pitch;
+        }
+        let x = taps(simd, self.modes[0], self.coordinates[0], width);
+        let y = taps(simd, self.modes[1], self.coordinates[1], height);
+        Footprint2x2 {
+            rows: [base + y.first * row_pitch, base + y.second * row_pitch],
+            columns: [x.first, x.second],
+            weights: [x.weight, y.weight],
+        }
+    }
+}
+
+/// The result registers, and the active lanes whose texels are across an edge of a cube: their result is undefined.
 #[inline(always)]
-fn filter<S: Simd, T: Texels>(
+fn filter<S: Simd>(
     simd: S,
     surface: &Surface,
     layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
     comparison: Option<(CompareOp, Floats)>,
-) -> [LaneWords; 4] {
+) -> ([LaneWords; 4], u16) {
     let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
     let comparison = match comparison {
         Some((op, reference)) => Some(Comparison { op, reference: f32x16::simd_from(simd, reference) }),
         None => None,
     };
-    let zero = f32x16::splat(simd, 0.0);
-    let mut texel = [zero; 4];
+    let points = Points::new(simd, sampler, request);
+    let mut texel = [f32x16::splat(simd, 0.0); 4];
+    let mut edges = 0;
     // A loop, so that one copy of the level's code serves both levels.
     for (is_low, levels) in [(false, &selection.high), (true, &selection.low)] {
         if is_low && selection.weight == [0.0; QUADS] {
             break;
         }
-        let found = level::<S, T>(simd, words, layout, sampler, request, comparison, levels);
+        let around = points.around(simd, layout, levels);
+        let found = for_codec!(layout.codec, mean(simd, words, &around, comparison));
         if !is_low {
             texel = found;
+            if points.face.is_some() {
+                edges = around.at_edges() & request.mask;
+            }
             continue;
         }
         let weight = spread(simd, selection.weight);
         let mixes = weight.simd_gt(0.0);
-        for c in 0..T::COMPONENTS {
+        for c in 0..4 {
             let mixed = texel[c] + weight * (found[c] - texel[c]);
             // A level of weight zero is not read, so that infinities in it have no effect.
-            texel[c] = if T::FINITE { mixed } else { mixes.select(mixed, texel[c]) };
+            texel[c] = mixes.select(mixed, texel[c]);
         }
     }
-    registers(surface, layout, texel, T::COMPONENTS)
+    let mut stored = [u32x16::splat(simd, 0); 4];
+    for c in 0..4 {
+        stored[c] = bits_of(texel[c]);
+    }
+    (layout.arrange(stored, 1f32.to_bits()), edges)
 }
 
-/// The weighted mean of the texels of a level for each quad.
+/// The weighted mean of the texels around each point.
 #[inline(always)]
-fn level<S: Simd, T: Texels>(
+fn mean<S: Simd, T: Texels>(
     simd: S,
     words: &[AtomicU32],
-    layout: &VectorLayout,
-    sampler: &Sampler,
-    request: &SampleRequest,
+    around: &Footprint2x2<S>,
     comparison: Option<Comparison<S>>,
-    levels: &[u32; QUADS],
 ) -> [f32x16<S>; 4] {
-    let (width, height, base, row_pitch);
-    let first = &layout.levels[levels[0] as usize];
-    if *levels == [levels[0]; QUADS] {
-        width = f32x16::splat(simd, first.extent[0] as f32);
-        height = f32x16::splat(simd, first.extent[1] as f32);
-        base = u32x16::splat(simd, first.base);
-        row_pitch = u32x16::splat(simd, first.row_pitch);
-    } else {
-        let mut each = [first; QUADS];
-        for quad in 1..QUADS {
-            each[quad] = &layout.levels[levels[quad] as usize];
-        }
-        width = spread(simd, of_each(each, |level| level.extent[0] as f32));
-        height = spread(simd, of_each(each, |level| level.extent[1] as f32));
-        base = spread_words(simd, of_each(each, |level| level.base));
-        row_pitch = spread_words(simd, of_each(each, |level| level.row_pitch));
-    }
-    let x = taps(simd, sampler.address_modes[0], &request.coordinate[0], width);
-    let y = taps(simd, sampler.address_modes[1], &request.coordinate[1], height);
-    let around = Footprint2x2 {
-        rows: [base + y.first * row_pitch, base + y.second * row_pitch],
-        columns: [x.first, x.second],
-        weights: [x.weight, y.weight],
-    };
     around.filter::<T>(simd, words, comparison)
 }
 
@@ -518,31 +563,4 @@ fn of_each<T: Copy + Default>(levels: [&PackedLevel; QUADS], value: impl Fn(&Pac
 fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
     let upper = u32x4::splat(simd, a).combine(u32x4::splat(simd, b));
     upper.combine(u32x4::splat(simd, c).combine(u32x4::splat(simd, d)))
-}
-
-/// The result registers for stored components: reordered, completed and swizzled.
-#[inline(always)]
-fn registers<S: Simd>(
-    surface: &Surface,
-    layout: &VectorLayout,
-    texel: [f32x16<S>; 4],
-    components: usize,
-) -> [LaneWords; 4] {
-    let mut stored = [[0.0; VECTOR_LANES]; 4];
-    for c in 0..components {
-        stored[c] = texel[c].into();
-    }
-    let (zero, one) = ([0.0; VECTOR_LANES], [1.0; VECTOR_LANES]);
-    let mut found = [&zero, &zero, &zero, &one];
-    for c in 0..4 {
-        // Of four components none is missing.
-        if components == 4 || layout.order[c] < components {
-            found[c] = &stored[layout.order[c]];
-        }
-    }
-    let mut out = [[0; VECTOR_LANES]; 4];
-    for (out, from) in out.iter_mut().zip(surface.swizzle) {
-        *out = bytemuck::cast(*from.pick(&found, &zero, &one));
-    }
-    out
 }

@@ -164,40 +164,67 @@ fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
     let mut at = Vec::new();
     let odd = rng.random_range(0..4) == 0;
     for _ in 0..4 {
-        let first = [(); 2].map(|()| rng.random_range(-2.0..3.0f32));
+        let first = [(); 3].map(|()| rng.random_range(-2.0..3.0f32));
         let step = 2f32.powf(rng.random_range(-9.0..1.0));
-        let [right, below] = [(); 2].map(|()| [(); 2].map(|()| step * rng.random_range(-1.0..1.0)));
+        let [right, below] = [(); 2].map(|()| [(); 3].map(|()| step * rng.random_range(-1.0..1.0)));
         for lane in 0..4 {
             let (x, y) = ((lane & 1) as f32, (lane >> 1) as f32);
-            let [s, t] = [0, 1].map(|axis| first[axis] + x * right[axis] + y * below[axis]);
-            at.push(if odd { [(); 4].map(|()| coordinate(rng)) } else { [s, t, 0.0, 0.0] });
+            let [s, t, r] = [0, 1, 2].map(|axis| first[axis] + x * right[axis] + y * below[axis]);
+            at.push(if odd { [(); 4].map(|()| coordinate(rng)) } else { [s, t, r, 0.0] });
         }
     }
     at
 }
 
+/// Formats that are sampled 16 lanes at once, and one that is not filtered.
+const SAMPLED: [Format; 18] = [
+    Format::R8Unorm,
+    Format::R8G8Unorm,
+    Format::R8G8B8A8Unorm,
+    Format::B8G8R8A8Unorm,
+    Format::R8G8B8A8Srgb,
+    Format::B8G8R8A8Srgb,
+    Format::R16Unorm,
+    Format::R16Sfloat,
+    Format::R16G16Sfloat,
+    Format::R16G16B16A16Sfloat,
+    Format::R32Sfloat,
+    Format::R32G32Sfloat,
+    Format::R32G32B32A32Sfloat,
+    Format::R32Uint,
+    Format::D16Unorm,
+    Format::D16Unorm,
+    Format::D32Sfloat,
+    Format::D32Sfloat,
+];
+
 #[gaurast_runner::test(each = simd_levels())]
 fn plain_samples_are_the_same_one_by_one(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let formats = [
-        Format::R8G8B8A8Unorm,
-        Format::B8G8R8A8Unorm,
-        Format::R8G8B8A8Srgb,
-        Format::B8G8R8A8Srgb,
-        Format::R32Uint,
-        Format::D16Unorm,
-        Format::D32Sfloat,
-        Format::D32Sfloat,
-    ];
-    for round in 0..2500 {
-        let [width, height]: [u32; 2] = [(); 2].map(|()| rng.random_range(1..70));
-        let format = *formats.choose(&mut rng).unwrap();
+    for round in 0..4000 {
+        let largest = if round % 7 == 0 { 3 } else { 70 };
+        let [width, mut height]: [u32; 2] = [(); 2].map(|()| rng.random_range(1..largest));
+        let is_cube = round % 4 == 0;
+        if is_cube {
+            height = width;
+        }
+        let format = *SAMPLED.choose(&mut rng).unwrap();
         let desc = ImageDesc {
-            mip_levels: rng.random_range(1..=width.max(height).ilog2() + 1),
+            mip_levels: if is_cube && rng.random() { 1 } else { rng.random_range(1..=width.max(height).ilog2() + 1) },
+            array_layers: if is_cube { 6 } else { 1 },
             ..desc(ImageKind::D2, format, [width, height, 1])
         };
-        let texels: Vec<[f32; 4]> = (0..97).map(|_| rng.random()).collect();
-        let mut image = image(desc, |level, _, [x, y, _]| texels[(7 * level + x + 14 * y) as usize % texels.len()]);
+        let mut texels: Vec<[f32; 4]> = (0..97).map(|_| rng.random()).collect();
+        if round % 8 == 1 {
+            // Infinities and denormal numbers, of binary16 too.
+            let special = [f32::INFINITY, -0.0, 1e-6, 1e-40, f32::NAN, -65_504.0];
+            for (texel, special) in texels.iter_mut().zip(special) {
+                *texel = [special; 4];
+            }
+        }
+        let mut image = image(desc, |level, layer, [x, y, _]| {
+            texels[(7 * level + 31 * layer + x + 14 * y) as usize % texels.len()]
+        });
         if round % 3 == 0 {
             image.swizzle =
                 [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Alpha, ComponentSwizzle::Zero];
@@ -208,7 +235,8 @@ fn plain_samples_are_the_same_one_by_one(case: &Case) {
             unnormalized_coordinates: false,
             ..random_sampler(&mut rng)
         };
-        let mut request = request(Dimension::D2, &surface_coordinates(&mut rng));
+        let dimension = if is_cube { Dimension::Cube } else { Dimension::D2 };
+        let mut request = request(dimension, &surface_coordinates(&mut rng));
         request.lod = LodRequest::Automatic;
         request.mask = if round % 2 == 0 { u16::MAX } else { rng.random() };
         if round % 10 == 0 {

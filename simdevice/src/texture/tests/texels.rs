@@ -174,17 +174,18 @@ const ACCESSED: [Format; 24] = [
     Format::D32Sfloat,
 ];
 
-/// An access of 16 lanes to places in and around an image: anywhere, or in rows.
+/// An access of 16 lanes to places in and around an image: anywhere, or in rows, in order or with lanes exchanged.
 fn random_access(rng: &mut ChaCha8Rng, shape: ImageShape, levels: u32) -> TexelRequest {
     let mut request = texels(shape, &[[0; 4]]);
     request.mask = if rng.random() { u16::MAX } else { rng.random() };
     let in_rows = rng.random_range(0..3) == 0;
+    let exchanged = if rng.random() { 0 } else { rng.random_range(0..16) };
     for (axis, lanes) in request.coordinate.iter_mut().enumerate() {
         let first = rng.random_range(0..3);
         for (lane, coordinate) in (0..).zip(lanes) {
             *coordinate = match rng.random_range(0..40) {
                 0 if !in_rows => rng.random(),
-                _ if in_rows && axis == 0 => first + lane,
+                _ if in_rows && axis == 0 => first + (lane ^ exchanged),
                 _ if in_rows => first,
                 _ => rng.random_range(0..14),
             };
