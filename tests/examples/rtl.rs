@@ -8,7 +8,7 @@ mod tiles;
 
 use std::path::Path;
 use timing_studies::number::Format;
-use timing_studies::rtl::{ModuleBench, Simulator};
+use timing_studies::rtl::{Memory, ModuleBench, Simulator};
 use timing_studies::rtl_cycles::{Cycles, Setting, calibrated_sharing, mean_error};
 
 fn main() -> std::io::Result<()> {
@@ -41,7 +41,7 @@ fn main() -> std::io::Result<()> {
                 sources.push((scene.clone(), view.lists(format, groups, count, setting.seed)));
             }
             for (source, lists) in sources {
-                let cycles = Cycles::of(&bench, setting, format, &lists)?;
+                let cycles = Cycles::of(&bench, setting, format, &lists, Memory::OF_PRESETS)?;
                 let pairs = cycles.by_cause().map(|[ours, model]| format!("{ours:.0} / {model:.0}"));
                 println!(
                     "| {source} | {name} | {} | {} | {} | {} |",

@@ -46,9 +46,12 @@ pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<MachineResult> {
     let number = trace.frames.len() - 1;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let shared = Shared::new(frame);
+    // Machines that share batches come one after the other.
+    let mut order: Vec<_> = (0..machines.len()).collect();
+    order.sort_by_cached_key(|&index| format!("{:?}", machines[index].config.rasterizer.of_batches()));
     let next = AtomicUsize::new(0);
     let take = || {
-        let index = next.fetch_add(1, Ordering::Relaxed);
+        let &index = order.get(next.fetch_add(1, Ordering::Relaxed))?;
         let machine = machines.get(index)?;
         let simulation = shared.simulate(&machine.config);
         Some((index, MachineResult { frame: number, machine: machine.clone(), simulation }))

@@ -124,6 +124,12 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
+    /// The rasterizer without its number of modules: what the batches of its tiles depend on. Machines that agree in it
+    /// share the work of making them, if they are simulated one soon after the other.
+    pub fn of_batches(&self) -> Self {
+        Self { modules: 0, ..self.clone() }
+    }
+
     /// The number of PEs of all modules.
     pub fn pes(&self) -> u32 {
         self.modules * self.pes_per_module

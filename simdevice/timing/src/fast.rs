@@ -8,7 +8,7 @@
 //!
 //! All ports that move bytes have the same rate. Therefore the ends of transfers are known as they begin, on a clock
 //! that counts the bytes that each of these ports has moved: rates change the speed of that clock, and not the order of
-//! the ends. An event concerns one module and takes time that grows with the logarithm of the number of modules.
+//! the ends. An event concerns one module, and the next ends of all modules are kept in order.
 
 use crate::config::{Config, Rasterizer};
 use crate::plan::{self, Division, Part, Rates, Task};
@@ -42,12 +42,25 @@ pub fn rasterize_tiles(frame: &FrameWork, config: &Config, others_gb_s: f64) -> 
 
 /// Rasterizes the tasks of a frame, as [`rasterize_tiles`] does.
 pub fn rasterize_tasks(tasks: &[Task], config: &Config, others_gb_s: f64) -> (RasterReport, Vec<TileSpan>) {
+    rasterize_batches(&FrameBatches::new(tasks, &config.rasterizer), config, others_gb_s)
+}
+
+/// Rasterizes the batches of a frame, as [`rasterize_tiles`] does. They must be of the configuration's rasterizer with
+/// any number of modules.
+pub(crate) fn rasterize_batches(
+    frame: &FrameBatches,
+    config: &Config,
+    others_gb_s: f64,
+) -> (RasterReport, Vec<TileSpan>) {
     let rates = Rates::new(config, others_gb_s);
-    let mut report = RasterReport::default();
-    let mut queue = tasks.iter();
+    let mut report = frame.work.clone();
+    let mut queue = frame.tiles();
     let raster = &config.rasterizer;
     let contended = rates.port * f64::from(raster.modules) > rates.memory;
     let mut modules: Vec<_> = (0..raster.modules).map(|_| Module::new(rates, contended)).collect();
+    if modules.is_empty() {
+        report = RasterReport::default();
+    }
     let now = run(&mut modules, rates, &mut queue, raster, &mut report);
     report.cycles = now;
     // The part of the steps' time that exceeds evaluation is waiting for memory.
@@ -68,9 +81,9 @@ const NEW_CLOCK: f64 = 65_536.0;
 
 /// Runs modules until the queue is empty, and returns the cycles. At each event the rates of all ports may change.
 fn run<'a>(
-    modules: &mut [Module],
+    modules: &mut [Module<'a>],
     rates: Rates,
-    queue: &mut impl Iterator<Item = &'a Task>,
+    queue: &mut impl Iterator<Item = Tile<'a>>,
     raster: &Rasterizer,
     report: &mut RasterReport,
 ) -> f64 {
@@ -86,7 +99,7 @@ fn run<'a>(
         let share = rates.port.min(rates.memory / asking.max(1) as f64);
         let [time, moved] = ends.first();
         // A port moves one request in a cycle: the rest of the request's last cycle is lost.
-        let transfers = clock.now + ((moved - clock.moved) / share).ceil();
+        let transfers = clock.now + whole_cycles((moved - clock.moved) / share);
         let next = time.min(transfers);
         if !next.is_finite() {
             return clock.now;
@@ -122,54 +135,69 @@ struct Clock {
     moved: f64,
 }
 
-/// The next ends of each module on both clocks, in two trees in which a node has the least of its children's ends.
+/// The next ends of each module on both clocks.
 #[derive(Debug)]
 struct Ends {
-    /// The root is at 1, and the children of `i` are at `2i` and `2i + 1`.
-    nodes: Vec<[f64; 2]>,
-    leaves: usize,
+    /// The ends of each module.
+    of: Vec<[f64; 2]>,
+    /// On each clock, the finite ends and their modules, in order, with the first at the back. Equal ends are in the order
+    /// of modules.
+    queues: [Vec<(f64, usize)>; 2],
 }
 
 impl Ends {
     fn new(count: usize) -> Self {
-        let leaves = count.next_power_of_two();
-        Self { nodes: vec![[f64::INFINITY; 2]; 2 * leaves], leaves }
+        let queue = || Vec::with_capacity(count);
+        Self { of: vec![[f64::INFINITY; 2]; count], queues: [queue(), queue()] }
     }
 
     /// The first ends of all modules.
     fn first(&self) -> [f64; 2] {
-        self.nodes[1]
+        let first = |queue: &Vec<(f64, usize)>| queue.last().map_or(f64::INFINITY, |&(end, _)| end);
+        let [times, moved] = &self.queues;
+        [first(times), first(moved)]
     }
 
     fn set(&mut self, index: usize, ends: [f64; 2]) {
-        let mut node = self.leaves + index;
-        self.nodes[node] = ends;
-        while node > 1 {
-            node /= 2;
-            let [a, b] = [self.nodes[2 * node], self.nodes[2 * node + 1]];
-            let least = [0, 1].map(|clock| if b[clock] < a[clock] { b[clock] } else { a[clock] });
-            if self.nodes[node] == least {
-                return;
+        let before = std::mem::replace(&mut self.of[index], ends);
+        for ((queue, before), end) in self.queues.iter_mut().zip(before).zip(ends) {
+            if before == end {
+                continue;
             }
-            self.nodes[node] = least;
+            if before.is_finite()
+                && let Some(place) = queue.iter().rposition(|&(_, module)| module == index)
+            {
+                queue.remove(place);
+            }
+            if end.is_finite() {
+                let place = queue.iter().position(|&(other, module)| (other, module) < (end, index));
+                queue.insert(place.unwrap_or(queue.len()), (end, index));
+            }
         }
     }
 
     /// The first module, by its number, with an end that is not after `now`.
     fn due(&self, now: [f64; 2]) -> Option<usize> {
-        let is_due = |node: usize| {
-            let ends = self.nodes[node];
-            ends[0] <= now[0] || ends[1] <= now[1]
-        };
-        if !is_due(1) {
-            return None;
+        let mut first = usize::MAX;
+        for (queue, now) in self.queues.iter().zip(now) {
+            for &(end, module) in queue.iter().rev() {
+                if end > now {
+                    break;
+                }
+                first = first.min(module);
+            }
         }
-        let mut node = 1;
-        while node < self.leaves {
-            node = 2 * node + usize::from(!is_due(2 * node));
-        }
-        Some(node - self.leaves)
+        (first < usize::MAX).then_some(first)
     }
+}
+
+/// The least whole number of cycles that is not less than a number of at most 2^53, or infinity.
+fn whole_cycles(cycles: f64) -> f64 {
+    if cycles > (1u64 << 53) as f64 {
+        return cycles;
+    }
+    let whole = cycles as i64 as f64;
+    if whole < cycles { whole + 1.0 } else { whole }
 }
 
 /// A module's current step, except for its port's transfers.
@@ -218,12 +246,60 @@ struct Batches {
     bytes: f64,
     /// True if they are fetched and then discarded. The fetch after them can't be made ahead.
     wasted: bool,
+    first_of_part: bool,
     first_of_tile: bool,
     last_of_tile: bool,
 }
 
+/// The batches of a frame's tasks. Rasterizers that differ in the number of modules, or in memory, share them.
+#[derive(Debug, Default)]
+pub(crate) struct FrameBatches {
+    /// Place of each task, and the end of its batches in `batches`.
+    tasks: Vec<([u32; 2], usize)>,
+    batches: Vec<Batches>,
+    /// What does not depend on the modules that take the tasks.
+    work: RasterReport,
+}
+
+/// The batches of a task, and its place.
+#[derive(Clone, Copy, Debug)]
+struct Tile<'a> {
+    at: [u32; 2],
+    batches: &'a [Batches],
+}
+
+impl FrameBatches {
+    /// The batches of tasks for a rasterizer.
+    pub(crate) fn new(tasks: &[Task], raster: &Rasterizer) -> Self {
+        let mut all = Self::default();
+        for task in tasks {
+            let begin = all.batches.len();
+            for part in &task.parts {
+                part_batches(part, raster, &mut all.work, &mut all.batches);
+            }
+            let of_task = &mut all.batches[begin..];
+            if let Some(first) = of_task.first_mut() {
+                first.first_of_tile = true;
+            }
+            if let Some(last) = of_task.iter_mut().rfind(|batches| !batches.wasted) {
+                last.last_of_tile = true;
+            }
+            all.tasks.push((task.at, all.batches.len()));
+        }
+        all
+    }
+
+    /// The batches of each task, in order.
+    fn tiles(&self) -> impl Iterator<Item = Tile<'_>> {
+        let mut begin = 0;
+        self.tasks
+            .iter()
+            .map(move |&(at, end)| Tile { at, batches: &self.batches[std::mem::replace(&mut begin, end)..end] })
+    }
+}
+
 #[derive(Debug)]
-struct Module {
+struct Module<'a> {
     /// The time, in cycles from the frame's first fetch.
     now: f64,
     /// Tiles that were claimed and whose evaluation has not begun.
@@ -232,7 +308,7 @@ struct Module {
     spans: Vec<TileSpan>,
     rates: Rates,
     contended: bool,
-    claimed: VecDeque<Batches>,
+    claimed: &'a [Batches],
     current: Option<Batches>,
     started: bool,
     mode: Option<Mode>,
@@ -247,7 +323,7 @@ struct Module {
     tile_ended: Option<Mode>,
 }
 
-impl Module {
+impl<'a> Module<'a> {
     fn new(rates: Rates, contended: bool) -> Self {
         Self {
             now: 0.0,
@@ -255,7 +331,7 @@ impl Module {
             spans: Vec::new(),
             rates,
             contended,
-            claimed: VecDeque::new(),
+            claimed: &[],
             current: None,
             started: false,
             mode: None,
@@ -292,10 +368,10 @@ impl Module {
     }
 
     /// Claims the first tile.
-    fn begin<'a>(
+    fn begin(
         &mut self,
         clock: &Clock,
-        queue: &mut impl Iterator<Item = &'a Task>,
+        queue: &mut impl Iterator<Item = Tile<'a>>,
         raster: &Rasterizer,
         report: &mut RasterReport,
     ) {
@@ -311,10 +387,10 @@ impl Module {
     }
 
     /// Ends what ends at this time, and goes on.
-    fn end<'a>(
+    fn end(
         &mut self,
         clock: &Clock,
-        queue: &mut impl Iterator<Item = &'a Task>,
+        queue: &mut impl Iterator<Item = Tile<'a>>,
         raster: &Rasterizer,
         report: &mut RasterReport,
     ) {
@@ -384,7 +460,9 @@ impl Module {
     /// Puts a request, if there is one, into the port's queue.
     fn ask(&mut self, request: Option<Request>) {
         self.writes += usize::from(request.is_some_and(|request| request.write));
-        self.port.extend(request);
+        if let Some(request) = request {
+            self.port.push_back(request);
+        }
     }
 
     /// Begins a step. The first of a tile waits until a half of the buffer is free for its pixels: two halves hold
@@ -396,12 +474,7 @@ impl Module {
     }
 
     /// Goes on to the next step, or to a run of equal steps, if there is any.
-    fn proceed<'a>(
-        &mut self,
-        queue: &mut impl Iterator<Item = &'a Task>,
-        raster: &Rasterizer,
-        report: &mut RasterReport,
-    ) {
+    fn proceed(&mut self, queue: &mut impl Iterator<Item = Tile<'a>>, raster: &Rasterizer, report: &mut RasterReport) {
         if let Some(step) = self.step.take() {
             self.lasted += self.now - step.begin;
         }
@@ -424,11 +497,12 @@ impl Module {
             return;
         }
         if self.claimed.is_empty()
-            && let Some(task) = queue.next()
+            && let Some(tile) = queue.next()
         {
-            self.claim(task, raster, report);
+            self.places.push_back(tile.at);
+            self.claimed = tile.batches;
         }
-        let next = self.claimed.pop_front();
+        let next = self.claim(raster, report);
         let before = std::mem::replace(&mut self.current, next);
         if let Some(next) = next {
             let cold = before.map_or(!self.started, |batch| batch.wasted);
@@ -463,28 +537,21 @@ impl Module {
         Some(Request { latency, bytes, write: true })
     }
 
-    /// Claims a tile: its batches, with equal ones grouped.
-    fn claim(&mut self, task: &Task, raster: &Rasterizer, report: &mut RasterReport) {
-        self.places.push_back(task.at);
-        let out = &mut self.claimed;
-        for part in &task.parts {
-            let mut begin = f64::from(raster.tile_overhead);
-            report.modules.controller += begin;
-            if let Some(before) = self.mode.filter(|&mode| mode != part.mode) {
+    /// The next batches of the claimed tile.
+    fn claim(&mut self, raster: &Rasterizer, report: &mut RasterReport) -> Option<Batches> {
+        let (&first, rest) = self.claimed.split_first()?;
+        self.claimed = rest;
+        let mut next = first;
+        if next.first_of_part {
+            if let Some(before) = self.mode.filter(|&mode| mode != next.mode) {
                 let switch = f64::from(raster.latency(before) + raster.mode_switch);
                 report.modules.mode_switch += switch;
                 report.switches += 1.0;
-                begin += switch;
+                next.cycles += switch;
             }
-            self.mode = Some(part.mode);
-            part_batches(part, raster, begin, report, out);
+            self.mode = Some(next.mode);
         }
-        if let Some(first) = out.front_mut() {
-            first.first_of_tile = true;
-        }
-        if let Some(last) = out.iter_mut().rfind(|batches| !batches.wasted) {
-            last.last_of_tile = true;
-        }
+        Some(next)
     }
 }
 
@@ -508,8 +575,9 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
     [busy, dependency, controller]
 }
 
-/// The batches of one draw in a tile. The first takes `begin` cycles more.
-fn part_batches(part: &Part, raster: &Rasterizer, begin: f64, report: &mut RasterReport, out: &mut VecDeque<Batches>) {
+/// The batches of one draw in a tile, with equal ones grouped.
+fn part_batches(part: &Part, raster: &Rasterizer, report: &mut RasterReport, out: &mut Vec<Batches>) {
+    let first = out.len();
     let size = raster.batch;
     let bytes_each = f64::from(raster.primitive_bytes());
     let mut listed = part.needed + part.left_over;
@@ -520,17 +588,19 @@ fn part_batches(part: &Part, raster: &Rasterizer, begin: f64, report: &mut Raste
         listed -= primitives;
         let bytes = f64::from(primitives) * bytes_each;
         fetched += bytes;
-        out.push_back(Batches {
+        out.push(Batches {
             mode: part.mode,
             count: f64::from(count),
             cycles,
             bytes: bytes / f64::from(count),
             wasted: false,
+            first_of_part: false,
             first_of_tile: false,
             last_of_tile: false,
         });
     };
-    let mut cycles = begin;
+    let mut cycles = f64::from(raster.tile_overhead);
+    report.modules.controller += cycles;
     let mut filled = 0;
     // A draw's first batch is not grouped: it takes longer, and may have to wait for pixels to be written.
     let mut alone = true;
@@ -575,15 +645,19 @@ fn part_batches(part: &Part, raster: &Rasterizer, begin: f64, report: &mut Raste
         let bytes = f64::from(listed.min(size)) * bytes_each;
         report.bytes_in += bytes;
         report.bytes_wasted += bytes;
-        out.push_back(Batches {
+        out.push(Batches {
             mode: part.mode,
             count: 1.0,
             cycles: 0.0,
             bytes,
             wasted: true,
+            first_of_part: false,
             first_of_tile: false,
             last_of_tile: false,
         });
+    }
+    if let Some(batches) = out.get_mut(first) {
+        batches.first_of_part = true;
     }
 }
 

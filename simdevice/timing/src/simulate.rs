@@ -2,7 +2,7 @@
 
 use crate::config::{Config, Lists, Rasterizer, Records};
 use crate::energy::{self, Changed, Energy, Power};
-use crate::fast;
+use crate::fast::{self, FrameBatches};
 use crate::plan::{self, Division, Task};
 use crate::raster::RasterReport;
 use crate::schedule::{self, Policy, Span, Stages};
@@ -10,6 +10,7 @@ use crate::shader_cores::{self, Roofline};
 use crate::work::{DrawWork, FrameWork, Mode, Saturation};
 use serde::Serialize;
 use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The time and energy of a frame, with the rasterizer and without it.
@@ -107,6 +108,28 @@ struct Listed<'a> {
 struct RasterizerWork {
     tasks: Vec<Task>,
     changed: Changed,
+    /// The batches for rasterizers that were asked for last, by what they depend on.
+    batches: Mutex<VecDeque<(Rasterizer, Arc<FrameBatches>)>>,
+}
+
+/// The greatest number of rasterizers whose batches are kept.
+const KEPT_BATCHES: usize = 16;
+
+impl RasterizerWork {
+    /// The batches for a rasterizer, made when it is first asked for.
+    fn batches(&self, raster: &Rasterizer) -> Arc<FrameBatches> {
+        let key = raster.of_batches();
+        let mut known = self.batches.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, batches)) = known.iter().find(|(of, _)| *of == key) {
+            return Arc::clone(batches);
+        }
+        let batches = Arc::new(FrameBatches::new(&self.tasks, &key));
+        if known.len() == KEPT_BATCHES {
+            known.pop_front();
+        }
+        known.push_back((key, Arc::clone(&batches)));
+        batches
+    }
 }
 
 impl<'a> Listed<'a> {
@@ -136,6 +159,7 @@ impl<'a> Listed<'a> {
         let work = Arc::new(RasterizerWork {
             tasks: plan::tasks(&self.frame, &division),
             changed: changed(&self.frame, &division),
+            batches: Mutex::default(),
         });
         known.push((division, Arc::clone(&work)));
         work
@@ -143,8 +167,8 @@ impl<'a> Listed<'a> {
 
     /// Rasterizes while others move `others_gb_s` to and from main memory.
     fn rasterize(&self, config: &Config, others_gb_s: f64) -> RasterReport {
-        let work = self.rasterizer_work(&config.rasterizer);
-        fast::rasterize_tasks(&work.tasks, config, others_gb_s).0
+        let batches = self.rasterizer_work(&config.rasterizer).batches(&config.rasterizer);
+        fast::rasterize_batches(&batches, config, others_gb_s).0
     }
 }
 

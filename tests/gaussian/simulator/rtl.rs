@@ -1,19 +1,21 @@
 //! Compares the SystemVerilog module, run by Verilator, with the model: its pixels bit by bit, and its cycles with the
 //! stepped model's.
 
+use super::page::hold_table;
 use super::tiles::{self, View};
 use gaurast_runner::{Case, Missing, Need, Variant, data, ignore, is_long};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::timing::config::Config;
 use simdevice::timing::work::Mode;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Once, OnceLock};
 use timing_studies::exponential::{Exponential, exp2};
 use timing_studies::module::{Drawn, Groups, List, Module};
 use timing_studies::number::Format;
-use timing_studies::rtl::{self, LATENCY, Latencies, ModuleBench, Simulator, UnitBench};
+use timing_studies::rtl::{self, Latencies, MODULES, Memory, ModuleBench, Rasterized, Simulator, UnitBench};
 use timing_studies::rtl_cycles::{Cycles, Setting};
 
 const FORMATS: [(&str, Format); 2] = [("fp32", Format::SINGLE), ("fp16", Format::HALF)];
@@ -141,7 +143,12 @@ pub(super) fn results_of_model(format: Format, [a, b]: [u32; 2]) -> [u32; 7] {
 
 /// Draws lists on both, and compares every pixel.
 fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
-    let rasterized = bench.run(lists, module, LATENCY).expect("a run");
+    let rasterized = bench.run(lists, module, Memory::OF_PRESETS).expect("a run");
+    compare_pixels(&rasterized, module, lists)
+}
+
+/// Compares every pixel of lists that were drawn with those of the model.
+fn compare_pixels(rasterized: &Rasterized, module: &Module, lists: &[List]) -> Vec<Drawn> {
     assert_eq!(rasterized.pixels.len(), lists.len());
     let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
     for (index, (ours, theirs)) in rasterized.pixels.iter().zip(&drawn).enumerate() {
@@ -194,7 +201,7 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
     let count = if is_long() { 120 } else { 24 };
     for setting in Setting::ALL {
         let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
-        let cycles = Cycles::of(bench, setting, format, &lists).expect("cycles");
+        let cycles = Cycles::of(bench, setting, format, &lists, Memory::OF_PRESETS).expect("cycles");
         let [all, busy, dependency, memory, controller, modes] = cycles.by_cause();
         let near = |[ours, model]: [f64; 2], share: f64| {
             assert!((ours - model).abs() <= share * all[1], "{setting:?}: {:?}", cycles.by_cause());
@@ -209,6 +216,87 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
         near(modes, 0.04);
         assert_eq!(cycles.latency, Latencies::of(format, Exponential::Table).longest() + 1);
     }
+}
+
+/// Memories that stall in random cycles.
+fn stalling_memories() -> impl Iterator<Item = Memory> {
+    let count = if is_long() { 20 } else { 2 };
+    (1..=count).map(|stalls| Memory { latency: 37 * stalls % 150, interval: 1 + stalls % 2, stalls })
+}
+
+#[gaurast_runner::test(each = designs(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn no_stall_of_a_port_changes_a_pixel(case: &Case) {
+    let design = design(case);
+    let (format, bench) = (design.format, design.bench());
+    for setting in Setting::ALL {
+        let module = design.module(setting);
+        let mut lists = tiles::short(format, setting, 20);
+        lists.extend(tiles::generated(format, setting.groups, setting.masked, 5, setting.seed));
+        let free = bench.run(&lists, &module, Memory::OF_PRESETS).expect("a run");
+        // The ring of 64 primitives has room for eight requests of eight.
+        assert_eq!(free.requests, 8);
+        for memory in stalling_memories() {
+            let stalled = bench.run(&lists, &module, memory).expect("a run");
+            assert!(stalled.cycles > free.cycles, "{memory:?}: {} {}", stalled.cycles, free.cycles);
+            compare_pixels(&stalled, &module, &lists);
+        }
+    }
+}
+
+#[gaurast_runner::test(needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn modules_share_a_memory() {
+    let design = &DESIGNS[1];
+    let (format, alone) = (design.format, design.bench());
+    let bench = ModuleBench::compile_rasterizer(&folder(), format).expect("a bench");
+    for setting in Setting::ALL {
+        let module = design.module(setting);
+        let lists = tiles::generated(format, setting.groups, setting.masked, 40, setting.seed);
+        let one = alone.run(&lists, &module, Memory::OF_PRESETS).expect("a run");
+        let all = bench.run(&lists, &module, Memory::OF_PRESETS).expect("a run");
+        compare_pixels(&all, &module, &lists);
+        // Nobody waits for long where evaluation takes most of the time.
+        if !setting.masked {
+            let share = f64::from(one.cycles) / f64::from(all.cycles);
+            assert!(share > 0.75 * f64::from(MODULES), "{} {}", one.cycles, all.cycles);
+        }
+        assert!(all.requests > 8, "requests of several modules are in flight: {}", all.requests);
+        for memory in stalling_memories() {
+            compare_pixels(&bench.run(&lists, &module, memory).expect("a run"), &module, &lists);
+        }
+    }
+}
+
+/// The errors of the model with the module's ring of pieces, for memories of two latencies and ports that move 16 bytes in
+/// every cycle, in every second and in every fourth.
+#[gaurast_runner::test(needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn the_modules_cycles_are_the_models_with_slow_memories() {
+    let mut table =
+        "| lists | numbers | groups | latency | all of the port | a half | a quarter | whole batches, at worst |\n\
+        |---|---|---|---:|---:|---:|---:|---:|\n"
+            .to_owned();
+    for (design, setting) in DESIGNS[..2].iter().flat_map(|design| Setting::ALL.map(|setting| (design, setting))) {
+        let (format, name) = (design.format, design.name);
+        let long = tiles::generated(format, setting.groups, setting.masked, 40, setting.seed);
+        for (kind, lists) in [("drawn", long), ("short", tiles::short(format, setting, 60))] {
+            for latency in [0, 100] {
+                write!(table, "| {kind} | {name} | {} | {latency} |", setting.name).expect("a string");
+                let mut worst = 0.0f64;
+                for interval in [1, 2, 4] {
+                    let memory = Memory { latency, interval, stalls: 0 };
+                    let cycles = Cycles::of(design.bench(), setting, format, &lists, memory).expect("cycles");
+                    assert_eq!(cycles.different_pixels, 0);
+                    let [ours, model] = cycles.with_ring();
+                    let error = model / ours - 1.0;
+                    write!(table, " {ours:.0} / {model:.0} ({:+.1} %) |", error * 100.0).expect("a string");
+                    assert!(error.abs() <= 0.05, "{memory:?}: {error}\n{table}");
+                    let [ours, batches] = cycles.by_cause()[0];
+                    worst = worst.max(batches / ours - 1.0);
+                }
+                writeln!(table, " {:+.1} % |", worst * 100.0).expect("a string");
+            }
+        }
+    }
+    hold_table("cycles with slow memories", &table);
 }
 
 #[gaurast_runner::test]
@@ -245,17 +333,19 @@ fn a_second_simulator_draws_the_same(case: &Case) {
 #[gaurast_runner::test(each = designs(), needs = [Need::Program("verilator")])]
 fn verilator_has_nothing_to_warn_of(case: &Case) {
     let design = design(case);
-    let mut command = Command::new("verilator");
-    command
-        .current_dir(folder())
-        .args(["--lint-only", "-Wall", "--top-module", "raster_module"])
-        .arg(format!("-GEXPONENT={}", design.format.exponent))
-        .arg(format!("-GMANTISSA={}", design.format.mantissa))
-        .args(design.parameters)
-        .args(rtl::sources());
-    let output = command.output().expect("verilator");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.is_empty(), "{said}");
+    for top in ["raster_module", "rasterizer"] {
+        let mut command = Command::new("verilator");
+        command
+            .current_dir(folder())
+            .args(["--lint-only", "-Wall", "--top-module", top])
+            .arg(format!("-GEXPONENT={}", design.format.exponent))
+            .arg(format!("-GMANTISSA={}", design.format.mantissa))
+            .args(design.parameters)
+            .args(rtl::sources());
+        let output = command.output().expect("verilator");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.is_empty(), "{said}");
+    }
     let files = rtl::files();
     let waives = |text: &str| text.contains("lint_off") || text.contains("-Wno");
     let waivers: Vec<_> = files.iter().filter(|(_, text)| waives(text)).map(|(name, _)| name).collect();
@@ -269,12 +359,12 @@ fn the_commands_of_the_readme_run() {
     let files = rtl::files();
     let readme = &files.iter().find(|(name, _)| *name == "README.md").expect("a README").1;
     let commands: Vec<_> = readme.lines().filter_map(|line| line.strip_prefix("    ")).collect();
-    // The module's program, the proof and the table of areas take minutes.
+    // The modules' programs, the proof and the table of areas take minutes.
     let starts = ["bash area.sh", "bash prove.sh"];
     let (long, short): (Vec<_>, Vec<_>) = commands.into_iter().partition(|command| {
-        starts.iter().any(|start| command.starts_with(start)) || command.contains("raster_module $SOURCES bench.cpp")
+        starts.iter().any(|start| command.starts_with(start)) || command.contains("$SOURCES bench.cpp")
     });
-    assert_eq!(long.len(), 3);
+    assert_eq!(long.len(), 4);
     let script = if is_long() { [short, long].concat() } else { short }.join("\n");
     let output = Command::new("bash").args(["-euc", &script]).current_dir(&folder).output().expect("bash");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -299,13 +389,33 @@ fn a_cell_library_gives_areas_and_times() {
         .collect();
     assert_eq!(rows.len(), if is_long() { 18 } else { 1 });
     assert!(rows.iter().all(|row| row.len() == 3 && row.iter().all(|number| *number > 0.0)), "{table}");
+    if is_long() {
+        let node = std::env::var("GAURAST_LIBERTY_NODE").expect("the gate length");
+        hold_table(&format!("cells of {node} nm"), &table);
+    }
 }
 
 #[gaurast_runner::test(needs = [Need::Program("yosys")])]
-fn yosys_reads_the_module() {
+fn a_gate_count_gives_areas() {
+    let folder = folder().join("area");
+    rtl::write(&folder).expect("files");
+    let mut command = Command::new("bash");
+    command.arg("area.sh").args((!is_long()).then_some("quick"));
+    let output = command.current_dir(&folder).output().expect("bash");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(table.lines().count(), if is_long() { 18 } else { 4 }, "{table}");
+    if is_long() {
+        hold_table("transistors", &table);
+    }
+}
+
+#[gaurast_runner::test(needs = [Need::Program("yosys")])]
+fn yosys_reads_the_modules() {
     let folder = folder().join("yosys");
     rtl::write(&folder).expect("files");
-    let script = format!("read_verilog -sv -I. {}; hierarchy -check -top raster_module", rtl::sources().join(" "));
+    let script = format!("read_verilog -sv -I. {}; hierarchy -check -top rasterizer", rtl::sources().join(" "));
     let output = Command::new("yosys").current_dir(&folder).args(["-q", "-p", &script]).output().expect("yosys");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");

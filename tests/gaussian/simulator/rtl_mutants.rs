@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 use timing_studies::number::Format;
-use timing_studies::rtl::{self, LATENCY, ModuleBench, Rasterized, Simulator, UnitBench};
+use timing_studies::rtl::{self, Memory, ModuleBench, Rasterized, Simulator, UnitBench};
 use timing_studies::rtl_cycles::Setting;
 
 /// A change of a file.
@@ -62,8 +62,8 @@ const MUTANTS: &[Mutant] = &[
     mutant(
         "the last primitive is left out",
         "raster_module.sv",
-        "assign is_last_primitive = {1'b0, current} + 1'b1 == batch_count[using];",
-        "assign is_last_primitive = {1'b0, current} + 2'd2 >= batch_count[using];",
+        "assign is_last_primitive = {1'b0, current} + 1'b1 == piece_count[using];",
+        "assign is_last_primitive = {1'b0, current} + 2'd2 >= piece_count[using];",
     ),
     mutant("a list that ends early is fetched on", "raster_module.sv", "if (drop_list) listed <= 1'b0;", ""),
     mutant(
@@ -75,18 +75,43 @@ const MUTANTS: &[Mutant] = &[
     mutant(
         "the mode changes under pixels",
         "raster_module.sv",
-        "batch_mode[using] != mode && !in_flight)",
-        "batch_mode[using] != mode)",
+        "piece_mode[using] != mode && !in_flight)",
+        "piece_mode[using] != mode)",
     ),
-    mutant("both halves are one", "raster_module.sv", "filling <= !filling;", "filling <= filling;"),
+    mutant("all pieces are one", "raster_module.sv", "filling <= filling + 1'b1;", "filling <= filling;"),
     mutant("groups of a block", "raster_module.sv", "{group[3:2], 2'(p / 4)}", "{group[1:0], 2'(p / 4)}"),
     mutant("a mask's last group", "raster_module.sv", "(pending & (pending - 1)) == 0", "pending == 16'h8000"),
-    mutant("a request in a half in use", "raster_module.sv", "!fetching && !ready[filling] &&", "!fetching &&"),
+    mutant(
+        "a request in a piece in use",
+        "raster_module.sv",
+        "!asked[asking] && !ready[asking] &&",
+        "!asked[asking] &&",
+    ),
+    mutant("a request is replaced", "raster_module.sv", " && (!request_valid || request_ready);", ";"),
+    mutant("lists have two tags", "raster_module.sv", "localparam int TAG = NUMBER + 1;", "localparam int TAG = 1;"),
+    mutant(
+        "a piece begins before it has come",
+        "raster_module.sv",
+        "!piece_last[using] && ready[NUMBER'(using + 1'b1)]",
+        "!piece_last[using]",
+    ),
+    mutant(
+        "the port moves data both ways at a time",
+        "raster_module.sv",
+        "asked[filling] && !(write_valid && write_ready)",
+        "asked[filling]",
+    ),
+    mutant(
+        "pixels do not wait for memory",
+        "raster_module.sv",
+        "if (write_valid && write_ready) begin\n            if (leave_part",
+        "if (write_valid) begin\n            if (leave_part",
+    ),
     mutant(
         "a primitive's numbers begin a beat late",
         "primitive_buffer.sv",
-        "rows[{half, place}] <= with_data[32+:9*BITS];",
-        "rows[{half, place}] <= with_data[48+:9*BITS];",
+        "rows[{piece, place}] <= with_data[32+:9*BITS];",
+        "rows[{piece, place}] <= with_data[48+:9*BITS];",
     ),
 ];
 
@@ -106,16 +131,23 @@ fn computes_right(folder: &Path) -> bool {
     })
 }
 
-/// Runs of the module of a folder over generated tiles, one for each setting. `None` if it is not compiled, or does not end.
+/// Runs of the module of a folder over generated tiles and over short lists, for each setting and with ports that stall
+/// and that do not. `None` if it is not compiled, or does not end.
 fn runs(folder: &Path) -> Option<Vec<Rasterized>> {
     let format = Format::HALF;
     let bench = ModuleBench::compile(Simulator::Verilator, folder, format, &[]).ok()?;
-    let run = |setting: Setting| {
-        let lists =
-            tiles::generated(format, setting.groups, setting.masked, 2 * (tiles::KINDS.len() + 1), setting.seed);
-        bench.run(&lists, &setting.module(format), LATENCY).ok()
-    };
-    Setting::ALL.into_iter().map(run).collect()
+    let count = 2 * (tiles::KINDS.len() + 1);
+    let mut runs = Vec::new();
+    for setting in Setting::ALL {
+        let module = setting.module(format);
+        let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
+        let short = tiles::short(format, setting, 3 * count);
+        for memory in [Memory::OF_PRESETS, Memory { stalls: 1, ..Memory::OF_PRESETS }] {
+            runs.push(bench.run(&lists, &module, memory).ok()?);
+            runs.push(bench.run(&short, &module, memory).ok()?);
+        }
+    }
+    Some(runs)
 }
 
 /// Runs of the right module, whose pixels are held against the model's elsewhere.

@@ -11,6 +11,7 @@ use std::path::Path;
 use timing_studies::module::{Groups, List, Primitive};
 use timing_studies::number::Format;
 use timing_studies::pe::{Gaussian, Triangle};
+use timing_studies::rtl_cycles::Setting;
 
 const SIDE: f64 = 16.0;
 
@@ -208,4 +209,13 @@ pub fn generated(format: Format, groups: Groups, masked: bool, count: usize, see
         None => triangles(format, groups, &mut random),
     };
     (0..count).map(list).collect()
+}
+
+/// Generated lists of 1 to 24 primitives, of which some saturate their tile.
+pub fn short(format: Format, setting: Setting, count: usize) -> Vec<List> {
+    let mut lists = generated(format, setting.groups, setting.masked, count, setting.seed + 100);
+    for (index, list) in lists.iter_mut().enumerate() {
+        list.primitives.truncate(1 + index * 7 % 24);
+    }
+    lists
 }

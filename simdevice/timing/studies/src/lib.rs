@@ -10,6 +10,7 @@ pub mod module;
 pub mod number;
 pub mod paper;
 pub mod pe;
+pub mod ring;
 pub mod rivals;
 pub mod rtl;
 pub mod rtl_cycles;

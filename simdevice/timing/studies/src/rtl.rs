@@ -22,6 +22,9 @@ const HARDWARE: &[(&str, &str)] = &[
     ("pixel_buffer.sv", include_str!("../rtl/pixel_buffer.sv")),
     ("primitive_buffer.sv", include_str!("../rtl/primitive_buffer.sv")),
     ("raster_module.sv", include_str!("../rtl/raster_module.sv")),
+    ("round_robin.sv", include_str!("../rtl/round_robin.sv")),
+    ("arbiter.sv", include_str!("../rtl/arbiter.sv")),
+    ("rasterizer.sv", include_str!("../rtl/rasterizer.sv")),
 ];
 
 /// Files of the benches, of the proof and of the measurements.
@@ -55,8 +58,24 @@ pub fn sources() -> Vec<&'static str> {
     names.filter(|name| name.ends_with(".sv")).chain([TABLE]).collect()
 }
 
-/// Cycles until the bench's memory answers a request that was not made ahead: the presets' 100 ns.
-pub const LATENCY: u32 = 100;
+/// The memory of a bench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// Cycles from a request to the first of its data.
+    pub latency: u32,
+    /// Cycles from one movement of 16 bytes, in or out, to the next: 1 for all that the port is wide enough for.
+    pub interval: u32,
+    /// A seed of random stalls, of half of the cycles of every port; 0 for none.
+    pub stalls: u32,
+}
+
+impl Memory {
+    /// The presets' memory for a module alone: 100 ns.
+    pub const OF_PRESETS: Self = Self { latency: 100, interval: 1, stalls: 0 };
+}
+
+/// The number of modules that [`ModuleBench::compile_rasterizer`] compiles.
+pub const MODULES: u32 = 4;
 
 /// Cycles of a PE, as `latencies.svh` has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +148,8 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     match top {
         "units" => command.args(["units.sv", "units.cpp"]),
         // Processing elements are compiled once, and not once for each of the module's.
-        _ => command.args(["--hierarchical", "bench.cpp"]),
+        "raster_module" => command.args(["--hierarchical", "bench.cpp"]),
+        _ => command.args(["--hierarchical", "-CFLAGS"]).arg(format!("-DRASTERIZER={MODULES}")).arg("bench.cpp"),
     };
     let output = command.output()?;
     if !output.status.success() {
@@ -242,8 +262,10 @@ pub struct Rasterized {
     /// Cycles of the PEs by cause: no work, evaluating a pixel each, waiting for a transmittance, for memory, for the
     /// controller, changing modes.
     pub causes: [u32; 6],
-    /// The most cycles that a pixel spends in the pipeline.
+    /// The most cycles that a pixel spends in the pipeline; of one module only.
     pub latency: u32,
+    /// The most requests that memory had not answered at one time.
+    pub requests: u32,
     /// The pixels of each list, as [`crate::module::Drawn::pixels`].
     pub pixels: Vec<Vec<[u32; 3]>>,
 }
@@ -256,6 +278,15 @@ impl ModuleBench {
     pub fn build(simulator: Simulator, folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
         write(folder)?;
         Self::compile(simulator, folder, format, parameters)
+    }
+
+    /// Compiles [`MODULES`] modules and their arbiter for a format with Verilator, from the files of a folder, which
+    /// keeps the compiled program.
+    ///
+    /// # Errors
+    /// Returns an error if Verilator is missing or fails.
+    pub fn compile_rasterizer(folder: &Path, format: Format) -> Result<Self> {
+        Ok(Self { program: build(folder, "rasterizer", format, &[])?, format })
     }
 
     /// Compiles a module for a format from the files of a folder, which keeps the compiled program. `parameters` are the
@@ -271,16 +302,17 @@ impl ModuleBench {
         Ok(Self { program, format })
     }
 
-    /// Draws lists one after the other on a module. Memory answers a request that was not made ahead after `latency`
-    /// cycles.
+    /// Draws lists one after the other on a module with a memory.
     ///
     /// # Errors
     /// Returns an error if the program can't be run.
-    pub fn run(&self, lists: &[List], module: &Module, latency: u32) -> Result<Rasterized> {
+    pub fn run(&self, lists: &[List], module: &Module, memory: Memory) -> Result<Rasterized> {
         let thresholds = &module.thresholds;
         let mut words = vec![
             lists.len() as u32,
-            latency,
+            memory.latency,
+            memory.interval,
+            memory.stalls,
             thresholds.alpha_floor,
             thresholds.alpha_ceiling,
             thresholds.transmittance_floor,
@@ -289,22 +321,23 @@ impl ModuleBench {
             u32::from(module.groups == Groups::Blocks),
             if module.skips_groups { 2 } else { 1 },
         ];
-        let mut memory = Vec::new();
+        let mut contents = Vec::new();
         for list in lists {
             let count = list.primitives.len() as u32;
-            words.extend([u32::from(list.mode == Mode::Gaussian), memory.len() as u32, count]);
-            self.store(list, &mut memory);
+            words.extend([u32::from(list.mode == Mode::Gaussian), contents.len() as u32, count]);
+            self.store(list, &mut contents);
         }
-        let (memory, _) = memory.as_chunks();
-        words.extend(memory.iter().map(|&bytes| u32::from_le_bytes(bytes)));
+        let (contents, _) = contents.as_chunks();
+        words.extend(contents.iter().map(|&bytes| u32::from_le_bytes(bytes)));
         let out = run(&self.program, &words)?;
-        let (head, beats) = out.split_first_chunk::<8>().ok_or_else(|| Error::other("the bench wrote nothing"))?;
-        let &[cycles, a, b, c, d, e, f, latency] = head;
+        let (head, beats) = out.split_first_chunk::<9>().ok_or_else(|| Error::other("the bench wrote nothing"))?;
+        let &[cycles, a, b, c, d, e, f, latency, requests] = head;
         let per_tile = (TILE_PIXELS * 3 * self.format.bits() / 32) as usize;
         Ok(Rasterized {
             cycles,
             causes: [a, b, c, d, e, f],
             latency,
+            requests,
             pixels: beats.chunks(per_tile).map(|tile| self.pixels(tile)).collect(),
         })
     }

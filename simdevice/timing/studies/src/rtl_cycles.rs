@@ -3,8 +3,8 @@
 use crate::exponential::Exponential;
 use crate::module::{Drawn, Groups, List, Module};
 use crate::number::Format;
-use crate::rtl::{LATENCY, ModuleBench, Rasterized};
-use crate::stepped;
+use crate::rtl::{Memory, ModuleBench, Rasterized};
+use crate::{ring, stepped};
 use std::io::{Error, Result};
 use timing::FrameWork;
 use timing::config::{Config, ConfigError};
@@ -58,15 +58,15 @@ pub struct Cycles {
 }
 
 impl Cycles {
-    /// Runs the module and the model.
+    /// Runs the module with a memory, and the model.
     ///
     /// # Errors
     /// Returns an error if the bench can't be run.
-    pub fn of(bench: &ModuleBench, setting: Setting, format: Format, lists: &[List]) -> Result<Self> {
+    pub fn of(bench: &ModuleBench, setting: Setting, format: Format, lists: &[List], memory: Memory) -> Result<Self> {
         let module = setting.module(format);
-        let rasterized = bench.run(lists, &module, LATENCY)?;
+        let rasterized = bench.run(lists, &module, memory)?;
         let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
-        let config = machine(format).map_err(Error::other)?;
+        let config = machine(format, memory).map_err(Error::other)?;
         let pairs = rasterized.pixels.iter().zip(&drawn);
         let different = |(ours, drawn): (&Vec<[u32; 3]>, &Drawn)| {
             let pairs = ours.iter().zip(&drawn.pixels);
@@ -93,6 +93,11 @@ impl Cycles {
         let tiles = frame.draws.iter_mut().flat_map(|draw| &mut draw.tiles);
         tiles.flat_map(|tile| &mut tile.runs).for_each(|run| run.waits = None);
         fast::rasterize(&frame, &config, 0.0).cycles / f64::from(self.rasterized.cycles) - 1.0
+    }
+
+    /// Cycles of the module, and of the model that has its ring of pieces.
+    pub fn with_ring(&self) -> [f64; 2] {
+        [f64::from(self.rasterized.cycles), ring::rasterize(&self.frame, &self.config)]
     }
 
     /// Cycles of the module and of the model, by cause: all, evaluating a pixel for each PE, waiting for a
@@ -127,13 +132,17 @@ pub fn calibrated_sharing(groups: &[&Cycles]) -> f64 {
 
 /// A configuration with one module of these numbers, limited only by its port. A list's runs say in which groups its
 /// primitives are evaluated.
-fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
+fn machine(format: Format, memory: Memory) -> std::result::Result<Config, ConfigError> {
     let base = match format {
         Format::HALF => "fp16",
         _ => "paper-15x16",
     };
-    let settings = ["modules=1", "bandwidth_gb_s=1000", "saturation=reached", "triangle_traversal=reached"];
-    Config::preset(base, &settings.map(str::to_owned))
+    let mut settings: Vec<_> = ["modules=1", "bandwidth_gb_s=1000", "saturation=reached", "triangle_traversal=reached"]
+        .map(str::to_owned)
+        .into();
+    settings.push(format!("memory.latency_ns={}", memory.latency));
+    settings.push(format!("port_bytes_per_cycle={}", 16.0 / f64::from(memory.interval)));
+    Config::preset(base, &settings)
 }
 
 /// A frame of lists that are drawn one after the other, each a tile of its own.
@@ -157,7 +166,7 @@ mod tests {
 
     /// Lists of small Gaussians, for which the module takes the model's cycles with `sharing`.
     fn cycles(sharing: f64, reached: u32) -> Cycles {
-        let config = machine(Format::SINGLE).unwrap();
+        let config = machine(Format::SINGLE, Memory::OF_PRESETS).unwrap();
         let run = Run { primitives: 600, rows: 16, blocks: 16, reached: 600 * reached, ..Run::default() };
         let tile = TileWork { listed: 600, runs: vec![run], ..TileWork::default() };
         let draw = DrawWork { tiles: vec![tile], ..DrawWork::default() };
@@ -166,7 +175,13 @@ mod tests {
         of_module.rasterizer.neighbour_sharing = sharing;
         let report = stepped::rasterize(&frame, &of_module, 0.0);
         Cycles {
-            rasterized: Rasterized { cycles: report.cycles as u32, causes: [0; 6], latency: 0, pixels: Vec::new() },
+            rasterized: Rasterized {
+                cycles: report.cycles as u32,
+                causes: [0; 6],
+                latency: 0,
+                requests: 0,
+                pixels: Vec::new(),
+            },
             stepped: report,
             different_pixels: 0,
             tiles: 1,
