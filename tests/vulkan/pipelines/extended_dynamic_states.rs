@@ -365,7 +365,7 @@ fn cases() -> Vec<Case> {
             |options, on| edges(options, line_mode(false), Some(pattern(on))),
             // SAFETY: see above.
             |device, c, on| unsafe {
-                device.lines.cmd_set_line_stipple(c, 1, pattern(on));
+                (device.lines.fp().cmd_set_line_stipple_ext)(c, 1, pattern(on));
             },
         ),
         case(
