@@ -3,7 +3,7 @@
 //!
 //! Coordinates are in 1/256 pixels. The values of such a line, as depth, are those of the rectangle of the same line.
 
-use super::setup::cross;
+use super::primitive::cross;
 use crate::simd::{both, three};
 use crate::state::{LineMode, LineStipple};
 

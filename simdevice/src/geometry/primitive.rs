@@ -52,3 +52,10 @@ pub struct Primitive {
     /// The layer to which it is drawn.
     pub layer: u16,
 }
+
+/// Twice the signed area of a triangle.
+#[inline(always)]
+pub(super) fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
+    let along = |to: [i32; 2], axis: usize| i64::from(to[axis]) - i64::from(a[axis]);
+    along(b, 0) * along(c, 1) - along(b, 1) * along(c, 0)
+}

@@ -5,7 +5,7 @@ use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::line::StyledLine;
-use super::primitive::Primitive;
+use super::primitive::{Primitive, cross};
 use super::primitive_list::ListedPrimitive;
 use super::shade::{NO_OPTIONAL_OUTPUTS, OptionalOutputs, Shaded, Vertex};
 use super::vertex_reuse::VertexReuse;
@@ -393,13 +393,6 @@ impl<'a> SegmentSetup<'a> {
 /// The position of a clipped vertex in binary32.
 pub(super) fn narrow(vertex: &ClipVertex) -> [f32; 4] {
     vertex.position.map(|coordinate| coordinate as f32)
-}
-
-/// Twice the signed area of a triangle.
-#[inline(always)]
-pub(super) fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
-    let along = |to: [i32; 2], axis: usize| i64::from(to[axis]) - i64::from(a[axis]);
-    along(b, 0) * along(c, 1) - along(b, 1) * along(c, 0)
 }
 
 /// The offsets of vertices that snapping has not moved.

@@ -269,11 +269,11 @@ impl Fetcher {
     ) {
         let decodings = &streams.activations.decodings;
         let table = streams.tables.as_ref().and_then(|tables| tables.position.as_ref());
-        match decodings.positions(&streams.position, table) {
+        match Decoder::of_positions(decodings, &streams.position, table) {
             None => self.read(&streams.position, group, out.each_mut()),
             Some(decoder) => {
                 let function = if decodings.signed_log_position { signed_exponential } else { |value| value };
-                self.decode(decoder, &streams.position, group, out.each_mut(), function);
+                self.decode(&decoder, &streams.position, group, out.each_mut(), function);
             }
         }
     }
@@ -286,8 +286,8 @@ impl Fetcher {
         let tables = streams.tables.as_deref();
         self.read_positions(streams, group, &mut out.position);
         let of_scale: fn(f64) -> f64 = if *log_scale { libm::exp } else { |scale| scale };
-        match decodings.scales(&streams.scale, tables.and_then(|tables| tables.scale.as_ref())) {
-            Some(decoder) => self.decode(decoder, &streams.scale, group, out.scale.each_mut(), of_scale),
+        match Decoder::of_scales(decodings, &streams.scale, tables.and_then(|tables| tables.scale.as_ref())) {
+            Some(decoder) => self.decode(&decoder, &streams.scale, group, out.scale.each_mut(), of_scale),
             None => {
                 self.read(&streams.scale, group, out.scale.each_mut());
                 out.scale.iter_mut().for_each(|lanes| apply(of_scale, &mut lanes[..group.len]));
@@ -299,8 +299,8 @@ impl Fetcher {
         }
         let of_opacity: fn(f64) -> f64 =
             if *logit_opacity { |logit| 1.0 / (1.0 + libm::exp(-logit)) } else { |opacity| opacity };
-        match decodings.opacities(&streams.opacity, tables.and_then(|tables| tables.opacity.as_ref())) {
-            Some(decoder) => self.decode(decoder, &streams.opacity, group, [&mut out.opacity], of_opacity),
+        match Decoder::of_opacities(decodings, &streams.opacity, tables.and_then(|tables| tables.opacity.as_ref())) {
+            Some(decoder) => self.decode(&decoder, &streams.opacity, group, [&mut out.opacity], of_opacity),
             None => {
                 self.read(&streams.opacity, group, [&mut out.opacity]);
                 apply(of_opacity, &mut out.opacity[..group.len]);
@@ -312,14 +312,15 @@ impl Fetcher {
     /// the function.
     fn decode<const COMPONENTS: usize>(
         &mut self,
-        mut decoder: Decoder<'_, COMPONENTS>,
+        decoder: &Decoder<'_, COMPONENTS>,
         stream: &AttributeStream,
         group: &GroupVertices<'_>,
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
         function: fn(f64) -> f64,
     ) {
+        let mut bounds = None;
         self.each_element(stream, group, |lane, element| {
-            let values = decoder.decode(group.vertex(lane), element);
+            let values = decoder.decode(group.vertex(lane), element, &mut bounds);
             for (out, value) in out.iter_mut().zip(values) {
                 out[lane] = function(value) as f32;
             }

@@ -88,11 +88,12 @@ enum Values<'a, const COMPONENTS: usize> {
         is_binary64: bool,
         /// The vertices of a chunk.
         size: u32,
-        /// The chunk whose bounds were read last, and these.
-        last: Option<(u64, [[f64; COMPONENTS]; 2])>,
     },
     Codebook(Box<[f64; CODEBOOK]>),
 }
+
+/// The number of a chunk, and the minima and maxima of its components.
+pub(super) type ChunkBounds<const COMPONENTS: usize> = (u64, [[f64; COMPONENTS]; 2]);
 
 /// Decodes an attribute.
 pub(super) struct Decoder<'a, const COMPONENTS: usize> {
@@ -111,19 +112,24 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         let values = match (decoding, table) {
             (Decoding::None, _) | (_, None) => return None,
             (Decoding::Chunk { size, is_binary64 }, Some(table)) => {
-                Values::Chunks { table, is_binary64, size: size.max(1), last: None }
+                Values::Chunks { table, is_binary64, size: size.max(1) }
             }
             (Decoding::Codebook { is_binary64 }, Some(table)) => Values::Codebook(codebook(table, is_binary64)),
         };
         Some(Self { fields: fields(format, of_word), values })
     }
 
-    /// The values of the element of `vertex`.
-    pub(super) fn decode(&mut self, vertex: u64, element: u64) -> [f64; COMPONENTS] {
+    /// The values of the element of `vertex`. `last` are the bounds that were read last, which are not read again.
+    pub(super) fn decode(
+        &self,
+        vertex: u64,
+        element: u64,
+        last: &mut Option<ChunkBounds<COMPONENTS>>,
+    ) -> [f64; COMPONENTS] {
         let fields = self.fields;
-        match &mut self.values {
+        match &self.values {
             Values::Codebook(numbers) => fields.map(|field| numbers[field.code(element) as usize % CODEBOOK]),
-            Values::Chunks { table, is_binary64, size, last } => {
+            Values::Chunks { table, is_binary64, size } => {
                 let chunk = vertex / u64::from(*size);
                 let bounds = match last {
                     Some((number, bounds)) if *number == chunk => *bounds,
@@ -150,47 +156,49 @@ fn bounds<const COMPONENTS: usize>(table: &AttributeStream, is_binary64: bool, c
     [0, COMPONENTS].map(|first| std::array::from_fn(|component| at(first + component)))
 }
 
-impl Decodings {
+impl<'a> Decoder<'a, 3> {
     /// The decoder of positions from elements of `stream`, if they are decoded.
-    pub(super) fn positions<'a>(
-        &self,
+    pub(super) fn of_positions(
+        decodings: &Decodings,
         stream: &AttributeStream,
         table: Option<&'a AttributeStream>,
-    ) -> Option<Decoder<'a, 3>> {
-        Decoder::new(self.position, table, stream.format, WORD_OF_LENGTHS)
+    ) -> Option<Self> {
+        Self::new(decodings.position, table, stream.format, WORD_OF_LENGTHS)
     }
 
     /// The decoder of scales.
-    pub(super) fn scales<'a>(
-        &self,
+    pub(super) fn of_scales(
+        decodings: &Decodings,
         stream: &AttributeStream,
         table: Option<&'a AttributeStream>,
-    ) -> Option<Decoder<'a, 3>> {
-        Decoder::new(self.scale, table, stream.format, WORD_OF_LENGTHS)
-    }
-
-    /// The decoder of opacities.
-    pub(super) fn opacities<'a>(
-        &self,
-        stream: &AttributeStream,
-        table: Option<&'a AttributeStream>,
-    ) -> Option<Decoder<'a, 1>> {
-        Decoder::new(self.opacity, table, stream.format, [Field::new(0, 8)])
+    ) -> Option<Self> {
+        Self::new(decodings.scale, table, stream.format, WORD_OF_LENGTHS)
     }
 
     /// The decoder of coefficient 0.
-    pub(super) fn colors<'a>(
-        &self,
+    pub(super) fn of_colors(
+        decodings: &Decodings,
         stream: &AttributeStream,
         table: Option<&'a AttributeStream>,
-    ) -> Option<Decoder<'a, 3>> {
-        Decoder::new(self.color, table, stream.format, WORD_OF_COLORS)
+    ) -> Option<Self> {
+        Self::new(decodings.color, table, stream.format, WORD_OF_COLORS)
     }
+}
 
-    /// The coefficient that a decoded component of coefficient 0 stands for.
-    pub(super) fn coefficient(&self, component: f64) -> f64 {
-        if self.base_color { (component - 0.5) / Y_0 } else { component }
+impl<'a> Decoder<'a, 1> {
+    /// The decoder of opacities.
+    pub(super) fn of_opacities(
+        decodings: &Decodings,
+        stream: &AttributeStream,
+        table: Option<&'a AttributeStream>,
+    ) -> Option<Self> {
+        Self::new(decodings.opacity, table, stream.format, [Field::new(0, 8)])
     }
+}
+
+/// The coefficient that a decoded component of coefficient 0 stands for.
+pub(super) fn coefficient(decodings: &Decodings, component: f64) -> f64 {
+    if decodings.base_color { (component - 0.5) / Y_0 } else { component }
 }
 
 /// The number whose signed logarithm is `value`.

@@ -1,7 +1,7 @@
 //! Decoding of spherical harmonics of single lanes.
 
 use super::attributes::GroupVertices;
-use super::decoding::{CODEBOOK, codebook};
+use super::decoding::{CODEBOOK, Decoder, codebook, coefficient};
 use crate::packet::{AttributeStream, Decodings, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
 
 /// The most bytes from the first to the last code of a vertex that are read with one copy.
@@ -10,8 +10,8 @@ const SPAN: usize = 256;
 /// Decodes the spherical harmonics of a draw.
 pub(super) struct HarmonicsDecoder<'a> {
     decodings: &'a Decodings,
-    /// The table of coefficient 0.
-    colors: Option<&'a AttributeStream>,
+    /// The decoder of coefficient 0, if it is decoded.
+    colors: Option<Decoder<'a, 3>>,
     codes: Option<CodeReader<'a>>,
 }
 
@@ -39,7 +39,8 @@ impl<'a> HarmonicsDecoder<'a> {
             HarmonicsDecoding::Codebook(codes) => reader(codes, None),
             HarmonicsDecoding::Palette(codes) => reader(codes, tables.labels.as_ref()),
         };
-        let colors = tables.color.as_ref();
+        let first = attributes.spherical_harmonics.first();
+        let colors = first.and_then(|stream| Decoder::of_colors(decodings, stream, tables.color.as_ref()));
         (codes.is_some() || colors.is_some()).then(|| Box::new(Self { decodings, colors, codes }))
     }
 
@@ -63,14 +64,14 @@ impl<'a> HarmonicsDecoder<'a> {
     }
 
     fn color(&self, stream: &AttributeStream, group: &GroupVertices<'_>, lane: usize) -> [f32; 3] {
-        let Some(mut decoder) = self.decodings.colors(stream, self.colors) else {
+        let Some(decoder) = &self.colors else {
             return group.triple(stream, lane);
         };
         let mut element = [0; 8];
         let size = stream.format.texel_size().min(8);
         stream.read(group.element(stream, lane), &mut element[..size]);
-        let decoded = decoder.decode(group.vertex(lane), u64::from_le_bytes(element));
-        decoded.map(|component| self.decodings.coefficient(component) as f32)
+        let decoded = decoder.decode(group.vertex(lane), u64::from_le_bytes(element), &mut None);
+        decoded.map(|component| coefficient(self.decodings, component) as f32)
     }
 }
 
