@@ -133,7 +133,7 @@ impl Intrinsics {
             let farthest = principal[axis].abs().max((self.size[axis] - principal[axis]).abs());
             farthest / focal[axis].abs()
         };
-        let fitted = lens.fitted(side(0).hypot(side(1)));
+        let fitted = lens.fitted(libm::hypot(side(0), side(1)));
         if fitted.error * focal[0].abs().max(focal[1].abs()) <= FITTED_PIXELS {
             (Model::Fisheye, FileDistortion::Drawn(fitted.distortion))
         } else {

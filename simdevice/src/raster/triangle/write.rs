@@ -322,6 +322,7 @@ fn line_coverage(draw: &TriangleTileDraw<'_>, batch: &Batch, chunk: usize) -> [f
 
 /// Writes 16 fragments to one sample of the colour attachments.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "the draw, its batch, and the place and the contents of a chunk of it")]
 fn write_colors<S: Simd>(
     simd: S,
     draw: &TriangleTileDraw<'_>,
