@@ -29,7 +29,7 @@ pub struct StyledLine {
     counter: f64,
 }
 
-/// What decides the pixels of a line.
+/// The form of a line, which decides its pixels.
 #[derive(Clone, Copy, Debug)]
 enum Form {
     /// The edges of the rectangle, sample by sample.

@@ -257,7 +257,7 @@ pub(crate) struct FrameBatches {
     /// Place of each task, and the end of its batches in `batches`.
     tasks: Vec<([u32; 2], usize)>,
     batches: Vec<Batches>,
-    /// What does not depend on the modules that take the tasks.
+    /// The work that does not depend on the modules that take the tasks.
     work: RasterReport,
 }
 

@@ -103,7 +103,7 @@ fn bresenham_lines_have_lavapipes_pixels() {
     }
 }
 
-/// Where a Bresenham line and a rectangle have the same pixel, its values are the same.
+/// A pixel that a Bresenham line and a rectangle share has the same values in both.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn bresenham_lines_have_the_values_of_rectangles() {
     let vertices = in_cells(4, 256.0);

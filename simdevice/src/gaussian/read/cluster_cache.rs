@@ -246,7 +246,7 @@ pub(crate) fn find(
     found
 }
 
-/// What is read for every cluster: the attributes that it holds, and the tables.
+/// The memory that is read for every cluster: the attributes that it holds, and the tables.
 fn shapes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
     let attributes = &append.attributes;
     let shapes = [&attributes.position, &attributes.scale, &attributes.rotation, &attributes.opacity];

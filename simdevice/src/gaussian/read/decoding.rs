@@ -10,7 +10,7 @@ pub(super) const CODEBOOK: usize = 256;
 /// The value of the constant spherical harmonic.
 const Y_0: f64 = 0.28209479177387814;
 
-/// What the fourth byte of a quaternion has beyond the number of its largest component.
+/// The fourth byte of a quaternion, less the number of its largest component.
 const LARGEST_BYTE: u64 = 252;
 
 /// The place of an integer in an element of at most 8 bytes.

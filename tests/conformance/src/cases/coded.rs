@@ -98,7 +98,7 @@ impl Layout {
     }
 }
 
-/// Where the codes of spherical harmonics are, in bytes.
+/// The layout of the codes of spherical harmonics, in bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CodeStrides {
     pub(super) gaussian: usize,
