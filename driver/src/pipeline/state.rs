@@ -320,7 +320,7 @@ impl FixedFunctionState {
             } else {
                 convert::line_mode(
                     lines.line_rasterization_mode,
-                    "VUID-VkPipelineRasterizationLineStateCreateInfo-lineRasterizationMode-parameter",
+                    "VUID-VkPipelineRasterizationLineStateCreateInfoEXT-lineRasterizationMode-parameter",
                 )?
             },
             stipples_lines: lines.stippled_line_enable != vk::FALSE,
