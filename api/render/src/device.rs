@@ -141,6 +141,8 @@ struct PhysicalDevice {
     distorts: bool,
     /// True if it has the unscented transform with any sigma points.
     has_sigma_points: bool,
+    /// True if it decodes attributes, and buffers have addresses, at which tables are.
+    decodes: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
@@ -184,6 +186,10 @@ impl Device {
         }
         if physical.counts {
             create_info = create_info.push_next(&mut counting);
+        }
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+        if physical.decodes {
+            create_info = create_info.push_next(&mut addresses);
         }
         // SAFETY: the structures are valid, and the physical device has what is enabled.
         let raw =
@@ -244,6 +250,11 @@ impl Device {
     /// Returns true if the device draws lenses that distort.
     pub(super) fn distorts(&self) -> bool {
         self.physical.distorts
+    }
+
+    /// Returns true if the device decodes attributes.
+    pub(super) fn decodes(&self) -> bool {
+        self.physical.decodes
     }
 
     /// Returns true if the device has the unscented transform with any sigma points.
@@ -396,8 +407,9 @@ impl PhysicalDevice {
             counting.performance_counter_query_pools == vk::TRUE
         };
         let mut features = GaussianFeatures::default();
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
         if draws_gaussians && has(gaussian_primitive_topology::NAME) {
-            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
+            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut features).push_next(&mut addresses);
             // SAFETY: as above.
             unsafe { instance.get_physical_device_features2(handle, &mut chain) };
         }
@@ -418,6 +430,7 @@ impl PhysicalDevice {
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,
             distorts: features.gaussian_distortion == vk::TRUE,
+            decodes: [features.attribute_decoding, addresses.buffer_device_address] == [vk::TRUE; 2],
             has_sigma_points: [features.unscented_projection, features.unscented_parameters] == [vk::TRUE; 2],
             // SAFETY: the handle is the instance's.
             memory: unsafe { instance.get_physical_device_memory_properties(handle) },

@@ -4,12 +4,11 @@ use ash::vk;
 use gaurast::gaussian_primitive_topology;
 
 use crate::device::Device;
-use crate::device_scene::DeviceScene;
+use crate::device_scene::{DeviceScene, Vertices};
 use crate::listed::List;
 use crate::mesh;
 use crate::modes::Kept;
-use crate::pipeline::BINDINGS;
-use crate::resource::{Buffer, Image};
+use crate::resource::Image;
 use crate::target::Target;
 use gaurast_scene::Camera;
 use gaurast_scene::camera::Model;
@@ -65,7 +64,7 @@ impl Recorder<'_> {
         if let Some(tested) = &tested {
             rendering = rendering.depth_attachment(tested);
         }
-        let buffers = scene.vertices().each_ref().map(Buffer::handle);
+        let buffers = scene.vertices.buffers();
         use vk::PipelineStageFlags as Stage;
         for image in [image].into_iter().chain(kept) {
             let to_attachment = image
@@ -87,7 +86,7 @@ impl Recorder<'_> {
         let commands = self.commands;
         // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
         // device and live until the submission has ended; the pipeline's dynamic state, vertex
-        // buffers and camera are all set before the draw, whose vertices and indices lie within the buffers.
+        // buffers, tables and camera are all set before the draw, whose vertices and indices lie within the buffers.
         unsafe {
             raw.cmd_begin_rendering(commands, &rendering);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
@@ -102,7 +101,10 @@ impl Recorder<'_> {
                 raw.cmd_draw(commands, mesh.vertices, 1, 0, 0);
             }
             raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
-            raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
+            raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &vec![0; buffers.len()]);
+            if let Vertices::Encoded(vertices) = &scene.vertices {
+                self.gaussian.cmd_bind_gaussian_decoding_tables(commands, vertices.tables.places());
+            }
             (self.gaussian).cmd_set_gaussian_cameras(commands, &[vulkan]);
             match list {
                 Some(list) => {

@@ -32,6 +32,7 @@ mod arrays;
 pub mod device;
 mod device_scene;
 mod draw;
+mod encoded;
 mod error;
 mod listed;
 mod mesh;

@@ -10,14 +10,41 @@ use gaurast::vk::{
 };
 
 use crate::device::Device;
+use crate::encoded::Encoding;
 use crate::error::{During, RenderError};
 use crate::modes::{self, Kept, SigmaPoints};
 use crate::settings::Settings;
 use crate::target::DEPTH_FORMAT;
 use gaurast_scene::GaussianShape;
 
-/// The number of vertex buffers: positions, shapes, spherical harmonics.
+/// The number of vertex buffers of a decoded scene: positions, shapes, spherical harmonics.
 pub(super) const BINDINGS: usize = 3;
+
+/// The layout of Gaussians in vertex buffers.
+pub(super) enum VertexLayout<'a> {
+    /// Numbers, in buffers of these strides.
+    Decoded([u32; BINDINGS]),
+    /// Integers that are decoded.
+    Encoded(&'a Encoding),
+}
+
+impl VertexLayout<'_> {
+    /// The strides of the vertex buffers.
+    fn strides(&self) -> &[u32] {
+        match self {
+            Self::Decoded(strides) => strides,
+            Self::Encoded(encoding) => &encoding.strides,
+        }
+    }
+
+    /// The vertex attributes of a pipeline that draws harmonics of degree `sh_degree`.
+    fn attributes(&self, sh_degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
+        match self {
+            Self::Decoded(_) => attributes(sh_degree),
+            Self::Encoded(encoding) => encoding.attributes(),
+        }
+    }
+}
 
 /// The first location of the spherical harmonics; those before are position, scale, rotation and
 /// opacity.
@@ -31,13 +58,13 @@ pub(super) struct GaussianPipeline {
 }
 
 impl GaussianPipeline {
-    /// A pipeline for vertex buffers of `strides`. It draws with `settings`, whose degree must be stored, into an
+    /// A pipeline for vertex buffers of a layout. It draws with `settings`, whose degree must be stored, into an
     /// attachment of `format`, whose contents it replaces. If the settings keep a value, it writes that to a second
     /// attachment, of [`Kept::format`]. If there are triangles (`over_mesh`), Gaussians are blended over them, and a
     /// depth test leaves out those behind them.
     pub(super) fn new(
         device: &Arc<Device>,
-        strides: [u32; BINDINGS],
+        vertices: &VertexLayout<'_>,
         settings: Settings,
         format: vk::Format,
         over_mesh: bool,
@@ -48,10 +75,11 @@ impl GaussianPipeline {
             unsafe { raw.create_pipeline_layout(&Default::default(), None) }.during("vkCreatePipelineLayout")?;
         let mut pipeline = Self { handle: vk::Pipeline::null(), layout, device: device.clone() };
 
-        let bindings = [0, 1, 2].map(|binding| {
-            vk::VertexInputBindingDescription::default().binding(binding).stride(strides[binding as usize])
-        });
-        let attributes = attributes(settings.sh_degree);
+        let strides = (0..).zip(vertices.strides());
+        let bindings = strides
+            .map(|(binding, stride)| vk::VertexInputBindingDescription::default().binding(binding).stride(*stride));
+        let bindings: Vec<_> = bindings.collect();
+        let attributes = vertices.attributes(settings.sh_degree);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
@@ -106,6 +134,9 @@ impl GaussianPipeline {
                     .opacity(3)
                     .first_spherical_harmonics(FIRST_SH),
             );
+        if let VertexLayout::Encoded(encoding) = vertices {
+            gaussian = gaussian.flags(encoding.flags());
+        }
         if let Some(kept) = kept {
             gaussian = gaussian.resolve_input_locations(kept.locations());
         }
@@ -120,6 +151,10 @@ impl GaussianPipeline {
         if unscented.is_some() {
             gaussian = gaussian.linearization(GaussianLinearizationGAURAST::UNSCENTED);
         }
+        let mut decoding = match vertices {
+            VertexLayout::Decoded(_) => None,
+            VertexLayout::Encoded(encoding) => Some(encoding.state(settings.sh_degree)),
+        };
         let mut create_info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)
@@ -134,6 +169,9 @@ impl GaussianPipeline {
             .push_next(&mut approximation)
             .push_next(&mut footprint)
             .push_next(&mut rendering);
+        if let Some(decoding) = &mut decoding {
+            create_info = create_info.push_next(decoding);
+        }
         if let Some(unscented) = &mut unscented {
             create_info = create_info.push_next(unscented);
         }

@@ -6,18 +6,20 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
-use gaurast_scene::{Camera, GaussianShape, MAX_SH_DEGREE, Scene};
+use gaurast_scene::{Camera, EncodedScene, GaussianShape, MAX_SH_DEGREE, Scene};
+use glam::{DMat3, DVec3};
 
 use crate::arrays::Arrays;
 use crate::device::{Device, Purpose};
-use crate::device_scene::DeviceScene;
+use crate::device_scene::{DecodedVertices, DeviceScene, Vertices};
 use crate::draw::{DepthScale, Recorder};
+use crate::encoded::{EncodedVertices, Encoding, Tables};
 use crate::error::RenderError;
 use crate::listed::{self, List};
 use crate::mesh::{self, DeviceMesh, MeshPipeline};
 use crate::modes::Kept;
 use crate::options::DeviceOptions;
-use crate::pipeline::{BINDINGS, GaussianPipeline};
+use crate::pipeline::{BINDINGS, GaussianPipeline, VertexLayout};
 use crate::process_stats::processor_time;
 use crate::query::{Counter, CounterQuery};
 use crate::resource::{Buffer, CommandBuffers, Memory};
@@ -26,6 +28,9 @@ use crate::target::{COLOR_FORMAT, Target, check_size, record_copy};
 
 /// The most bytes that are copied to the device at once.
 const STAGING: u64 = 64 << 20;
+
+/// The reason for which a compressed scene is not listed.
+const ENCODED_BY_Z: &str = "Gaussians of a compressed scene are sorted by the device alone: to sort them by z, they are decoded first";
 
 /// A device that draws Gaussians, with the objects that it reuses for each frame.
 pub struct Renderer {
@@ -120,21 +125,70 @@ impl Renderer {
                 pipeline: MeshPipeline::new(&self.device)?,
             })
         };
-        let over_mesh = mesh.is_some();
-        Ok(DeviceScene {
-            mesh,
-            origin: scene.origin(),
-            count,
+        let pipeline = self.pipeline(&VertexLayout::Decoded(strides), scene.sh_degree(), settings, mesh.is_some())?;
+        let vertices = DecodedVertices {
             strides,
-            stored_degree: scene.sh_degree(),
-            settings,
-            pipeline: self.pipeline(strides, scene.sh_degree(), settings, over_mesh)?,
             resident: None,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
             ],
+        };
+        Ok(DeviceScene {
+            mesh,
+            origin: DVec3::from_array(scene.origin()),
+            turn: DMat3::IDENTITY,
+            count,
+            stored_degree: scene.sh_degree(),
+            settings,
+            pipeline,
+            vertices: Vertices::Decoded(vertices),
+        })
+    }
+
+    /// Returns true if the device draws compressed scenes as they are.
+    pub fn draws_encoded(&self) -> bool {
+        self.device.decodes()
+    }
+
+    /// Copies a compressed scene to the device, which decodes its integers as it draws them. The degree is as in
+    /// [`Renderer::upload`]. Each array in host memory is freed when it has been copied.
+    ///
+    /// # Errors
+    /// If the device has no `attributeDecoding`, the scene is too large for it, or Vulkan fails.
+    pub fn upload_encoded(
+        &mut self,
+        mut scene: EncodedScene,
+        sh_degree: Option<u32>,
+    ) -> Result<DeviceScene, RenderError> {
+        if !self.draws_encoded() {
+            return Err(RenderError::Combination("the device does not decode attributes (attributeDecoding)"));
+        }
+        let settings = Settings { sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE), ..Settings::default() };
+        let count = self.checked_count(scene.count)?;
+        let encoding = Encoding::of(&scene);
+        let pipeline = self.pipeline(&VertexLayout::Encoded(&encoding), scene.sh_degree, settings, false)?;
+        let mut buffers = Vec::new();
+        for stream in std::mem::take(&mut scene.streams) {
+            buffers.push(self.upload_bytes(&stream.bytes)?);
+        }
+        let numbers = self.upload_table(bytemuck::cast_slice(&scene.numbers))?;
+        let (mut codes, mut labels) = (None, None);
+        if let Some(harmonics) = &scene.harmonics {
+            codes = Some(self.upload_table(&harmonics.codes.bytes)?);
+            labels = harmonics.labels.as_ref().map(|labels| self.upload_table(&labels.bytes)).transpose()?;
+        }
+        let tables = Tables::new(&scene, numbers, codes, labels);
+        Ok(DeviceScene {
+            mesh: None,
+            origin: DVec3::ZERO,
+            turn: scene.turn,
+            count,
+            stored_degree: scene.sh_degree,
+            settings,
+            pipeline,
+            vertices: Vertices::Encoded(Box::new(EncodedVertices { encoding, buffers, tables })),
         })
     }
 
@@ -152,8 +206,12 @@ impl Renderer {
     /// # Errors
     /// If Vulkan fails.
     pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
-        let over_mesh = scene.mesh.is_some();
-        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings, over_mesh)?;
+        let layout = match &scene.vertices {
+            Vertices::Encoded(_) if settings.by_z => return Err(RenderError::Combination(ENCODED_BY_Z)),
+            Vertices::Encoded(vertices) => VertexLayout::Encoded(&vertices.encoding),
+            Vertices::Decoded(vertices) => VertexLayout::Decoded(vertices.strides),
+        };
+        scene.pipeline = self.pipeline(&layout, scene.stored_degree, settings, scene.mesh.is_some())?;
         scene.settings = settings;
         Ok(())
     }
@@ -167,7 +225,7 @@ impl Renderer {
 
     fn pipeline(
         &self,
-        strides: [u32; BINDINGS],
+        layout: &VertexLayout<'_>,
         stored_degree: u32,
         mut settings: Settings,
         over_mesh: bool,
@@ -176,13 +234,23 @@ impl Renderer {
             return Err(RenderError::Combination("the device has no unscented transform with other sigma points"));
         }
         settings.sh_degree = settings.sh_degree.min(stored_degree).min(self.device.max_sh_degree());
-        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over_mesh)
+        GaussianPipeline::new(&self.device, layout, settings, COLOR_FORMAT, over_mesh)
     }
 
-    /// A device-local vertex buffer of `bytes`, copied through a staging buffer.
+    /// A device-local vertex buffer of `bytes`.
     fn upload_bytes(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
+        self.upload_for(bytes, vk::BufferUsageFlags::VERTEX_BUFFER)
+    }
+
+    /// A device-local buffer of `bytes` with an address.
+    fn upload_table(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
+        self.upload_for(bytes, vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS)
+    }
+
+    /// A device-local buffer of `bytes` for a usage, copied through a staging buffer.
+    fn upload_for(&mut self, bytes: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer, RenderError> {
         use vk::BufferUsageFlags as Usage;
-        let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST | Usage::TRANSFER_SRC;
+        let usage = usage | Usage::TRANSFER_DST | Usage::TRANSFER_SRC;
         // Vulkan has no empty buffers; an empty scene is drawn without reading this one.
         let size = (bytes.len() as u64).max(4);
         let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
@@ -198,7 +266,7 @@ impl Renderer {
         Ok(buffer)
     }
 
-    /// Copies regions of buffers to others, from which the next submission's draws read vertices, or the host.
+    /// Copies regions of buffers to others, from which the next submission's draws read vertices and tables, or the host.
     fn copy(&mut self, regions: &[(&Buffer, &Buffer, vk::BufferCopy)]) -> Result<(), RenderError> {
         self.commands.record(0, |device, commands| {
             for (from, to, region) in regions {
@@ -208,13 +276,16 @@ impl Renderer {
             }
             let barrier = vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ | vk::AccessFlags::HOST_READ);
+                .dst_access_mask(
+                    vk::AccessFlags::VERTEX_ATTRIBUTE_READ | vk::AccessFlags::SHADER_READ | vk::AccessFlags::HOST_READ,
+                );
+            use vk::PipelineStageFlags as Stage;
             // SAFETY: the command buffer is recording, outside a render pass.
             unsafe {
                 device.cmd_pipeline_barrier(
                     commands,
-                    vk::PipelineStageFlags::TRANSFER,
-                    vk::PipelineStageFlags::VERTEX_INPUT | vk::PipelineStageFlags::HOST,
+                    Stage::TRANSFER,
+                    Stage::VERTEX_INPUT | Stage::VERTEX_SHADER | Stage::HOST,
                     vk::DependencyFlags::empty(),
                     &[barrier],
                     &[],
@@ -248,55 +319,73 @@ impl Renderer {
         let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), sh_stride * size_of::<[f32; 3]>()];
         let strides = strides.map(|stride| stride as u32);
         let bytes = strides.map(|stride| u64::from(stride) * u64::from(count));
-        let mut scene = match used {
-            Some(mut used) => {
-                let is_same = (used.count, used.strides) == (count, strides) && arrays.are_in(&used.buffers)?;
-                if (used.strides, used.stored_degree, used.settings) != (strides, stored_degree, settings) {
-                    used.pipeline = self.pipeline(strides, stored_degree, settings, false)?;
-                }
-                let used = DeviceScene { count, strides, stored_degree, settings, ..used };
-                if is_same {
-                    return self.made_resident(used, bytes);
-                }
-                DeviceScene { resident: None, ..used }
-            }
-            None => DeviceScene {
-                mesh: None,
-                origin: [0.0; 3],
-                count,
-                strides,
-                stored_degree,
-                settings,
-                pipeline: self.pipeline(strides, stored_degree, settings, false)?,
-                buffers: [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?],
-                resident: None,
-            },
+        let layout = VertexLayout::Decoded(strides);
+        let scene = |vertices: DecodedVertices, pipeline: GaussianPipeline| DeviceScene {
+            mesh: None,
+            origin: DVec3::ZERO,
+            turn: DMat3::IDENTITY,
+            count,
+            stored_degree,
+            settings,
+            pipeline,
+            vertices: Vertices::Decoded(vertices),
         };
-        for (buffer, bytes) in scene.buffers.iter_mut().zip(bytes) {
+        let (mut vertices, pipeline) = match used {
+            Some(DeviceScene {
+                vertices: Vertices::Decoded(held),
+                pipeline,
+                count: held_count,
+                stored_degree: held_degree,
+                settings: held_settings,
+                ..
+            }) => {
+                let keeps_pipeline = (held_degree, held_settings) == (stored_degree, settings);
+                let is_same = (held_count, held.strides) == (count, strides) && arrays.are_in(&held.buffers)?;
+                let pipeline = if keeps_pipeline && held.strides == strides {
+                    pipeline
+                } else {
+                    self.pipeline(&layout, stored_degree, settings, false)?
+                };
+                if is_same {
+                    return Ok(scene(self.made_resident(held, bytes)?, pipeline));
+                }
+                (DecodedVertices { strides, resident: None, ..held }, pipeline)
+            }
+            _ => {
+                let buffers = [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?];
+                let pipeline = self.pipeline(&layout, stored_degree, settings, false)?;
+                (DecodedVertices { strides, buffers, resident: None }, pipeline)
+            }
+        };
+        for (buffer, bytes) in vertices.buffers.iter_mut().zip(bytes) {
             if buffer.size() < bytes {
                 *buffer = self.vertices(bytes)?;
             }
         }
-        arrays.write_to(&scene.buffers)?;
-        Ok(scene)
+        arrays.write_to(&vertices.buffers)?;
+        Ok(scene(vertices, pipeline))
     }
 
-    /// The scene with copies in the device's memory, of which the first `bytes` are drawn.
-    fn made_resident(&mut self, mut scene: DeviceScene, bytes: [u64; BINDINGS]) -> Result<DeviceScene, RenderError> {
-        if scene.resident.is_none() && scene.count > 0 {
+    /// The vertices with copies in the device's memory, of which the first `bytes` are drawn.
+    fn made_resident(
+        &mut self,
+        mut vertices: DecodedVertices,
+        bytes: [u64; BINDINGS],
+    ) -> Result<DecodedVertices, RenderError> {
+        if vertices.resident.is_none() && bytes[0] > 0 {
             let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
             let copy = |bytes: u64| Buffer::new(&self.device, bytes, usage, Memory::Device);
             let copies = [copy(bytes[0])?, copy(bytes[1])?, copy(bytes[2])?];
             let region = |bytes: u64| vk::BufferCopy::default().size(bytes);
-            let [positions, shapes, harmonics] = &scene.buffers;
+            let [positions, shapes, harmonics] = &vertices.buffers;
             self.copy(&[
                 (positions, &copies[0], region(bytes[0])),
                 (shapes, &copies[1], region(bytes[1])),
                 (harmonics, &copies[2], region(bytes[2])),
             ])?;
-            scene.resident = Some(copies);
+            vertices.resident = Some(copies);
         }
-        Ok(scene)
+        Ok(vertices)
     }
 
     /// A vertex buffer in host memory of `bytes`.
@@ -308,11 +397,14 @@ impl Renderer {
 
     /// The list of what `camera` sees of `scene`, by z.
     fn list(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<List, RenderError> {
+        let Vertices::Decoded(vertices) = &scene.vertices else {
+            return Err(RenderError::Combination(ENCODED_BY_Z));
+        };
         let bytes = u64::from(scene.count) * size_of::<[f32; 3]>() as u64;
         // Vulkan has no empty buffers.
         let read = Buffer::new(&self.device, bytes.max(4), vk::BufferUsageFlags::TRANSFER_DST, Memory::HostCached)?;
         if scene.count > 0 {
-            self.copy(&[(&scene.buffers[0], &read, vk::BufferCopy::default().size(bytes))])?;
+            self.copy(&[(&vertices.buffers[0], &read, vk::BufferCopy::default().size(bytes))])?;
         }
         let numbers = read.look(scene.count as usize, |positions| listed::by_z(positions, camera))?;
         let size = (size_of_val(&numbers[..]) as u64).max(4);
@@ -326,8 +418,7 @@ impl Renderer {
     /// # Errors
     /// Returns an error if the size exceeds the device's limits, modes can't be combined, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
-        let eye = std::array::from_fn(|axis| camera.eye[axis] - scene.origin[axis]);
-        let camera = &Camera { eye, ..camera.clone() };
+        let camera = &scene.seen_by(camera);
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
         scene.settings.check(camera)?;

@@ -38,15 +38,23 @@ impl Memory {
         }
     }
 
-    fn allocate(self, device: &Device, requirements: vk::MemoryRequirements) -> Result<vk::DeviceMemory, RenderError> {
+    fn allocate(
+        self,
+        device: &Device,
+        requirements: vk::MemoryRequirements,
+        flags: vk::MemoryAllocateFlags,
+    ) -> Result<vk::DeviceMemory, RenderError> {
         let name = match self {
             Self::Device => "device",
             Self::Host | Self::HostCached => "host-visible",
         };
         let memory_type =
             device.memory_type(requirements.memory_type_bits, self.preferences()).ok_or(RenderError::NoMemory(name))?;
-        let allocate_info =
-            vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(memory_type);
+        let mut flags_info = vk::MemoryAllocateFlagsInfo::default().flags(flags);
+        let allocate_info = vk::MemoryAllocateInfo::default()
+            .allocation_size(requirements.size)
+            .memory_type_index(memory_type)
+            .push_next(&mut flags_info);
         // SAFETY: the structure is valid.
         unsafe { device.raw().allocate_memory(&allocate_info, None) }.during("vkAllocateMemory")
     }
@@ -77,7 +85,10 @@ impl Buffer {
         let mut buffer = Self { handle, memory: vk::DeviceMemory::null(), size, device: device.clone() };
         // SAFETY: the buffer is the device's.
         let requirements = unsafe { device.raw().get_buffer_memory_requirements(handle) };
-        buffer.memory = kind.allocate(device, requirements)?;
+        let has_address = usage.contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+        let flags =
+            if has_address { vk::MemoryAllocateFlags::DEVICE_ADDRESS } else { vk::MemoryAllocateFlags::empty() };
+        buffer.memory = kind.allocate(device, requirements, flags)?;
         // SAFETY: the memory is new, and of the size and a type that the buffer requires.
         unsafe { device.raw().bind_buffer_memory(handle, buffer.memory, 0) }.during("vkBindBufferMemory")?;
         Ok(buffer)
@@ -86,6 +97,13 @@ impl Buffer {
     /// The buffer's handle.
     pub fn handle(&self) -> vk::Buffer {
         self.handle
+    }
+
+    /// The buffer's address, for one with the usage `SHADER_DEVICE_ADDRESS`.
+    pub fn address(&self) -> vk::DeviceAddress {
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.handle);
+        // SAFETY: the buffer is the device's, and was created to have an address.
+        unsafe { self.device.raw().get_buffer_device_address(&info) }
     }
 
     /// Copies `bytes` to the beginning of the buffer, which must be in host memory and unused by
@@ -265,7 +283,7 @@ impl Image {
         };
         // SAFETY: the image is the device's.
         let requirements = unsafe { device.raw().get_image_memory_requirements(handle) };
-        image.memory = Memory::Device.allocate(device, requirements)?;
+        image.memory = Memory::Device.allocate(device, requirements, vk::MemoryAllocateFlags::empty())?;
         // SAFETY: the memory is new, and of the size and a type that the image requires.
         unsafe { device.raw().bind_image_memory(handle, image.memory, 0) }.during("vkBindImageMemory")?;
         let create_info = vk::ImageViewCreateInfo::default()

@@ -267,6 +267,22 @@ impl Scene {
         (self.sh, self.sh_degree) = (sh, degree);
     }
 
+    /// Warns of Gaussians that the device does not draw because of numbers that are not finite.
+    pub(crate) fn warn_of_dropped(&mut self) {
+        let is_dropped = |(position, shape): (&[f32; 3], &GaussianShape)| {
+            let mut numbers = position.iter().chain(&shape.scale).chain(&shape.rotation).chain([&shape.opacity]);
+            !numbers.all(|number| number.is_finite())
+        };
+        let gaussians = self.positions.par_iter().zip(&self.shapes);
+        let dropped = gaussians.filter(|gaussian| is_dropped(*gaussian)).count();
+        if dropped > 0 {
+            let all = self.len();
+            self.metadata.warn(format!(
+                "{dropped} of {all} Gaussians have a position, scale, rotation or opacity that is not finite, and are not drawn"
+            ));
+        }
+    }
+
     /// The point in the file's coordinates to which positions and triangles are relative: zero, unless they lie so far from
     /// there that binary32 would lose their digits. Cameras are not relative to it.
     pub fn origin(&self) -> [f64; 3] {
@@ -354,11 +370,5 @@ impl Scene {
     /// 0.5 plus their sum weighted by the basis functions.
     pub fn sh(&self) -> &[[f32; 3]] {
         &self.sh
-    }
-
-    /// The coefficients of Gaussian `index`, for a reader that reads them after the rest.
-    pub(crate) fn sh_of_mut(&mut self, index: usize) -> &mut [[f32; 3]] {
-        let stride = self.sh_stride();
-        &mut self.sh[index * stride..][..stride]
     }
 }

@@ -35,6 +35,10 @@ pub struct RenderArguments {
 
     #[command(flatten)]
     pub report: ReportArguments,
+
+    /// Decode a compressed scene (compressed PLY, SOG, SPZ) when it is read, which takes more memory, and not when it is drawn
+    #[arg(long, help_heading = "Drawing")]
+    pub decode: bool,
 }
 
 /// The scene arguments.

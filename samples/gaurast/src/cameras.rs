@@ -104,6 +104,11 @@ impl Known {
         }
     }
 
+    /// Returns true if a camera file shows a part of the scene.
+    pub fn crops(&self) -> bool {
+        matches!(self, Self::File(views) if views.cropped.is_some())
+    }
+
     /// Leaves out the part of the scene that a camera file does not show.
     pub fn crop(&mut self, scene: &mut Scene) {
         let Self::File(views) = self else {

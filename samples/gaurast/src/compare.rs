@@ -221,13 +221,13 @@ fn draw(arguments: &CompareArguments, path: &Path, size: [u32; 2]) -> Result<Pic
     let trained = known.background().or(source.background);
     let views = cameras::of_scene(known, &camera, &scene, false)?.views;
     if !arguments.quiet && !arguments.json {
-        for note in drawing::notes(&arguments.modes, &scene) {
+        for note in drawing::notes(&arguments.modes, &scene, scene.sh_degree()) {
             eprintln!("gaurast: {note}");
         }
     }
     let [view]: [View; 1] = views.try_into().map_err(|views: Vec<View>| Error::Views(views.len()))?;
     let settings = drawing::settings(&arguments.modes, &scene, [&view.camera]);
-    let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
+    let mut drawing = Drawing::new(scene.into(), settings, arguments.modes.device.as_deref(), false, None)?;
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(trained);
     Ok(frame.picture.over(background.map_or([0.0; 3], Background::color)))

@@ -5,7 +5,9 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use gaurast_render::{DeviceOptions, Frame, RenderError, Renderer, Settings, WorkTrace};
-use gaurast_scene::{Antialiasing, Axes, AxesReason, Camera, ColorSpace, Geometry, MAX_SH_DEGREE, Scene};
+use gaurast_scene::{
+    Antialiasing, Axes, AxesReason, Camera, ColorSpace, Geometry, Loaded, MAX_SH_DEGREE, Scene, SceneError,
+};
 use thiserror::Error;
 
 use crate::args::{Choice, ModeArguments, chosen};
@@ -21,6 +23,8 @@ use crate::sources::axes_and_reason;
 pub enum DrawError {
     #[error(transparent)]
     Render(#[from] RenderError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("the thread that writes pictures cannot start: {0}")]
@@ -60,8 +64,8 @@ pub fn has_linear_colors(scene: &Scene) -> bool {
     scene.metadata().color_space == Some(ColorSpace::LinearRec709Display)
 }
 
-/// Notes for the user about settings in the scene's file, a sentence each.
-pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
+/// Notes for the user about settings in the scene's file, a sentence each. The file has spherical harmonics of `sh_degree`.
+pub fn notes(modes: &ModeArguments, scene: &Scene, sh_degree: u32) -> Vec<String> {
     let metadata = scene.metadata();
     let mut notes = metadata.warnings.clone();
     notes.extend(metadata.notes.iter().cloned());
@@ -88,8 +92,8 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
         let note = "the file's colours are linear light, and are written without a transfer function";
         notes.push(note.to_owned());
     }
-    if let Some(degree) = modes.sh_degree.filter(|degree| *degree > scene.sh_degree()) {
-        notes.push(format!("--sh-degree {degree} is of no account: the scene has degree {}", scene.sh_degree()));
+    if let Some(degree) = modes.sh_degree.filter(|degree| *degree > sh_degree) {
+        notes.push(format!("--sh-degree {degree} is of no account: the scene has degree {sh_degree}"));
     }
     notes
 }
@@ -117,7 +121,7 @@ impl Drawing {
     /// # Errors
     /// If there is no device, or not enough memory.
     pub fn new(
-        scene: Scene,
+        scene: Loaded,
         settings: Settings,
         device: Option<&str>,
         counters: bool,
@@ -137,8 +141,13 @@ impl Drawing {
         if counters {
             renderer.count_everything()?;
         }
-        let mut uploaded = renderer.upload(&scene, Some(settings.sh_degree))?;
-        drop(scene);
+        let degree = Some(settings.sh_degree);
+        let mut uploaded = match scene {
+            Loaded::Encoded(scene) if renderer.draws_encoded() && !settings.by_z => {
+                renderer.upload_encoded(*scene, degree)?
+            }
+            scene => renderer.upload(&scene.decode()?, degree)?,
+        };
         renderer.set(&mut uploaded, settings)?;
         Ok(Self { renderer, scene: uploaded })
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use gaurast_picture::OutputError;
 use gaurast_render::WorkTrace;
+use gaurast_scene::Loaded;
 use gaurast_scene::camera_path::Keyframe;
 use thiserror::Error;
 use timing::work::Trace;
@@ -86,7 +87,15 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
     }
     let quiet = arguments.report.quiet;
     let progress = Progress { quiet };
-    let (mut scene, loading) = source.load(progress)?;
+    let (loaded, loading) = source.load_as_it_lies(progress)?;
+    // A compressed scene is drawn as it lies; the rest of the program looks at its Gaussians without their harmonics.
+    let (mut scene, encoded) = match loaded {
+        Loaded::Encoded(encoded) if !known.crops() && !arguments.decode => {
+            (encoded.outline().map_err(SourceError::from)?, Some(encoded))
+        }
+        loaded => (loaded.decode().map_err(SourceError::from)?, None),
+    };
+    let sh_degree = encoded.as_ref().map_or(scene.sh_degree(), |encoded| encoded.sh_degree);
     if arguments.report.strict {
         sources::check_strictly(&scene)?;
     }
@@ -102,7 +111,7 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
         return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }
     notes.extend(source.notes.iter().cloned());
-    notes.extend(drawing::notes(&arguments.modes, &scene));
+    notes.extend(drawing::notes(&arguments.modes, &scene, sh_degree));
     if !quiet && !arguments.report.json {
         for note in &notes {
             eprintln!("gaurast: {note}");
@@ -126,12 +135,19 @@ fn draw(arguments: &RenderArguments, trace: Option<&Arc<WorkTrace>>) -> Result<(
         return Err(Error::HeatmapViews(indices.len()));
     }
 
-    let contents = Contents::of(&scene);
+    let contents = Contents::of(&scene, sh_degree);
     let start = Instant::now();
     let drawn = if indices.is_empty() {
         Vec::new()
     } else {
         let step = progress.step("uploading");
+        let scene = match encoded {
+            Some(encoded) => {
+                drop(scene);
+                Loaded::Encoded(encoded)
+            }
+            None => scene.into(),
+        };
         let mut drawing = Drawing::new(
             scene,
             settings,

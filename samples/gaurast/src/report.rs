@@ -25,9 +25,9 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// The contents of `scene`.
-    pub fn of(scene: &Scene) -> Self {
-        Self { gaussians: scene.len(), sh_degree: scene.sh_degree(), triangles: scene.mesh().triangles() }
+    /// The contents of `scene`, whose file has spherical harmonics of `sh_degree`.
+    pub fn of(scene: &Scene, sh_degree: u32) -> Self {
+        Self { gaussians: scene.len(), sh_degree, triangles: scene.mesh().triangles() }
     }
 }
 

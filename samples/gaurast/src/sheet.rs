@@ -106,12 +106,12 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     };
     let cameras = AZIMUTHS.as_flattened().iter().map(camera).collect::<Result<Vec<_>, _>>()?;
     if !arguments.quiet {
-        for note in drawing::notes(&arguments.modes, &scene) {
+        for note in drawing::notes(&arguments.modes, &scene, scene.sh_degree()) {
             eprintln!("gaurast: {note}");
         }
     }
     let settings = drawing::settings(&arguments.modes, &scene, &cameras);
-    let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
+    let mut drawing = Drawing::new(scene.into(), settings, arguments.modes.device.as_deref(), false, None)?;
     let background = arguments.background.or(source.background);
     let behind = background.map_or([0.0; 3], Background::color);
     let bar = progress.pictures(8);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use gaurast_picture::Background;
-use gaurast_scene::{AxesReason, FileAxes, Options, Scene, SceneError, Transform};
+use gaurast_scene::{AxesReason, FileAxes, Loaded, Options, Scene, SceneError, Transform};
 use thiserror::Error;
 
 use crate::args::{Choice, SceneArguments};
@@ -127,6 +127,20 @@ impl Source {
         self.files.is_empty()
     }
 
+    /// Reads the scene. A compressed file that is all of it is not decoded.
+    ///
+    /// # Errors
+    /// The errors of the file's reader.
+    pub fn load_as_it_lies(&self, progress: Progress) -> Result<(Loaded, Duration), SourceError> {
+        match &self.files[..] {
+            [file] if file.transform == Transform::default() && file.path != Path::new(STANDARD_INPUT) => {
+                let start = Instant::now();
+                Ok((file.read(progress)?, start.elapsed()))
+            }
+            _ => self.load(progress).map(|(scene, time)| (scene.into(), time)),
+        }
+    }
+
     /// Reads the scene, or generates it.
     ///
     /// # Errors
@@ -139,17 +153,12 @@ impl Source {
             return Ok((garden, start.elapsed()));
         }
         let mut scene = Scene::default();
-        for SourceFile { path, transform, options } in &self.files {
+        for file in &self.files {
+            let SourceFile { path, transform, options } = file;
             let part = if path == Path::new(STANDARD_INPUT) {
                 read_standard_input(options)?
             } else {
-                let bar = progress.bytes("reading", 0);
-                let part = gaurast_scene::open_with(path, options, |file, len| {
-                    bar.set_length(len);
-                    bar.wrap_read(file)
-                })?;
-                bar.finish_and_clear();
-                part
+                file.read(progress)?.decode()?
             };
             let first = scene.is_empty() && scene.mesh().is_empty();
             if first && *transform == Transform::default() {
@@ -159,6 +168,19 @@ impl Source {
             }
         }
         Ok((scene, start.elapsed()))
+    }
+}
+
+impl SourceFile {
+    /// Reads the file. A compressed one is not decoded.
+    fn read(&self, progress: Progress) -> Result<Loaded, SceneError> {
+        let bar = progress.bytes("reading", 0);
+        let loaded = gaurast_scene::load_with(&self.path, &self.options, |file, len| {
+            bar.set_length(len);
+            bar.wrap_read(file)
+        })?;
+        bar.finish_and_clear();
+        Ok(loaded)
     }
 }
 

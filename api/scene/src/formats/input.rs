@@ -6,7 +6,9 @@ use std::path::{Component, Path};
 use flate2::bufread::GzDecoder;
 
 use crate::axes::Axes;
-use crate::error::{Fault, Place, Reason};
+use crate::encoded::EncodedScene;
+use crate::error::{Fault, Place, Reason, SceneError};
+use crate::metadata::Metadata;
 use crate::scene::Scene;
 
 /// Deflate's highest ratio of expansion. A header that claims more is malformed.
@@ -54,7 +56,49 @@ pub(super) trait Format: Sync {
     ///
     /// # Errors
     /// Returns an error if the input is malformed. A reader allocates nothing that is larger than the input can hold.
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault>;
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault>;
+}
+
+/// A scene as its file was read.
+#[derive(Clone, Debug)]
+pub enum Loaded {
+    /// As Gaussians.
+    Decoded(Scene),
+    /// As integers, of a format that has them.
+    Encoded(Box<EncodedScene>),
+}
+
+impl Loaded {
+    /// The scene as Gaussians.
+    ///
+    /// # Errors
+    /// If there is not enough memory.
+    pub fn decode(self) -> Result<Scene, SceneError> {
+        match self {
+            Self::Decoded(scene) => Ok(scene),
+            Self::Encoded(scene) => scene.decode(),
+        }
+    }
+
+    /// The scene's metadata, for changes.
+    pub(super) fn metadata_mut(&mut self) -> &mut Metadata {
+        match self {
+            Self::Decoded(scene) => scene.metadata_mut(),
+            Self::Encoded(scene) => &mut scene.metadata,
+        }
+    }
+}
+
+impl From<Scene> for Loaded {
+    fn from(scene: Scene) -> Self {
+        Self::Decoded(scene)
+    }
+}
+
+impl From<EncodedScene> for Loaded {
+    fn from(scene: EncodedScene) -> Self {
+        Self::Encoded(Box::new(scene))
+    }
 }
 
 /// The input of a [`Format`]: bytes in order, their number, and the number of those that have been read.

@@ -8,7 +8,7 @@
 
 use half::f16;
 
-use super::input::{Format, Input};
+use super::input::{Format, Input, Loaded};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::{SH_C0, sh_coefficients};
 use crate::scene::Scene;
@@ -32,7 +32,7 @@ impl Format for KSplat {
         &["ksplat"]
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let bytes = input.rest()?;
         let file = File::parse(&bytes)?;
         let degree = file.sections.iter().map(|s| s.degree).max().unwrap_or(0);
@@ -49,7 +49,7 @@ impl Format for KSplat {
                 scene.push(position, shape, &sh);
             }
         }
-        Ok(scene)
+        Ok(scene.into())
     }
 }
 

@@ -16,14 +16,12 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::axes::{AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason, SceneError};
 use crate::scene::Scene;
-use crate::shape::GaussianShape;
 use crate::transform::Motion;
-pub use input::Options;
+pub use input::{Loaded, Options};
 use input::{Format, Input, Origin};
 
 /// Reads the scene file at `path`, or the one in the folder `path`.
@@ -44,6 +42,18 @@ pub fn open_with<R: Read>(
     options: &Options,
     wrap: impl FnOnce(File, u64) -> R,
 ) -> Result<Scene, SceneError> {
+    load_with(path, options, wrap)?.decode()
+}
+
+/// Reads like [`open_with`], and leaves a compressed file's integers as they are.
+///
+/// # Errors
+/// As [`open`].
+pub fn load_with<R: Read>(
+    path: &Path,
+    options: &Options,
+    wrap: impl FnOnce(File, u64) -> R,
+) -> Result<Loaded, SceneError> {
     let path = &inside(path);
     let io = |source| io_error(path, source);
     let file = File::open(path).map_err(io)?;
@@ -53,7 +63,7 @@ pub fn open_with<R: Read>(
     }
     let len = metadata.len();
     let mut reader = BufReader::with_capacity(1 << 20, wrap(file, len));
-    read_with(path, &mut reader, len, options)
+    load(path, &mut reader, len, options)
 }
 
 fn io_error(path: &Path, source: std::io::Error) -> SceneError {
@@ -83,45 +93,40 @@ pub fn read(path: &Path, reader: &mut dyn BufRead, len: u64) -> Result<Scene, Sc
 /// # Errors
 /// As [`open`].
 pub fn read_with(path: &Path, reader: &mut dyn BufRead, len: u64, options: &Options) -> Result<Scene, SceneError> {
+    load(path, reader, len, options)?.decode()
+}
+
+/// Reads a scene of `len` bytes from `reader`, as [`read_with`] does, and leaves a compressed file's integers as they are.
+fn load(path: &Path, reader: &mut dyn BufRead, len: u64, options: &Options) -> Result<Loaded, SceneError> {
     Input::new(reader, len, Origin { path, options })
         .unpacked(|input| {
             let format = choose(path, input.peek()?)
                 .ok_or_else(|| Reason::UnknownFormat(known_to_user(path)).at(Place::File))?;
             log::debug!("reading {} as {}", path.display(), format.name());
-            let mut scene = format.load(input)?;
+            let mut loaded = format.load(input)?;
             if format.has_axes_of_cameras() {
-                turn(&mut scene, options);
+                turn(&mut loaded, options);
             }
-            name_dropped(&mut scene);
-            Ok(scene)
+            match &mut loaded {
+                Loaded::Decoded(scene) => scene.warn_of_dropped(),
+                Loaded::Encoded(scene) => path.clone_into(&mut scene.path),
+            }
+            Ok(loaded)
         })
         .map_err(|fault| fault.of(path))
 }
 
 /// Turns a scene into the axes of scenes: from those that the caller or else the file names.
-fn turn(scene: &mut Scene, options: &Options) {
+fn turn(loaded: &mut Loaded, options: &Options) {
     let given = options.axes.map(|axes| FileAxes { axes, reason: AxesReason::Given, of_cameras: true });
-    let named = given.or(scene.metadata().axes);
+    let named = given.or(loaded.metadata_mut().axes);
     if let Some(FileAxes { axes, .. }) = named {
-        scene.apply(&Motion::new(axes.matrix(), DVec3::ZERO, scene.sh_degree()));
+        match loaded {
+            Loaded::Decoded(scene) => scene.apply(&Motion::new(axes.matrix(), DVec3::ZERO, scene.sh_degree())),
+            Loaded::Encoded(scene) => scene.turn = axes.matrix(),
+        }
     }
-    scene.metadata_mut().axes = named;
-}
-
-/// Warns of Gaussians that the device does not draw because of numbers that are not finite.
-fn name_dropped(scene: &mut Scene) {
-    let is_dropped = |(position, shape): (&[f32; 3], &GaussianShape)| {
-        let mut numbers = position.iter().chain(&shape.scale).chain(&shape.rotation).chain([&shape.opacity]);
-        !numbers.all(|number| number.is_finite())
-    };
-    let gaussians = scene.positions().par_iter().zip(scene.shapes());
-    let dropped = gaussians.filter(|gaussian| is_dropped(*gaussian)).count();
-    if dropped > 0 {
-        let all = scene.len();
-        scene.metadata_mut().warn(format!(
-            "{dropped} of {all} Gaussians have a position, scale, rotation or opacity that is not finite, and are not drawn"
-        ));
-    }
+    loaded.metadata_mut().axes = named;
 }
 
 /// Every known format, in the order in which they are tried.
@@ -159,7 +164,7 @@ impl Format for NotRead {
         false
     }
 
-    fn load(&self, _: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, _: &mut Input<'_>) -> Result<Loaded, Fault> {
         Err(Reason::NotRead(self.name).at(Place::File))
     }
 }

@@ -4,7 +4,7 @@
 //! 255) and a quaternion w, x, y, z (4 bytes, 128 being zero), little-endian. The frame is that
 //! of PLY files.
 
-use super::input::{Format, Input};
+use super::input::{Format, Input, Loaded};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::SH_C0;
 use crate::scene::Scene;
@@ -25,7 +25,7 @@ impl Format for Splat {
         &["splat"]
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let bytes = input.rest()?;
         let (records, rest) = bytes.as_chunks::<RECORD>();
         if !rest.is_empty() {
@@ -35,7 +35,7 @@ impl Format for Splat {
         if records.is_empty() {
             return Err(Reason::Empty.at(Place::File));
         }
-        Scene::try_generate(0, records.len(), |index, sh| gaussian(&records[index], sh))
+        Ok(Scene::try_generate(0, records.len(), |index, sh| gaussian(&records[index], sh))?.into())
     }
 }
 

@@ -9,20 +9,18 @@
 //! saying so. Therefore the end where the scene's ground is decides, if there is no doubt about it.
 
 use std::f32::consts::FRAC_1_SQRT_2;
+use std::path::PathBuf;
 
-use glam::DVec3;
 use half::f16;
 use ruzstd::decoding::StreamingDecoder;
 
 use super::ground::{End, ground};
-use super::input::{Format, Input, read_growing};
+use super::input::{Format, Input, Loaded, read_growing};
 use crate::axes::{Axes, AxesReason, FileAxes};
+use crate::encoded::{Attribute, CODEBOOK, Decoding, EncodedHarmonics, EncodedScene, Form, Stream};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
 use crate::metadata::{Antialiasing, Metadata};
-use crate::scene::Scene;
-use crate::shape::GaussianShape;
-use crate::transform::Motion;
 
 /// The format.
 pub(super) struct Spz;
@@ -81,28 +79,25 @@ impl Format for Spz {
         false
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let given = input.origin().options.axes;
         let mut scene = load_into(input, given, Axes::RIGHT_DOWN_FRONT)?;
-        if scene.metadata().axes.is_some_and(|axes| axes.reason == AxesReason::Format)
-            && let Some(end) = ground(&scene)
+        if scene.metadata.axes.is_some_and(|axes| axes.reason == AxesReason::Format)
+            && let Some(end) = ground(&scene.decoded(0)?)
         {
             let axes = match end {
                 End::Down => DEFAULT_AXES,
-                End::Up => {
-                    let turn = Axes::RIGHT_DOWN_FRONT.matrix() * DEFAULT_AXES.matrix().transpose();
-                    scene.apply(&Motion::new(turn, DVec3::ZERO, scene.sh_degree()));
-                    Axes::RIGHT_DOWN_FRONT
-                }
+                End::Up => Axes::RIGHT_DOWN_FRONT,
             };
-            scene.metadata_mut().axes = Some(FileAxes { axes, reason: AxesReason::Ground, of_cameras: false });
+            scene.turn = axes.matrix();
+            scene.metadata.axes = Some(FileAxes { axes, reason: AxesReason::Ground, of_cameras: false });
         }
-        Ok(scene)
+        Ok(scene.into())
     }
 }
 
 /// Reads a scene into the axes `into`, from the axes that are `given`, or that the file names, or that are the format's.
-pub(super) fn load_into(input: &mut Input<'_>, given: Option<Axes>, into: Axes) -> Result<Scene, Fault> {
+pub(super) fn load_into(input: &mut Input<'_>, given: Option<Axes>, into: Axes) -> Result<EncodedScene, Fault> {
     let conversion = Conversion { given, into };
     input.unpacked(
         |input| if input.is_compressed() { load_gzip(input, conversion) } else { load_plain(input, conversion) },
@@ -117,7 +112,7 @@ struct Conversion {
 }
 
 /// Reads versions 1 to 3.
-fn load_gzip(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fault> {
+fn load_gzip(input: &mut Input<'_>, conversion: Conversion) -> Result<EncodedScene, Fault> {
     let mut header = [0; HEADER];
     input.fill(&mut header)?;
     let header = Header::parse(&header)?;
@@ -128,24 +123,21 @@ fn load_gzip(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fau
     if claimed > available {
         return Err(Reason::TooShort { claimed, available }.at(Place::Header("numPoints")));
     }
-    let data = input.bytes(claimed)?;
+    let mut arrays = [const { Vec::new() }; 6];
+    for (array, size) in arrays.iter_mut().zip(header.sizes()) {
+        *array = input.bytes(size)?;
+    }
     let end = HEADER as u64 + claimed;
     let allowed = if header.flags & FLAG_EXTENSIONS != 0 { MAX_EXTENSIONS } else { 0 };
     let records = input.up_to(allowed + 1)?;
     if records.len() as u64 > allowed {
         return Err(Reason::Trailing.at(Place::Byte(end)));
     }
-    let mut rest = &data[..];
-    let arrays = header.sizes().map(|size| {
-        let (array, after) = rest.split_at(size as usize);
-        rest = after;
-        array
-    });
-    header.unpack(arrays, &Extensions::parse(&records), conversion)
+    header.encoded(arrays, &Extensions::parse(&records), conversion)
 }
 
 /// Reads version 4. Other versions are an error.
-fn load_plain(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fault> {
+fn load_plain(input: &mut Input<'_>, conversion: Conversion) -> Result<EncodedScene, Fault> {
     let size = input.size();
     let start = input.up_to(PLAIN_HEADER as u64)?;
     if !start.starts_with(MAGIC) {
@@ -200,7 +192,7 @@ fn load_plain(input: &mut Input<'_>, conversion: Conversion) -> Result<Scene, Fa
     if input.remaining() > 0 {
         return Err(Reason::Trailing.at(Place::File));
     }
-    parsed.unpack(arrays.each_ref().map(Vec::as_slice), &extensions, conversion)
+    parsed.encoded(arrays, &extensions, conversion)
 }
 
 /// The contents of the zstd stream `compressed`, which must be `len` bytes.
@@ -321,36 +313,61 @@ impl Header {
         self.strides().map(|stride| stride as u64 * u64::from(self.count))
     }
 
-    /// Decodes `arrays`, which have [`Header::sizes`], to a scene in the frame `into`.
-    fn unpack(&self, arrays: [&[u8]; 6], extensions: &Extensions, conversion: Conversion) -> Result<Scene, Fault> {
+    /// The scene of `arrays`, which have [`Header::sizes`]. Positions and rotations become binary32.
+    fn encoded(
+        &self,
+        [positions, opacities, colors, scales, rotations, codes]: [Vec<u8>; 6],
+        extensions: &Extensions,
+        conversion: Conversion,
+    ) -> Result<EncodedScene, Fault> {
         let named = |axes: Option<Axes>, reason| axes.map(|axes| FileAxes { axes, reason, of_cameras: false });
         let from = named(conversion.given, AxesReason::Given)
             .or(named(extensions.axes, AxesReason::File))
             .unwrap_or(FileAxes { axes: DEFAULT_AXES, reason: AxesReason::Format, of_cameras: false });
-        let map = conversion.into.matrix().transpose() * from.axes.matrix();
-        let motion = Motion::new(map, DVec3::ZERO, self.sh_degree);
-        let strides = self.strides();
-        let mut scene = Scene::try_generate(self.sh_degree, self.count as usize, |i, sh| {
-            let [positions, opacities, colours, scales, rotations, rests] =
-                std::array::from_fn(|k| &arrays[k][strides[k] * i..][..strides[k]]);
-            let mut shape = GaussianShape {
-                scale: std::array::from_fn(|axis| scale(scales[axis])),
-                rotation: rotation(rotations),
-                opacity: f32::from(opacities[0]) / 255.0,
-            };
-            sh[0] = std::array::from_fn(|c| (f32::from(colours[c]) / 255.0 - 0.5) / COLOUR_SCALE);
-            for (rgb, bytes) in sh[1..].iter_mut().zip(rests.chunks_exact(3)) {
-                *rgb = std::array::from_fn(|c| (f32::from(bytes[c]) - 128.0) / 128.0);
-            }
-            let mut position = self.position(positions);
-            motion.apply(DVec3::ZERO, &mut position, &mut shape, sh);
-            (position, shape)
-        })?;
-        let metadata = scene.metadata_mut();
-        metadata.antialiasing = Some(self.antialiasing());
-        metadata.axes = Some(from);
-        metadata.notes.clone_from(&extensions.notes.notes);
-        Ok(scene)
+        let [position_stride, .., rotation_stride, code_stride] = self.strides();
+        let positions = floats(positions.chunks_exact(position_stride).map(|bytes| self.position(bytes)))?;
+        let rotations = floats(rotations.chunks_exact(rotation_stride).map(rotation))?;
+        let attribute = |stream: usize, form: Form, decoding: Decoding| Attribute { stream, offset: 0, form, decoding };
+        let codebook = |index: usize| Decoding::Codebook { table: CODEBOOK * index };
+        let scale = |byte: u8| f64::from(byte) / 16.0 - 10.0;
+        let color = |byte: u8| f64::from((f32::from(byte) / 255.0 - 0.5) / COLOUR_SCALE);
+        let coefficient = |byte: u8| f64::from((f32::from(byte) - 128.0) / 128.0);
+        let bytes = || 0..=u8::MAX;
+        Ok(EncodedScene {
+            count: self.count as usize,
+            sh_degree: self.sh_degree,
+            position: attribute(0, Form::Floats, Decoding::None),
+            rotation: attribute(1, Form::Floats, Decoding::None),
+            scale: attribute(2, Form::Bytes, codebook(0)),
+            color: attribute(3, Form::Bytes, codebook(1)),
+            opacity: attribute(4, Form::Bytes, Decoding::None),
+            streams: vec![
+                positions,
+                rotations,
+                Stream { bytes: scales, stride: 3 },
+                Stream { bytes: colors, stride: 3 },
+                Stream { bytes: opacities, stride: 1 },
+            ],
+            has_signed_log_positions: false,
+            has_logit_opacities: false,
+            has_base_colors: false,
+            numbers: bytes().map(scale).chain(bytes().map(color)).chain(bytes().map(coefficient)).collect(),
+            harmonics: (self.sh_degree > 0).then_some(EncodedHarmonics {
+                codes: Stream { bytes: codes, stride: code_stride },
+                coefficient_stride: 3,
+                component_stride: 1,
+                codebook: CODEBOOK * 2,
+                labels: None,
+            }),
+            turn: conversion.into.matrix().transpose() * from.axes.matrix(),
+            metadata: Metadata {
+                antialiasing: Some(self.antialiasing()),
+                axes: Some(from),
+                notes: extensions.notes.notes.clone(),
+                ..Metadata::default()
+            },
+            path: PathBuf::new(),
+        })
     }
 
     fn position(&self, bytes: &[u8]) -> [f32; 3] {
@@ -366,8 +383,14 @@ impl Header {
     }
 }
 
-fn scale(byte: u8) -> f32 {
-    libm::exp(f64::from(byte) / 16.0 - 10.0) as f32
+/// A stream of numbers as binary32.
+fn floats<const N: usize>(values: impl ExactSizeIterator<Item = [f32; N]>) -> Result<Stream, Fault> {
+    let stride = 4 * N;
+    let mut bytes = Vec::new();
+    let size = values.len().saturating_mul(stride);
+    bytes.try_reserve_exact(size).map_err(|_| Reason::Memory(size as u64).at(Place::File))?;
+    bytes.extend(values.flatten().flat_map(f32::to_le_bytes));
+    Ok(Stream { bytes, stride })
 }
 
 /// Decodes a quaternion w, x, y, z.

@@ -46,7 +46,7 @@ pub fn run(arguments: &EvalArguments) -> Result<(), Error> {
         );
         dataset.choices.insert("world", choice);
     }
-    dataset.notes.extend(drawing::notes(&arguments.modes, &scene));
+    dataset.notes.extend(drawing::notes(&arguments.modes, &scene, scene.sh_degree()));
     let drawn = match arguments.modes.renderer.and_then(|renderer| renderer.to_possible_value()) {
         Some(renderer) => format!("--as {}", renderer.get_name()),
         None => "wherever alpha reaches 1/255".to_owned(),
@@ -91,7 +91,7 @@ pub fn run(arguments: &EvalArguments) -> Result<(), Error> {
     }
     if !missing.is_empty() {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(scene, settings, arguments.modes.device.as_deref(), false, None)?;
+        let mut drawing = Drawing::new(scene.into(), settings, arguments.modes.device.as_deref(), false, None)?;
         step.finish_and_clear();
         outcomes.extend(measure(&mut drawing, &dataset, &missing, results.as_ref(), progress)?);
     }

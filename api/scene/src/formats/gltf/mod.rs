@@ -12,7 +12,7 @@ mod triangles;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::input::{Format, Input, Origin};
+use super::input::{Format, Input, Loaded, Origin};
 use super::spz::one_line;
 use crate::axes::{Axes, AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason};
@@ -46,9 +46,9 @@ impl Format for Gltf {
         false
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let json = input.rest()?;
-        load(&json, None, input.origin())
+        Ok(load(&json, None, input.origin())?.into())
     }
 }
 
@@ -69,7 +69,7 @@ impl Format for Glb {
         false
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let bytes = input.rest()?;
         let word = |at: usize| {
             let word = bytes.get(at..at + 4)?;
@@ -107,7 +107,7 @@ impl Format for Glb {
             rest = after;
         }
         let json = chunks[0].ok_or_else(|| Reason::Missing.at(Place::Header("the JSON chunk")))?;
-        load(json, chunks[1], input.origin())
+        Ok(load(json, chunks[1], input.origin())?.into())
     }
 }
 

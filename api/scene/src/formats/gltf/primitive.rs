@@ -126,7 +126,8 @@ fn from_spz(buffers: &mut Buffers<'_>, view: usize, place: &str) -> Result<Scene
     let (mut bytes, _) = buffers.view(view, place)?;
     let len = bytes.len() as u64;
     let mut input = Input::new(&mut bytes, len, origin);
-    spz::load_into(&mut input, None, Axes::LEFT_UP_FRONT).map_err(|fault| {
+    let read = spz::load_into(&mut input, None, Axes::LEFT_UP_FRONT).and_then(|scene| scene.decoded(scene.sh_degree));
+    read.map_err(|fault| {
         let place = format!("{place}, the SPZ file in it, {}", fault.place);
         fault.reason.at(Place::Part(place))
     })

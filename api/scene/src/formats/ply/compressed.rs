@@ -6,16 +6,16 @@
 //! each with the index of the largest, colour and opacity as 8 bits each. The optional element
 //! `sh` holds the other coefficients as bytes over -4 to 4, channel by channel.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::path::PathBuf;
 
+use glam::DMat3;
 use ply_rs_bw::ply::ScalarType;
 
 use super::table::Table;
 use super::{columns, inria};
+use crate::encoded::{Attribute, CODEBOOK, Decoding, EncodedHarmonics, EncodedScene, Form, Stream, harmonics_bytes};
 use crate::error::{Fault, Place, Reason};
-use crate::harmonics::SH_C0;
-use crate::scene::Scene;
-use crate::shape::GaussianShape;
+use crate::metadata::Metadata;
 
 /// Gaussians per chunk.
 const CHUNK: usize = 256;
@@ -47,8 +47,11 @@ const BOUNDS_WITHOUT_COLOUR: usize = 12;
 
 const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
+/// The bytes of a Gaussian's words.
+const WORDS: usize = 4 * PACKED.len();
+
 /// Reads the scene.
-pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
+pub(super) fn load(mut table: Table<'_, '_>) -> Result<EncodedScene, Fault> {
     let packed = PACKED
         .iter()
         .map(|name| table.column_of("vertex", name, &ScalarType::UInt, "uint"))
@@ -59,7 +62,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     }
     let chunks = read_chunks(&mut table, count)?;
     let has_sh = table.element("sh").is_some();
-    let (degree, rest) = if has_sh { inria::rest_columns(&table, "sh")? } else { (0, Vec::new()) };
+    let (sh_degree, rest) = if has_sh { inria::rest_columns(&table, "sh")? } else { (0, Vec::new()) };
     if has_sh {
         for i in 0..rest.len() {
             table.column_of("sh", &format!("f_rest_{i}"), &ScalarType::UChar, "uchar")?;
@@ -67,32 +70,63 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         same_count("sh", table.count("sh")?, count)?;
     }
 
-    let mut scene = Scene::try_with_capacity(degree, count)?;
+    let mut metadata = Metadata::default();
     if let Some(warning) = columns::warning(&table, "vertex", |name| PACKED.contains(&name)) {
-        scene.metadata_mut().warn(warning);
+        metadata.warn(warning);
     }
     let unbounded = chunks.iter().filter(|bounds| !bounds.iter().all(|bound| bound.is_finite())).count();
     if unbounded > 0 {
         let all = chunks.len();
-        scene.metadata_mut().warn(format!("{unbounded} of {all} chunks of Gaussians have bounds that are not finite"));
+        metadata.warn(format!("{unbounded} of {all} chunks of Gaussians have bounds that are not finite"));
     }
-    let mut sh = vec![[0.0; 3]; scene.sh_stride()];
-    table.read("vertex", &packed, |index, words| {
-        let words = std::array::from_fn(|i| words[i] as u32);
-        let (position, shape, colour) = unpack(&chunks[index / CHUNK], words);
-        sh[0] = colour;
-        scene.push(position, shape, &sh);
+    let mut words = stream(count, WORDS)?;
+    table.read("vertex", &packed, |_, values| {
+        words.bytes.extend(values.iter().flat_map(|value| (*value as u32).to_le_bytes()));
     })?;
-    if has_sh {
-        let mut values = vec![0.0; rest.len()];
-        table.read("sh", &rest, |index, bytes| {
-            for (value, byte) in values.iter_mut().zip(bytes) {
-                *value = sh_value(*byte);
-            }
-            inria::unpack_rest(&values, &mut scene.sh_of_mut(index)[1..]);
-        })?;
+    let mut numbers = chunks.concat();
+    let mut harmonics = None;
+    if sh_degree > 0 {
+        let mut codes = stream(count, harmonics_bytes(sh_degree))?;
+        table.read("sh", &rest, |_, values| codes.bytes.extend(values.iter().map(|value| *value as u8)))?;
+        let component_stride = codes.stride / 3;
+        harmonics = Some(EncodedHarmonics {
+            codes,
+            coefficient_stride: 1,
+            component_stride,
+            codebook: numbers.len(),
+            labels: None,
+        });
+        numbers.extend((0..CODEBOOK).map(sh_value));
     }
-    Ok(scene)
+    let word = |index: usize, decoding: Decoding| Attribute { stream: 0, offset: 4 * index, form: Form::Word, decoding };
+    let chunks = |first: usize| Decoding::Chunks { table: first, stride: BOUNDS.len(), size: CHUNK };
+    Ok(EncodedScene {
+        count,
+        sh_degree,
+        streams: vec![words],
+        position: word(0, chunks(0)),
+        rotation: word(1, Decoding::SmallestThree),
+        scale: word(2, chunks(6)),
+        color: word(3, chunks(12)),
+        // The lowest byte of the colour's word.
+        opacity: Attribute { form: Form::Bytes, ..word(3, Decoding::None) },
+        has_signed_log_positions: false,
+        has_logit_opacities: false,
+        has_base_colors: true,
+        numbers,
+        harmonics,
+        turn: DMat3::IDENTITY,
+        metadata,
+        path: PathBuf::new(),
+    })
+}
+
+/// A stream with room for `count` times `stride` bytes, and without any yet.
+fn stream(count: usize, stride: usize) -> Result<Stream, Fault> {
+    let mut bytes = Vec::new();
+    let size = count.saturating_mul(stride);
+    bytes.try_reserve_exact(size).map_err(|_| Reason::Memory(size as u64).at(Place::File))?;
+    Ok(Stream { bytes, stride })
 }
 
 /// Minima and maxima of one chunk, in the order of [`BOUNDS`].
@@ -125,57 +159,12 @@ fn same_count(element: &str, found: usize, expected: usize) -> Result<(), Fault>
     Err(Reason::Count { found, expected }.at(Place::Element(element.to_owned())))
 }
 
-/// Position, shape and constant coefficient of a Gaussian.
-fn unpack(bounds: &Bounds, words: [u32; 4]) -> ([f32; 3], GaussianShape, [f32; 3]) {
-    let [position, rotation, scale, colour] = words;
-    let between = |first: usize, axis: usize, t: f64| {
-        let (min, max) = (bounds[first + axis], bounds[first + 3 + axis]);
-        min * (1.0 - t) + max * t
-    };
-    let position = unpack_11_10_11(position);
-    let scale = unpack_11_10_11(scale);
-    let channel = |index: usize| bits(colour, 24 - 8 * index as u32, 8);
-    let shape = GaussianShape {
-        scale: std::array::from_fn(|axis| libm::exp(between(6, axis, scale[axis])) as f32),
-        rotation: unpack_rotation(rotation),
-        opacity: channel(3) as f32,
-    };
-    (
-        std::array::from_fn(|axis| between(0, axis, position[axis]) as f32),
-        shape,
-        std::array::from_fn(|c| ((between(12, c, channel(c)) - 0.5) / SH_C0) as f32),
-    )
-}
-
-/// `count` bits of `word` from bit `shift`, as a fraction of their maximum.
-fn bits(word: u32, shift: u32, count: u32) -> f64 {
-    let max = (1 << count) - 1;
-    f64::from((word >> shift) & max) / f64::from(max)
-}
-
-fn unpack_11_10_11(word: u32) -> [f64; 3] {
-    [bits(word, 21, 11), bits(word, 11, 10), bits(word, 0, 11)]
-}
-
-/// Decodes a quaternion w, x, y, z. The two highest bits are the index of the largest component; the other three
-/// components follow in order, over -1/sqrt(2) to 1/sqrt(2).
-fn unpack_rotation(word: u32) -> [f32; 4] {
-    let small = [20, 10, 0].map(|shift| (bits(word, shift, 10) - 0.5) / FRAC_1_SQRT_2);
-    let largest = (1.0 - small.iter().map(|c| c * c).sum::<f64>()).max(0.0).sqrt();
-    let which = (word >> 30) as usize;
-    let mut small = small.into_iter();
-    std::array::from_fn(|i| {
-        let component = if i == which { Some(largest) } else { small.next() };
-        component.unwrap_or_default() as f32
-    })
-}
-
 /// The value of a byte: the middle of its interval, except that the extremes are exact.
-fn sh_value(byte: f64) -> f64 {
+fn sh_value(byte: usize) -> f64 {
     let fraction = match byte {
-        0.0 => 0.0,
-        255.0 => 1.0,
-        _ => (byte + 0.5) / 256.0,
+        0 => 0.0,
+        255 => 1.0,
+        _ => (byte as f64 + 0.5) / 256.0,
     };
     (fraction - 0.5) * 8.0
 }

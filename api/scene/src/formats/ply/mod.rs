@@ -8,9 +8,8 @@ mod mesh;
 mod points;
 mod table;
 
-use super::input::{Format, Input};
+use super::input::{Format, Input, Loaded};
 use crate::error::Fault;
-use crate::scene::Scene;
 
 /// The format. The header's elements tell the layout.
 pub(in crate::formats) struct Ply;
@@ -28,25 +27,25 @@ impl Format for Ply {
         Some(b"ply")
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let options = input.origin().options;
         let table = table::Table::open(input)?;
         let mut said = comments::metadata(table.comments());
-        let mut scene = if table.element("chunk").is_some() {
-            compressed::load(table)?
+        let mut loaded = if table.element("chunk").is_some() {
+            Loaded::from(compressed::load(table)?)
         } else if mesh::is_one(&table) {
-            mesh::load(table)?
+            mesh::load(table)?.into()
         } else if points::is_one(&table) {
-            points::load(table, options.points)?
+            points::load(table, options.points)?.into()
         } else {
-            inria::load(table)?
+            inria::load(table)?.into()
         };
-        let metadata = scene.metadata_mut();
+        let metadata = loaded.metadata_mut();
         // The absence of a third scale is more reliable than a comment.
         metadata.geometry = metadata.geometry.or(said.geometry);
         metadata.antialiasing = said.antialiasing;
         metadata.axes = said.axes;
         metadata.take_messages(&mut said);
-        Ok(scene)
+        Ok(loaded)
     }
 }

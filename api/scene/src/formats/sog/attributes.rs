@@ -6,20 +6,17 @@
 //! of them, and opacities are logits. Other coefficients come from a palette: one image has its entries, 64 in a row,
 //! and another one the entry's index for each Gaussian.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::path::PathBuf;
 
+use glam::DMat3;
 use serde::Deserialize;
 
 use super::document::{META, parse};
 use super::files::{Files, Image};
+use crate::encoded::{Attribute, CODEBOOK, Decoding, EncodedHarmonics, EncodedScene, Form, Stream};
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::sh_coefficients;
 use crate::metadata::{Antialiasing, Geometry, Metadata};
-use crate::scene::Scene;
-use crate::shape::{GaussianShape, sigmoid};
-
-/// The number of entries of a codebook.
-const CODEBOOK: usize = 256;
 
 /// The entries of the palette in one row of its image.
 const PALETTE_ROW: usize = 64;
@@ -32,17 +29,17 @@ struct Meta {
     version: Option<f64>,
     count: Option<f64>,
     model: Option<String>,
-    means: Attribute,
-    scales: Attribute,
-    quats: Attribute,
-    sh0: Attribute,
+    means: Property,
+    scales: Property,
+    quats: Property,
+    sh0: Property,
     #[serde(rename = "shN")]
-    sh_rest: Option<Attribute>,
+    sh_rest: Option<Property>,
 }
 
-/// An attribute: its images, and the bounds or codebook that decode their bytes.
+/// A property of Gaussians: its images, and the bounds or codebook that decode their bytes.
 #[derive(Deserialize)]
-struct Attribute {
+struct Property {
     files: Vec<String>,
     #[serde(default)]
     mins: Numbers,
@@ -75,25 +72,23 @@ fn fault(name: &str, field: &str, reason: Reason) -> Fault {
     reason.at(Place::Part(format!("meta.json, {name}.{field}")))
 }
 
-impl Attribute {
-    /// Image `index` of the attribute `name`, which must have `expected` entries.
+impl Property {
+    /// Image `index` of the property `name`, which must have `expected` entries.
     fn image(&self, name: &str, index: usize, files: &Files<'_>, expected: u64) -> Result<Image, Fault> {
         let file = self.files.get(index).ok_or_else(|| fault(name, "files", Reason::Missing))?;
         files.image(file, expected)
     }
 
-    /// The minima and maxima of `N` components.
-    fn bounds<const N: usize>(&self, name: &str) -> Result<[[f64; 2]; N], Fault> {
+    /// The minima of the components, and then their maxima.
+    fn bounds(&self, name: &str, components: usize) -> Result<Vec<f64>, Fault> {
         let numbers = |numbers: &Numbers, field: &str| match numbers {
-            Numbers::Many(values) if values.len() >= N => Ok(std::array::from_fn(|i| values[i])),
-            Numbers::One(value) if N == 1 => Ok([*value; N]),
+            Numbers::Many(values) if values.len() >= components => Ok(values[..components].to_vec()),
+            Numbers::One(value) if components == 1 => Ok(vec![*value]),
             Numbers::None => Err(fault(name, field, Reason::Missing)),
-            Numbers::One(_) => Err(count(name, field, 1, N)),
-            Numbers::Many(values) => Err(count(name, field, values.len(), N)),
+            Numbers::One(_) => Err(count(name, field, 1, components)),
+            Numbers::Many(values) => Err(count(name, field, values.len(), components)),
         };
-        let mins: [f64; N] = numbers(&self.mins, "mins")?;
-        let maxs: [f64; N] = numbers(&self.maxs, "maxs")?;
-        Ok(std::array::from_fn(|i| [mins[i], maxs[i]]))
+        Ok([numbers(&self.mins, "mins")?, numbers(&self.maxs, "maxs")?].concat())
     }
 
     /// The values of the 256 bytes.
@@ -117,14 +112,6 @@ fn count(name: &str, field: &str, found: usize, expected: usize) -> Fault {
     fault(name, field, Reason::Count { found, expected })
 }
 
-/// The values of a byte in each component of an attribute.
-type Values<const N: usize> = [[f64; 256]; N];
-
-/// Values spaced evenly between bounds.
-fn linear<const N: usize>(bounds: [[f64; 2]; N]) -> Values<N> {
-    bounds.map(|[min, max]| std::array::from_fn(|byte| min + (max - min) * (byte as f64 / 255.0)))
-}
-
 /// The palette of other coefficients.
 struct Palette {
     degree: u32,
@@ -135,7 +122,7 @@ struct Palette {
 }
 
 /// Reads the scene of the document `meta`.
-pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<Scene, Fault> {
+pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<EncodedScene, Fault> {
     let meta: Meta = parse(meta, Place::Entry(META.to_owned()))?;
     let part = |field: &str| Place::Part(format!("meta.json, {field}"));
     let version = meta.version.unwrap_or(1.0);
@@ -156,62 +143,91 @@ pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<Scene, Fault> {
     if count == 0 {
         return Err(Reason::Empty.at(part("count")));
     }
-    let bounds = meta.means.bounds::<3>("means")?;
-    let (scale_values, colour_values, opacities) = if legacy {
-        let [red, green, blue, opacity] = linear(meta.sh0.bounds::<4>("sh0")?);
-        let scales = linear(meta.scales.bounds::<3>("scales")?);
-        (scales, [red, green, blue], opacity.map(sigmoid))
-    } else {
-        let opacities = std::array::from_fn(|byte| byte as f32 / 255.0);
-        let scales = [meta.scales.codebook("scales")?; 3];
-        (scales, [meta.sh0.codebook("sh0")?; 3], opacities)
+    let size = count as usize;
+    let mut numbers = Vec::new();
+    // All Gaussians are one chunk.
+    let mut chunk = |mut bounds: Vec<f64>| {
+        let table = numbers.len();
+        let stride = bounds.len();
+        numbers.append(&mut bounds);
+        Decoding::Chunks { table, stride, size }
     };
-    let scale_values = scale_values.map(|values| values.map(|log| libm::exp(log) as f32));
+    let mut bounds = meta.means.bounds("means", 3)?;
+    for axis in 0..3 {
+        if bounds[3 + axis] == bounds[axis] {
+            bounds[3 + axis] = bounds[axis] + 1.0;
+        }
+    }
+    let means = chunk(bounds);
+    let (scale_decoding, color_decoding, opacity_decoding) = if legacy {
+        let bounds = meta.sh0.bounds("sh0", 4)?;
+        let (colors, opacities) = ([&bounds[..3], &bounds[4..7]].concat(), vec![bounds[3], bounds[7]]);
+        (chunk(meta.scales.bounds("scales", 3)?), chunk(colors), chunk(opacities))
+    } else {
+        let mut codebook = |values: [f64; CODEBOOK]| {
+            let table = numbers.len();
+            numbers.extend(values);
+            Decoding::Codebook { table }
+        };
+        (codebook(meta.scales.codebook("scales")?), codebook(meta.sh0.codebook("sh0")?), Decoding::None)
+    };
     let low = meta.means.image("means", 0, files, count)?;
     let high = meta.means.image("means", 1, files, count)?;
+    let positions = joined(&low, &high, size)?;
+    drop((low, high));
     let scales = meta.scales.image("scales", 0, files, count)?;
-    let quaternions = meta.quats.image("quats", 0, files, count)?;
-    let colours = meta.sh0.image("sh0", 0, files, count)?;
+    let quaternions = meta.quats.image("quats", 0, files, count)?.with_alpha()?;
+    let colors = meta.sh0.image("sh0", 0, files, count)?.with_alpha()?;
+    let mut metadata = Metadata::default();
+    say_model(meta.model.as_deref(), &mut metadata);
+    let untagged = (0..size).filter(|index| quaternions.texel(*index)[3] < 252).count();
+    if untagged > 0 {
+        metadata.note(format!("{untagged} rotations name no largest component, and are none"));
+    }
     let palette = match &meta.sh_rest {
         Some(rest) => Palette::read(rest, legacy, files, count)?,
         None => None,
     };
-    let degree = palette.as_ref().map_or(0, |palette| palette.degree);
-
-    let mut scene = Scene::try_generate(degree, count as usize, |index, sh| {
-        let (low, high) = (low.texel(index), high.texel(index));
-        let position = std::array::from_fn(|axis| {
-            let [min, max] = bounds[axis];
-            let span = if max == min { 1.0 } else { max - min };
-            let code = u16::from_le_bytes([low[axis], high[axis]]);
-            unsigned_log(min + span * (f64::from(code) / 65535.0)) as f32
-        });
-        let scale = scales.texel(index);
-        let colour = colours.texel(index);
-        sh[0] = std::array::from_fn(|c| colour_values[c][usize::from(colour[c])] as f32);
-        if let Some(palette) = &palette {
-            palette.fill(index, &mut sh[1..]);
-        }
-        let shape = GaussianShape {
-            scale: std::array::from_fn(|axis| scale_values[axis][usize::from(scale[axis])]),
-            rotation: quaternion(quaternions.texel(index)).unwrap_or([1.0, 0.0, 0.0, 0.0]),
-            opacity: opacities[usize::from(colour[3])],
-        };
-        (position, shape)
-    })?;
-    let metadata = scene.metadata_mut();
-    say_model(meta.model.as_deref(), metadata);
-    let untagged = (0..count as usize).filter(|index| quaternion(quaternions.texel(*index)).is_none()).count();
-    if untagged > 0 {
-        metadata.note(format!("{untagged} rotations name no largest component, and are none"));
-    }
     let unlabelled =
-        palette.map_or(0, |palette| (0..count as usize).filter(|index| palette.label(*index) >= palette.len).count());
+        (palette.as_ref()).map_or(0, |palette| (0..size).filter(|index| palette.label(*index) >= palette.len).count());
     if unlabelled > 0 {
         metadata
             .note(format!("{unlabelled} Gaussians name no entry of the palette, and have one colour from all sides"));
     }
-    Ok(scene)
+    let codebook = numbers.len();
+    numbers.extend(palette.iter().flat_map(|palette| palette.values));
+    let bytes = |stream: usize, decoding: Decoding| Attribute { stream, offset: 0, form: Form::Bytes, decoding };
+    Ok(EncodedScene {
+        count: size,
+        sh_degree: palette.as_ref().map_or(0, |palette| palette.degree),
+        streams: vec![positions, scales.into_stream(size), quaternions.into_stream(size), colors.into_stream(size)],
+        position: Attribute { form: Form::Shorts, ..bytes(0, means) },
+        scale: bytes(1, scale_decoding),
+        rotation: bytes(2, Decoding::SmallestThree),
+        color: bytes(3, color_decoding),
+        opacity: Attribute { offset: 3, ..bytes(3, opacity_decoding) },
+        has_signed_log_positions: true,
+        has_logit_opacities: legacy,
+        has_base_colors: false,
+        numbers,
+        harmonics: palette.map(|palette| palette.into_harmonics(codebook, size)),
+        turn: DMat3::IDENTITY,
+        metadata,
+        path: PathBuf::new(),
+    })
+}
+
+/// Positions whose components have their bytes in two images.
+fn joined(low: &Image, high: &Image, count: usize) -> Result<Stream, Fault> {
+    let stride = 2 * 3;
+    let mut bytes = Vec::new();
+    let size = count.saturating_mul(stride);
+    bytes.try_reserve_exact(size).map_err(|_| Reason::Memory(size as u64).at(Place::File))?;
+    for index in 0..count {
+        let (low, high) = (low.texel(index), high.texel(index));
+        bytes.extend([low[0], high[0], low[1], high[1], low[2], high[2]]);
+    }
+    Ok(Stream { bytes, stride })
 }
 
 fn say_model(model: Option<&str>, metadata: &mut Metadata) {
@@ -226,32 +242,14 @@ fn say_model(model: Option<&str>, metadata: &mut Metadata) {
     metadata.geometry = Some(geometry);
 }
 
-/// The number whose signed logarithm, sign(x) ln(1 + |x|), is `value`.
-fn unsigned_log(value: f64) -> f64 {
-    (libm::exp(value.abs()) - 1.0).copysign(value)
-}
-
-/// Decodes a quaternion w, x, y, z. Alpha minus 252 is the index of the largest component; None if alpha is smaller.
-fn quaternion([a, b, c, tag]: [u8; 4]) -> Option<[f32; 4]> {
-    let largest = usize::from(tag.checked_sub(252)?);
-    let small = [a, b, c].map(|byte| (f64::from(byte) / 255.0 * 2.0 - 1.0) * FRAC_1_SQRT_2);
-    let squares: f64 = small.iter().map(|c| c * c).sum();
-    let mut quaternion = [0.0; 4];
-    quaternion[largest] = (1.0 - squares).max(0.0).sqrt() as f32;
-    let others = (0..4).filter(|i| *i != largest);
-    for (i, component) in others.zip(small) {
-        quaternion[i] = component as f32;
-    }
-    Some(quaternion)
-}
-
 impl Palette {
-    /// Reads the palette of the attribute `rest`; None if it has no bands.
-    fn read(rest: &Attribute, legacy: bool, files: &Files<'_>, count: u64) -> Result<Option<Self>, Fault> {
+    /// Reads the palette of the property `rest`; None if it has no bands.
+    fn read(rest: &Property, legacy: bool, files: &Files<'_>, count: u64) -> Result<Option<Self>, Fault> {
         let name = "shN";
         let values = if legacy {
-            let [values] = linear(rest.bounds::<1>(name)?);
-            values
+            let bounds = rest.bounds(name, 1)?;
+            // Values spaced evenly between bounds.
+            std::array::from_fn(|byte| bounds[0] + (bounds[1] - bounds[0]) * (byte as f64 / 255.0))
         } else {
             rest.codebook(name)?
         };
@@ -298,17 +296,17 @@ impl Palette {
         u16::from_le_bytes([low, high]).into()
     }
 
-    /// Writes the coefficients of Gaussian `index` from degree 1 on.
-    fn fill(&self, index: usize, sh: &mut [[f32; 3]]) {
-        let label = self.label(index);
-        if label >= self.len {
-            return;
-        }
-        let row = label / PALETTE_ROW * self.entries.width as usize;
-        let first = row + label % PALETTE_ROW * sh.len();
-        for (k, rgb) in sh.iter_mut().enumerate() {
-            let texel = self.entries.texel(first + k);
-            *rgb = std::array::from_fn(|c| self.values[usize::from(texel[c])] as f32);
+    /// The palette as coefficients of `count` Gaussians. The codebook is at place `codebook` of the numbers. Entries follow one
+    /// another, since a row of the image has a whole number of them.
+    fn into_harmonics(self, codebook: usize, count: usize) -> EncodedHarmonics {
+        let coefficients = sh_coefficients(self.degree) - 1;
+        let pixels = self.entries.into_stream(self.len * coefficients);
+        EncodedHarmonics {
+            coefficient_stride: pixels.stride,
+            component_stride: 1,
+            codes: Stream { stride: pixels.stride * coefficients, ..pixels },
+            codebook,
+            labels: Some(self.labels.into_stream(count)),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use image_webp::WebPDecoder;
 
+use crate::encoded::Stream;
 use crate::error::{Fault, Place, Reason};
 use crate::formats::archive::Archive;
 use crate::formats::input::Origin;
@@ -29,6 +30,25 @@ impl Image {
     pub(super) fn texel(&self, index: usize) -> [u8; 4] {
         let texel = &self.texels[self.channels * index..][..self.channels];
         [texel[0], texel[1], texel[2], texel.get(3).copied().unwrap_or(255)]
+    }
+
+    /// The image with an alpha of 255 if it has none.
+    pub(super) fn with_alpha(mut self) -> Result<Self, Fault> {
+        if self.channels == 3 {
+            let pixels = self.texels.len() / 3;
+            let mut texels = Vec::new();
+            texels.try_reserve_exact(4 * pixels).map_err(|_| Reason::Memory(4 * pixels as u64).at(Place::File))?;
+            texels.extend((0..pixels).flat_map(|index| self.texel(index)));
+            (self.channels, self.texels) = (4, texels);
+        }
+        Ok(self)
+    }
+
+    /// The first `count` pixels.
+    pub(super) fn into_stream(mut self, count: usize) -> Stream {
+        self.texels.truncate(self.channels * count);
+        self.texels.shrink_to_fit();
+        Stream { bytes: self.texels, stride: self.channels }
     }
 }
 

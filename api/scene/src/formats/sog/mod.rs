@@ -11,9 +11,8 @@ mod streamed;
 
 use serde::Deserialize;
 
-use super::input::{Format, Input};
+use super::input::{Format, Input, Loaded};
 use crate::error::{Fault, Place};
-use crate::scene::Scene;
 use document::parse;
 pub(super) use document::{META, STREAMED_META};
 use files::Files;
@@ -37,11 +36,11 @@ impl Format for Sog {
         Some(b"PK\x03\x04")
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let archive = input.rest()?;
         let files = Files::archive(&archive)?;
         let meta = files.read(META)?;
-        attributes::load(&meta, &files)
+        Ok(attributes::load(&meta, &files)?.into())
     }
 }
 
@@ -57,7 +56,7 @@ impl Format for SogFolder {
         &["json"]
     }
 
-    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+    fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
         let meta = input.up_to(MAX_META)?;
         /// The field that distinguishes the two documents.
         #[derive(Deserialize)]
@@ -66,9 +65,9 @@ impl Format for SogFolder {
         }
         let kind: Kind = parse(&meta, Place::File)?;
         if kind.tree.is_some() {
-            streamed::load(&meta, input.origin())
+            Ok(streamed::load(&meta, input.origin())?.into())
         } else {
-            attributes::load(&meta, &Files::folder(input.origin(), ""))
+            Ok(attributes::load(&meta, &Files::folder(input.origin(), ""))?.into())
         }
     }
 }

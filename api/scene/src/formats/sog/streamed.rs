@@ -110,7 +110,7 @@ fn unit(name: &str, origin: Origin<'_>) -> Result<Scene, Fault> {
         attributes::load(&bytes, &Files::folder(origin, folder))
     };
     // The place of the fault is in the named file.
-    read().map_err(|fault| match fault.place {
+    read().and_then(|scene| scene.decoded(scene.sh_degree)).map_err(|fault| match fault.place {
         Place::Part(place) => fault.reason.at(Place::Part(format!("{name:?}, {place}"))),
         Place::Entry(entry) if !entry.contains('/') => fault.reason.at(Place::Entry(join(name, &entry))),
         _ => fault.reason.at(Place::Entry(name.to_owned())),

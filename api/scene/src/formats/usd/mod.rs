@@ -12,7 +12,7 @@ mod text;
 mod xform;
 
 use super::archive::Archive;
-use super::input::{Format, Input, Origin};
+use super::input::{Format, Input, Loaded, Origin};
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 use composition::NamedLayer;
@@ -50,9 +50,9 @@ macro_rules! usd_format {
                 false
             }
 
-            fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+            fn load(&self, input: &mut Input<'_>) -> Result<Loaded, Fault> {
                 let bytes = input.rest()?;
-                load(&bytes, input.origin())
+                Ok(load(&bytes, input.origin())?.into())
             }
         }
     };
