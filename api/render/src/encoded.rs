@@ -2,9 +2,10 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianDecodingGAURAST, GaussianDecodingTableGAURAST, GaussianDecodingTablesGAURAST, GaussianHarmonicsCodesGAURAST,
-    GaussianHarmonicsDecodingGAURAST, GaussianHarmonicsLabelsGAURAST, GaussianRotationDecodingGAURAST,
-    PipelineGaussianDecodingStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    GaussianDecodingGAURAST, GaussianDecodingTableGAURAST, GaussianDecodingTablesGAURAST,
+    GaussianHarmonicsCodesGAURAST, GaussianHarmonicsDecodingGAURAST, GaussianHarmonicsLabelsGAURAST,
+    GaussianRotationDecodingGAURAST, PipelineGaussianDecodingStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST,
 };
 use gaurast_scene::EncodedScene;
 use gaurast_scene::encoded::{Attribute, Decoding, Form};
@@ -156,7 +157,7 @@ impl Tables {
         if let (Some(harmonics), Some(codes)) = (&scene.harmonics, &codes) {
             let of_entries = GaussianHarmonicsCodesGAURAST::default()
                 .device_address(codes.address())
-                .size(harmonics.codes.bytes.len() as u64)
+                .size(codes.size())
                 .stride(harmonics.codes.stride as u32)
                 .coefficient_stride(harmonics.coefficient_stride as u32)
                 .component_stride(harmonics.component_stride as u32);
@@ -164,7 +165,7 @@ impl Tables {
             if let (Some(stream), Some(labels)) = (&harmonics.labels, &labels) {
                 let of_gaussians = GaussianHarmonicsLabelsGAURAST::default()
                     .device_address(labels.address())
-                    .size(stream.bytes.len() as u64)
+                    .size(labels.size())
                     .stride(stream.stride as u32);
                 places = places.labels(of_gaussians);
             }

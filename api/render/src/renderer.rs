@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
+use bytemuck::Pod;
 use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
-use gaurast_scene::{Camera, EncodedScene, GaussianShape, MAX_SH_DEGREE, Scene};
+use gaurast_scene::{Camera, EncodedScene, GaussianShape, MAX_SH_DEGREE, Scene, SceneArrays};
 use glam::{DMat3, DVec3};
 
 use crate::arrays::Arrays;
@@ -30,7 +31,8 @@ use crate::target::{COLOR_FORMAT, Target, check_size, record_copy};
 const STAGING: u64 = 64 << 20;
 
 /// The reason for which a compressed scene is not listed.
-const ENCODED_BY_Z: &str = "Gaussians of a compressed scene are sorted by the device alone: to sort them by z, they are decoded first";
+const ENCODED_BY_Z: &str =
+    "Gaussians of a compressed scene are sorted by the device alone: to sort them by z, they are decoded first";
 
 /// A device that draws Gaussians, with the objects that it reuses for each frame.
 pub struct Renderer {
@@ -109,8 +111,41 @@ impl Renderer {
     /// # Errors
     /// If the scene is too large for the device, or Vulkan fails.
     pub fn upload(&mut self, scene: &Scene, sh_degree: Option<u32>) -> Result<DeviceScene, RenderError> {
-        let settings = Settings { sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE), ..Settings::default() };
         let count = self.checked_count(scene.len())?;
+        let buffers = [
+            self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
+            self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
+            self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
+        ];
+        self.with_buffers(scene, sh_degree, count, buffers)
+    }
+
+    /// As [`Renderer::upload`], and frees the scene's arrays as they are copied, so that there is hardly any memory that has them
+    /// twice.
+    ///
+    /// # Errors
+    /// As [`Renderer::upload`].
+    pub fn upload_and_free(&mut self, mut scene: Scene, sh_degree: Option<u32>) -> Result<DeviceScene, RenderError> {
+        let count = self.checked_count(scene.len())?;
+        let SceneArrays { positions, shapes, sh, .. } = scene.take_arrays();
+        let usage = vk::BufferUsageFlags::VERTEX_BUFFER;
+        let buffers = [
+            self.upload_and_free_array(positions, usage)?,
+            self.upload_and_free_array(shapes, usage)?,
+            self.upload_and_free_array(sh, usage)?,
+        ];
+        self.with_buffers(&scene, sh_degree, count, buffers)
+    }
+
+    /// The scene on the device, whose `count` Gaussians are in the buffers.
+    fn with_buffers(
+        &mut self,
+        scene: &Scene,
+        sh_degree: Option<u32>,
+        count: u32,
+        buffers: [Buffer; BINDINGS],
+    ) -> Result<DeviceScene, RenderError> {
+        let settings = Settings { sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE), ..Settings::default() };
         let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), scene.sh_stride() * size_of::<[f32; 3]>()]
             .map(|stride| stride as u32);
         let lit = mesh::lit(scene);
@@ -126,15 +161,6 @@ impl Renderer {
             })
         };
         let pipeline = self.pipeline(&VertexLayout::Decoded(strides), scene.sh_degree(), settings, mesh.is_some())?;
-        let vertices = DecodedVertices {
-            strides,
-            resident: None,
-            buffers: [
-                self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
-                self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
-                self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
-            ],
-        };
         Ok(DeviceScene {
             mesh,
             origin: DVec3::from_array(scene.origin()),
@@ -143,7 +169,7 @@ impl Renderer {
             stored_degree: scene.sh_degree(),
             settings,
             pipeline,
-            vertices: Vertices::Decoded(vertices),
+            vertices: Vertices::Decoded(DecodedVertices { strides, resident: None, buffers }),
         })
     }
 
@@ -171,13 +197,16 @@ impl Renderer {
         let pipeline = self.pipeline(&VertexLayout::Encoded(&encoding), scene.sh_degree, settings, false)?;
         let mut buffers = Vec::new();
         for stream in std::mem::take(&mut scene.streams) {
-            buffers.push(self.upload_bytes(&stream.bytes)?);
+            buffers.push(self.upload_and_free_array(stream.bytes, vk::BufferUsageFlags::VERTEX_BUFFER)?);
         }
-        let numbers = self.upload_table(bytemuck::cast_slice(&scene.numbers))?;
+        let usage = vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        let numbers = self.upload_for(bytemuck::cast_slice(&scene.numbers), usage)?;
         let (mut codes, mut labels) = (None, None);
-        if let Some(harmonics) = &scene.harmonics {
-            codes = Some(self.upload_table(&harmonics.codes.bytes)?);
-            labels = harmonics.labels.as_ref().map(|labels| self.upload_table(&labels.bytes)).transpose()?;
+        if let Some(harmonics) = &mut scene.harmonics {
+            codes = Some(self.upload_and_free_array(std::mem::take(&mut harmonics.codes.bytes), usage)?);
+            if let Some(stream) = &mut harmonics.labels {
+                labels = Some(self.upload_and_free_array(std::mem::take(&mut stream.bytes), usage)?);
+            }
         }
         let tables = Tables::new(&scene, numbers, codes, labels);
         Ok(DeviceScene {
@@ -242,28 +271,60 @@ impl Renderer {
         self.upload_for(bytes, vk::BufferUsageFlags::VERTEX_BUFFER)
     }
 
-    /// A device-local buffer of `bytes` with an address.
-    fn upload_table(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
-        self.upload_for(bytes, vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS)
-    }
-
     /// A device-local buffer of `bytes` for a usage, copied through a staging buffer.
     fn upload_for(&mut self, bytes: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer, RenderError> {
+        let buffer = self.device_buffer(bytes.len(), usage)?;
+        let staging = self.staging_for(&buffer)?;
+        let most = staging.size() as usize;
+        for (number, piece) in bytes.chunks(most).enumerate() {
+            self.copy_piece(piece, &staging, &buffer, (number * most) as u64)?;
+        }
+        Ok(buffer)
+    }
+
+    /// The same of the bytes of `values`, which are freed on the way, from the last one on.
+    fn upload_and_free_array<T: Pod>(
+        &mut self,
+        mut values: Vec<T>,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<Buffer, RenderError> {
+        let buffer = self.device_buffer(size_of_val(&values[..]), usage)?;
+        let staging = self.staging_for(&buffer)?;
+        let most = (staging.size() as usize / size_of::<T>()).max(1);
+        while !values.is_empty() {
+            let first = (values.len() - 1) / most * most;
+            let place = first * size_of::<T>();
+            self.copy_piece(bytemuck::cast_slice(&values[first..]), &staging, &buffer, place as u64)?;
+            values.truncate(first);
+            values.shrink_to_fit();
+        }
+        Ok(buffer)
+    }
+
+    /// A buffer of `size` bytes in the device's own memory, to which the host's are copied.
+    fn device_buffer(&self, size: usize, usage: vk::BufferUsageFlags) -> Result<Buffer, RenderError> {
         use vk::BufferUsageFlags as Usage;
         let usage = usage | Usage::TRANSFER_DST | Usage::TRANSFER_SRC;
         // Vulkan has no empty buffers; an empty scene is drawn without reading this one.
-        let size = (bytes.len() as u64).max(4);
-        let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
-        let staging_size = size.min(STAGING);
-        let staging = Buffer::new(&self.device, staging_size, Usage::TRANSFER_SRC, Memory::Host)?;
-        let mut offset = 0;
-        for chunk in bytes.chunks(staging_size as usize) {
-            staging.write(chunk)?;
-            let region = vk::BufferCopy::default().dst_offset(offset).size(chunk.len() as u64);
-            self.copy(&[(&staging, &buffer, region)])?;
-            offset += chunk.len() as u64;
-        }
-        Ok(buffer)
+        Buffer::new(&self.device, (size as u64).max(4), usage, Memory::Device)
+    }
+
+    /// A buffer through which pieces of what `buffer` holds are copied.
+    fn staging_for(&self, buffer: &Buffer) -> Result<Buffer, RenderError> {
+        Buffer::new(&self.device, buffer.size().min(STAGING), vk::BufferUsageFlags::TRANSFER_SRC, Memory::Host)
+    }
+
+    /// Copies `piece` through the staging buffer to a place of a buffer.
+    fn copy_piece(
+        &mut self,
+        piece: &[u8],
+        staging: &Buffer,
+        buffer: &Buffer,
+        place: vk::DeviceSize,
+    ) -> Result<(), RenderError> {
+        staging.write(piece)?;
+        let region = vk::BufferCopy::default().dst_offset(place).size(piece.len() as u64);
+        self.copy(&[(staging, buffer, region)])
     }
 
     /// Copies regions of buffers to others, from which the next submission's draws read vertices and tables, or the host.
@@ -274,9 +335,8 @@ impl Renderer {
                 // submission below has ended.
                 unsafe { device.cmd_copy_buffer(commands, from.handle(), to.handle(), &[*region]) };
             }
-            let barrier = vk::MemoryBarrier::default()
-                .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(
+            let barrier =
+                vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::TRANSFER_WRITE).dst_access_mask(
                     vk::AccessFlags::VERTEX_ATTRIBUTE_READ | vk::AccessFlags::SHADER_READ | vk::AccessFlags::HOST_READ,
                 );
             use vk::PipelineStageFlags as Stage;

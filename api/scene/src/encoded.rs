@@ -187,7 +187,9 @@ impl EncodedScene {
     fn components(&self, attribute: &Attribute, fields: [Field; 3], finish: fn(f64) -> f32) -> Components<'_> {
         let values = match attribute.decoding {
             Decoding::None | Decoding::SmallestThree => Values::Fractions,
-            Decoding::Chunks { table, stride, size } => Values::Bounds { numbers: &self.numbers[table..], stride, size },
+            Decoding::Chunks { table, stride, size } => {
+                Values::Bounds { numbers: &self.numbers[table..], stride, size }
+            }
             Decoding::Codebook { table } => Values::Codebook(Box::new(self.codebook(table, finish))),
         };
         let Stream { bytes, stride } = &self.streams[attribute.stream];
@@ -206,7 +208,9 @@ impl EncodedScene {
         match self.rotation.form {
             Form::Floats => std::array::from_fn(|component| float(&bytes[4 * component..])),
             Form::Bytes => match bytes[3].checked_sub(252) {
-                Some(largest) => quaternion([bytes[0], bytes[1], bytes[2]].map(|code| fraction(code.into(), 8)), largest),
+                Some(largest) => {
+                    quaternion([bytes[0], bytes[1], bytes[2]].map(|code| fraction(code.into(), 8)), largest)
+                }
                 None => [1.0, 0.0, 0.0, 0.0],
             },
             Form::Shorts | Form::Word => {

@@ -45,6 +45,6 @@ pub use framing::{DEFAULT_UP, Extent, Framed, Framing, Subject, default_angles, 
 pub use harmonics::{MAX_SH_DEGREE, SH_C0};
 pub use mesh::{Mesh, MeshVertex};
 pub use metadata::{Antialiasing, ColorSpace, Geometry, Metadata, SortOrder};
-pub use scene::Scene;
+pub use scene::{Scene, SceneArrays};
 pub use shape::{GaussianShape, sigmoid};
 pub use transform::Transform;

@@ -32,6 +32,18 @@ pub struct Scene {
     metadata: Metadata,
 }
 
+/// The arrays of a scene: see [`Scene::positions`], [`Scene::shapes`] and [`Scene::sh`].
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct SceneArrays {
+    /// Centres.
+    pub positions: Vec<[f32; 3]>,
+    /// Scale, rotation and opacity of each Gaussian.
+    pub shapes: Vec<GaussianShape>,
+    /// The coefficients of all Gaussians.
+    pub sh: Vec<[f32; 3]>,
+}
+
 impl Scene {
     /// An empty scene of spherical harmonics degree `sh_degree`, with memory reserved for `count` Gaussians.
     ///
@@ -354,6 +366,15 @@ impl Scene {
     /// Scale, rotation and opacity of each Gaussian.
     pub fn shapes(&self) -> &[GaussianShape] {
         &self.shapes
+    }
+
+    /// The positions, the shapes and the coefficients, which are taken out of the scene: it is empty then.
+    pub fn take_arrays(&mut self) -> SceneArrays {
+        SceneArrays {
+            positions: std::mem::take(&mut self.positions),
+            shapes: std::mem::take(&mut self.shapes),
+            sh: std::mem::take(&mut self.sh),
+        }
     }
 
     /// The spherical harmonics degree stored, 0 to [`MAX_SH_DEGREE`].

@@ -146,7 +146,7 @@ impl Drawing {
             Loaded::Encoded(scene) if renderer.draws_encoded() && !settings.by_z => {
                 renderer.upload_encoded(*scene, degree)?
             }
-            scene => renderer.upload(&scene.decode()?, degree)?,
+            scene => renderer.upload_and_free(scene.decode()?, degree)?,
         };
         renderer.set(&mut uploaded, settings)?;
         Ok(Self { renderer, scene: uploaded })

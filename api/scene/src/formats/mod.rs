@@ -21,8 +21,8 @@ use crate::axes::{AxesReason, FileAxes};
 use crate::error::{Fault, Place, Reason, SceneError};
 use crate::scene::Scene;
 use crate::transform::Motion;
-pub use input::{Loaded, Options};
 use input::{Format, Input, Origin};
+pub use input::{Loaded, Options};
 
 /// Reads the scene file at `path`, or the one in the folder `path`.
 ///

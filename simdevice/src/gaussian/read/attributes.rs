@@ -1,6 +1,6 @@
 //! Attributes: vertex fetch for Gaussians, from streams to structures of arrays.
 
-use super::decoding::{Decoder, quaternion, signed_exponential};
+use super::decoding::{Codebooks, Decoder, Encoded, Finish, quaternion};
 use crate::format::Format;
 use crate::gaussian::lanes::F32_LANES;
 use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding};
@@ -206,10 +206,12 @@ fn is_of_floats(format: Format) -> bool {
     matches!(format, Format::R32Sfloat | Format::R32G32Sfloat | Format::R32G32B32Sfloat | Format::R32G32B32A32Sfloat)
 }
 
-/// Reads attributes. It owns the bytes that a read needs in between.
+/// Reads attributes. It owns the bytes that a read needs in between, and the codebooks that it has read. It lives no longer
+/// than the reading of a set.
 #[derive(Default)]
 pub(crate) struct Fetcher {
     bytes: Vec<u8>,
+    pub(super) codebooks: Codebooks,
 }
 
 impl Fetcher {
@@ -268,61 +270,70 @@ impl Fetcher {
         out: &mut [[f32; F32_LANES]; 3],
     ) {
         let decodings = &streams.activations.decodings;
-        let table = streams.tables.as_ref().and_then(|tables| tables.position.as_ref());
-        match Decoder::of_positions(decodings, &streams.position, table) {
+        let positions = Encoded {
+            stream: &streams.position,
+            decoding: decodings.position,
+            table: streams.tables.as_ref().and_then(|tables| tables.position.as_ref()),
+            finish: if decodings.signed_log_position { Finish::SignedExponential } else { Finish::None },
+        };
+        match Decoder::of_lengths(&positions, &mut self.codebooks) {
             None => self.read(&streams.position, group, out.each_mut()),
-            Some(decoder) => {
-                let function = if decodings.signed_log_position { signed_exponential } else { |value| value };
-                self.decode(&decoder, &streams.position, group, out.each_mut(), function);
-            }
+            Some(decoder) => self.decode(&decoder, &streams.position, group, out.each_mut()),
         }
     }
 
     /// The same as [`Self::read_own`] where decodings or activations are applied: `exp` to logarithms of scales, the logistic
     /// function to logits of opacities.
-    #[cold]
+    #[inline(never)]
     fn read_activated(&mut self, streams: &GaussianAttributes, group: &GroupVertices<'_>, out: &mut Attributes) {
         let Activations { log_scale, logit_opacity, decodings } = &streams.activations;
         let tables = streams.tables.as_deref();
         self.read_positions(streams, group, &mut out.position);
-        let of_scale: fn(f64) -> f64 = if *log_scale { libm::exp } else { |scale| scale };
-        match Decoder::of_scales(decodings, &streams.scale, tables.and_then(|tables| tables.scale.as_ref())) {
-            Some(decoder) => self.decode(&decoder, &streams.scale, group, out.scale.each_mut(), of_scale),
+        let scales = Encoded {
+            stream: &streams.scale,
+            decoding: decodings.scale,
+            table: tables.and_then(|tables| tables.scale.as_ref()),
+            finish: if *log_scale { Finish::Exponential } else { Finish::None },
+        };
+        match Decoder::of_lengths(&scales, &mut self.codebooks) {
+            Some(decoder) => self.decode(&decoder, &streams.scale, group, out.scale.each_mut()),
             None => {
                 self.read(&streams.scale, group, out.scale.each_mut());
-                out.scale.iter_mut().for_each(|lanes| apply(of_scale, &mut lanes[..group.len]));
+                out.scale.iter_mut().for_each(|lanes| apply(scales.finish, &mut lanes[..group.len]));
             }
         }
         match decodings.rotation {
             RotationDecoding::None => self.read(&streams.rotation, group, out.rotation.each_mut()),
             decoding => self.decode_rotations(decoding, &streams.rotation, group, &mut out.rotation),
         }
-        let of_opacity: fn(f64) -> f64 =
-            if *logit_opacity { |logit| 1.0 / (1.0 + libm::exp(-logit)) } else { |opacity| opacity };
-        match Decoder::of_opacities(decodings, &streams.opacity, tables.and_then(|tables| tables.opacity.as_ref())) {
-            Some(decoder) => self.decode(&decoder, &streams.opacity, group, [&mut out.opacity], of_opacity),
+        let opacities = Encoded {
+            stream: &streams.opacity,
+            decoding: decodings.opacity,
+            table: tables.and_then(|tables| tables.opacity.as_ref()),
+            finish: if *logit_opacity { Finish::Logistic } else { Finish::None },
+        };
+        match Decoder::of_opacities(&opacities, &mut self.codebooks) {
+            Some(decoder) => self.decode(&decoder, &streams.opacity, group, [&mut out.opacity]),
             None => {
                 self.read(&streams.opacity, group, [&mut out.opacity]);
-                apply(of_opacity, &mut out.opacity[..group.len]);
+                apply(opacities.finish, &mut out.opacity[..group.len]);
             }
         }
     }
 
-    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`: what the decoder makes of the elements, and then
-    /// the function.
+    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`: what the decoder makes of the elements.
     fn decode<const COMPONENTS: usize>(
         &mut self,
         decoder: &Decoder<'_, COMPONENTS>,
         stream: &AttributeStream,
         group: &GroupVertices<'_>,
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
-        function: fn(f64) -> f64,
     ) {
         let mut bounds = None;
         self.each_element(stream, group, |lane, element| {
             let values = decoder.decode(group.vertex(lane), element, &mut bounds);
             for (out, value) in out.iter_mut().zip(values) {
-                out[lane] = function(value) as f32;
+                out[lane] = value;
             }
         });
     }
@@ -403,9 +414,9 @@ impl Fetcher {
     }
 }
 
-/// Applies a function to all values.
-fn apply(function: fn(f64) -> f64, lanes: &mut [f32]) {
+/// Finishes all values.
+fn apply(finish: Finish, lanes: &mut [f32]) {
     for value in lanes {
-        *value = function(f64::from(*value)) as f32;
+        *value = finish.value(f64::from(*value));
     }
 }

@@ -3,7 +3,7 @@
 
 use super::attributes::{Attributes, Fetcher, GroupVertices};
 use super::fingerprint::SourceFingerprint;
-use super::harmonics::{CoefficientReader, Harmonics};
+use super::harmonics::{CoefficientReader, Harmonics, floats};
 use super::morton::morton_order;
 use crate::gaussian::lanes::GROUP;
 use crate::gaussian::spherical_harmonics::COEFFICIENT_FLOATS;
@@ -60,8 +60,7 @@ fn max_occluders(count: usize) -> usize {
 
 /// The bytes of host memory that clusters of `append`'s Gaussians take, with or without spherical harmonics.
 pub(crate) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
-    let reader = CoefficientReader::new(&append.attributes);
-    let floats = if with_harmonics { reader.floats() } else { 0 };
+    let floats = if with_harmonics { floats(&append.attributes.spherical_harmonics) } else { 0 };
     let cluster = size_of::<Cluster>() + 4 * GROUP * (1 + floats);
     let occluder = size_of::<Cluster>() + 4 * GROUP;
     let clusters = |count: u64| count.div_ceil(GROUP as u64);
@@ -217,7 +216,7 @@ impl Cluster {
         }
         let mut harmonics = Vec::new();
         if with_harmonics {
-            let reader = CoefficientReader::new(&append.attributes);
+            let reader = CoefficientReader::new(&append.attributes, &mut fetcher.codebooks);
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
             host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {

@@ -1,8 +1,10 @@
 //! Decoding: the values that integers in memory stand for, in binary64.
 
 use crate::format::Format;
-use crate::packet::{AttributeStream, Decoding, Decodings, RotationDecoding};
+use crate::packet::{AttributeStream, Decoding, RotationDecoding};
+use devmem::BufferRange;
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::Arc;
 
 /// The numbers of a codebook.
 pub(super) const CODEBOOK: usize = 256;
@@ -68,17 +70,89 @@ const fn number_size(is_binary64: bool) -> usize {
     if is_binary64 { 8 } else { 4 }
 }
 
-/// The numbers of a codebook. Those that its buffer does not have are zero.
-pub(super) fn codebook(table: &AttributeStream, is_binary64: bool) -> Box<[f64; CODEBOOK]> {
+/// The last step of decoding: the value of a component, as a function of its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Finish {
+    /// The number.
+    None,
+    /// The number whose signed logarithm it is.
+    SignedExponential,
+    /// The number whose logarithm it is.
+    Exponential,
+    /// The logistic function.
+    Logistic,
+    /// The coefficient of a colour, its component of coefficient 0.
+    Coefficient,
+}
+
+impl Finish {
+    /// The value of a number, rounded to binary32.
+    #[inline]
+    pub(super) fn value(self, number: f64) -> f32 {
+        let value = match self {
+            Self::None => number,
+            Self::SignedExponential => libm::expm1(number.abs()).copysign(number),
+            Self::Exponential => libm::exp(number),
+            Self::Logistic => 1.0 / (1.0 + libm::exp(-number)),
+            Self::Coefficient => (number - 0.5) / Y_0,
+        };
+        value as f32
+    }
+}
+
+/// The values of the numbers in a codebook. Those that its buffer does not have are zero.
+fn codebook(table: &AttributeStream, is_binary64: bool, finish: Finish) -> [f32; CODEBOOK] {
     let size = number_size(is_binary64);
     let count = usize::try_from(table.buffer.size / size as u64).unwrap_or(CODEBOOK).min(CODEBOOK);
     let mut bytes = [0; 8 * CODEBOOK];
     table.read(0, &mut bytes[..size * count]);
-    let mut numbers = Box::new([0.0; CODEBOOK]);
+    let mut numbers = [0.0; CODEBOOK];
     for (value, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(size)).take(count) {
         *value = number(bytes, is_binary64);
     }
-    numbers
+    numbers.map(|number| finish.value(number))
+}
+
+/// The codebooks that a worker has read last. It lives no longer than the reading of a set, in which no table changes.
+#[derive(Default)]
+pub(crate) struct Codebooks {
+    held: Vec<Codebook>,
+}
+
+/// A codebook that was read.
+struct Codebook {
+    table: BufferRange,
+    is_binary64: bool,
+    finish: Finish,
+    values: Arc<[f32; CODEBOOK]>,
+}
+
+impl Codebooks {
+    /// The most codebooks that are held.
+    const MOST: usize = 8;
+
+    /// The values of the numbers in a codebook.
+    pub(super) fn values(
+        &mut self,
+        table: &AttributeStream,
+        is_binary64: bool,
+        finish: Finish,
+    ) -> Arc<[f32; CODEBOOK]> {
+        let is_it = |held: &&Codebook| {
+            Arc::ptr_eq(&held.table.memory, &table.buffer.memory)
+                && (held.table.offset, held.table.size) == (table.buffer.offset, table.buffer.size)
+                && (held.is_binary64, held.finish) == (is_binary64, finish)
+        };
+        if let Some(held) = self.held.iter().find(is_it) {
+            return held.values.clone();
+        }
+        let values = Arc::new(codebook(table, is_binary64, finish));
+        if self.held.len() == Self::MOST {
+            self.held.remove(0);
+        }
+        self.held.push(Codebook { table: table.buffer.clone(), is_binary64, finish, values: values.clone() });
+        values
+    }
 }
 
 /// The numbers that an attribute's integers select or lie between.
@@ -89,7 +163,8 @@ enum Values<'a, const COMPONENTS: usize> {
         /// The vertices of a chunk.
         size: u32,
     },
-    Codebook(Box<[f64; CODEBOOK]>),
+    /// Finished values.
+    Codebook(Arc<[f32; CODEBOOK]>),
 }
 
 /// The number of a chunk, and the minima and maxima of its components.
@@ -99,24 +174,31 @@ pub(super) type ChunkBounds<const COMPONENTS: usize> = (u64, [[f64; COMPONENTS];
 pub(super) struct Decoder<'a, const COMPONENTS: usize> {
     fields: [Field; COMPONENTS],
     values: Values<'a, COMPONENTS>,
+    finish: Finish,
+}
+
+/// An attribute that may be decoded.
+pub(super) struct Encoded<'s, 'a> {
+    pub(super) stream: &'s AttributeStream,
+    pub(super) decoding: Decoding,
+    pub(super) table: Option<&'a AttributeStream>,
+    pub(super) finish: Finish,
 }
 
 impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
-    /// A decoder of elements of `format`; `None` if nothing is decoded.
-    fn new(
-        decoding: Decoding,
-        table: Option<&'a AttributeStream>,
-        format: Format,
-        of_word: [Field; COMPONENTS],
-    ) -> Option<Self> {
-        let values = match (decoding, table) {
+    /// The decoder of an attribute whose words have these fields; `None` if nothing is decoded.
+    fn new(encoded: &Encoded<'_, 'a>, of_word: [Field; COMPONENTS], codebooks: &mut Codebooks) -> Option<Self> {
+        let finish = encoded.finish;
+        let values = match (encoded.decoding, encoded.table) {
             (Decoding::None, _) | (_, None) => return None,
             (Decoding::Chunk { size, is_binary64 }, Some(table)) => {
                 Values::Chunks { table, is_binary64, size: size.max(1) }
             }
-            (Decoding::Codebook { is_binary64 }, Some(table)) => Values::Codebook(codebook(table, is_binary64)),
+            (Decoding::Codebook { is_binary64 }, Some(table)) => {
+                Values::Codebook(codebooks.values(table, is_binary64, finish))
+            }
         };
-        Some(Self { fields: fields(format, of_word), values })
+        Some(Self { fields: fields(encoded.stream.format, of_word), values, finish })
     }
 
     /// The values of the element of `vertex`. `last` are the bounds that were read last, which are not read again.
@@ -125,7 +207,7 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         vertex: u64,
         element: u64,
         last: &mut Option<ChunkBounds<COMPONENTS>>,
-    ) -> [f64; COMPONENTS] {
+    ) -> [f32; COMPONENTS] {
         let fields = self.fields;
         match &self.values {
             Values::Codebook(numbers) => fields.map(|field| numbers[field.code(element) as usize % CODEBOOK]),
@@ -139,7 +221,7 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
                 let [low, high] = bounds;
                 std::array::from_fn(|at| {
                     let t = fields[at].fraction(element);
-                    low[at] * (1.0 - t) + high[at] * t
+                    self.finish.value(low[at] * (1.0 - t) + high[at] * t)
                 })
             }
         }
@@ -157,53 +239,22 @@ fn bounds<const COMPONENTS: usize>(table: &AttributeStream, is_binary64: bool, c
 }
 
 impl<'a> Decoder<'a, 3> {
-    /// The decoder of positions from elements of `stream`, if they are decoded.
-    pub(super) fn of_positions(
-        decodings: &Decodings,
-        stream: &AttributeStream,
-        table: Option<&'a AttributeStream>,
-    ) -> Option<Self> {
-        Self::new(decodings.position, table, stream.format, WORD_OF_LENGTHS)
-    }
-
-    /// The decoder of scales.
-    pub(super) fn of_scales(
-        decodings: &Decodings,
-        stream: &AttributeStream,
-        table: Option<&'a AttributeStream>,
-    ) -> Option<Self> {
-        Self::new(decodings.scale, table, stream.format, WORD_OF_LENGTHS)
+    /// The decoder of positions or scales.
+    pub(super) fn of_lengths(encoded: &Encoded<'_, 'a>, codebooks: &mut Codebooks) -> Option<Self> {
+        Self::new(encoded, WORD_OF_LENGTHS, codebooks)
     }
 
     /// The decoder of coefficient 0.
-    pub(super) fn of_colors(
-        decodings: &Decodings,
-        stream: &AttributeStream,
-        table: Option<&'a AttributeStream>,
-    ) -> Option<Self> {
-        Self::new(decodings.color, table, stream.format, WORD_OF_COLORS)
+    pub(super) fn of_colors(encoded: &Encoded<'_, 'a>, codebooks: &mut Codebooks) -> Option<Self> {
+        Self::new(encoded, WORD_OF_COLORS, codebooks)
     }
 }
 
 impl<'a> Decoder<'a, 1> {
     /// The decoder of opacities.
-    pub(super) fn of_opacities(
-        decodings: &Decodings,
-        stream: &AttributeStream,
-        table: Option<&'a AttributeStream>,
-    ) -> Option<Self> {
-        Self::new(decodings.opacity, table, stream.format, [Field::new(0, 8)])
+    pub(super) fn of_opacities(encoded: &Encoded<'_, 'a>, codebooks: &mut Codebooks) -> Option<Self> {
+        Self::new(encoded, [Field::new(0, 8)], codebooks)
     }
-}
-
-/// The coefficient that a decoded component of coefficient 0 stands for.
-pub(super) fn coefficient(decodings: &Decodings, component: f64) -> f64 {
-    if decodings.base_color { (component - 0.5) / Y_0 } else { component }
-}
-
-/// The number whose signed logarithm is `value`.
-pub(super) fn signed_exponential(value: f64) -> f64 {
-    libm::expm1(value.abs()).copysign(value)
 }
 
 /// The quaternion w, x, y, z that an element stands for.

@@ -102,7 +102,7 @@ impl<'a> GroupSource<'a> {
                 (&*attributes, false)
             }
         };
-        let reader = CoefficientReader::new(streams);
+        let reader = CoefficientReader::new(streams, &mut fetcher.codebooks);
         GroupAttributes { reader, vertices, attributes, matrices, is_sound, harmonics }
     }
 

@@ -1,6 +1,7 @@
 //! Spherical harmonics of single lanes: read from memory, or held by a cluster.
 
 use super::attributes::GroupVertices;
+use super::decoding::Codebooks;
 use super::harmonics_decoding::HarmonicsDecoder;
 use crate::format::Format;
 use crate::gaussian::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
@@ -13,18 +14,23 @@ fn at(stream: &AttributeStream, group: &GroupVertices<'_>, lane: usize) -> u64 {
     group.element(stream, lane).saturating_mul(u64::from(stream.stride)).saturating_add(u64::from(stream.offset))
 }
 
+/// The number of floats in a vertex's coefficients, of which each has a stream: three for each coefficient.
+pub(super) fn floats(streams: &[AttributeStream]) -> usize {
+    3 * streams.len().min(MAX_COEFFICIENTS)
+}
+
 /// Reads the spherical harmonics of single lanes.
 pub(crate) struct CoefficientReader<'a> {
     streams: &'a [AttributeStream],
     /// True if the coefficients of a vertex follow one another in memory as 32-bit floats.
     packed: bool,
     /// The decoder of the coefficients, if some are decoded.
-    decoder: Option<Box<HarmonicsDecoder<'a>>>,
+    decoder: Option<HarmonicsDecoder<'a>>,
 }
 
 impl<'a> CoefficientReader<'a> {
     /// A reader of these attributes' spherical harmonics, which have a stream per coefficient.
-    pub(crate) fn new(attributes: &'a GaussianAttributes) -> Self {
+    pub(crate) fn new(attributes: &'a GaussianAttributes, codebooks: &mut Codebooks) -> Self {
         let streams = &attributes.spherical_harmonics[..];
         let follows = |a: &AttributeStream, b: &AttributeStream| {
             Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
@@ -37,12 +43,12 @@ impl<'a> CoefficientReader<'a> {
         };
         let packed = streams.first().is_some_and(|s| s.format == Format::R32G32B32Sfloat)
             && streams.windows(2).all(|pair| follows(&pair[0], &pair[1]));
-        Self { streams, packed, decoder: HarmonicsDecoder::new(attributes) }
+        Self { streams, packed, decoder: HarmonicsDecoder::new(attributes, codebooks) }
     }
 
-    /// The number of floats in a vertex's coefficients: three for each coefficient.
+    /// The number of floats in a vertex's coefficients.
     pub(crate) fn floats(&self) -> usize {
-        3 * self.streams.len().min(MAX_COEFFICIENTS)
+        floats(self.streams)
     }
 
     /// Starts to load the first `count` coefficients of `lane` into the processor's cache, if they are packed.

@@ -1,15 +1,15 @@
 //! Decoding of spherical harmonics of single lanes.
 
 use super::attributes::GroupVertices;
-use super::decoding::{CODEBOOK, Decoder, codebook, coefficient};
-use crate::packet::{AttributeStream, Decodings, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
+use super::decoding::{CODEBOOK, Codebooks, Decoder, Encoded, Finish};
+use crate::packet::{AttributeStream, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
+use std::sync::Arc;
 
 /// The most bytes from the first to the last code of a vertex that are read with one copy.
 const SPAN: usize = 256;
 
 /// Decodes the spherical harmonics of a draw.
 pub(super) struct HarmonicsDecoder<'a> {
-    decodings: &'a Decodings,
     /// The decoder of coefficient 0, if it is decoded.
     colors: Option<Decoder<'a, 3>>,
     codes: Option<CodeReader<'a>>,
@@ -19,19 +19,18 @@ pub(super) struct HarmonicsDecoder<'a> {
 struct CodeReader<'a> {
     component_stride: u64,
     /// The codebook in binary32.
-    values: Box<[f32; CODEBOOK]>,
+    values: Arc<[f32; CODEBOOK]>,
     /// The labels of a palette's entries, if there is one.
     labels: Option<&'a AttributeStream>,
 }
 
 impl<'a> HarmonicsDecoder<'a> {
     /// The decoder of these attributes' harmonics; `None` if none is decoded.
-    pub(super) fn new(attributes: &'a GaussianAttributes) -> Option<Box<Self>> {
+    pub(super) fn new(attributes: &'a GaussianAttributes, codebooks: &mut Codebooks) -> Option<Self> {
         let tables = attributes.tables.as_deref()?;
         let decodings = &attributes.activations.decodings;
-        let reader = |codes: HarmonicsCodes, labels| {
-            let numbers = codebook(tables.harmonics.as_ref()?, codes.is_binary64);
-            let values = Box::new(numbers.map(|number| number as f32));
+        let mut reader = |codes: HarmonicsCodes, labels| {
+            let values = codebooks.values(tables.harmonics.as_ref()?, codes.is_binary64, Finish::None);
             Some(CodeReader { component_stride: codes.component_stride.into(), values, labels })
         };
         let codes = match decodings.harmonics {
@@ -39,9 +38,12 @@ impl<'a> HarmonicsDecoder<'a> {
             HarmonicsDecoding::Codebook(codes) => reader(codes, None),
             HarmonicsDecoding::Palette(codes) => reader(codes, tables.labels.as_ref()),
         };
-        let first = attributes.spherical_harmonics.first();
-        let colors = first.and_then(|stream| Decoder::of_colors(decodings, stream, tables.color.as_ref()));
-        (codes.is_some() || colors.is_some()).then(|| Box::new(Self { decodings, colors, codes }))
+        let colors = attributes.spherical_harmonics.first().and_then(|stream| {
+            let finish = if decodings.base_color { Finish::Coefficient } else { Finish::None };
+            let colors = Encoded { stream, decoding: decodings.color, table: tables.color.as_ref(), finish };
+            Decoder::of_colors(&colors, codebooks)
+        });
+        (codes.is_some() || colors.is_some()).then_some(Self { colors, codes })
     }
 
     /// Reads the coefficients of `lane` from the streams: red, green and blue of each in turn.
@@ -70,8 +72,7 @@ impl<'a> HarmonicsDecoder<'a> {
         let mut element = [0; 8];
         let size = stream.format.texel_size().min(8);
         stream.read(group.element(stream, lane), &mut element[..size]);
-        let decoded = decoder.decode(group.vertex(lane), u64::from_le_bytes(element), &mut None);
-        decoded.map(|component| coefficient(self.decodings, component) as f32)
+        decoder.decode(group.vertex(lane), u64::from_le_bytes(element), &mut None)
     }
 }
 

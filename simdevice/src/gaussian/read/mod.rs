@@ -3,7 +3,7 @@
 pub(crate) mod attributes;
 pub(crate) mod cluster_cache;
 pub(crate) mod clusters;
-mod decoding;
+pub(crate) mod decoding;
 pub(crate) mod fingerprint;
 pub(crate) mod group;
 pub(crate) mod harmonics;

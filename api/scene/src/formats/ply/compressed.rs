@@ -87,7 +87,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<EncodedScene, Fault> {
     let mut harmonics = None;
     if sh_degree > 0 {
         let mut codes = stream(count, harmonics_bytes(sh_degree))?;
-        table.read("sh", &rest, |_, values| codes.bytes.extend(values.iter().map(|value| *value as u8)))?;
+        table.read_blocks("sh", &rest, |rows| rows.append_bytes(&mut codes.bytes))?;
         let component_stride = codes.stride / 3;
         harmonics = Some(EncodedHarmonics {
             codes,
@@ -98,7 +98,8 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<EncodedScene, Fault> {
         });
         numbers.extend((0..CODEBOOK).map(sh_value));
     }
-    let word = |index: usize, decoding: Decoding| Attribute { stream: 0, offset: 4 * index, form: Form::Word, decoding };
+    let word =
+        |index: usize, decoding: Decoding| Attribute { stream: 0, offset: 4 * index, form: Form::Word, decoding };
     let chunks = |first: usize| Decoding::Chunks { table: first, stride: BOUNDS.len(), size: CHUNK };
     Ok(EncodedScene {
         count,

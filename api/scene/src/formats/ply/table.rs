@@ -393,6 +393,24 @@ impl Rows<'_> {
             Source::Values(found) => values.copy_from_slice(&found[..values.len()]),
         }
     }
+
+    /// Appends the integers of every row to `bytes`. The columns have 8 bits each.
+    pub(super) fn append_bytes(&self, bytes: &mut Vec<u8>) {
+        match self.source {
+            Source::Binary { bytes: rows, stride, .. } => {
+                let first = self.columns.first().map_or(0, |column| column.offset);
+                let follow = self.columns.iter().zip(first..).all(|(column, offset)| column.offset == offset);
+                for row in rows.chunks_exact(stride) {
+                    if follow {
+                        bytes.extend_from_slice(&row[first..][..self.columns.len()]);
+                    } else {
+                        bytes.extend(self.columns.iter().map(|column| row[column.offset]));
+                    }
+                }
+            }
+            Source::Values(found) => bytes.extend(found[..self.columns.len()].iter().map(|value| *value as u8)),
+        }
+    }
 }
 
 /// The header's bytes, up to and including the line `end_header`.

@@ -7,6 +7,7 @@ use crate::gaussian::lanes::GROUP;
 use crate::gaussian::project::group::project;
 use crate::gaussian::project::scratch::Scratch;
 use crate::gaussian::read::attributes::GroupVertices;
+use crate::gaussian::read::decoding::Codebooks;
 use crate::gaussian::read::group::{GroupAttributes, Sequence};
 use crate::gaussian::read::harmonics::{CoefficientReader, Harmonics};
 use crate::gaussian::splats::group::ProjectedGroup;
@@ -130,7 +131,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 let frustum = Frustum::new(&constants, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let group = GroupAttributes {
-                    reader: CoefficientReader::new(&append.attributes),
+                    reader: CoefficientReader::new(&append.attributes, &mut Codebooks::default()),
                     vertices: GroupVertices::new(&append, 0, 0, GROUP),
                     attributes: &attributes,
                     matrices: None,
