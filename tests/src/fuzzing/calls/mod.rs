@@ -46,7 +46,10 @@ fn call(run: &mut Run, bytes: &mut Bytes<'_>) {
         13 => unsafe { run.device.cmd_end_rendering(run.commands) },
         14..18 => record::copy(run, bytes),
         18 | 19 => record::query(run, bytes),
-        20 | 21 => record::set_state(run, bytes),
+        20 => {
+            let _ = record::set_state(run, bytes);
+        }
+        21 => record::set_state_with_lens(run, bytes),
         22..24 => record::bind_vertex_buffers(run, bytes),
         24 => record::clear(run, bytes),
         _ => record::draw(run, bytes),

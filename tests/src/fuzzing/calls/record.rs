@@ -1,7 +1,9 @@
 //! Commands that are recorded. The safety of `unsafe` is explained in the parent module.
 
 use ash::vk;
-use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use gaurast::vk::{
+    GaussianCameraDistortionGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianDistortionModelGAURAST,
+};
 
 use super::run::{DEPTH_FORMATS, Run, pick};
 use crate::fuzzing::bytes::Bytes;
@@ -138,7 +140,8 @@ pub(super) fn query(run: &mut Run, bytes: &mut Bytes<'_>) {
     }
 }
 
-pub(super) fn set_state(run: &mut Run, bytes: &mut Bytes<'_>) {
+/// Sets a camera, viewport, scissor, push constants and pipeline, and returns the camera.
+pub(super) fn set_state(run: &mut Run, bytes: &mut Bytes<'_>) -> GaussianCameraGAURAST<'static> {
     let mut or = |usual: f32| {
         if bytes.rarely(8) { bytes.float() } else { usual }
     };
@@ -182,6 +185,28 @@ pub(super) fn set_state(run: &mut Run, bytes: &mut Bytes<'_>) {
             run.device.cmd_bind_pipeline(run.commands, point, *pipeline);
         }
     }
+    camera
+}
+
+/// Sets the state, with a lens that distorts.
+pub(super) fn set_state_with_lens(run: &mut Run, bytes: &mut Bytes<'_>) {
+    let camera = set_state(run, bytes);
+    let model = bytes.one(&[
+        GaussianDistortionModelGAURAST::RATIONAL,
+        GaussianDistortionModelGAURAST::POLYNOMIAL,
+        GaussianDistortionModelGAURAST::POLYNOMIAL_FIRST,
+        GaussianDistortionModelGAURAST::FIELD_OF_VIEW,
+        GaussianDistortionModelGAURAST::DIVISION,
+    ]);
+    let mut or_none = || if bytes.rarely(3) { bytes.float() } else { 0.0 };
+    let mut lens = GaussianCameraDistortionGAURAST::default()
+        .model(model)
+        .radial([0; 6].map(|_| or_none()))
+        .tangential([0; 2].map(|_| or_none()))
+        .thin_prism([0; 4].map(|_| or_none()));
+    let camera = camera.push_next(&mut lens);
+    // SAFETY: see above.
+    unsafe { run.gaussian.cmd_set_gaussian_cameras(run.commands, &[camera]) };
 }
 
 pub(super) fn bind_vertex_buffers(run: &mut Run, bytes: &mut Bytes<'_>) {

@@ -92,6 +92,7 @@ impl Run {
                 .rasterization_float16(true)
                 .unscented_projection(true)
                 .gaussian_2d(true)
+                .gaussian_distortion(true)
                 .gaussian_depth_stencil(true)
                 .gaussian_multisample(true)
                 .gaussian_approximation(true);
