@@ -329,13 +329,9 @@ impl Fetcher {
         group: &GroupVertices<'_>,
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
-        let mut bounds = None;
-        self.each_element(stream, group, |lane, element| {
-            let values = decoder.decode(group.vertex(lane), element, &mut bounds);
-            for (out, value) in out.iter_mut().zip(values) {
-                out[lane] = value;
-            }
-        });
+        let mut elements = [0; F32_LANES];
+        self.each_element(stream, group, |lane, element| elements[lane] = element);
+        decoder.decode_all(|lane| group.vertex(lane), &elements[..group.len], &mut out);
     }
 
     /// Reads lanes `0..group.len` of quaternions. Those that lie beyond their buffer are zeros.

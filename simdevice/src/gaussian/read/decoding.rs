@@ -1,6 +1,7 @@
 //! Decoding: the values that integers in memory stand for, in binary64.
 
 use crate::format::Format;
+use crate::gaussian::lanes::F32_LANES;
 use crate::packet::{AttributeStream, Decoding, RotationDecoding};
 use devmem::BufferRange;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -13,7 +14,7 @@ pub(super) const CODEBOOK: usize = 256;
 const Y_0: f64 = 0.28209479177387814;
 
 /// The fourth byte of a quaternion, less the number of its largest component.
-const LARGEST_BYTE: u64 = 252;
+const LARGEST_BYTE: u16 = 252;
 
 /// The place of an integer in an element of at most 8 bytes.
 #[derive(Clone, Copy)]
@@ -28,17 +29,20 @@ impl Field {
         Self { shift, bits }
     }
 
-    const fn max(self) -> u64 {
-        (1 << self.bits) - 1
+    /// The greatest integer of so many bits, at most 16.
+    const fn max(self) -> u16 {
+        u16::MAX >> (u16::BITS - self.bits)
     }
 
-    fn code(self, element: u64) -> u64 {
-        element >> self.shift & self.max()
+    #[inline(always)]
+    fn code(self, element: u64) -> u16 {
+        (element >> self.shift) as u16 & self.max()
     }
 
     /// The integer's part of the greatest one.
+    #[inline(always)]
     fn fraction(self, element: u64) -> f64 {
-        self.code(element) as f64 / self.max() as f64
+        f64::from(self.code(element)) / f64::from(self.max())
     }
 }
 
@@ -167,8 +171,21 @@ enum Values<'a, const COMPONENTS: usize> {
     Codebook(Arc<[f32; CODEBOOK]>),
 }
 
-/// The number of a chunk, and the minima and maxima of its components.
-pub(super) type ChunkBounds<const COMPONENTS: usize> = (u64, [[f64; COMPONENTS]; 2]);
+/// The bounds of a chunk.
+#[derive(Clone, Copy)]
+pub(super) struct ChunkBounds<const COMPONENTS: usize> {
+    /// The chunk's vertices.
+    first: u64,
+    end: u64,
+    low: [f64; COMPONENTS],
+    high: [f64; COMPONENTS],
+}
+
+impl<const COMPONENTS: usize> ChunkBounds<COMPONENTS> {
+    fn has(&self, vertex: u64) -> bool {
+        (self.first..self.end).contains(&vertex)
+    }
+}
 
 /// Decodes an attribute.
 pub(super) struct Decoder<'a, const COMPONENTS: usize> {
@@ -208,23 +225,76 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         element: u64,
         last: &mut Option<ChunkBounds<COMPONENTS>>,
     ) -> [f32; COMPONENTS] {
-        let fields = self.fields;
-        match &self.values {
-            Values::Codebook(numbers) => fields.map(|field| numbers[field.code(element) as usize % CODEBOOK]),
-            Values::Chunks { table, is_binary64, size } => {
-                let chunk = vertex / u64::from(*size);
-                let bounds = match last {
-                    Some((number, bounds)) if *number == chunk => *bounds,
-                    _ => bounds(table, *is_binary64, chunk),
-                };
-                *last = Some((chunk, bounds));
-                let [low, high] = bounds;
-                std::array::from_fn(|at| {
-                    let t = fields[at].fraction(element);
-                    self.finish.value(low[at] * (1.0 - t) + high[at] * t)
-                })
+        let mut values = [0.0; COMPONENTS];
+        let bounds = self.bounds(vertex, last);
+        for (component, value) in values.iter_mut().enumerate() {
+            self.decode_component(component, bounds.as_ref(), &[element], std::slice::from_mut(value));
+        }
+        values
+    }
+
+    /// The values of several vertices, of which `vertex` gives the numbers, and `elements` what they hold: an array for each
+    /// component.
+    pub(super) fn decode_all(
+        &self,
+        vertex: impl Fn(usize) -> u64,
+        elements: &[u64],
+        out: &mut [&mut [f32; F32_LANES]; COMPONENTS],
+    ) {
+        let mut last = None;
+        let mut start = 0;
+        while start < elements.len() {
+            let bounds = self.bounds(vertex(start), &mut last);
+            let mut end = elements.len();
+            if let Some(bounds) = &bounds {
+                end = (start + 1..end).find(|lane| !bounds.has(vertex(*lane))).unwrap_or(end);
+            }
+            for (component, out) in out.iter_mut().enumerate() {
+                self.decode_component(component, bounds.as_ref(), &elements[start..end], &mut out[start..end]);
+            }
+            start = end;
+        }
+    }
+
+    /// The values of a component in elements of one chunk, whose bounds are given, or of a codebook.
+    fn decode_component(
+        &self,
+        component: usize,
+        bounds: Option<&ChunkBounds<COMPONENTS>>,
+        elements: &[u64],
+        out: &mut [f32],
+    ) {
+        let field = self.fields[component];
+        match (&self.values, bounds) {
+            (Values::Codebook(values), _) => {
+                for (value, element) in out.iter_mut().zip(elements) {
+                    *value = values[usize::from(field.code(*element)) % CODEBOOK];
+                }
+            }
+            (Values::Chunks { .. }, None) => out.fill(0.0),
+            (Values::Chunks { .. }, Some(bounds)) => {
+                let (low, high) = (bounds.low[component], bounds.high[component]);
+                for (value, element) in out.iter_mut().zip(elements) {
+                    let t = field.fraction(*element);
+                    *value = self.finish.value(low * (1.0 - t) + high * t);
+                }
             }
         }
+    }
+
+    /// The bounds of a vertex, which are then the last ones; `None` for a codebook.
+    fn bounds(&self, vertex: u64, last: &mut Option<ChunkBounds<COMPONENTS>>) -> Option<ChunkBounds<COMPONENTS>> {
+        let Values::Chunks { table, is_binary64, size } = &self.values else {
+            return None;
+        };
+        if !last.is_some_and(|last| last.has(vertex)) {
+            let size = u64::from(*size);
+            let chunk = vertex / size;
+            let [low, high] = bounds(table, *is_binary64, chunk);
+            let first = chunk * size;
+            *last = Some(ChunkBounds { first, end: first.saturating_add(size), low, high });
+        }
+        *last
     }
 }
 
@@ -258,6 +328,7 @@ impl<'a> Decoder<'a, 1> {
 }
 
 /// The quaternion w, x, y, z that an element stands for.
+#[inline(always)]
 pub(super) fn quaternion(decoding: RotationDecoding, element: u64) -> [f64; 4] {
     let (largest, smaller) = match decoding {
         RotationDecoding::SmallestThree8 => {
@@ -272,8 +343,8 @@ pub(super) fn quaternion(decoding: RotationDecoding, element: u64) -> [f64; 4] {
             (Field::new(30, 2).code(element), fields)
         }
     };
-    let smaller = smaller.map(|field| (2.0 * field.fraction(element) - 1.0) * FRAC_1_SQRT_2);
-    let [a, b, c] = smaller;
+    let component = |field: Field| (2.0 * field.fraction(element) - 1.0) * FRAC_1_SQRT_2;
+    let [a, b, c] = [component(smaller[0]), component(smaller[1]), component(smaller[2])];
     let greatest = (1.0 - (a * a + b * b + c * c)).max(0.0).sqrt();
     match largest {
         0 => [greatest, a, b, c],

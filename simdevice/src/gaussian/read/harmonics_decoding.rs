@@ -1,8 +1,9 @@
 //! Decoding of spherical harmonics of single lanes.
 
 use super::attributes::GroupVertices;
-use super::decoding::{CODEBOOK, Codebooks, Decoder, Encoded, Finish};
+use super::decoding::{CODEBOOK, ChunkBounds, Codebooks, Decoder, Encoded, Finish};
 use crate::packet::{AttributeStream, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
+use std::cell::Cell;
 use std::sync::Arc;
 
 /// The most bytes from the first to the last code of a vertex that are read with one copy.
@@ -12,6 +13,8 @@ const SPAN: usize = 256;
 pub(super) struct HarmonicsDecoder<'a> {
     /// The decoder of coefficient 0, if it is decoded.
     colors: Option<Decoder<'a, 3>>,
+    /// The bounds of the chunk whose colours were read last.
+    bounds: Cell<Option<ChunkBounds<3>>>,
     codes: Option<CodeReader<'a>>,
 }
 
@@ -43,7 +46,7 @@ impl<'a> HarmonicsDecoder<'a> {
             let colors = Encoded { stream, decoding: decodings.color, table: tables.color.as_ref(), finish };
             Decoder::of_colors(&colors, codebooks)
         });
-        (codes.is_some() || colors.is_some()).then_some(Self { colors, codes })
+        (codes.is_some() || colors.is_some()).then_some(Self { colors, bounds: Cell::default(), codes })
     }
 
     /// Reads the coefficients of `lane` from the streams: red, green and blue of each in turn.
@@ -72,7 +75,10 @@ impl<'a> HarmonicsDecoder<'a> {
         let mut element = [0; 8];
         let size = stream.format.texel_size().min(8);
         stream.read(group.element(stream, lane), &mut element[..size]);
-        decoder.decode(group.vertex(lane), u64::from_le_bytes(element), &mut None)
+        let mut bounds = self.bounds.get();
+        let color = decoder.decode(group.vertex(lane), u64::from_le_bytes(element), &mut bounds);
+        self.bounds.set(bounds);
+        color
     }
 }
 
@@ -102,7 +108,8 @@ impl CodeReader<'_> {
             for (stream, out) in streams.iter().zip(out) {
                 let at = (u64::from(stream.offset) - start) as usize;
                 let stride = self.component_stride as usize;
-                *out = [0, 1, 2].map(|component| self.values[usize::from(span[at + component * stride])]);
+                let value = |component: usize| self.values[usize::from(span[at + component * stride])];
+                *out = [value(0), value(1), value(2)];
             }
             return;
         }
