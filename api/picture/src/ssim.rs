@@ -9,7 +9,7 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::tiles::{Filter, Form, Tile, tiles};
+use crate::tiles::{Filter, Form, Tile, sum, tiles};
 
 /// Half the window's width.
 const RADIUS: usize = 5;
@@ -56,8 +56,11 @@ impl Ssim {
         let (height, filter) = (image.len() / width, Filter { form: Form::Even, weights: window()[RADIUS..].to_vec() });
         let level = Level::new();
         let sums = |tiles: Vec<Tile>, border: Border| {
-            let sums_of = |tile: Tile| dispatch!(level, simd => tile_sums(simd, image, reference, [width, height], tile, &filter, border));
-            let sums: Vec<Sums> = tiles.into_par_iter().map(sums_of).collect();
+            let of_tile = |memory: &mut Memory, tile: Tile| {
+                let images = Images { a: image, b: reference, width, height };
+                dispatch!(level, simd => memory.sums(simd, images, tile, &filter, border))
+            };
+            let sums: Vec<Sums> = tiles.into_par_iter().map_init(Memory::default, of_tile).collect();
             // Summed in the order of the tiles, so that threads change nothing.
             sums.iter()
                 .fold(Sums::default(), |sum, one| Sums { all: sum.all + one.all, inside: sum.inside + one.inside })
@@ -102,65 +105,116 @@ fn inside(first: usize, count: usize, side: usize) -> Range<usize> {
     RADIUS.saturating_sub(first).min(end)..end
 }
 
-#[inline(always)]
-fn tile_sums<S: Simd>(
-    simd: S,
-    a: &[[f32; 4]],
-    b: &[[f32; 4]],
-    [width, height]: [usize; 2],
-    tile: Tile,
-    filter: &Filter<f64>,
-    border: Border,
-) -> Sums {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            let (rows, columns) = (inside(tile.top, tile.height, height), inside(tile.left, tile.width, width));
-            let mut sums = Sums { all: 0.0, inside: 0.0 };
-            for channel in 0..3 {
-                let a = channel_of(a, [width, height], tile, channel, border);
-                let b = channel_of(b, [width, height], tile, channel, border);
-                let (mut both, mut squares) = (vec![0.0; a.len()], vec![0.0; a.len()]);
-                for at in 0..a.len() {
-                    both[at] = a[at] * b[at];
-                    squares[at] = a[at] * a[at] + b[at] * b[at];
-                }
-                let mean_a = filter.correlate_both(&a, tile, RADIUS);
-                let mean_b = filter.correlate_both(&b, tile, RADIUS);
-                let both = filter.correlate_both(&both, tile, RADIUS);
-                let squares = filter.correlate_both(&squares, tile, RADIUS);
-                // Computed before they are summed, since a sum in order is not vectorized.
-                let mut values = vec![0.0; both.len()];
-                for at in 0..values.len() {
-                    let (x, y) = (mean_a[at], mean_b[at]);
-                    let covariance = both[at] - x * y;
-                    let variances = squares[at] - (x * x + y * y);
-                    values[at] =
-                        (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2));
-                }
-                sums.all += tile.sum(&values, 0..tile.height, 0..tile.width);
-                sums.inside += tile.sum(&values, rows.clone(), columns.clone());
-            }
-            sums
-        },
-    )
+/// Two images of one size.
+#[derive(Clone, Copy, Debug)]
+struct Images<'a> {
+    a: &'a [[f32; 4]],
+    b: &'a [[f32; 4]],
+    width: usize,
+    height: usize,
 }
 
-/// A channel of a tile and its border.
+/// The memory of a thread, used again for each tile.
+#[derive(Debug, Default)]
+struct Memory {
+    /// Of a channel of a tile and its border: both images, their product, and the sum of their squares.
+    planes: [Vec<f64>; 4],
+    /// A row of a plane, filtered along columns.
+    down: Vec<f64>,
+    /// A row of each plane, filtered along both.
+    filtered: [Vec<f64>; 4],
+    /// The values of a row's pixels.
+    values: Vec<f64>,
+}
+
+impl Memory {
+    /// The sums of a tile.
+    #[inline(always)]
+    fn sums<S: Simd>(&mut self, simd: S, images: Images<'_>, tile: Tile, filter: &Filter<f64>, border: Border) -> Sums {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (stride, columns) = (tile.stride(RADIUS), tile.columns());
+                for plane in &mut self.planes {
+                    plane.resize(stride * tile.rows(RADIUS), 0.0);
+                }
+                self.down.resize(stride, 0.0);
+                for row in self.filtered.iter_mut().chain([&mut self.values]) {
+                    row.resize(columns, 0.0);
+                }
+                let inner_rows = inside(tile.top, tile.height, images.height);
+                let inner_columns = inside(tile.left, tile.width, images.width);
+                let mut sums = Sums::default();
+                for channel in 0..3 {
+                    for row in 0..tile.rows(RADIUS) {
+                        // A row is taken when it is first needed, and is still in a cache when it is filtered.
+                        self.take_row(images, tile, row, channel, border);
+                        let Some(row) = row.checked_sub(2 * RADIUS) else { continue };
+                        for (plane, filtered) in self.planes.iter().zip(&mut self.filtered) {
+                            filter.correlate(simd, plane, (row + RADIUS) * stride, stride, &mut self.down);
+                            filter.correlate(simd, &self.down, RADIUS, 1, filtered);
+                        }
+                        self.compute_values();
+                        sums.all += sum(&self.values[..tile.width]);
+                        if inner_rows.contains(&row) {
+                            sums.inside += sum(&self.values[inner_columns.clone()]);
+                        }
+                    }
+                }
+                sums
+            },
+        )
+    }
+
+    /// Fills a row of the planes with a channel of the images.
+    #[inline(always)]
+    fn take_row(&mut self, images: Images<'_>, tile: Tile, row: usize, channel: usize, border: Border) {
+        let stride = tile.stride(RADIUS);
+        let [a, b, both, squares] = self.planes.each_mut().map(|plane| &mut plane[row * stride..][..stride]);
+        let y = (tile.top + row) as isize - RADIUS as isize;
+        let y = if border == Border::Reflection { reflected(y, images.height) } else { y };
+        for (values, image) in [(&mut *a, images.a), (&mut *b, images.b)] {
+            if (0..images.height as isize).contains(&y) {
+                take_channel(&image[y as usize * images.width..][..images.width], tile, channel, border, values);
+            } else {
+                values.fill(0.0);
+            }
+        }
+        for at in 0..stride {
+            both[at] = a[at] * b[at];
+            squares[at] = a[at] * a[at] + b[at] * b[at];
+        }
+    }
+
+    /// Computes the values of a row's pixels from what is filtered.
+    #[inline(always)]
+    fn compute_values(&mut self) {
+        let count = self.values.len();
+        let [mean_a, mean_b, both, squares] = self.filtered.each_ref().map(|row| &row[..count]);
+        for (at, value) in self.values.iter_mut().enumerate() {
+            let (x, y) = (mean_a[at], mean_b[at]);
+            let covariance = both[at] - x * y;
+            let variances = squares[at] - (x * x + y * y);
+            *value = (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2));
+        }
+    }
+}
+
+/// Fills a row of a plane with a channel of a row of an image.
 #[inline(always)]
-fn channel_of(image: &[[f32; 4]], [width, height]: [usize; 2], tile: Tile, channel: usize, border: Border) -> Vec<f64> {
-    tile.bordered(
-        RADIUS,
-        #[inline(always)]
-        |x, y| {
-            let (x, y) = match border {
-                Border::Zeros => (x, y),
-                Border::Reflection => (reflected(x, width), reflected(y, height)),
-            };
-            let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
-            if inside { f64::from(image[y as usize * width + x as usize][channel]) } else { 0.0 }
-        },
-    )
+fn take_channel(pixels: &[[f32; 4]], tile: Tile, channel: usize, border: Border, values: &mut [f64]) {
+    // The columns of the plane whose pixels are in the image.
+    let first = RADIUS.saturating_sub(tile.left);
+    let of_image = &pixels[tile.left + first - RADIUS..];
+    let end = values.len().min(first + of_image.len());
+    for (value, pixel) in values[first..end].iter_mut().zip(of_image) {
+        *value = f64::from(pixel[channel]);
+    }
+    for column in (0..first).chain(end..values.len()) {
+        let x = (tile.left + column) as isize - RADIUS as isize;
+        let at = pixels.get(reflected(x, pixels.len()) as usize).filter(|_| border == Border::Reflection);
+        values[column] = at.map_or(0.0, |pixel| f64::from(pixel[channel]));
+    }
 }
 
 /// A coordinate reflected at the outermost ones of an image of `side` pixels, if it lies beyond.

@@ -59,23 +59,33 @@ struct Largest {
     count: usize,
     /// Their bits, which are in the order of the numbers, the least first.
     bits: BinaryHeap<Reverse<u64>>,
+    /// The bits of the least of them if there are `count`.
+    least: Option<u64>,
 }
 
 impl Largest {
     /// Of none yet, with so many to keep.
     fn new(count: usize) -> Self {
-        Self { count, bits: BinaryHeap::new() }
+        Self { count, bits: BinaryHeap::new(), least: None }
     }
 
     fn add(&mut self, value: f64) {
         let bits = value.to_bits();
-        if self.bits.len() < self.count {
-            self.bits.push(Reverse(bits));
-        } else if let Some(mut least) = self.bits.peek_mut()
-            && bits > least.0
-        {
-            *least = Reverse(bits);
+        // Most numbers are none of the largest.
+        if self.least.is_none_or(|least| bits > least) {
+            self.keep(bits);
         }
+    }
+
+    #[cold]
+    fn keep(&mut self, bits: u64) {
+        if self.least.is_some() {
+            self.bits.pop();
+        }
+        if self.count > 0 {
+            self.bits.push(Reverse(bits));
+        }
+        self.least = self.bits.peek().map(|least| least.0).filter(|_| self.bits.len() == self.count);
     }
 
     /// The least of them; 0 if there are none.

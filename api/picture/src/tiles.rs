@@ -1,15 +1,18 @@
-//! Tiles of a picture, and the filters that metrics correlate them with. A tile and all that is computed of it fit into a cache.
+//! Tiles of a picture, and the filters that metrics correlate them with.
 //!
-//! All of it is inlined into the callers' vectorized code. A function that is not, and a closure without the attribute, is
-//! compiled for the least processor.
+//! A metric computes a tile row by row, from the rows around it, so that what it computes of a row stays in the first caches. The
+//! memory for that is used again for the next tile.
+//!
+//! Sums are inlined into the callers' vectorized code. A function that is not, and a closure without the attribute, is compiled for the
+//! least processor.
 
-use std::ops::{Add, Mul, Range, Sub};
+use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
 
 /// The width of tiles, a multiple of [`LANES`], and their height, in pixels.
 const SIZE: [usize; 2] = [256, 128];
 
-/// The pixels that are filtered together.
-const LANES: usize = 16;
+/// The columns that are computed together, of which rows have whole groups.
+const LANES: usize = 32;
 
 /// A rectangle of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,39 +43,47 @@ impl Tile {
         self.width.next_multiple_of(LANES)
     }
 
-    /// The values of a picture in the tile and `border` pixels around its columns and rows. `value` receives the place of each,
-    /// which may lie outside of the picture.
-    #[inline(always)]
-    pub(crate) fn bordered<T>(self, border: usize, mut value: impl FnMut(isize, isize) -> T) -> Vec<T> {
-        let (stride, rows) = (self.columns() + 2 * border, self.height + 2 * border);
-        let mut values = Vec::with_capacity(stride * rows);
-        for row in 0..rows {
-            let y = (self.top + row) as isize - border as isize;
-            for column in 0..stride {
-                values.push(value((self.left + column) as isize - border as isize, y));
-            }
-        }
-        values
+    /// The values of a row of a plane with at least `border` columns on both sides of those that are computed: whole groups.
+    pub(crate) fn stride(self, border: usize) -> usize {
+        (self.columns() + 2 * border).next_multiple_of(LANES)
     }
 
-    /// The sum of a plane's values over some of the tile's rows and columns, row by row. The plane has the tile's columns.
-    #[inline(always)]
-    pub(crate) fn sum<T: Copy + Into<f64>>(self, plane: &[T], rows: Range<usize>, columns: Range<usize>) -> f64 {
-        let mut sum = 0.0;
-        for row in rows {
-            for value in &plane[row * self.columns()..][columns.clone()] {
-                sum += (*value).into();
-            }
-        }
-        sum
+    /// The rows of a plane with `border` rows above and below the tile.
+    pub(crate) fn rows(self, border: usize) -> usize {
+        self.height + 2 * border
     }
 }
 
-/// The numbers of a filter.
-pub(crate) trait Number: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+/// The sum of a row's values, in the order of its groups.
+#[inline(always)]
+pub(crate) fn sum<T: Copy + Into<f64>>(values: &[T]) -> f64 {
+    let (groups, rest) = values.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for group in groups {
+        for lane in 0..LANES {
+            sums[lane] += group[lane].into();
+        }
+    }
+    let mut sum: f64 = sums.iter().sum();
+    for value in rest {
+        sum += (*value).into();
+    }
+    sum
+}
 
-impl Number for f32 {}
-impl Number for f64 {}
+/// The numbers of a filter.
+pub(crate) trait Number: SimdElement + Default {
+    /// Half as many as are filtered together, which is at most half of a group.
+    type Vector<S: Simd>: SimdBase<S, Element = Self>;
+}
+
+impl Number for f32 {
+    type Vector<S: Simd> = f32x16<S>;
+}
+
+impl Number for f64 {
+    type Vector<S: Simd> = f64x8<S>;
+}
 
 /// The form of a filter, by which values at equal distances from the middle share a multiplication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,82 +104,99 @@ pub(crate) struct Filter<T> {
     pub(crate) weights: Vec<T>,
 }
 
-/// The direction of a filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Along {
-    Rows,
-    Columns,
-}
-
 impl<T: Number> Filter<T> {
-    /// Correlates a plane that has `border` values on both sides of what is computed, along rows or columns.
-    #[inline(always)]
-    pub(crate) fn correlate(&self, plane: &[T], tile: Tile, border: usize, along: Along) -> Vec<T> {
-        let columns = tile.columns();
-        let (stride, step, rows) = match along {
-            Along::Rows => (columns + 2 * border, 1, tile.height + 2 * border),
-            Along::Columns => (columns, columns, tile.height),
-        };
-        let mut output = vec![T::default(); columns * rows];
-        for (row, output) in output.chunks_exact_mut(columns).enumerate() {
-            let middle = row * stride + border * step;
-            for (group, output) in output.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-                *output = self.correlate_group(plane, middle + group * LANES, step);
-            }
-        }
-        output
+    /// Correlates as many values as `output` has, whole groups. The first is at `middle`, and neighbours are `step` apart: 1 along
+    /// rows, and a row's length along columns.
+    ///
+    /// It is a function of its own for each level, since it is called in many places, with a row each.
+    pub(crate) fn correlate<S: Simd>(&self, simd: S, values: &[T], middle: usize, step: usize, output: &mut [T]) {
+        let pass = Pass { values, middle, step };
+        simd.vectorize(
+            #[inline(always)]
+            || match self.form {
+                Form::Even => self.run(
+                    simd,
+                    pass,
+                    output,
+                    #[inline(always)]
+                    |before, _, after| before + after,
+                ),
+                Form::Balanced => self.run(
+                    simd,
+                    pass,
+                    output,
+                    #[inline(always)]
+                    |before, centre, after| (before - centre) + (after - centre),
+                ),
+                Form::Odd => self.run(
+                    simd,
+                    pass,
+                    output,
+                    #[inline(always)]
+                    |before, _, after| after - before,
+                ),
+            },
+        );
     }
 
-    /// Correlates a plane with `border` values around the tile along rows, then along columns.
+    /// Correlates two vectors at a time. `both` makes what a weight multiplies of the values before, those in the middle and those
+    /// after.
     #[inline(always)]
-    pub(crate) fn correlate_both(&self, plane: &[T], tile: Tile, border: usize) -> Vec<T> {
-        let along_rows = self.correlate(plane, tile, border, Along::Rows);
-        self.correlate(&along_rows, tile, border, Along::Columns)
-    }
-
-    /// Correlates a group of values, of which the first is at `middle`.
-    #[inline(always)]
-    fn correlate_group(&self, plane: &[T], middle: usize, step: usize) -> [T; LANES] {
-        let centre = group(plane, middle);
-        let mut sums = [T::default(); LANES];
-        if self.form == Form::Even {
-            for lane in 0..LANES {
-                sums[lane] = self.weights[0] * centre[lane];
-            }
-        }
-        for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
-            let (before, after) = (group(plane, middle - distance * step), group(plane, middle + distance * step));
-            match self.form {
-                Form::Even => {
-                    for lane in 0..LANES {
-                        sums[lane] = sums[lane] + weight * (before[lane] + after[lane]);
-                    }
-                }
-                Form::Balanced => {
-                    for lane in 0..LANES {
-                        let both = (before[lane] - centre[lane]) + (after[lane] - centre[lane]);
-                        sums[lane] = sums[lane] + weight * both;
-                    }
-                }
-                Form::Odd => {
-                    for lane in 0..LANES {
-                        sums[lane] = sums[lane] + weight * (after[lane] - before[lane]);
-                    }
+    fn run<S: Simd>(
+        &self,
+        simd: S,
+        pass: Pass<'_, T>,
+        output: &mut [T],
+        both: impl Fn(T::Vector<S>, T::Vector<S>, T::Vector<S>) -> T::Vector<S>,
+    ) {
+        let length = T::Vector::<S>::LEN;
+        let zero = T::Vector::<S>::splat(simd, T::default());
+        for (number, output) in output.chunks_exact_mut(2 * length).enumerate() {
+            let at = pass.middle + number * 2 * length;
+            let centre = pass.load(simd, at);
+            let mut sums = [zero; 2];
+            if self.form == Form::Even {
+                for part in 0..2 {
+                    sums[part] = centre[part] * self.weights[0];
                 }
             }
+            for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
+                let weight = T::Vector::<S>::splat(simd, weight);
+                let before = pass.load(simd, at - distance * pass.step);
+                let after = pass.load(simd, at + distance * pass.step);
+                for part in 0..2 {
+                    sums[part] += weight * both(before[part], centre[part], after[part]);
+                }
+            }
+            for part in 0..2 {
+                sums[part].store_slice(&mut output[part * length..][..length]);
+            }
         }
-        sums
     }
 }
 
-/// The values of a plane from `at` on.
-#[inline(always)]
-fn group<T>(plane: &[T], at: usize) -> &[T; LANES] {
-    plane[at..].first_chunk().expect("a plane has whole groups")
+/// What is filtered: values, of which the first one is at `middle`, with neighbours that are `step` apart.
+#[derive(Clone, Copy, Debug)]
+struct Pass<'a, T> {
+    values: &'a [T],
+    middle: usize,
+    step: usize,
+}
+
+impl<T: Number> Pass<'_, T> {
+    /// The two vectors of values from `at` on.
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, at: usize) -> [T::Vector<S>; 2] {
+        let length = T::Vector::<S>::LEN;
+        let (first, second) = self.values[at..][..2 * length].split_at(length);
+        [T::Vector::<S>::from_slice(simd, first), T::Vector::<S>::from_slice(simd, second)]
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
 
     #[test]
@@ -196,7 +224,19 @@ mod tests {
             }
             let filter = Filter { form, weights };
             let border = 4;
-            let both = filter.correlate_both(&tile.bordered(border, value), tile, border);
+            let (stride, columns) = (tile.stride(border), tile.columns());
+            let place = |at: usize| {
+                let (x, y) = (tile.left + at % stride, tile.top + at / stride);
+                value(x as isize - border as isize, y as isize - border as isize)
+            };
+            let plane: Vec<f64> = (0..stride * tile.rows(border)).map(place).collect();
+            let (mut down, mut both) = (vec![0.0; stride], vec![0.0; columns * tile.height]);
+            for (row, both) in both.chunks_exact_mut(columns).enumerate() {
+                dispatch!(Level::new(), simd => {
+                    filter.correlate(simd, &plane, (row + border) * stride, stride, &mut down);
+                    filter.correlate(simd, &down, border, 1, both);
+                });
+            }
             let weight = |at: isize| {
                 let weight = filter.weights.get(at.unsigned_abs()).copied().unwrap_or(0.0);
                 match (form, at.signum()) {
@@ -213,9 +253,16 @@ mod tests {
                             expected += weight(dx) * weight(dy) * value(x + dx, y + dy);
                         }
                     }
-                    assert_eq!(both[row * tile.columns() + column], expected, "{form:?} {column} {row}");
+                    assert_eq!(both[row * columns + column], expected, "{form:?} {column} {row}");
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_sum_has_every_value() {
+        let values: Vec<f32> = (1..=37_u16).map(f32::from).collect();
+        assert_eq!(sum(&values), f64::from(37 * 38 / 2));
+        assert_eq!(sum::<f64>(&[]), 0.0);
     }
 }

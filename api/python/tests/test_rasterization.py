@@ -225,6 +225,40 @@ def test_results_are_jaxs_where_arguments_are(arrays):
     assert np.array_equal(found, picture) and np.array_equal(alphas, alpha)
 
 
+def test_results_are_torchs_where_arguments_are(arrays):
+    if importlib.util.find_spec("torch") is None:
+        pytest.skip("torch is missing")
+    import torch
+
+    scene = arrays(7, 100)
+    picture, alpha, _ = call(scene, scene.colors)
+    given = {name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "colors", "viewmat", "K")}
+
+    def drawn(tensor):
+        for name, array in given.items():
+            setattr(scene, name, tensor(array))
+        return call(scene, scene.colors)
+
+    def strided(array):
+        return torch.from_numpy(np.stack([array, array], axis=-1))[..., 0]
+
+    for tensor in [torch.from_numpy, lambda array: torch.from_numpy(array).double(), strided]:
+        found, alphas, _ = drawn(tensor)
+        assert isinstance(found, torch.Tensor) and isinstance(alphas, torch.Tensor)
+        assert np.array_equal(found.numpy(), picture) and np.array_equal(alphas.numpy(), alpha)
+    # NumPy has no bfloat16. Cameras would be inexact in it.
+    rounded = {name: torch.from_numpy(array).bfloat16() for name, array in given.items() if name not in ("viewmat", "K")}
+    found, expected = [], []
+    for pictures, tensors in [(found, rounded), (expected, {name: tensor.float() for name, tensor in rounded.items()})]:
+        for name, tensor in tensors.items():
+            setattr(scene, name, tensor)
+        pictures.append(call(scene, scene.colors)[0].numpy())
+    assert np.array_equal(found, expected)
+    scene.means.requires_grad = True
+    with pytest.raises(NotImplementedError, match=r"means needs a gradient.*means\.detach"):
+        call(scene, scene.colors)
+
+
 def test_a_scenes_own_arrays_are_drawn_as_copies_are():
     scene = gaurast.garden(1, 2000)
     camera = scene.frame((64, 48))

@@ -6,7 +6,8 @@
 //! edges and points that appear or vanish raise the error.
 //!
 //! All filters are separable (one is a sum of two that are); borders repeat the outermost pixel. As in the authors'
-//! implementation, numbers are binary32. Tiles are filtered one by one, so that a large image needs little memory.
+//! implementation, numbers are binary32. Tiles are filtered one by one, and a tile row by row, so that a large image needs little
+//! memory.
 
 mod power;
 #[cfg(test)]
@@ -17,7 +18,7 @@ use std::f64::consts::PI;
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::tiles::{Along, Filter, Form, Tile, tiles};
+use crate::tiles::{Filter, Form, Tile, sum, tiles};
 use power::power;
 
 /// The default pixels per degree of visual angle: a 0.7 m wide display of 3840 pixels seen from 0.7 m.
@@ -34,6 +35,16 @@ const W: f64 = 0.082;
 /// White of standard illuminant D65.
 const WHITE: [f64; 3] = [0.950428545, 1.0, 1.088900371];
 
+/// X, Y and Z relative to white of linear red, green and blue.
+const X_OF_WHITE: [f64; 3] = relative_to(WHITE[0], [10135552.0, 8788810.0, 4435075.0], 24577794.0);
+const Y_OF_WHITE: [f64; 3] = relative_to(WHITE[1], [2613072.0, 8788810.0, 887015.0], 12288897.0);
+const Z_OF_WHITE: [f64; 3] = relative_to(WHITE[2], [1425312.0, 8788810.0, 70074185.0], 73733382.0);
+
+/// The weights of red, green and blue, which are quotients by `divisor`, relative to a value of white.
+const fn relative_to(white: f64, [r, g, b]: [f64; 3], divisor: f64) -> [f64; 3] {
+    [r / divisor / white, g / divisor / white, b / divisor / white]
+}
+
 /// The greatest colour difference, which is that from green to blue.
 const GREATEST_DIFFERENCE: f64 = 203.301654592;
 
@@ -45,11 +56,10 @@ const LEAST_WEIGHT: f64 = 1e-10;
 pub fn flip<const N: usize>(reference: &[[f32; N]], test: &[[f32; N]], width: u32, pixels_per_degree: f64) -> Vec<f64> {
     let width = width as usize;
     let mut errors = vec![0.0; reference.len()];
-    for (tile, of_tile) in by_tile(reference, test, width, pixels_per_degree, |_, errors| errors) {
-        for row in 0..tile.height {
-            for column in 0..tile.width {
-                let error = of_tile[row * tile.columns() + column];
-                errors[(tile.top + row) * width + tile.left + column] = error.into();
+    for (tile, of_tile) in by_tile(reference, test, width, pixels_per_degree, |_, errors| errors.to_vec()) {
+        for (row, of_row) in of_tile.chunks_exact(tile.columns()).enumerate() {
+            for (column, error) in of_row[..tile.width].iter().enumerate() {
+                errors[(tile.top + row) * width + tile.left + column] = (*error).into();
             }
         }
     }
@@ -58,18 +68,20 @@ pub fn flip<const N: usize>(reference: &[[f32; N]], test: &[[f32; N]], width: u3
 
 /// The mean of [`flip`]'s errors.
 pub fn mean<const N: usize>(reference: &[[f32; N]], test: &[[f32; N]], width: u32, pixels_per_degree: f64) -> f64 {
-    let sum = |tile: Tile, errors: Vec<f32>| tile.sum(&errors, 0..tile.height, 0..tile.width);
-    let sums = by_tile(reference, test, width as usize, pixels_per_degree, sum);
+    let sum_of = |tile: Tile, errors: &[f32]| -> f64 {
+        errors.chunks_exact(tile.columns()).map(|row| sum(&row[..tile.width])).sum()
+    };
+    let sums = by_tile(reference, test, width as usize, pixels_per_degree, sum_of);
     sums.into_iter().map(|(_, sum)| sum).sum::<f64>() / reference.len() as f64
 }
 
-/// The tiles of two images, and what is made of their errors.
+/// The tiles of two images, and what is made of their errors, which are a plane of the tile's columns.
 fn by_tile<const N: usize, T: Send>(
     reference: &[[f32; N]],
     test: &[[f32; N]],
     width: usize,
     pixels_per_degree: f64,
-    made: impl Fn(Tile, Vec<f32>) -> T + Sync,
+    made: impl Fn(Tile, &[f32]) -> T + Sync,
 ) -> Vec<(Tile, T)> {
     assert_eq!(reference.len(), test.len(), "the sizes differ");
     if reference.is_empty() {
@@ -77,11 +89,11 @@ fn by_tile<const N: usize, T: Send>(
     }
     let vision = Vision::new(pixels_per_degree);
     let level = Level::new();
-    let error = |tile: Tile| {
-        let errors = dispatch!(level, simd => vision.errors(simd, reference, test, width, tile));
-        (tile, made(tile, errors))
+    let of_tile = |memory: &mut Memory, tile: Tile| {
+        dispatch!(level, simd => vision.compute_errors(simd, reference, test, width, tile, memory));
+        (tile, made(tile, &memory.errors))
     };
-    tiles(width, reference.len() / width).into_par_iter().map(error).collect()
+    tiles(width, reference.len() / width).into_par_iter().map_init(Memory::default, of_tile).collect()
 }
 
 /// The filters of human vision.
@@ -95,17 +107,81 @@ struct Vision {
     point: Filter<f32>,
     smooth: Filter<f32>,
     /// The linear values of sRGB's 256 steps.
-    linear: Vec<f64>,
+    linear: [f64; 256],
 }
 
-/// A tile of an image as it is seen.
-struct Perceived {
-    /// Filtered colour in Hunt-adjusted L*a*b*.
+/// The memory of a thread, used again for each tile.
+#[derive(Debug, Default)]
+struct Memory {
+    reference: Seen,
+    test: Seen,
+    rows: Rows,
+    /// The errors of a tile's pixels, in a plane of its columns.
+    errors: Vec<f32>,
+}
+
+/// A tile of an image, and one row of it as it is seen.
+#[derive(Debug, Default)]
+struct Seen {
+    /// The tile with its border in YCxCz, a linear form of L*a*b*, in which filters may be applied.
+    opponent: [Vec<f32>; 3],
+    /// A row's filtered colour in Hunt-adjusted L*a*b*.
     color: [Vec<f32>; 3],
-    /// Strength of edges, per pixel.
+    /// A row's strength of edges.
     edges: Vec<f32>,
-    /// Strength of points, per pixel.
+    /// A row's strength of points.
     points: Vec<f32>,
+}
+
+/// Rows of values between filters.
+#[derive(Debug, Default)]
+struct Rows {
+    /// The sRGB steps of a row of an image in the tile and its border, all channels of a pixel after one another.
+    steps: Vec<u8>,
+    /// The linear red, green and blue of a row and its border.
+    linear: [Vec<f64>; 3],
+    /// A row and its border after a filter along columns, and after the smoothing one.
+    down: Vec<f32>,
+    smooth: Vec<f32>,
+    /// A row after filters along both.
+    along: Vec<f32>,
+}
+
+impl Memory {
+    fn resize(&mut self, stride: usize, rows: usize, columns: usize) {
+        for seen in [&mut self.reference, &mut self.test] {
+            for plane in &mut seen.opponent {
+                plane.resize(stride * rows, 0.0);
+            }
+            for row in seen.color.iter_mut().chain([&mut seen.edges, &mut seen.points]) {
+                row.resize(columns, 0.0);
+            }
+        }
+        for row in &mut self.rows.linear {
+            row.resize(stride, 0.0);
+        }
+        self.rows.down.resize(stride, 0.0);
+        self.rows.smooth.resize(stride, 0.0);
+        self.rows.along.resize(columns, 0.0);
+    }
+}
+
+impl Seen {
+    /// Takes a row of the tile and its border, of linear red, green and blue.
+    #[inline(always)]
+    fn take(&mut self, row: usize, stride: usize, linear: &[Vec<f64>; 3]) {
+        let [red, green, blue] = linear.each_ref().map(|values| &values[..stride]);
+        let [y, cx, cz] = self.opponent.each_mut().map(|plane| &mut plane[row * stride..][..stride]);
+        for at in 0..stride {
+            let (r, g, b) = (red[at], green[at], blue[at]);
+            let x_of_white = X_OF_WHITE[0] * r + X_OF_WHITE[1] * g + X_OF_WHITE[2] * b;
+            let y_of_white = Y_OF_WHITE[0] * r + Y_OF_WHITE[1] * g + Y_OF_WHITE[2] * b;
+            let z_of_white = Z_OF_WHITE[0] * r + Z_OF_WHITE[1] * g + Z_OF_WHITE[2] * b;
+            y[at] = (116.0 * y_of_white - 16.0) as f32;
+            cx[at] = (500.0 * (x_of_white - y_of_white)) as f32;
+            cz[at] = (200.0 * (y_of_white - z_of_white)) as f32;
+        }
+    }
 }
 
 impl Vision {
@@ -135,148 +211,159 @@ impl Vision {
             edge: filter(Form::Odd, &balanced(of_features(&|x| -x))),
             point: filter(Form::Balanced, &balanced(of_features(&|x| x * x / (sigma * sigma) - 1.0))),
             smooth: filter(Form::Even, &normalised(of_features(&|_| 1.0))),
-            linear: (0..=255u8).map(|step| srgb_to_linear(f32::from(step) / 255.0)).collect(),
+            linear: std::array::from_fn(|step| srgb_to_linear(step as f32 / 255.0)),
         }
     }
 
-    /// The errors of a tile's pixels, in a plane of its columns.
+    /// Computes the errors of a tile's pixels.
     #[inline(always)]
-    fn errors<S: Simd, const N: usize>(
+    fn compute_errors<S: Simd, const N: usize>(
         &self,
         simd: S,
         reference: &[[f32; N]],
         test: &[[f32; N]],
         width: usize,
         tile: Tile,
-    ) -> Vec<f32> {
+        memory: &mut Memory,
+    ) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let (reference, test) = (self.perceived(reference, width, tile), self.perceived(test, width, tile));
-                let mut errors = vec![0.0; reference.edges.len()];
-                for (at, value) in errors.iter_mut().enumerate() {
-                    *value = error(&reference, &test, at);
+                let (stride, columns) = (tile.stride(self.border), tile.columns());
+                memory.resize(stride, tile.rows(self.border), columns);
+                memory.errors.resize(columns * tile.height, 0.0);
+                for row in 0..tile.rows(self.border) {
+                    // A row is taken when it is first needed, and is still in a cache when it is filtered.
+                    for (image, seen) in [(reference, &mut memory.reference), (test, &mut memory.test)] {
+                        let y = (tile.top + row).saturating_sub(self.border).min(image.len() / width - 1);
+                        self.take_linear(&image[y * width..][..width], tile, &mut memory.rows);
+                        seen.take(row, stride, &memory.rows.linear);
+                    }
+                    if let Some(row) = row.checked_sub(2 * self.border) {
+                        self.see(simd, &mut memory.reference, row, stride, &mut memory.rows);
+                        self.see(simd, &mut memory.test, row, stride, &mut memory.rows);
+                        compare(&memory.reference, &memory.test, &mut memory.errors[row * columns..][..columns]);
+                    }
                 }
-                errors
-            },
-        )
-    }
-
-    /// A tile of an image after the filters of human vision.
-    #[inline(always)]
-    fn perceived<const N: usize>(&self, image: &[[f32; N]], width: usize, tile: Tile) -> Perceived {
-        let border = self.border;
-        let [y, cx, cz] = self.opponent(image, width, tile);
-        let [of_y, of_cx, of_cz] = &self.sensitivities;
-        let color = hunt_lab(
-            filtered(&y, of_y, tile, border),
-            filtered(&cx, of_cx, tile, border),
-            filtered(&cz, of_cz, tile, border),
-        );
-
-        let mut luminance = y;
-        for value in &mut luminance {
-            *value = (*value + 16.0) / 116.0;
-        }
-        let smooth = self.smooth.correlate(&luminance, tile, border, Along::Rows);
-        Perceived {
-            color,
-            edges: self.gradient(&self.edge, &luminance, &smooth, tile),
-            points: self.gradient(&self.point, &luminance, &smooth, tile),
-        }
-    }
-
-    /// The strength of what `across` detects in both directions. `smooth` is the luminance smoothed along rows.
-    #[inline(always)]
-    fn gradient(&self, across: &Filter<f32>, luminance: &[f32], smooth: &[f32], tile: Tile) -> Vec<f32> {
-        let horizontal = across.correlate(luminance, tile, self.border, Along::Rows);
-        let horizontal = self.smooth.correlate(&horizontal, tile, self.border, Along::Columns);
-        let mut strength = across.correlate(smooth, tile, self.border, Along::Columns);
-        for (strength, x) in strength.iter_mut().zip(horizontal) {
-            let y = *strength;
-            *strength = (x * x + y * y).sqrt();
-        }
-        strength
-    }
-
-    /// A tile with its border in YCxCz, a linear form of L*a*b*, in which filters may be applied.
-    #[inline(always)]
-    fn opponent<const N: usize>(&self, image: &[[f32; N]], width: usize, tile: Tile) -> [Vec<f32>; 3] {
-        let height = image.len() / width;
-        let linear = tile.bordered(
-            self.border,
-            #[inline(always)]
-            |x, y| {
-                let x = x.clamp(0, width as isize - 1) as usize;
-                let y = y.clamp(0, height as isize - 1) as usize;
-                let pixel = image[y * width + x];
-                [self.linear(pixel[0]), self.linear(pixel[1]), self.linear(pixel[2])]
             },
         );
-        let (mut y, mut cx, mut cz) = (vec![0.0; linear.len()], vec![0.0; linear.len()], vec![0.0; linear.len()]);
-        for (at, &[r, g, b]) in linear.iter().enumerate() {
-            let x_of_white = (10135552.0 * r + 8788810.0 * g + 4435075.0 * b) / 24577794.0 / WHITE[0];
-            let y_of_white = (2613072.0 * r + 8788810.0 * g + 887015.0 * b) / 12288897.0 / WHITE[1];
-            let z_of_white = (1425312.0 * r + 8788810.0 * g + 70074185.0 * b) / 73733382.0 / WHITE[2];
-            y[at] = (116.0 * y_of_white - 16.0) as f32;
-            cx[at] = (500.0 * (x_of_white - y_of_white)) as f32;
-            cz[at] = (200.0 * (y_of_white - z_of_white)) as f32;
-        }
-        [y, cx, cz]
     }
 
-    /// The linear value of an sRGB value, which is clamped to 0 to 1.
+    /// Takes the linear values of a row of an image in the tile and its border.
     #[inline(always)]
-    fn linear(&self, value: f32) -> f64 {
-        let value = value.clamp(0.0, 1.0);
-        let step = (value * 255.0 + 0.5) as usize;
-        if step as f32 / 255.0 == value { self.linear[step] } else { srgb_to_linear(value) }
+    fn take_linear<const N: usize>(&self, pixels: &[[f32; N]], tile: Tile, rows: &mut Rows) {
+        let stride = tile.stride(self.border);
+        let place = |at: usize| (tile.left + at).saturating_sub(self.border).min(pixels.len() - 1);
+        let (first, end) = (place(0), place(stride - 1) + 1);
+        let [red, green, blue] = rows.linear.each_mut().map(|row| &mut row[..stride]);
+        if Self::take_steps(pixels[first..end].as_flattened(), &mut rows.steps) {
+            for at in 0..stride {
+                let of_pixel = &rows.steps[(place(at) - first) * N..][..3];
+                red[at] = self.linear[usize::from(of_pixel[0])];
+                green[at] = self.linear[usize::from(of_pixel[1])];
+                blue[at] = self.linear[usize::from(of_pixel[2])];
+            }
+        } else {
+            for at in 0..stride {
+                let (pixel, steps) = (pixels[place(at)], &rows.steps[(place(at) - first) * N..]);
+                red[at] = self.linear_of(pixel[0], steps[0]);
+                green[at] = self.linear_of(pixel[1], steps[1]);
+                blue[at] = self.linear_of(pixel[2], steps[2]);
+            }
+        }
+    }
+
+    /// The linear value of an sRGB value, of which `step` is the nearest step.
+    #[inline(always)]
+    fn linear_of(&self, value: f32, step: u8) -> f64 {
+        if f32::from(step) / 255.0 == value { self.linear[usize::from(step)] } else { srgb_to_linear(value) }
+    }
+
+    /// Takes the nearest step of sRGB of each value, or any step of a value beyond 0 to 1. Returns false if one is no step.
+    #[inline(always)]
+    fn take_steps(values: &[f32], steps: &mut Vec<u8>) -> bool {
+        steps.resize(values.len(), 0);
+        let mut are_steps = true;
+        for (step, &value) in steps.iter_mut().zip(values) {
+            *step = (value * 255.0 + power::WHOLE).to_bits() as u8;
+            are_steps &= f32::from(*step) / 255.0 == value;
+        }
+        are_steps
+    }
+
+    /// Filters a row of the tile as human vision does.
+    #[inline(always)]
+    fn see<S: Simd>(&self, simd: S, seen: &mut Seen, row: usize, stride: usize, rows: &mut Rows) {
+        let Seen { opponent, color, edges, points } = seen;
+        let middle = (row + self.border) * stride;
+        for ((plane, sensitivity), sums) in opponent.iter().zip(&self.sensitivities).zip(color.iter_mut()) {
+            sums.fill(0.0);
+            for (weight, filter) in sensitivity {
+                filter.correlate(simd, plane, middle, stride, &mut rows.down);
+                filter.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
+                for (sum, value) in sums.iter_mut().zip(&rows.along) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        hunt_lab(color);
+        let luminance = &opponent[0];
+        self.smooth.correlate(simd, luminance, middle, stride, &mut rows.smooth);
+        for (across, strength) in [(&self.edge, edges), (&self.point, points)] {
+            across.correlate(simd, luminance, middle, stride, &mut rows.down);
+            self.smooth.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
+            across.correlate(simd, &rows.smooth, self.border, 1, strength);
+            for (x, y) in strength.iter_mut().zip(&rows.along) {
+                // Luminance is (Y + 16) / 116, and equal values have no strength.
+                *x = (*x * *x + y * y).sqrt() * (1.0 / 116.0);
+            }
+        }
     }
 }
 
-/// A channel of a tile under a sensitivity: a sum of weighted filters.
+/// Computes the errors of a row's pixels.
+///
+/// In two loops, of which each reads few enough rows for compilers to make vectors of it.
 #[inline(always)]
-fn filtered(plane: &[f32], sensitivity: &[(f32, Filter<f32>)], tile: Tile, border: usize) -> Vec<f32> {
-    let mut sums = vec![0.0; tile.columns() * tile.height];
-    for (weight, filter) in sensitivity {
-        for (sum, value) in sums.iter_mut().zip(filter.correlate_both(plane, tile, border)) {
-            *sum += weight * value;
-        }
+fn compare(reference: &Seen, test: &Seen, errors: &mut [f32]) {
+    let count = errors.len();
+    let [l, a, b] = reference.color.each_ref().map(|row| &row[..count]);
+    let [test_l, test_a, test_b] = test.color.each_ref().map(|row| &row[..count]);
+    for at in 0..count {
+        errors[at] = color_error(l[at] - test_l[at], a[at] - test_a[at], b[at] - test_b[at]);
     }
-    sums
+    let (edges, points) = (&reference.edges[..count], &reference.points[..count]);
+    let (test_edges, test_points) = (&test.edges[..count], &test.points[..count]);
+    for at in 0..count {
+        let (edge, point) = ((edges[at] - test_edges[at]).abs(), (points[at] - test_points[at]).abs());
+        // A root: the exponent of the feature difference is a half.
+        let feature_error = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
+        errors[at] = power(errors[at], 1.0 - feature_error);
+    }
 }
 
-/// The error of a pixel.
+/// The error of colours of L*a*b* that differ so much.
 #[inline(always)]
-fn error(reference: &Perceived, test: &Perceived, at: usize) -> f32 {
+fn color_error(l: f32, a: f32, b: f32) -> f32 {
     // The HyAB distance: city-block in lightness, Euclidean in the other two.
-    let l = reference.color[0][at] - test.color[0][at];
-    let a = reference.color[1][at] - test.color[1][at];
-    let b = reference.color[2][at] - test.color[2][at];
     let difference = power(l.abs() + (a * a + b * b).sqrt(), QC as f32);
     // Differences are mapped to 0 to 1, and most of the range to small ones.
     let greatest = power(GREATEST_DIFFERENCE as f32, QC as f32);
     let (knee, part) = (PC as f32 * greatest, PT as f32);
     let beyond = part + (difference - knee) / (greatest - knee) * (1.0 - part);
-    let color_error = if difference < knee { part / knee * difference } else { beyond };
-    let edge = (reference.edges[at] - test.edges[at]).abs();
-    let point = (reference.points[at] - test.points[at]).abs();
-    // A root: the exponent of the feature difference is a half.
-    let feature_error = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
-    power(color_error, 1.0 - feature_error)
+    if difference < knee { part / knee * difference } else { beyond }
 }
 
-/// Filtered colours of YCxCz as L*a*b*, with the Hunt effect: colours look more colourful where they are brighter. Planes
-/// become planes.
+/// Changes a row of filtered colours of YCxCz to L*a*b*, with the Hunt effect: colours look more colourful where they are brighter.
 #[inline(always)]
-fn hunt_lab(mut y: Vec<f32>, mut cx: Vec<f32>, mut cz: Vec<f32>) -> [Vec<f32>; 3] {
+fn hunt_lab([y, cx, cz]: &mut [Vec<f32>; 3]) {
     let count = y.len();
-    let (y_plane, cx_plane, cz_plane) = (&mut y[..count], &mut cx[..count], &mut cz[..count]);
+    let (y_row, cx_row, cz_row) = (&mut y[..count], &mut cx[..count], &mut cz[..count]);
     for at in 0..count {
-        let of_white = (y_plane[at] + 16.0) * (1.0 / 116.0);
-        let x = (of_white + cx_plane[at] * (1.0 / 500.0)) * WHITE[0] as f32;
+        let of_white = (y_row[at] + 16.0) * (1.0 / 116.0);
+        let x = (of_white + cx_row[at] * (1.0 / 500.0)) * WHITE[0] as f32;
         let y = of_white * WHITE[1] as f32;
-        let z = (of_white - cz_plane[at] * (1.0 / 200.0)) * WHITE[2] as f32;
+        let z = (of_white - cz_row[at] * (1.0 / 200.0)) * WHITE[2] as f32;
         let r = (3.241_003_3 * x - 1.537_398_9 * y - 0.498_615_86 * z).clamp(0.0, 1.0);
         let g = (-0.969_224_33 * x + 1.875_930_1 * y + 0.041554224 * z).clamp(0.0, 1.0);
         let b = (0.055639423 * x - 0.204_011_2 * y + 1.057_148_9 * z).clamp(0.0, 1.0);
@@ -285,11 +372,10 @@ fn hunt_lab(mut y: Vec<f32>, mut cx: Vec<f32>, mut cz: Vec<f32>) -> [Vec<f32>; 3
         let z = (1425312.0 / 73733382.0) * r + (8788810.0 / 73733382.0) * g + (70074185.0 / 73733382.0) * b;
         let (x, y, z) = (lab_root(x, WHITE[0]), lab_root(y, WHITE[1]), lab_root(z, WHITE[2]));
         let l = 116.0 * y - 16.0;
-        y_plane[at] = l;
-        cx_plane[at] = 0.01 * l * (500.0 * (x - y));
-        cz_plane[at] = 0.01 * l * (200.0 * (y - z));
+        y_row[at] = l;
+        cx_row[at] = 0.01 * l * (500.0 * (x - y));
+        cz_row[at] = 0.01 * l * (200.0 * (y - z));
     }
-    [y, cx, cz]
 }
 
 /// L*a*b*'s root of a value relative to that of white.

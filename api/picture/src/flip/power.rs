@@ -3,7 +3,7 @@
 use std::f32::consts::LN_2;
 
 /// A sum with this rounds a number below 2^22 to a whole one, which is in the low bits.
-const WHOLE: f32 = 12_582_912.0;
+pub(super) const WHOLE: f32 = 12_582_912.0;
 
 /// The least number whose powers are not taken for zero.
 const LEAST: f32 = 1e-30;

@@ -27,14 +27,18 @@ def floats(value: Any, name: str) -> Floats:
         try:
             value = np.from_dlpack(value)
         except (AttributeError, BufferError, RuntimeError, TypeError):
-            # NumPy before 1.23, and types that DLPack lacks.
-            value = np.asarray(value)
+            # NumPy before 1.23, and types that DLPack lacks, of which NumPy takes none of torch's.
+            value = np.asarray(value.float() if _library(value) == "torch" else value)
     return np.ascontiguousarray(value, dtype=np.float32)
+
+
+def _library(value: Any) -> str:
+    return type(value).__module__.partition(".")[0]
 
 
 def like(array: npt.NDArray[Any], example: Any) -> Any:
     """`array` as a tensor of the library that `example` is of."""
-    library = type(example).__module__.partition(".")[0]
+    library = _library(example)
     if library == "torch":
         return sys.modules["torch"].from_numpy(array)
     if library in ("jax", "jaxlib"):
