@@ -48,7 +48,7 @@ pub fn simulate_all(trace: &Trace, machines: &[Machine]) -> Vec<MachineResult> {
     let shared = Shared::new(frame);
     // Machines that share batches come one after the other.
     let mut order: Vec<_> = (0..machines.len()).collect();
-    order.sort_by_cached_key(|&index| format!("{:?}", machines[index].config.rasterizer.of_batches()));
+    order.sort_by_cached_key(|&index| format!("{:?}", machines[index].config.rasterizer.of_lists()));
     let next = AtomicUsize::new(0);
     let take = || {
         let &index = order.get(next.fetch_add(1, Ordering::Relaxed))?;

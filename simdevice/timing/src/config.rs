@@ -100,7 +100,7 @@ pub struct Rasterizer {
     pub hierarchical_depth: bool,
     /// The side of a tile in pixels: 16, or 8, 32 and 64 as an estimate.
     pub tile_side: u32,
-    /// Primitives that half of the ping-pong tile buffer holds.
+    /// Primitives that half of the tile buffers holds.
     pub batch: u32,
     /// The kind of the tile lists.
     pub lists: Lists,
@@ -124,10 +124,11 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// The rasterizer without its number of modules: what the batches of its tiles depend on. Machines that agree in it
-    /// share the work of making them, if they are simulated one soon after the other.
-    pub fn of_batches(&self) -> Self {
-        Self { modules: 0, ..self.clone() }
+    /// The rasterizer with what the pieces of its lists depend on: without its number of modules, and of its buffers only
+    /// the size of a piece. Machines that agree in it share the work of making them, if they are simulated one soon after
+    /// the other.
+    pub fn of_lists(&self) -> Self {
+        Self { modules: 0, batch: self.piece(), ..self.clone() }
     }
 
     /// The number of PEs of all modules.
@@ -209,6 +210,16 @@ impl Rasterizer {
     /// True if the units are those of 16-bit numbers.
     pub fn is_half(&self) -> bool {
         self.number_bytes <= 2
+    }
+
+    /// Primitives of a piece of the tile buffers, which is fetched at a time: eight, if half of them holds as many.
+    pub fn piece(&self) -> u32 {
+        self.batch.min(8)
+    }
+
+    /// Pieces of both halves.
+    pub fn pieces(&self) -> u32 {
+        2 * self.batch / self.piece()
     }
 
     /// Bytes of a module's two halves for primitives.

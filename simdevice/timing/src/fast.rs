@@ -1,20 +1,20 @@
-//! The fast model: closed form from event to event.
+//! The fast model: the times of each piece of a list, from its request to the end of its evaluation.
 //!
-//! With two halves of a tile buffer, a module proceeds in steps: while one batch is evaluated, the next is fetched, and
-//! the longer of the two is the step's length. Without contention for memory, `n` equal steps take `n max(c, b / h)`
-//! cycles, for `c` cycles of evaluation and `b` bytes a step at `h` bytes per cycle, so they are not simulated one by
-//! one. If the modules' ports together are wider than main memory, steps are simulated one by one: time advances to the
-//! next end of an evaluation, a fetch or a write, each at a rate that is constant in between.
+//! Each of these times is the later one of a few earlier ones, by the rules of [`crate::ring`]: a piece is requested once a
+//! place of the ring is free, comes when the port has moved its bytes, and is evaluated once it has come and the piece before
+//! has ended. So a piece takes a fixed number of operations, however many cycles it takes.
 //!
-//! All ports that move bytes have the same rate. Therefore the ends of transfers are known as they begin, on a clock
-//! that counts the bytes that each of these ports has moved: rates change the speed of that clock, and not the order of
-//! the ends. An event concerns one module, and the next ends of all modules are kept in order.
+//! Only requests and writes concern other modules, because main memory answers them in the order of their times. So the
+//! module whose next request or write is the first of all goes on by it; the rest of its state follows.
 
 use crate::config::{Config, Rasterizer};
 use crate::plan::{self, Division, Part, Rates, Task};
 use crate::raster::RasterReport;
+use crate::ring::{self, BEGIN, DISCARD, LEAVE, MainMemory, NEXT_LIST, NEXT_PIECE, REQUEST};
 use crate::work::{FrameWork, Mode, Segment};
-use std::collections::VecDeque;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::ops::Range;
 
 /// The time that a tile spends in a module, from its first evaluated primitive to its last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,516 +42,531 @@ pub fn rasterize_tiles(frame: &FrameWork, config: &Config, others_gb_s: f64) -> 
 
 /// Rasterizes the tasks of a frame, as [`rasterize_tiles`] does.
 pub fn rasterize_tasks(tasks: &[Task], config: &Config, others_gb_s: f64) -> (RasterReport, Vec<TileSpan>) {
-    rasterize_batches(&FrameBatches::new(tasks, &config.rasterizer), config, others_gb_s)
+    rasterize_lists(&FrameLists::new(tasks, &config.rasterizer), config, others_gb_s)
 }
 
-/// Rasterizes the batches of a frame, as [`rasterize_tiles`] does. They must be of the configuration's rasterizer with
-/// any number of modules.
-pub(crate) fn rasterize_batches(
-    frame: &FrameBatches,
-    config: &Config,
-    others_gb_s: f64,
-) -> (RasterReport, Vec<TileSpan>) {
+/// Rasterizes the lists of a frame, as [`rasterize_tiles`] does. They must be of the configuration's rasterizer with any
+/// number of modules.
+pub(crate) fn rasterize_lists(frame: &FrameLists, config: &Config, others_gb_s: f64) -> (RasterReport, Vec<TileSpan>) {
     let rates = Rates::new(config, others_gb_s);
-    let mut report = frame.work.clone();
-    let mut queue = frame.tiles();
-    let raster = &config.rasterizer;
-    let contended = rates.port * f64::from(raster.modules) > rates.memory;
-    let mut modules: Vec<_> = (0..raster.modules).map(|_| Module::new(rates, contended)).collect();
-    if modules.is_empty() {
-        report = RasterReport::default();
+    let mut memory = MainMemory::new(&rates);
+    let costs = Costs::new(&config.rasterizer, rates, &memory);
+    let mut tiles = frame.tiles.iter();
+    let mut modules: Vec<_> = (0..config.rasterizer.modules).map(|_| Module::new(frame, costs)).collect();
+    // The next request or write of each module, the first one on top; modules of equal times in their own order.
+    let mut next: BinaryHeap<_> =
+        modules.iter().enumerate().map(|(index, module)| Reverse(Next::new(module.next(), index))).collect();
+    while let Some(mut first) = next.peek_mut() {
+        let (now, index) = (first.0.time(), first.0.module());
+        if now == NEVER {
+            break;
+        }
+        let module = &mut modules[index];
+        module.go_on(now, &mut tiles, &mut memory);
+        *first = Reverse(Next::new(module.next(), index));
     }
-    let now = run(&mut modules, rates, &mut queue, raster, &mut report);
-    report.cycles = now;
-    // The part of the steps' time that exceeds evaluation is waiting for memory.
-    let evaluation = report.modules.total();
-    let lasted: f64 = modules.iter().map(|module| module.lasted).sum();
-    report.modules.memory = (lasted - evaluation).max(0.0);
-    report.modules.idle = now * modules.len() as f64 - report.modules.total();
-    let spans = |(module, drawn): (usize, Module)| {
-        let span = move |span: TileSpan| TileSpan { module, ..span };
-        drawn.spans.into_iter().map(span)
+    let mut report = if modules.is_empty() { RasterReport::default() } else { frame.work.clone() };
+    modules.iter().for_each(|module| module.spent.add_to(&mut report));
+    let cycles = modules.iter().map(|module| module.end.max(module.written)).max().unwrap_or(0);
+    report.cycles = cycles as f64;
+    report.modules.idle = report.cycles * modules.len() as f64 - report.modules.total();
+    let spans = |(number, module): (usize, Module)| {
+        let span = move |span: TileSpan| TileSpan { module: number, ..span };
+        module.spans.into_iter().map(span)
     };
     let spans = modules.into_iter().enumerate().flat_map(spans).collect();
     (report, spans)
 }
 
-/// The bytes after which the clock of bytes begins anew, so that its numbers keep their digits.
-const NEW_CLOCK: f64 = 65_536.0;
+/// The next time of a module, and the module's number in the lowest bits, so that one comparison orders them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Next(u64);
 
-/// Runs modules until the queue is empty, and returns the cycles. At each event the rates of all ports may change.
-fn run<'a>(
-    modules: &mut [Module<'a>],
-    rates: Rates,
-    queue: &mut impl Iterator<Item = Tile<'a>>,
-    raster: &Rasterizer,
-    report: &mut RasterReport,
-) -> f64 {
-    let mut clock = Clock::default();
-    let mut ends = Ends::new(modules.len());
-    let mut asking = 0;
-    for (index, module) in modules.iter_mut().enumerate() {
-        module.begin(&clock, queue, raster, report);
-        asking += usize::from(module.asks());
-        ends.set(index, module.ends());
+impl Next {
+    /// Bits of a module's number.
+    const BITS: u32 = 16;
+
+    fn new(time: u64, module: usize) -> Self {
+        Self(time << Self::BITS | module as u64)
     }
-    loop {
-        let share = rates.port.min(rates.memory / asking.max(1) as f64);
-        let [time, moved] = ends.first();
-        // A port moves one request in a cycle: the rest of the request's last cycle is lost.
-        let transfers = clock.now + whole_cycles((moved - clock.moved) / share);
-        let next = time.min(transfers);
-        if !next.is_finite() {
-            return clock.now;
-        }
-        if asking > 0 {
-            clock.moved += (next - clock.now) * share;
-        }
-        clock.now = next;
-        // Modules claim tiles in their own order if they end one at the same time.
-        while let Some(index) = ends.due([clock.now, clock.moved]) {
-            let module = &mut modules[index];
-            asking -= usize::from(module.asks());
-            module.end(&clock, queue, raster, report);
-            asking += usize::from(module.asks());
-            ends.set(index, module.ends());
-        }
-        if clock.moved > NEW_CLOCK {
-            for (index, module) in modules.iter_mut().enumerate() {
-                module.restart_clock(clock.moved);
-                ends.set(index, module.ends());
-            }
-            clock.moved = 0.0;
-        }
+
+    fn time(self) -> u64 {
+        self.0 >> Self::BITS
+    }
+
+    fn module(self) -> usize {
+        (self.0 & ((1 << Self::BITS) - 1)) as usize
     }
 }
 
-/// The time on two clocks.
-#[derive(Clone, Copy, Debug, Default)]
-struct Clock {
-    /// Cycles from the frame's first fetch.
-    now: f64,
-    /// The bytes that a port would have moved if it had always asked.
-    moved: f64,
-}
+/// A time that does not come.
+const NEVER: u64 = u64::MAX >> Next::BITS;
 
-/// The next ends of each module on both clocks.
-#[derive(Debug)]
-struct Ends {
-    /// The ends of each module.
-    of: Vec<[f64; 2]>,
-    /// On each clock, the finite ends and their modules, in order, with the first at the back. Equal ends are in the order
-    /// of modules.
-    queues: [Vec<(f64, usize)>; 2],
-}
-
-impl Ends {
-    fn new(count: usize) -> Self {
-        let queue = || Vec::with_capacity(count);
-        Self { of: vec![[f64::INFINITY; 2]; count], queues: [queue(), queue()] }
-    }
-
-    /// The first ends of all modules.
-    fn first(&self) -> [f64; 2] {
-        let first = |queue: &Vec<(f64, usize)>| queue.last().map_or(f64::INFINITY, |&(end, _)| end);
-        let [times, moved] = &self.queues;
-        [first(times), first(moved)]
-    }
-
-    fn set(&mut self, index: usize, ends: [f64; 2]) {
-        let before = std::mem::replace(&mut self.of[index], ends);
-        for ((queue, before), end) in self.queues.iter_mut().zip(before).zip(ends) {
-            if before == end {
-                continue;
-            }
-            if before.is_finite()
-                && let Some(place) = queue.iter().rposition(|&(_, module)| module == index)
-            {
-                queue.remove(place);
-            }
-            if end.is_finite() {
-                let place = queue.iter().position(|&(other, module)| (other, module) < (end, index));
-                queue.insert(place.unwrap_or(queue.len()), (end, index));
-            }
-        }
-    }
-
-    /// The first module, by its number, with an end that is not after `now`.
-    fn due(&self, now: [f64; 2]) -> Option<usize> {
-        let mut first = usize::MAX;
-        for (queue, now) in self.queues.iter().zip(now) {
-            for &(end, module) in queue.iter().rev() {
-                if end > now {
-                    break;
-                }
-                first = first.min(module);
-            }
-        }
-        (first < usize::MAX).then_some(first)
-    }
-}
-
-/// The least whole number of cycles that is not less than a number of at most 2^53, or infinity.
-fn whole_cycles(cycles: f64) -> f64 {
-    if cycles > (1u64 << 53) as f64 {
-        return cycles;
-    }
-    let whole = cycles as i64 as f64;
-    if whole < cycles { whole + 1.0 } else { whole }
-}
-
-/// A module's current step, except for its port's transfers.
+/// Consecutive pieces of a list of the same cost.
 #[derive(Clone, Copy, Debug)]
-struct Step {
-    /// The time at which the step begins.
-    begin: f64,
-    /// Cycles of evaluation.
-    cycles: f64,
-    /// The time at which evaluation ends; infinite while it waits for pixels to be written.
-    end: f64,
+struct PieceRun {
+    count: u32,
+    /// Cycles of the evaluation of each.
+    cycles: u32,
 }
 
-/// A transfer of a port. A port does its transfers in order.
+/// One draw in one tile, as a module sees it.
 #[derive(Clone, Copy, Debug)]
-struct Request {
-    /// Cycles until the first byte, counted from when the port begins the transfer.
-    latency: f64,
-    bytes: f64,
-    /// True for a write of pixels, which no step waits for.
-    write: bool,
-}
-
-/// The state of a port's first transfer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Transfer {
-    /// There is none, or it has not begun.
-    None,
-    /// Its first byte comes at this time.
-    Waiting(f64),
-    /// Bytes move until a port has moved this many.
-    Moving(f64),
-    /// Bytes move until this time, since nobody else takes a part of the rate.
-    Alone(f64),
-}
-
-/// A remainder of bytes that counts as zero, because of rounding.
-const SLACK: f64 = 1e-6;
-
-/// Batches of the same cost.
-#[derive(Clone, Copy, Debug)]
-struct Batches {
+struct List {
     mode: Mode,
-    count: f64,
-    cycles: f64,
-    bytes: f64,
-    /// True if they are fetched and then discarded. The fetch after them can't be made ahead.
-    wasted: bool,
-    first_of_part: bool,
+    /// The tile's column and row.
+    at: [u32; 2],
+    /// Primitives, and the pieces of all of them and of those that are evaluated.
+    primitives: u32,
+    pieces: u32,
+    needed: u32,
+    /// The first run of its pieces.
+    first_run: u32,
     first_of_tile: bool,
     last_of_tile: bool,
 }
 
-/// The batches of a frame's tasks. Rasterizers that differ in the number of modules, or in memory, share them.
+/// The lists of a frame's tasks. Rasterizers that differ in the number of modules, in the size of the buffers or in memory
+/// share them.
 #[derive(Debug, Default)]
-pub(crate) struct FrameBatches {
-    /// Place of each task, and the end of its batches in `batches`.
-    tasks: Vec<([u32; 2], usize)>,
-    batches: Vec<Batches>,
+pub(crate) struct FrameLists {
+    /// The lists of each task.
+    tiles: Vec<Range<u32>>,
+    lists: Vec<List>,
+    runs: Vec<PieceRun>,
     /// The work that does not depend on the modules that take the tasks.
     work: RasterReport,
 }
 
-/// The batches of a task, and its place.
-#[derive(Clone, Copy, Debug)]
-struct Tile<'a> {
-    at: [u32; 2],
-    batches: &'a [Batches],
-}
-
-impl FrameBatches {
-    /// The batches of tasks for a rasterizer.
+impl FrameLists {
+    /// The lists of tasks for a rasterizer.
     pub(crate) fn new(tasks: &[Task], raster: &Rasterizer) -> Self {
         let mut all = Self::default();
         for task in tasks {
-            let begin = all.batches.len();
+            let first = all.lists.len() as u32;
             for part in &task.parts {
-                part_batches(part, raster, &mut all.work, &mut all.batches);
+                all.push(part, task.at, raster);
             }
-            let of_task = &mut all.batches[begin..];
-            if let Some(first) = of_task.first_mut() {
-                first.first_of_tile = true;
+            let of_task = &mut all.lists[first as usize..];
+            if let Some(list) = of_task.first_mut() {
+                list.first_of_tile = true;
             }
-            if let Some(last) = of_task.iter_mut().rfind(|batches| !batches.wasted) {
-                last.last_of_tile = true;
+            if let Some(list) = of_task.last_mut() {
+                list.last_of_tile = true;
             }
-            all.tasks.push((task.at, all.batches.len()));
+            all.tiles.push(first..all.lists.len() as u32);
         }
         all
     }
 
-    /// The batches of each task, in order.
-    fn tiles(&self) -> impl Iterator<Item = Tile<'_>> {
-        let mut begin = 0;
-        self.tasks
-            .iter()
-            .map(move |&(at, end)| Tile { at, batches: &self.batches[std::mem::replace(&mut begin, end)..end] })
+    /// Appends the list of a draw in a tile, with equal pieces grouped.
+    fn push(&mut self, part: &Part, at: [u32; 2], raster: &Rasterizer) {
+        let piece = raster.piece();
+        let primitives = part.needed + part.left_over;
+        self.lists.push(List {
+            mode: part.mode,
+            at,
+            primitives,
+            pieces: primitives.div_ceil(piece),
+            needed: part.needed.div_ceil(piece),
+            first_run: self.runs.len() as u32,
+            first_of_tile: false,
+            last_of_tile: false,
+        });
+        let Self { runs, work, .. } = self;
+        work.pairs += f64::from(part.needed);
+        work.modules.controller += f64::from(raster.tile_overhead);
+        let (mut cycles, mut filled, mut all) = (0.0, 0, 0.0);
+        for segment in &part.segments {
+            let mut spend = |range: [u32; 2]| {
+                let [busy, dependency, controller] = cycles_of(segment, range, part.mode, raster);
+                work.modules.busy += busy;
+                work.modules.dependency += dependency;
+                work.modules.controller += controller;
+                busy + dependency + controller
+            };
+            let waiting = raster.known_waiting_cycles(part.mode, segment).unwrap_or(0);
+            let count = u64::from(segment.primitives);
+            let is_even = segment.groups.is_multiple_of(count) && waiting.is_multiple_of(count);
+            let mut at = 0;
+            while at < segment.primitives {
+                let left = segment.primitives - at;
+                let whole = left / piece;
+                if filled == 0 && whole >= 1 && is_even {
+                    let total = spend([at, at + whole * piece]);
+                    runs.push(PieceRun { count: whole, cycles: (total / f64::from(whole)) as u32 });
+                    all += total;
+                    at += whole * piece;
+                    continue;
+                }
+                let taken = left.min(piece - filled);
+                cycles += spend([at, at + taken]);
+                filled += taken;
+                at += taken;
+                if filled == piece {
+                    runs.push(PieceRun { count: 1, cycles: cycles as u32 });
+                    all += cycles;
+                    (cycles, filled) = (0.0, 0);
+                }
+            }
+            work.add_evaluations(part.mode, (segment.groups * 16) as f64);
+        }
+        let rest = ring::rest_cycles(part, (all + cycles) as u64, raster) as u32;
+        work.modules.busy += f64::from(rest);
+        if filled > 0 {
+            runs.push(PieceRun { count: 1, cycles: cycles as u32 });
+        }
+        // The last piece takes longer than those that it is grouped with.
+        if rest > 0
+            && let Some(PieceRun { count, cycles }) = runs.pop()
+        {
+            runs.extend((count > 1).then_some(PieceRun { count: count - 1, cycles }));
+            runs.push(PieceRun { count: 1, cycles: cycles + rest });
+        }
+    }
+}
+
+/// Costs of a machine that all its modules have in common.
+#[derive(Clone, Copy, Debug)]
+struct Costs<'a> {
+    raster: &'a Rasterizer,
+    rates: Rates,
+    /// Bytes of a whole piece, cycles of a port for them, and parts of a cycle of main memory.
+    piece_bytes: u32,
+    piece_cycles: u64,
+    piece_parts: u64,
+    /// The same of a tile's pixels.
+    tile_bytes: u32,
+    tile_cycles: u64,
+    tile_parts: u64,
+}
+
+impl<'a> Costs<'a> {
+    fn new(raster: &'a Rasterizer, rates: Rates, memory: &MainMemory) -> Self {
+        let (piece_bytes, tile_bytes) = (ring::piece_bytes(raster, 0, raster.piece()), raster.tile_bytes());
+        let cycles = |bytes| ring::port_cycles(bytes, &rates);
+        Self {
+            raster,
+            rates,
+            piece_bytes,
+            piece_cycles: cycles(piece_bytes),
+            piece_parts: memory.parts(piece_bytes),
+            tile_bytes,
+            tile_cycles: cycles(tile_bytes),
+            tile_parts: memory.parts(tile_bytes),
+        }
+    }
+}
+
+/// A piece that was requested and has not been left.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    list: u32,
+    /// Its number in the list.
+    number: u32,
+    /// Cycles of the port for it.
+    port_cycles: u64,
+    /// The time from which its data may come, and that from which memory has moved all of them.
+    due: u64,
+    answered: u64,
+}
+
+/// The write of a tile's pixels that memory has not been asked for.
+#[derive(Clone, Copy, Debug)]
+struct Write {
+    from: u64,
+    /// The time at which the port has moved them.
+    moved: u64,
+}
+
+/// What a module did, apart from the work that does not depend on when it is done: bytes, and cycles by activity as in
+/// [`ModuleCycles`](crate::raster::ModuleCycles).
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    bytes_in: u64,
+    bytes_wasted: u64,
+    bytes_out: u64,
+    memory: u64,
+    controller: u64,
+    mode_switch: u64,
+    switches: u64,
+}
+
+impl Spent {
+    fn add_to(&self, report: &mut RasterReport) {
+        report.bytes_in += self.bytes_in as f64;
+        report.bytes_wasted += self.bytes_wasted as f64;
+        report.bytes_out += self.bytes_out as f64;
+        report.modules.memory += self.memory as f64;
+        report.modules.controller += self.controller as f64;
+        report.modules.mode_switch += self.mode_switch as f64;
+        report.switches += self.switches as f64;
     }
 }
 
 #[derive(Debug)]
 struct Module<'a> {
-    /// The time, in cycles from the frame's first fetch.
-    now: f64,
-    /// Tiles that were claimed and whose evaluation has not begun.
-    places: VecDeque<[u32; 2]>,
-    /// Tiles whose evaluation has begun. The last may not have ended.
-    spans: Vec<TileSpan>,
-    rates: Rates,
-    contended: bool,
-    claimed: &'a [Batches],
-    current: Option<Batches>,
-    started: bool,
+    frame: &'a FrameLists,
+    costs: Costs<'a>,
+    /// Lists of the claimed tile that are not requested whole, and the next piece of the first of them.
+    claimed: Range<u32>,
+    number: u32,
+    /// The time from which the next piece may be requested.
+    ask_from: u64,
+    /// Times from which places of the ring are free.
+    free: VecDeque<u64>,
+    /// Pieces that were requested and whose evaluation is not known.
+    requested: VecDeque<Piece>,
+    /// The time at which the port has moved the last of the other pieces.
+    came: u64,
+    /// The times from and to which the port writes pixels, as far as pieces may meet them.
+    writing: VecDeque<[u64; 2]>,
+    /// The end of the last of them.
+    port_written: u64,
+    /// Writes that memory has not been asked for.
+    writes: VecDeque<Write>,
+    /// Times from which there is room for a tile's pixels: two tiles have some.
+    room: VecDeque<u64>,
+    /// The time at which the last pixels are written.
+    written: u64,
     mode: Option<Mode>,
-    step: Option<Step>,
-    port: VecDeque<Request>,
-    /// The number of writes in `port`.
-    writes: usize,
-    transfer: Transfer,
-    /// Cycles spent in steps.
-    lasted: f64,
-    /// The mode of the tile whose last batch the step evaluates, if it does.
-    tile_ended: Option<Mode>,
+    /// The run of the next piece, and those of its pieces that were evaluated.
+    run: u32,
+    of_run: u32,
+    /// The end of what is known of the evaluation.
+    end: u64,
+    /// The last list whose evaluation has ended, and its end.
+    ended: Option<(u32, u64)>,
+    spans: Vec<TileSpan>,
+    spent: Spent,
 }
 
 impl<'a> Module<'a> {
-    fn new(rates: Rates, contended: bool) -> Self {
+    fn new(frame: &'a FrameLists, costs: Costs<'a>) -> Self {
         Self {
-            now: 0.0,
-            places: VecDeque::new(),
-            spans: Vec::new(),
-            rates,
-            contended,
-            claimed: &[],
-            current: None,
-            started: false,
+            frame,
+            costs,
+            claimed: 0..0,
+            number: 0,
+            ask_from: 1,
+            free: std::iter::repeat_n(0, costs.raster.pieces() as usize).collect(),
+            requested: VecDeque::with_capacity(costs.raster.pieces() as usize),
+            came: 0,
+            writing: VecDeque::new(),
+            port_written: 0,
+            writes: VecDeque::new(),
+            room: VecDeque::from([0, 0]),
+            written: 0,
             mode: None,
-            step: None,
-            port: VecDeque::new(),
-            writes: 0,
-            transfer: Transfer::None,
-            lasted: 0.0,
-            tile_ended: None,
+            run: 0,
+            of_run: 0,
+            end: 0,
+            ended: None,
+            spans: Vec::new(),
+            spent: Spent::default(),
         }
     }
 
-    /// True if the port takes a part of the memory's rate.
-    fn asks(&self) -> bool {
-        matches!(self.transfer, Transfer::Moving(_))
+    /// The time of the next request or write.
+    fn next(&self) -> u64 {
+        self.next_request().min(self.next_write())
     }
 
-    /// True if the step has ended, with all transfers that it waits for.
-    fn is_done(&self) -> bool {
-        self.step.is_some_and(|step| step.end <= self.now && self.port.len() == self.writes)
+    /// The time of the next request; [`NEVER`] if evaluation must go on before.
+    fn next_request(&self) -> u64 {
+        self.free.front().map_or(NEVER, |&free| free.max(self.ask_from))
     }
 
-    /// The next end on each clock: of an evaluation, of a latency or of a transfer.
-    fn ends(&self) -> [f64; 2] {
-        let evaluation = match self.step {
-            Some(step) if step.end > self.now => step.end,
-            _ => f64::INFINITY,
-        };
-        match self.transfer {
-            Transfer::None => [evaluation, f64::INFINITY],
-            Transfer::Waiting(time) | Transfer::Alone(time) => [evaluation.min(time), f64::INFINITY],
-            Transfer::Moving(bytes) => [evaluation, bytes],
-        }
+    fn next_write(&self) -> u64 {
+        self.writes.front().map_or(NEVER, |write| write.from)
     }
 
-    /// Claims the first tile.
-    fn begin(
-        &mut self,
-        clock: &Clock,
-        queue: &mut impl Iterator<Item = Tile<'a>>,
-        raster: &Rasterizer,
-        report: &mut RasterReport,
-    ) {
-        self.proceed(queue, raster, report);
-        self.transfer_next(clock);
-    }
-
-    /// Takes note that the clock of bytes begins anew after `moved`.
-    fn restart_clock(&mut self, moved: f64) {
-        if let Transfer::Moving(until) = &mut self.transfer {
-            *until -= moved;
-        }
-    }
-
-    /// Ends what ends at this time, and goes on.
-    fn end(
-        &mut self,
-        clock: &Clock,
-        queue: &mut impl Iterator<Item = Tile<'a>>,
-        raster: &Rasterizer,
-        report: &mut RasterReport,
-    ) {
-        self.now = clock.now;
-        let moved = match self.transfer {
-            Transfer::None => false,
-            Transfer::Waiting(time) => {
-                if time <= clock.now {
-                    self.move_bytes(clock);
-                }
-                false
-            }
-            Transfer::Moving(until) => until <= clock.moved,
-            Transfer::Alone(time) => time <= clock.now,
-        };
-        if moved {
-            self.transfer = Transfer::None;
-            let request = self.port.pop_front();
-            self.writes -= usize::from(request.is_some_and(|request| request.write));
-        }
-        // Steps of no length are followed at once.
-        while self.is_done() {
-            self.proceed(queue, raster, report);
-        }
-        // A tile may end while the next batch is still being fetched.
-        if self.step.is_some_and(|step| step.end <= self.now) {
-            let write = self.end_tile(raster, report);
-            self.ask(write);
-        }
-        // A half of the buffer may be free now for the pixels of a tile that waits.
-        if moved
-            && self.writes <= 1
-            && let Some(step) = &mut self.step
-            && step.end == f64::INFINITY
-        {
-            step.end = self.now + step.cycles;
-        }
-        self.transfer_next(clock);
-    }
-
-    /// Begins the port's next transfer, if it has one and none has begun.
-    fn transfer_next(&mut self, clock: &Clock) {
-        if self.transfer != Transfer::None {
-            return;
-        }
-        match self.port.front() {
-            Some(request) if request.latency > 0.0 => {
-                self.transfer = Transfer::Waiting(self.now + request.latency);
-            }
-            Some(_) => self.move_bytes(clock),
-            None => {}
-        }
-    }
-
-    /// Begins to move the bytes of the port's first transfer.
-    fn move_bytes(&mut self, clock: &Clock) {
-        let bytes = self.port.front().map_or(0.0, |request| request.bytes);
-        // Every transfer takes some time.
-        let bytes = (bytes - SLACK).max(SLACK);
-        self.transfer = if self.contended {
-            Transfer::Moving(clock.moved + bytes)
+    /// Makes the next request or write, whose time it is.
+    fn go_on(&mut self, now: u64, tiles: &mut impl Iterator<Item = &'a Range<u32>>, memory: &mut MainMemory) {
+        if self.next_write() <= now {
+            self.write(memory);
+        } else if self.claim(tiles) {
+            self.request(now, memory);
         } else {
-            Transfer::Alone(self.now + (bytes / self.rates.port).ceil())
-        };
-    }
-
-    /// Puts a request, if there is one, into the port's queue.
-    fn ask(&mut self, request: Option<Request>) {
-        self.writes += usize::from(request.is_some_and(|request| request.write));
-        if let Some(request) = request {
-            self.port.push_back(request);
+            // No work is left.
+            self.ask_from = NEVER;
         }
+        while self.evaluate() {}
+        self.skip_what_ended();
     }
 
-    /// Begins a step. The first of a tile waits until a half of the buffer is free for its pixels: two halves hold
-    /// pixels.
-    fn begin_step(&mut self, cycles: f64, first_of_tile: bool) {
-        let is_blocked = first_of_tile && cycles > 0.0 && self.writes > 1;
-        let end = if is_blocked { f64::INFINITY } else { self.now + cycles };
-        self.step = Some(Step { begin: self.now, cycles, end });
-    }
-
-    /// Goes on to the next step, or to a run of equal steps, if there is any.
-    fn proceed(&mut self, queue: &mut impl Iterator<Item = Tile<'a>>, raster: &Rasterizer, report: &mut RasterReport) {
-        if let Some(step) = self.step.take() {
-            self.lasted += self.now - step.begin;
-        }
-        let write = self.end_tile(raster, report);
-        if let Some(current) = &mut self.current
-            && current.count > 1.0
+    /// Claims a tile if no list is left. Returns false if there is none.
+    fn claim(&mut self, tiles: &mut impl Iterator<Item = &'a Range<u32>>) -> bool {
+        if self.claimed.is_empty()
+            && let Some(tile) = tiles.next()
         {
-            let Batches { count, cycles, bytes, .. } = *current;
-            if self.contended || write.is_some() || !self.port.is_empty() {
-                current.count -= 1.0;
-                self.ask(Some(Request { latency: 0.0, bytes, write: false }));
-                self.ask(write);
-                self.begin_step(cycles, false);
-                return;
-            }
-            // A run of equal steps, in closed form.
-            current.count = 1.0;
-            let each = cycles.max(((bytes - SLACK) / self.rates.port).ceil());
-            self.begin_step((count - 1.0) * each, false);
+            self.claimed = tile.clone();
+        }
+        !self.claimed.is_empty()
+    }
+
+    /// Requests a piece.
+    fn request(&mut self, now: u64, memory: &mut MainMemory) {
+        let (list, number) = (self.claimed.start, self.number);
+        let &List { primitives, pieces, needed, .. } = &self.frame.lists[list as usize];
+        let Costs { raster, rates, mut piece_bytes, piece_cycles: mut port_cycles, piece_parts: mut parts, .. } =
+            self.costs;
+        let is_last = number + 1 == pieces;
+        if is_last {
+            piece_bytes = ring::piece_bytes(raster, number, primitives);
+            port_cycles = ring::port_cycles(piece_bytes, &rates);
+            parts = memory.parts(piece_bytes);
+        }
+        self.spent.bytes_in += u64::from(piece_bytes);
+        if number >= needed {
+            self.spent.bytes_wasted += u64::from(piece_bytes);
+        }
+        let latency = REQUEST + u64::from(rates.latency);
+        let answered = memory.serve(now, parts) + latency;
+        self.requested.push_back(Piece { list, number, port_cycles, due: now + latency, answered });
+        self.free.pop_front();
+        self.number += 1;
+        self.ask_from = now + NEXT_PIECE;
+        if is_last {
+            self.next_list(now);
+        }
+    }
+
+    /// Goes on with the next list after a time.
+    fn next_list(&mut self, now: u64) {
+        self.claimed.start += 1;
+        self.number = 0;
+        self.ask_from = self.ask_from.max(now + NEXT_LIST);
+    }
+
+    /// Leaves out the pieces of a list that ends before they are requested.
+    fn skip_what_ended(&mut self) {
+        if let Some((list, end)) = self.ended
+            && list == self.claimed.start
+            && !self.claimed.is_empty()
+            && self.next_request() >= end
+        {
+            self.next_list(end);
+        }
+    }
+
+    /// Asks memory for the next write of pixels.
+    fn write(&mut self, memory: &mut MainMemory) {
+        if let Some(Write { from, moved }) = self.writes.pop_front() {
+            self.written = memory.serve(from, self.costs.tile_parts).max(moved);
+            self.room.push_back(self.written);
+        }
+    }
+
+    /// Evaluates the next piece that was requested. Returns false if there is none, or if it waits for a write.
+    fn evaluate(&mut self) -> bool {
+        let Some(&piece) = self.requested.front() else { return false };
+        let list = &self.frame.lists[piece.list as usize];
+        let is_first = piece.number == 0;
+        let mut room = 0;
+        if is_first && list.first_of_tile {
+            let Some(from) = self.room.pop_front() else { return false };
+            room = from;
+        }
+        self.requested.pop_front();
+        let came = self.receive(piece);
+        if piece.number >= list.needed {
+            self.discard(came);
+            return true;
+        }
+        if is_first {
+            self.begin_list(list);
+        }
+        let begin = self.end.max(came).max(room);
+        if is_first && list.first_of_tile {
+            let (module, at, begin) = (0, list.at, begin as f64);
+            self.spans.push(TileSpan { module, at, begin, end: begin });
+        }
+        let waited = begin - self.end;
+        let mut controller = 0;
+        if is_first {
+            controller = u64::from(self.costs.raster.tile_overhead);
+        } else if waited > 0 {
+            controller = BEGIN;
+            self.spent.controller += BEGIN;
+        }
+        self.spent.memory += waited;
+        self.end = begin + controller + u64::from(self.next_cycles());
+        self.free.push_back(self.end);
+        if piece.number + 1 == list.needed {
+            self.end_list(piece.list);
+        }
+        true
+    }
+
+    /// Discards a piece of a list that has ended, once it has come.
+    fn discard(&mut self, came: u64) {
+        let left = came.max(self.end);
+        self.spent.memory += left - self.end;
+        self.spent.controller += DISCARD;
+        self.end = left + DISCARD;
+        self.free.push_back(left);
+    }
+
+    /// Begins a list: of another mode once the pipeline has drained.
+    fn begin_list(&mut self, list: &List) {
+        self.run = list.first_run;
+        self.of_run = 0;
+        if let Some(before) = self.mode.filter(|&mode| mode != list.mode) {
+            let raster = self.costs.raster;
+            let switch = u64::from(raster.latency(before) + raster.mode_switch);
+            self.spent.mode_switch += switch;
+            self.spent.switches += 1;
+            self.end += switch;
+        }
+        self.mode = Some(list.mode);
+    }
+
+    /// Moves a piece through the port, around writes of pixels. Returns the time at which it has come.
+    fn receive(&mut self, piece: Piece) -> u64 {
+        let mut at = piece.due.max(self.came);
+        let mut left = piece.port_cycles;
+        while let Some(&[from, to]) = self.writing.front()
+            && from < at + left
+        {
+            left -= from.saturating_sub(at);
+            at = at.max(to);
+            self.writing.pop_front();
+        }
+        self.came = (at + left).max(piece.answered);
+        self.came
+    }
+
+    /// Cycles of the next piece of the list in evaluation.
+    fn next_cycles(&mut self) -> u32 {
+        let PieceRun { count, cycles } = self.frame.runs[self.run as usize];
+        self.of_run += 1;
+        if self.of_run >= count {
+            self.run += 1;
+            self.of_run = 0;
+        }
+        cycles
+    }
+
+    /// Ends a list, and its tile if it is the last of it.
+    fn end_list(&mut self, number: u32) {
+        self.ended = Some((number, self.end));
+        let list = &self.frame.lists[number as usize];
+        if !list.last_of_tile {
             return;
         }
-        if self.claimed.is_empty()
-            && let Some(tile) = queue.next()
-        {
-            self.places.push_back(tile.at);
-            self.claimed = tile.batches;
-        }
-        let next = self.claim(raster, report);
-        let before = std::mem::replace(&mut self.current, next);
-        if let Some(next) = next {
-            let cold = before.map_or(!self.started, |batch| batch.wasted);
-            let latency = if cold { f64::from(self.rates.latency) } else { 0.0 };
-            self.ask(Some(Request { latency, bytes: next.bytes, write: false }));
-        }
-        self.started = true;
-        self.ask(write);
-        self.tile_ended = before.filter(|batch| batch.last_of_tile).map(|batch| batch.mode);
-        if before.is_some_and(|batch| batch.first_of_tile)
-            && let Some(at) = self.places.pop_front()
-        {
-            let (module, begin, end) = (0, self.now, self.now);
-            self.spans.push(TileSpan { module, at, begin, end });
-        }
-        if before.is_some() || next.is_some() {
-            let cycles = before.map_or(0.0, |batch| batch.cycles);
-            self.begin_step(cycles, before.is_some_and(|batch| batch.first_of_tile));
-        }
-    }
-
-    /// The write of a tile whose last batch has just been evaluated.
-    fn end_tile(&mut self, raster: &Rasterizer, report: &mut RasterReport) -> Option<Request> {
-        let mode = self.tile_ended.take()?;
         if let Some(span) = self.spans.last_mut() {
-            span.end = self.now;
+            span.end = self.end as f64;
         }
-        let bytes = f64::from(raster.tile_bytes());
-        report.bytes_out += bytes;
+        let Costs { raster, tile_bytes, tile_cycles, .. } = self.costs;
+        self.spent.bytes_out += u64::from(tile_bytes);
         // The last pixels must leave the pipeline before they are written.
-        let latency = f64::from(raster.latency(mode));
-        Some(Request { latency, bytes, write: true })
-    }
-
-    /// The next batches of the claimed tile.
-    fn claim(&mut self, raster: &Rasterizer, report: &mut RasterReport) -> Option<Batches> {
-        let (&first, rest) = self.claimed.split_first()?;
-        self.claimed = rest;
-        let mut next = first;
-        if next.first_of_part {
-            if let Some(before) = self.mode.filter(|&mode| mode != next.mode) {
-                let switch = f64::from(raster.latency(before) + raster.mode_switch);
-                report.modules.mode_switch += switch;
-                report.switches += 1.0;
-                next.cycles += switch;
-            }
-            self.mode = Some(next.mode);
-        }
-        Some(next)
+        let complete = self.end + u64::from(raster.latency(list.mode)) + LEAVE;
+        let from = complete.max(self.port_written);
+        let moved = from + tile_cycles;
+        self.port_written = moved;
+        self.writing.push_back([from, moved]);
+        self.writes.push_back(Write { from, moved });
     }
 }
 
@@ -575,96 +590,11 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
     [busy, dependency, controller]
 }
 
-/// The batches of one draw in a tile, with equal ones grouped.
-fn part_batches(part: &Part, raster: &Rasterizer, report: &mut RasterReport, out: &mut Vec<Batches>) {
-    let first = out.len();
-    let size = raster.batch;
-    let bytes_each = f64::from(raster.primitive_bytes());
-    let mut listed = part.needed + part.left_over;
-    report.pairs += f64::from(part.needed);
-    let mut fetched = 0.0;
-    let mut push = |count: u32, cycles: f64| {
-        let primitives = listed.min(size * count);
-        listed -= primitives;
-        let bytes = f64::from(primitives) * bytes_each;
-        fetched += bytes;
-        out.push(Batches {
-            mode: part.mode,
-            count: f64::from(count),
-            cycles,
-            bytes: bytes / f64::from(count),
-            wasted: false,
-            first_of_part: false,
-            first_of_tile: false,
-            last_of_tile: false,
-        });
-    };
-    let mut cycles = f64::from(raster.tile_overhead);
-    report.modules.controller += cycles;
-    let mut filled = 0;
-    // A draw's first batch is not grouped: it takes longer, and may have to wait for pixels to be written.
-    let mut alone = true;
-    for segment in &part.segments {
-        let mut spend = |range: [u32; 2]| {
-            let [busy, dependency, controller] = cycles_of(segment, range, part.mode, raster);
-            report.modules.busy += busy;
-            report.modules.dependency += dependency;
-            report.modules.controller += controller;
-            busy + dependency + controller
-        };
-        let waiting = raster.known_waiting_cycles(part.mode, segment).unwrap_or(0);
-        let primitives = u64::from(segment.primitives);
-        let even = segment.groups.is_multiple_of(primitives) && waiting.is_multiple_of(primitives);
-        let mut at = 0;
-        while at < segment.primitives {
-            let left = segment.primitives - at;
-            let whole = left / size;
-            // The last batch of a list may be partly filled.
-            if filled == 0 && !alone && whole >= 1 && even {
-                let total = spend([at, at + whole * size]);
-                push(whole, total / f64::from(whole));
-                at += whole * size;
-                continue;
-            }
-            let taken = left.min(size - filled);
-            cycles += spend([at, at + taken]);
-            filled += taken;
-            at += taken;
-            if filled == size {
-                push(1, cycles);
-                (cycles, filled, alone) = (0.0, 0, false);
-            }
-        }
-        report.add_evaluations(part.mode, (segment.groups * 16) as f64);
-    }
-    if filled > 0 {
-        push(1, cycles);
-    }
-    report.bytes_in += fetched;
-    if listed > 0 {
-        let bytes = f64::from(listed.min(size)) * bytes_each;
-        report.bytes_in += bytes;
-        report.bytes_wasted += bytes;
-        out.push(Batches {
-            mode: part.mode,
-            count: 1.0,
-            cycles: 0.0,
-            bytes,
-            wasted: true,
-            first_of_part: false,
-            first_of_tile: false,
-            last_of_tile: false,
-        });
-    }
-    if let Some(batches) = out.get_mut(first) {
-        batches.first_of_part = true;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::simulate::even_frame;
+    use crate::work::{DrawWork, TileWork};
     use std::collections::HashSet;
 
     #[test]
@@ -683,46 +613,47 @@ mod tests {
         assert!(in_tiles >= modules.busy && in_tiles <= modules.total() + 1e-6);
         assert!(spans.iter().all(|span| span.end <= report.cycles + 1e-6));
     }
-    #[test]
-    fn ends_come_in_the_order_of_time_and_then_of_modules() {
-        for count in [1, 2, 3, 15, 16, 33] {
-            let mut ends = Ends::new(count);
-            let mut all = vec![[f64::INFINITY; 2]; count];
-            assert_eq!(ends.due([1e300; 2]), None);
-            for step in 0..2000_usize {
-                // Multiplication by an odd number scatters the steps.
-                let scattered = step.wrapping_mul(2_654_435_761) >> 7;
-                let index = scattered % count;
-                let end = |shift: usize| match scattered >> shift & 31 {
-                    0..8 => f64::INFINITY,
-                    number => number as f64,
-                };
-                all[index] = [end(8), end(13)];
-                ends.set(index, all[index]);
-                let least = |clock: usize| {
-                    let of = all.iter().map(|ends| ends[clock]);
-                    of.fold(f64::INFINITY, f64::min)
-                };
-                assert_eq!(ends.first(), [least(0), least(1)]);
-                let now = [(step % 29) as f64, (step % 31) as f64];
-                let is_due = |ends: &[f64; 2]| ends[0] <= now[0] || ends[1] <= now[1];
-                assert_eq!(ends.due(now), all.iter().position(is_due));
-            }
-        }
+    /// The cycles of one module for lists of some Gaussians, each in a tile of its own of which all pixels are evaluated.
+    fn cycles(lists: &[u32], settings: &[&str]) -> f64 {
+        let settings: Vec<_> = ["modules=1"].iter().chain(settings).map(|&setting| setting.to_owned()).collect();
+        let config = Config::preset("paper-15x16", &settings).unwrap();
+        let tiles = lists.iter().enumerate().map(|(x, &listed)| TileWork::open([x as u32, 0], listed));
+        let draw = DrawWork { tiles: tiles.collect(), ..DrawWork::default() };
+        rasterize(&FrameWork { size: [16, 16], draws: vec![draw], ..FrameWork::default() }, &config, 0.0).cycles
     }
 
     #[test]
-    fn a_new_clock_of_bytes_changes_no_cycle() {
-        // Transfers of this size begin the clock anew many times; 15 ports ask for more than there is.
+    fn a_list_takes_its_latency_its_primitives_and_its_pixels() {
+        // A request in cycle 1, two registers and 100 ns; eight records of 40 bytes by 16; the controller's cycle; 16 cycles a
+        // primitive; the pipeline and two cycles; 3072 bytes of pixels by 16.
+        let first = 1 + 2 + 100 + 20 + 1;
+        assert_eq!(cycles(&[24], &[]), f64::from(first + 24 * 16 + 34 + 2 + 192));
+        // Pixels are written while the next tile is evaluated, whose pieces have come.
+        assert_eq!(cycles(&[24, 24], &[]), f64::from(first + 24 * 16 + 1 + 24 * 16 + 34 + 2 + 192));
+        // The third tile of one Gaussian waits for the pixels of the first to be written, by a port of half the width.
+        let narrow = ["port_bytes_per_cycle=8"];
+        let written = |count: u32| f64::from(1 + 2 + 100 + 6 + 1 + 16 + 34 + 2 + count * 384);
+        assert_eq!([cycles(&[1], &narrow), cycles(&[1; 2], &narrow)], [written(1), written(2)]);
+        assert_eq!(cycles(&[1; 3], &narrow), written(3));
+    }
+
+    #[test]
+    fn a_small_ring_does_not_hide_the_latency() {
+        // Eight pieces of 128 cycles hide 100 ns, and not 2000: the ring goes round once in the latency and one of them.
+        let [long, short] = [8000, 800].map(|count| cycles(&[count], &["memory.latency_ns=2000"]));
+        let each = (2.0 + 2000.0 + 20.0 + 1.0 + 128.0) / 64.0;
+        assert!(((long - short) / 7200.0 / each - 1.0).abs() < 0.01, "{} {each}", (long - short) / 7200.0);
+        let [long, short] = [8000, 800].map(|count| cycles(&[count], &[]));
+        assert_eq!(long - short, 7200.0 * 16.0);
+    }
+
+    #[test]
+    fn main_memory_limits_modules_whose_ports_are_wider() {
+        // 15 ports ask for more than 18 bytes a cycle.
         let settings = ["bandwidth_gb_s=20", "batch=64"].map(str::to_owned);
         let config = Config::preset("paper-15x16", &settings).unwrap();
-        let short = rasterize(&even_frame([240, 16], 15 * 640, 0.3), &config, 0.0);
-        let long = rasterize(&even_frame([240, 16], 15 * 640_000, 0.3), &config, 0.0);
-        assert!(long.bytes_in / 15.0 > 100.0 * NEW_CLOCK);
-        // The port of each module moves a fifteenth of 18 bytes a cycle.
-        let cycles = |report: &RasterReport| report.bytes_in / 18.0;
-        let rest = long.cycles - short.cycles - (cycles(&long) - cycles(&short));
-        // Each transfer may lose a part of its last cycle.
-        assert!((0.0..=9990.0).contains(&rest), "{rest}");
+        let report = rasterize(&even_frame([240, 16], 15 * 64_000, 0.3), &config, 0.0);
+        let least = (report.bytes_in + report.bytes_out) / 18.0;
+        assert!(report.cycles >= least && report.cycles < 1.01 * least, "{} {least}", report.cycles);
     }
 }

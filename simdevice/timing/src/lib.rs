@@ -14,6 +14,7 @@ pub mod fast;
 pub mod pe;
 pub mod plan;
 pub mod raster;
+pub mod ring;
 pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;

@@ -1,5 +1,5 @@
 //! The order in which rasterizer modules take the tiles of a frame: every draw of a tile before the next tile, as the
-//! device does. Both models of the rasterizer use this order; apart from it they share only the cost of one primitive.
+//! device does. Both models of the rasterizer use this order; apart from it they share only the cost of one primitive and [`crate::ring`].
 
 use crate::config::{Config, Rasterizer};
 use crate::work::{DrawWork, FrameWork, Mode, Saturation, Segment, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
@@ -171,7 +171,7 @@ pub struct Rates {
     pub port: f64,
     /// Bytes per cycle of main memory, for all modules together.
     pub memory: f64,
-    /// Cycles from a request to its first byte, for a request that can't be made ahead.
+    /// Cycles from a request to its first byte.
     pub latency: u32,
 }
 

@@ -12,7 +12,8 @@ pub struct ModuleCycles {
     pub dependency: f64,
     /// The PEs wait for primitives from memory, or for the pixels of the tile before the last to be written.
     pub memory: f64,
-    /// The controller begins a tile, or checks primitives that reach no unfinished pixel.
+    /// The controller begins a tile or a piece of its list that was waited for, discards a piece of a list that has ended, or
+    /// checks primitives that reach no unfinished pixel.
     pub controller: f64,
     /// The pipeline drains and is reconfigured.
     pub mode_switch: f64,

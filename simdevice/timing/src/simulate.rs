@@ -2,7 +2,7 @@
 
 use crate::config::{Config, Lists, Rasterizer, Records};
 use crate::energy::{self, Changed, Energy, Power};
-use crate::fast::{self, FrameBatches};
+use crate::fast::{self, FrameLists};
 use crate::plan::{self, Division, Task};
 use crate::raster::RasterReport;
 use crate::schedule::{self, Policy, Span, Stages};
@@ -108,27 +108,27 @@ struct Listed<'a> {
 struct RasterizerWork {
     tasks: Vec<Task>,
     changed: Changed,
-    /// The batches for rasterizers that were asked for last, by what they depend on.
-    batches: Mutex<VecDeque<(Rasterizer, Arc<FrameBatches>)>>,
+    /// The lists for rasterizers that were asked for last, by what they depend on.
+    lists: Mutex<VecDeque<(Rasterizer, Arc<FrameLists>)>>,
 }
 
-/// The greatest number of rasterizers whose batches are kept.
-const KEPT_BATCHES: usize = 16;
+/// The greatest number of rasterizers whose lists are kept.
+const KEPT_LISTS: usize = 16;
 
 impl RasterizerWork {
-    /// The batches for a rasterizer, made when it is first asked for.
-    fn batches(&self, raster: &Rasterizer) -> Arc<FrameBatches> {
-        let key = raster.of_batches();
-        let mut known = self.batches.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, batches)) = known.iter().find(|(of, _)| *of == key) {
-            return Arc::clone(batches);
+    /// The lists for a rasterizer, made when it is first asked for.
+    fn lists(&self, raster: &Rasterizer) -> Arc<FrameLists> {
+        let key = raster.of_lists();
+        let mut known = self.lists.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, lists)) = known.iter().find(|(of, _)| *of == key) {
+            return Arc::clone(lists);
         }
-        let batches = Arc::new(FrameBatches::new(&self.tasks, &key));
-        if known.len() == KEPT_BATCHES {
+        let lists = Arc::new(FrameLists::new(&self.tasks, &key));
+        if known.len() == KEPT_LISTS {
             known.pop_front();
         }
-        known.push_back((key, Arc::clone(&batches)));
-        batches
+        known.push_back((key, Arc::clone(&lists)));
+        lists
     }
 }
 
@@ -159,7 +159,7 @@ impl<'a> Listed<'a> {
         let work = Arc::new(RasterizerWork {
             tasks: plan::tasks(&self.frame, &division),
             changed: changed(&self.frame, &division),
-            batches: Mutex::default(),
+            lists: Mutex::default(),
         });
         known.push((division, Arc::clone(&work)));
         work
@@ -167,8 +167,8 @@ impl<'a> Listed<'a> {
 
     /// Rasterizes while others move `others_gb_s` to and from main memory.
     fn rasterize(&self, config: &Config, others_gb_s: f64) -> RasterReport {
-        let batches = self.rasterizer_work(&config.rasterizer).batches(&config.rasterizer);
-        fast::rasterize_batches(&batches, config, others_gb_s).0
+        let lists = self.rasterizer_work(&config.rasterizer).lists(&config.rasterizer);
+        fast::rasterize_lists(&lists, config, others_gb_s).0
     }
 }
 

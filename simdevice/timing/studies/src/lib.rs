@@ -10,7 +10,6 @@ pub mod module;
 pub mod number;
 pub mod paper;
 pub mod pe;
-pub mod ring;
 pub mod rivals;
 pub mod rtl;
 pub mod rtl_cycles;

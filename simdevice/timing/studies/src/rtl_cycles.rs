@@ -1,10 +1,10 @@
-//! Cycles of the module in SystemVerilog compared with those of the stepped model, for the same lists.
+//! Cycles of the module in SystemVerilog compared with those of the models, for the same lists.
 
 use crate::exponential::Exponential;
 use crate::module::{Drawn, Groups, List, Module};
 use crate::number::Format;
 use crate::rtl::{Memory, ModuleBench, Rasterized};
-use crate::{ring, stepped};
+use crate::stepped;
 use std::io::{Error, Result};
 use timing::FrameWork;
 use timing::config::{Config, ConfigError};
@@ -95,12 +95,12 @@ impl Cycles {
         fast::rasterize(&frame, &config, 0.0).cycles / f64::from(self.rasterized.cycles) - 1.0
     }
 
-    /// Cycles of the module, and of the model that has its ring of pieces.
-    pub fn with_ring(&self) -> [f64; 2] {
-        [f64::from(self.rasterized.cycles), ring::rasterize(&self.frame, &self.config)]
+    /// Cycles of the module, and of the model that simulations use.
+    pub fn with_fast(&self) -> [f64; 2] {
+        [f64::from(self.rasterized.cycles), fast::rasterize(&self.frame, &self.config, 0.0).cycles]
     }
 
-    /// Cycles of the module and of the model, by cause: all, evaluating a pixel for each PE, waiting for a
+    /// Cycles of the module and of the stepped model, by cause: all, evaluating a pixel for each PE, waiting for a
     /// transmittance, for memory, for the controller, changing modes.
     pub fn by_cause(&self) -> [[f64; 2]; 6] {
         let modules = &self.stepped.modules;

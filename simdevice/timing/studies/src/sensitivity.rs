@@ -5,8 +5,10 @@ use crate::chart::{self, Chart, Corner, Curve, Mark};
 use crate::{rivals, scene, simt};
 use std::fmt::Write;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
+use timing::plan::Rates;
+use timing::ring;
 use timing::simulate::{Simulation, simulate};
-use timing::work::FrameWork;
+use timing::work::{FrameWork, Mode, TILE_GROUPS};
 
 /// The generated scene: pixels, Gaussians and seed.
 const SIZE: [u32; 2] = [640, 360];
@@ -144,7 +146,7 @@ fn modules(frame: &FrameWork, paper: &Config) -> Result<Sweep, ConfigError> {
     let why = format!(
         "A busy module moves {each:.1} GB/s: {} bytes a primitive of 16 cycles, and the pixels of a tile for the {:.0} \
          primitives that it needs on average here. Streams get {:.1} GB/s of main memory, but stages 1 and 2 of the next \
-         frame want {:.1} of it meanwhile, and fair arbitration leaves the rasterizer {left:.1}: enough for {:.0} modules, \
+         frame want {:.1} of it meanwhile, and the arbiter leaves the rasterizer {left:.1}: enough for {:.0} modules, \
          or {:.0} PEs, beyond which they wait. Alone it would be {:.0} PEs; longer lists would need fewer bytes for pixels. \
          The whole frame stops gaining much earlier: stages 1 and 2 take {before:.2} ms on the shader cores whatever the \
          rasterizer does, and from {} PEs on it is faster than they are.",
@@ -187,14 +189,20 @@ fn batch(frame: &FrameWork, paper: &Config) -> Result<Sweep, ConfigError> {
     let raster = &paper.rasterizer;
     let wasted = |point: &Point| 100.0 * point.simulation.raster.bytes_wasted / point.simulation.raster.bytes_in;
     let (first, last) = (&points[0], &points[points.len() - 1]);
+    let rates = Rates::new(paper, 0.0);
+    let piece_bytes = ring::piece_bytes(raster, 0, raster.piece());
+    let comes = ring::REQUEST + u64::from(rates.latency) + ring::port_cycles(piece_bytes, &rates);
+    let cycles = raster.busy_cycles(Mode::Gaussian, TILE_GROUPS.into());
     let why = format!(
-        "Half of the buffer holds so many primitives of {} bytes; the other half is being filled meanwhile. A batch is \
-         fetched in {:.2} cycles a primitive and evaluated in 16, so that even one primitive a half hides its own fetch: \
-         the buffer's size buys no speed here, because the controller knows a tile's list and asks ahead. What grows with \
-         it is what was fetched for a tile that had ended: {:.1} % of the bytes with {} a half, {:.1} % with {}. A \
-         narrower port moves the knee: the fetch shows where a primitive's bytes take more cycles than its pixels.",
+        "Half of the buffer holds so many primitives of {} bytes. Both halves are a ring of pieces of {} primitives, or of half \
+         of the buffer if it is less. A piece that is requested when another is left comes {comes} cycles later, in which the PEs \
+         evaluate {:.1} primitives of {cycles} cycles. With so many beside the piece that is evaluated, the latency of memory is \
+         hidden, and more buys no speed, because the controller knows a tile's list and asks ahead. What grows with \
+         it is what was fetched for a tile that had ended, which costs time where memory is the limit: {:.1} % of the bytes \
+         with {} a half, {:.1} % with {}.",
         raster.primitive_bytes(),
-        f64::from(raster.primitive_bytes()) / raster.port_bytes_per_cycle,
+        raster.piece(),
+        comes as f64 / cycles as f64,
         wasted(first),
         first.name,
         wasted(last),
@@ -218,7 +226,7 @@ fn bandwidth(frame: &FrameWork, paper: &Config) -> Result<Sweep, ConfigError> {
     let why = format!(
         "Fifteen busy modules move {wanted:.1} GB/s, primitives and pixels. With {:.0} % of the peak for streams, {:.0} GB/s \
          would feed them alone. Stages 1 and 2 of the next frame move their bytes meanwhile, as fast as they get them ({:.1} \
-         GB/s at {} GB/s), and fair arbitration leaves the rasterizer half: that takes {:.0} GB/s. The whole frame goes on \
+         GB/s at {} GB/s), and the arbiter leaves the rasterizer half: that takes {:.0} GB/s. The whole frame goes on \
          gaining beyond it, since sorting is limited by memory.",
         100.0 * paper.memory.efficiency,
         wanted / paper.memory.efficiency,

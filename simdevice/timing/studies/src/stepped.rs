@@ -1,346 +1,336 @@
-//! The cycle-stepped model: every module's fetch engine, buffers and PEs, one clock cycle at a time. It is slow and
+//! The cycle-stepped model: every module's requests, port, ring of pieces and PEs, one clock cycle at a time. It is slow and
 //! simple, and the reference for the fast model.
 
 use std::collections::VecDeque;
 use timing::config::{Config, Rasterizer};
 use timing::plan::{self, Division, Part, Rates, Task};
 use timing::raster::{ModuleCycles, RasterReport};
+use timing::ring::{self, BEGIN, DISCARD, LEAVE, MainMemory, NEXT_LIST, NEXT_PIECE, REQUEST};
 use timing::work::{FrameWork, Mode};
 
 /// Rasterizes a frame, cycle by cycle, while other units move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
     let tasks = plan::tasks(frame, &Division::of(&config.rasterizer));
     let rates = Rates::new(config, others_gb_s);
-    let mut report = RasterReport::default();
-    let mut queue = tasks.iter();
+    let mut shared = SharedState {
+        raster: &config.rasterizer,
+        rates,
+        memory: MainMemory::new(&rates),
+        tiles: tasks.iter().map(|task| lists(task, &config.rasterizer)).collect(),
+        report: RasterReport::default(),
+    };
+    for part in tasks.iter().flat_map(|task| &task.parts) {
+        shared.report.pairs += f64::from(part.needed);
+        let groups: u64 = part.segments.iter().map(|segment| segment.groups).sum();
+        shared.report.add_evaluations(part.mode, (groups * 16) as f64);
+    }
+    if config.rasterizer.modules == 0 {
+        return RasterReport::default();
+    }
     let mut modules: Vec<_> = (0..config.rasterizer.modules).map(|_| Module::default()).collect();
-    let mut cycles = 0u64;
-    while !tasks.is_empty() {
+    let mut cycles = 0;
+    for now in 0.. {
         for module in &mut modules {
-            module.claim(&mut queue, config, rates.latency, &mut report);
-            let write = module.ended.take();
-            module.port.extend(write);
+            while module.acts(now, &mut shared) {}
         }
-        if modules.iter().all(Module::is_done) {
+        if modules.iter().all(|module| module.is_done(now, &shared)) {
             break;
         }
         for module in &mut modules {
-            module.step(config, &mut report.modules);
+            cycles = cycles.max(now + u64::from(!module.is_idle(now)));
+            module.move_bytes(now, rates.port);
         }
-        // The arbiter gives every requesting port the same share.
-        let asking = modules.iter().filter(|module| module.wants_memory()).count();
-        let share = rates.port.min(rates.memory / asking.max(1) as f64);
-        for module in &mut modules {
-            module.transfer(share);
-        }
-        cycles += 1;
     }
+    let mut report = shared.report;
     report.cycles = cycles as f64;
-    report.switches = modules.iter().map(|module| f64::from(module.switches)).sum();
     report.modules.idle = report.cycles * modules.len() as f64 - report.modules.total();
     report
 }
 
-/// A batch of primitives in half of a tile buffer.
-#[derive(Clone, Debug)]
-struct Batch {
+/// What modules share.
+struct SharedState<'a> {
+    raster: &'a Rasterizer,
+    rates: Rates,
+    memory: MainMemory,
+    /// Tiles that no module has claimed.
+    tiles: VecDeque<VecDeque<List>>,
+    report: RasterReport,
+}
+
+/// One draw in one tile.
+#[derive(Clone, Debug, Default)]
+struct List {
     mode: Mode,
-    /// The groups of 16 pixels of each primitive; empty if the batch was fetched and is then discarded.
-    groups: Vec<Groups>,
-    bytes: f64,
-    first_of_part: bool,
+    primitives: u32,
+    /// Cycles of each piece that is evaluated.
+    pieces: Vec<ModuleCycles>,
     first_of_tile: bool,
     last_of_tile: bool,
-    /// True if the fetch could not be made ahead, so that the module waits for its latency.
-    cold: bool,
 }
 
-/// The groups of 16 pixels of a primitive.
-#[derive(Clone, Copy, Debug)]
-struct Groups {
-    /// The number of groups in which it is evaluated.
-    evaluated: u64,
-    /// The number of groups in which it may be evaluated.
-    open: u64,
-    /// The cycles that it waits for transmittances, if they are known.
-    waiting: Option<u64>,
+/// The lists of a tile.
+fn lists(task: &Task, raster: &Rasterizer) -> VecDeque<List> {
+    let mut lists: VecDeque<_> = task.parts.iter().map(|part| List::of(part, raster)).collect();
+    if let Some(list) = lists.front_mut() {
+        list.first_of_tile = true;
+    }
+    if let Some(list) = lists.back_mut() {
+        list.last_of_tile = true;
+    }
+    lists
 }
 
-/// A transfer of a port. A port does its transfers in order.
-#[derive(Debug)]
-struct Request {
-    latency: u32,
+impl List {
+    /// The groups of a segment are spread evenly over its primitives, and so are known waits.
+    fn of(part: &Part, raster: &Rasterizer) -> Self {
+        let mode = part.mode;
+        let mut pieces = vec![ModuleCycles::default(); part.needed.div_ceil(raster.piece()) as usize];
+        let mut at = 0;
+        for segment in &part.segments {
+            let n = u64::from(segment.primitives);
+            let of = |k: u64, all: u64| (k + 1) * all / n - k * all / n;
+            let known = raster.known_waiting_cycles(mode, segment);
+            for k in 0..n {
+                let groups = of(k, segment.groups);
+                let waits = known.map_or_else(|| raster.waiting_cycles(mode, groups, segment.open), |all| of(k, all));
+                let piece = &mut pieces[at / raster.piece() as usize];
+                piece.busy += raster.busy_cycles(mode, groups) as f64;
+                piece.dependency += waits as f64;
+                piece.controller += Rasterizer::looking_cycles(groups) as f64;
+                at += 1;
+            }
+        }
+        let all: f64 = pieces.iter().map(ModuleCycles::total).sum();
+        if let Some(last) = pieces.last_mut() {
+            last.busy += ring::rest_cycles(part, all as u64, raster) as f64;
+        }
+        if let Some(first) = pieces.first_mut() {
+            first.controller += f64::from(raster.tile_overhead);
+        }
+        let primitives = part.needed + part.left_over;
+        Self { mode, primitives, pieces, first_of_tile: false, last_of_tile: false }
+    }
+}
+
+/// A piece in the ring.
+#[derive(Clone, Debug)]
+struct Piece {
+    /// Its mode, and its place in its list.
+    mode: Mode,
+    number: u32,
+    is_last_needed: bool,
+    first_of_tile: bool,
+    last_of_tile: bool,
+    /// Cycles of its evaluation; none if it is discarded.
+    cycles: Option<ModuleCycles>,
+    /// The bytes that the port has not moved, the time from which they may come, and that at which memory has moved them.
     bytes: f64,
-    /// The fetched batch; None for a write.
-    batch: Option<Batch>,
+    due: u64,
+    answered: u64,
 }
 
-/// The state of the PEs.
-#[derive(Debug)]
-struct Computation {
-    batch: Batch,
-    /// The number of primitives begun.
-    next: usize,
-    /// The cycles left of each kind, spent in this order.
-    switch: u32,
-    controller: u32,
-    busy: u64,
-    dependency: u64,
+/// Pixels of a tile that are not written.
+#[derive(Clone, Debug)]
+struct Pixels {
+    from: u64,
+    bytes: f64,
+    /// The time at which memory has moved them, if it was asked.
+    answered: Option<u64>,
 }
 
+/// A module at a time.
 #[derive(Debug, Default)]
 struct Module {
-    /// Batches that are claimed but not requested.
-    claimed: VecDeque<Batch>,
-    port: VecDeque<Request>,
-    /// Batches in a buffer that have not begun.
-    ready: VecDeque<Batch>,
-    computing: Option<Computation>,
+    /// Lists of the claimed tile that are not requested whole, and the next piece of the first of them.
+    claimed: VecDeque<List>,
+    number: u32,
+    /// The cycle before which no piece is requested.
+    ask_from: u64,
+    is_out_of_work: bool,
+    /// The pieces that were requested and have not been left, the oldest first, and how many of them have come.
+    ring: VecDeque<Piece>,
+    come: usize,
+    /// The time at which the evaluation of the oldest piece ends, if it has begun.
+    ends: Option<u64>,
+    /// The end of the last evaluation, and the time from which the next may begin.
+    begin_from: u64,
     mode: Option<Mode>,
-    switches: u32,
-    started: bool,
-    after_waste: bool,
-    out_of_tasks: bool,
-    /// The write of a tile that ended in the last cycle.
-    ended: Option<Request>,
+    /// The tiles that were evaluated and whose pixels are not written.
+    pixels: VecDeque<Pixels>,
 }
 
 impl Module {
-    /// Requests the next batch as soon as half of the tile buffer is free.
-    fn claim<'a>(
-        &mut self,
-        queue: &mut impl Iterator<Item = &'a Task>,
-        config: &Config,
-        latency: u32,
-        report: &mut RasterReport,
-    ) {
-        let fetching = self.port.iter().filter(|request| request.batch.is_some()).count();
-        let held = self.ready.len() + usize::from(self.computing.is_some());
-        // One fetch at a time: the second begins when the first has ended.
-        if fetching > 0 || held >= 2 {
+    /// Does something that can be done at this time. Returns false if there is nothing.
+    fn acts(&mut self, now: u64, shared: &mut SharedState) -> bool {
+        self.receives(now) || self.writes(now, shared) || self.evaluates(now, shared) || self.asks(now, shared)
+    }
+
+    /// True if the module has nothing to evaluate or to write.
+    fn is_idle(&self, now: u64) -> bool {
+        self.ring.is_empty() && self.pixels.is_empty() && self.begin_from <= now
+    }
+
+    fn is_done(&self, now: u64, shared: &SharedState) -> bool {
+        self.is_idle(now) && self.claimed.is_empty() && (self.is_out_of_work || shared.tiles.is_empty())
+    }
+
+    /// Ends the transfer of a piece.
+    fn receives(&mut self, now: u64) -> bool {
+        let has_come = |piece: &Piece| piece.bytes <= 0.0 && piece.answered <= now;
+        let comes = self.ring.get(self.come).is_some_and(has_come);
+        self.come += usize::from(comes);
+        comes
+    }
+
+    /// Begins or ends the write of a tile.
+    fn writes(&mut self, now: u64, shared: &mut SharedState) -> bool {
+        let bytes = shared.raster.tile_bytes();
+        let next = self.pixels.iter_mut().find(|pixels| pixels.bytes > 0.0);
+        if let Some(pixels) = next
+            && pixels.answered.is_none()
+            && pixels.from <= now
+        {
+            pixels.answered = Some(shared.memory.serve(now, shared.memory.parts(bytes)));
+            return true;
+        }
+        let is_written = |pixels: &Pixels| pixels.bytes <= 0.0 && pixels.answered.is_some_and(|time| time <= now);
+        let written = self.pixels.front().is_some_and(is_written);
+        if written {
+            self.pixels.pop_front();
+        }
+        written
+    }
+
+    /// Begins or ends the evaluation of the oldest piece, or discards it.
+    fn evaluates(&mut self, now: u64, shared: &mut SharedState) -> bool {
+        let Some(piece) = self.ring.front().filter(|_| self.come > 0).cloned() else { return false };
+        let spent = &mut shared.report.modules;
+        match (self.ends, piece.cycles) {
+            (Some(end), _) if end <= now => {
+                self.leave(&piece, now, shared);
+                true
+            }
+            (Some(_), _) => false,
+            (None, None) if self.begin_from <= now => {
+                spent.memory += (now - self.begin_from) as f64;
+                spent.controller += DISCARD as f64;
+                self.begin_from = now + DISCARD;
+                self.drop_piece();
+                true
+            }
+            (None, Some(cycles)) => self.begins(&piece, &cycles, now, shared),
+            _ => false,
+        }
+    }
+
+    /// Begins the evaluation of a piece, if it may.
+    fn begins(&mut self, piece: &Piece, cycles: &ModuleCycles, now: u64, shared: &mut SharedState) -> bool {
+        let (raster, spent) = (shared.raster, &mut shared.report.modules);
+        if let Some(before) = self.mode.filter(|&mode| mode != piece.mode) {
+            // The pipeline drains.
+            let switch = raster.latency(before) + raster.mode_switch;
+            spent.mode_switch += f64::from(switch);
+            shared.report.switches += 1.0;
+            self.begin_from += u64::from(switch);
+        }
+        self.mode = Some(piece.mode);
+        // Two tiles have room for their pixels.
+        if self.begin_from > now || (piece.first_of_tile && self.pixels.len() > 1) {
+            return false;
+        }
+        let waited = now - self.begin_from;
+        spent.memory += waited as f64;
+        let begin = if piece.number > 0 && waited > 0 { BEGIN } else { 0 };
+        spent.controller += begin as f64 + cycles.controller;
+        spent.busy += cycles.busy;
+        spent.dependency += cycles.dependency;
+        self.ends = Some(now + begin + cycles.total() as u64);
+        true
+    }
+
+    fn drop_piece(&mut self) {
+        self.ring.pop_front();
+        self.come -= 1;
+    }
+
+    /// Leaves a piece whose evaluation has ended.
+    fn leave(&mut self, piece: &Piece, now: u64, shared: &mut SharedState) {
+        self.drop_piece();
+        self.ends = None;
+        self.begin_from = now;
+        if !piece.is_last_needed {
             return;
+        }
+        if piece.last_of_tile {
+            // The last pixels must leave the pipeline before they are written.
+            let from = now + u64::from(shared.raster.latency(piece.mode)) + LEAVE;
+            let bytes = shared.raster.tile_bytes();
+            shared.report.bytes_out += f64::from(bytes);
+            self.pixels.push_back(Pixels { from, bytes: f64::from(bytes), answered: None });
+        }
+        let is_of_asked = self.ring.iter().all(|piece| piece.cycles.is_none());
+        if is_of_asked && self.number > 0 {
+            // The rest of the list is left out.
+            self.next_list(now);
+        }
+    }
+
+    fn next_list(&mut self, now: u64) {
+        self.claimed.pop_front();
+        self.number = 0;
+        self.ask_from = self.ask_from.max(now + NEXT_LIST);
+    }
+
+    /// Requests a piece, if one is free.
+    fn asks(&mut self, now: u64, shared: &mut SharedState) -> bool {
+        let raster = shared.raster;
+        if self.is_out_of_work || self.ring.len() >= raster.pieces() as usize || self.ask_from.max(1) > now {
+            return false;
         }
         if self.claimed.is_empty() {
-            match queue.next() {
-                Some(task) => self.claimed = batches(task, config, &mut self.after_waste, report),
-                None => self.out_of_tasks = true,
+            match shared.tiles.pop_front() {
+                Some(lists) => self.claimed = lists,
+                None => self.is_out_of_work = true,
             }
         }
-        if let Some(batch) = self.claimed.pop_front() {
-            let cold = batch.cold || !self.started;
-            self.started = true;
-            self.port.push_back(Request {
-                latency: if cold { latency } else { 0 },
-                bytes: batch.bytes,
-                batch: Some(batch),
-            });
+        let Some(list) = self.claimed.front() else { return false };
+        let bytes = ring::piece_bytes(raster, self.number, list.primitives);
+        let number = self.number as usize;
+        let latency = REQUEST + u64::from(shared.rates.latency);
+        let cycles = list.pieces.get(number).copied();
+        shared.report.bytes_in += f64::from(bytes);
+        if cycles.is_none() {
+            shared.report.bytes_wasted += f64::from(bytes);
         }
-    }
-
-    fn is_done(&self) -> bool {
-        self.out_of_tasks
-            && self.claimed.is_empty()
-            && self.port.is_empty()
-            && self.ready.is_empty()
-            && self.computing.is_none()
-    }
-
-    fn wants_memory(&self) -> bool {
-        self.port.front().is_some_and(|request| request.latency == 0)
-    }
-
-    /// Moves up to `share` bytes.
-    fn transfer(&mut self, share: f64) {
-        let Some(request) = self.port.front_mut() else {
-            return;
-        };
-        if request.latency > 0 {
-            request.latency -= 1;
-            return;
+        self.ring.push_back(Piece {
+            mode: list.mode,
+            number: self.number,
+            is_last_needed: number + 1 == list.pieces.len(),
+            first_of_tile: list.first_of_tile && number == 0,
+            last_of_tile: list.last_of_tile,
+            cycles,
+            bytes: f64::from(bytes),
+            due: now + latency,
+            answered: shared.memory.serve(now, shared.memory.parts(bytes)) + latency,
+        });
+        self.ask_from = now + NEXT_PIECE;
+        self.number += 1;
+        if self.number * raster.piece() >= list.primitives {
+            self.next_list(now);
         }
-        request.bytes -= share;
-        if request.bytes <= 1e-6
-            && let Some(request) = self.port.pop_front()
+        true
+    }
+
+    /// Moves the bytes of a cycle: those of pixels first.
+    fn move_bytes(&mut self, now: u64, most: f64) {
+        if let Some(pixels) = self.pixels.iter_mut().find(|pixels| pixels.bytes > 0.0)
+            && pixels.from <= now
         {
-            self.ready.extend(request.batch);
+            pixels.bytes -= most;
+        } else if let Some(piece) = self.ring.get_mut(self.come)
+            && piece.due <= now
+        {
+            piece.bytes -= most;
         }
     }
-
-    /// One cycle of the PEs.
-    fn step(&mut self, config: &Config, spent: &mut ModuleCycles) {
-        if self.computing.is_none() {
-            self.begin(config);
-        }
-        let Some(work) = &mut self.computing else {
-            if !(self.out_of_tasks
-                && self.claimed.is_empty()
-                && self.ready.is_empty()
-                && self.port.iter().all(|r| r.batch.is_none()))
-            {
-                spent.memory += 1.0;
-            }
-            return;
-        };
-        work.spend(config, spent);
-        if work.is_done() {
-            let batch = &work.batch;
-            if batch.last_of_tile {
-                let latency = config.rasterizer.latency(batch.mode);
-                let bytes = f64::from(config.rasterizer.tile_bytes());
-                // The last pixels must leave the pipeline before they are written.
-                self.ended = Some(Request { latency, bytes, batch: None });
-            }
-            self.computing = None;
-        }
-    }
-
-    fn begin(&mut self, config: &Config) {
-        let held = self.port.iter().filter(|request| request.batch.is_none()).count();
-        while let Some(batch) = self.ready.pop_front() {
-            // Two halves hold pixels: one is free once the tile before the last is written.
-            if batch.first_of_tile && held > 1 {
-                self.ready.push_front(batch);
-                return;
-            }
-            if batch.groups.is_empty() {
-                // The batch is discarded: the buffer is free again at once.
-                continue;
-            }
-            let raster = &config.rasterizer;
-            let mut switch = 0;
-            if let Some(before) = self.mode.filter(|&mode| mode != batch.mode) {
-                switch = raster.latency(before) + raster.mode_switch;
-                self.switches += 1;
-            }
-            self.mode = Some(batch.mode);
-            let mut work = Computation {
-                switch,
-                controller: if batch.first_of_part { raster.tile_overhead } else { 0 },
-                next: 0,
-                busy: 0,
-                dependency: 0,
-                batch,
-            };
-            work.advance(config);
-            self.computing = Some(work);
-            return;
-        }
-    }
-}
-
-impl Computation {
-    /// Begins the next primitive if the last one has ended.
-    fn advance(&mut self, config: &Config) {
-        if self.busy > 0 || self.dependency > 0 {
-            return;
-        }
-        let Some(&groups) = self.batch.groups.get(self.next) else {
-            return;
-        };
-        self.next += 1;
-        let (raster, mode) = (&config.rasterizer, self.batch.mode);
-        if groups.evaluated == 0 {
-            self.controller += 1;
-            self.dependency = groups.waiting.unwrap_or(0);
-            return;
-        }
-        self.busy = raster.busy_cycles(mode, groups.evaluated);
-        let estimate = || raster.waiting_cycles(mode, groups.evaluated, groups.open);
-        self.dependency = groups.waiting.unwrap_or_else(estimate);
-    }
-
-    fn spend(&mut self, config: &Config, spent: &mut ModuleCycles) {
-        if self.switch > 0 {
-            self.switch -= 1;
-            spent.mode_switch += 1.0;
-            return;
-        }
-        if self.controller > 0 {
-            self.controller -= 1;
-            spent.controller += 1.0;
-        } else if self.busy > 0 {
-            self.busy -= 1;
-            spent.busy += 1.0;
-        } else if self.dependency > 0 {
-            self.dependency -= 1;
-            spent.dependency += 1.0;
-        }
-        if self.controller == 0 {
-            self.advance(config);
-        }
-    }
-
-    fn is_done(&self) -> bool {
-        self.switch == 0
-            && self.controller == 0
-            && self.busy == 0
-            && self.dependency == 0
-            && self.next == self.batch.groups.len()
-    }
-}
-
-/// Divides a tile's lists into batches.
-fn batches(task: &Task, config: &Config, after_waste: &mut bool, report: &mut RasterReport) -> VecDeque<Batch> {
-    let raster = &config.rasterizer;
-    let mut out = VecDeque::new();
-    for part in &task.parts {
-        let groups = groups_of_each(part, raster);
-        let pixels = groups.iter().map(|groups| groups.evaluated).sum::<u64>() * 16;
-        report.add_evaluations(part.mode, pixels as f64);
-        report.pairs += f64::from(part.needed);
-        let mut left = part.needed + part.left_over;
-        for (index, groups) in groups.chunks(raster.batch as usize).enumerate() {
-            let fetched = left.min(raster.batch);
-            left -= fetched;
-            out.push_back(Batch {
-                mode: part.mode,
-                groups: groups.to_vec(),
-                bytes: f64::from(fetched * raster.primitive_bytes()),
-                first_of_part: index == 0,
-                first_of_tile: false,
-                last_of_tile: false,
-                cold: std::mem::take(after_waste),
-            });
-        }
-        if left > 0 {
-            // The next batch was requested before the tile was found to be finished.
-            let bytes = f64::from(left.min(raster.batch) * raster.primitive_bytes());
-            report.bytes_wasted += bytes;
-            *after_waste = true;
-            out.push_back(Batch {
-                mode: part.mode,
-                groups: Vec::new(),
-                bytes,
-                first_of_part: false,
-                first_of_tile: false,
-                last_of_tile: false,
-                cold: false,
-            });
-        }
-    }
-    if let Some(first) = out.front_mut() {
-        first.first_of_tile = true;
-    }
-    report.bytes_in += out.iter().map(|batch| batch.bytes).sum::<f64>();
-    if let Some(last) = out.iter_mut().rfind(|batch| !batch.groups.is_empty()) {
-        last.last_of_tile = true;
-        report.bytes_out += f64::from(raster.tile_bytes());
-    }
-    out
-}
-
-/// The groups of 16 pixels of each primitive: those of a segment are spread evenly, and so are known waits.
-fn groups_of_each(part: &Part, raster: &Rasterizer) -> Vec<Groups> {
-    let mut out = Vec::with_capacity(part.needed as usize);
-    for segment in &part.segments {
-        let n = u64::from(segment.primitives);
-        let of = |k: u64, all: u64| (k + 1) * all / n - k * all / n;
-        let waiting = raster.known_waiting_cycles(part.mode, segment);
-        out.extend((0..n).map(|k| Groups {
-            evaluated: of(k, segment.groups),
-            open: segment.open,
-            waiting: waiting.map(|waiting| of(k, waiting)),
-        }));
-    }
-    out
 }

@@ -125,11 +125,10 @@ fn kinds() -> Vec<Variant> {
 }
 
 #[gaurast_runner::test(each = kinds())]
-fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
+fn the_fast_model_is_the_stepped_model(case: &Case) {
     // The number of traces of all kinds together.
     const TRACES: usize = 10_000;
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let mut errors = Vec::new();
     let mut pressed = 0;
     for number in 0..TRACES {
         let kind = KINDS[number % KINDS.len()];
@@ -140,34 +139,13 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
         }
         let fast = fast::rasterize(&frame, &config, 0.0);
         let slow = stepped::rasterize(&frame, &config, 0.0);
-        // The work is the same in both models.
-        assert_eq!(fast.gaussian_evaluations, slow.gaussian_evaluations);
-        assert_eq!(fast.triangle_evaluations, slow.triangle_evaluations);
-        assert_eq!(fast.bytes_out, slow.bytes_out);
-        assert!((fast.bytes_in - slow.bytes_in).abs() < 1e-3, "{fast:?} {slow:?}");
-        assert!((fast.bytes_wasted - slow.bytes_wasted).abs() < 1e-3);
-        assert!((fast.modules.busy - slow.modules.busy).abs() < 1e-3);
-        assert!((fast.modules.dependency - slow.modules.dependency).abs() < 1e-3);
-        // The causes of stalls are the same, too.
-        assert!((fast.modules.controller - slow.modules.controller).abs() < 1e-3);
-        assert!((fast.modules.mode_switch - slow.modules.mode_switch).abs() < 1e-3);
-        let all = slow.modules.total().max(1.0);
-        let apart = (fast.modules.memory - slow.modules.memory).abs() / all;
-        assert!(apart < 0.02, "trace {number}: {apart} of all cycles, {fast:?} {slow:?}");
-        if slow.cycles == 0.0 {
-            assert_eq!(fast.cycles, 0.0);
-            continue;
-        }
         pressed += usize::from(match kind {
             Kind::BandwidthBound => slow.modules.memory > slow.modules.busy,
             Kind::ModeSwitching => slow.switches >= 2.0,
-            _ => true,
+            _ => slow.cycles > 0.0,
         });
-        let error = ((fast.cycles - slow.cycles) / slow.cycles).abs();
-        assert!(error <= 0.02, "trace {number}: {error}, {} instead of {} cycles", fast.cycles, slow.cycles);
-        errors.push(error);
+        // Numbers of cycles are whole.
+        assert_eq!(fast, slow, "trace {number}");
     }
     assert!(pressed >= 100, "{pressed}");
-    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    assert!(mean <= 0.005, "mean {mean}");
 }
