@@ -224,7 +224,7 @@ impl EncodedScene {
 
 impl EncodedHarmonics {
     /// The entry of a Gaussian in the codes; None if there is no such entry.
-    pub(crate) fn entry(&self, index: usize) -> Option<&[u8]> {
+    fn entry(&self, index: usize) -> Option<&[u8]> {
         let entry = self.labels.as_ref().map_or(index, |labels| {
             let bytes = &labels.bytes[labels.stride * index..];
             u16::from_le_bytes([bytes[0], bytes[1]]).into()

@@ -243,26 +243,26 @@ fn say_model(model: Option<&str>, metadata: &mut Metadata) {
 }
 
 impl Palette {
-    /// Reads the palette of the property `rest`; None if it has no bands.
-    fn read(rest: &Property, legacy: bool, files: &Files<'_>, count: u64) -> Result<Option<Self>, Fault> {
+    /// Reads the palette of a property; None if it has no bands.
+    fn read(property: &Property, legacy: bool, files: &Files<'_>, count: u64) -> Result<Option<Self>, Fault> {
         let name = "shN";
         let values = if legacy {
-            let bounds = rest.bounds(name, 1)?;
+            let bounds = property.bounds(name, 1)?;
             // Values spaced evenly between bounds.
             std::array::from_fn(|byte| bounds[0] + (bounds[1] - bounds[0]) * (byte as f64 / 255.0))
         } else {
-            rest.codebook(name)?
+            property.codebook(name)?
         };
         // Version 1 gives neither the number of bands nor that of entries: the image's width tells the bands.
         let (degree, len) = if legacy {
             (None, 0)
         } else {
-            let bands = rest.bands.ok_or_else(|| fault(name, "bands", Reason::Missing))?;
+            let bands = property.bands.ok_or_else(|| fault(name, "bands", Reason::Missing))?;
             let Some(bands) = whole(bands, 3) else {
                 let text = format!("{bands} bands are not 0 to 3");
                 return Err(fault(name, "bands", Reason::Unsupported(text)));
             };
-            let len = rest.count.ok_or_else(|| fault(name, "count", Reason::Missing))?;
+            let len = property.count.ok_or_else(|| fault(name, "count", Reason::Missing))?;
             let Some(len) = whole(len, 1 << 16) else {
                 let text = format!("a palette of {len} entries is not one of 16-bit labels");
                 return Err(fault(name, "count", Reason::Unsupported(text)));
@@ -274,17 +274,17 @@ impl Palette {
         };
         let width = |degree: u32| PALETTE_ROW * (sh_coefficients(degree) - 1);
         let pixels = degree.map_or(1, |degree| width(degree) * len.div_ceil(PALETTE_ROW));
-        let entries = rest.image(name, 0, files, pixels as u64)?;
+        let entries = property.image(name, 0, files, pixels as u64)?;
         let degree = (1..=3).find(|l| entries.width as usize == width(*l) && degree.is_none_or(|d| d == *l));
         let Some(degree) = degree else {
             let text = format!("{} pixels are not the width of a palette", entries.width);
-            return Err(Reason::Unsupported(text).at(Place::Entry(rest.files[0].clone())));
+            return Err(Reason::Unsupported(text).at(Place::Entry(property.files[0].clone())));
         };
         let rows = entries.height as usize * PALETTE_ROW;
         Ok(Some(Self {
             degree,
             entries,
-            labels: rest.image(name, 1, files, count)?,
+            labels: property.image(name, 1, files, count)?,
             len: if legacy { rows } else { len.min(rows) },
             values,
         }))
