@@ -15,7 +15,7 @@ use std::sync::{Once, OnceLock};
 use timing_studies::exponential::{Exponential, exp2};
 use timing_studies::module::{Drawn, Groups, List, Module};
 use timing_studies::number::Format;
-use timing_studies::rtl::{self, Latencies, Memory, ModuleBench, Rasterized, Simulator, UnitBench};
+use timing_studies::rtl::{self, Latencies, MODULES, Memory, ModuleBench, Rasterized, Simulator, UnitBench};
 use timing_studies::rtl_cycles::{Cycles, Setting};
 
 const FORMATS: [(&str, Format); 2] = [("fp32", Format::SINGLE), ("fp16", Format::HALF)];
@@ -245,8 +245,8 @@ fn no_stall_of_a_port_changes_a_pixel(case: &Case) {
 fn modules_share_a_memory() {
     let design = &DESIGNS[1];
     let (format, alone) = (design.format, design.bench());
-    let (modules, count) = if is_long() { (4, 40) } else { (2, 10) };
-    let bench = ModuleBench::compile_rasterizer(&folder(), format, modules).expect("a bench");
+    let count = if is_long() { 40 } else { 10 };
+    let bench = ModuleBench::compile_rasterizer(&folder(), format).expect("a bench");
     for setting in Setting::ALL {
         let module = design.module(setting);
         let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
@@ -256,7 +256,7 @@ fn modules_share_a_memory() {
         // Nobody waits for long where evaluation takes most of the time.
         if !setting.masked {
             let share = f64::from(one.cycles) / f64::from(all.cycles);
-            assert!(share > 0.75 * f64::from(modules), "{} {}", one.cycles, all.cycles);
+            assert!(share > 0.75 * f64::from(MODULES), "{} {}", one.cycles, all.cycles);
         }
         assert!(all.requests > 8, "requests of several modules are in flight: {}", all.requests);
         for memory in stalling_memories(1) {

@@ -74,6 +74,9 @@ impl Memory {
     pub const OF_PRESETS: Self = Self { latency: 100, interval: 1, stalls: 0 };
 }
 
+/// The number of modules that [`ModuleBench::compile_rasterizer`] compiles.
+pub const MODULES: u32 = 4;
+
 /// Cycles of a PE, as `latencies.svh` has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Latencies {
@@ -145,7 +148,8 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     match top {
         "units" => command.args(["units.sv", "units.cpp"]),
         // Processing elements are compiled once, and not once for each of the module's.
-        _ => command.args(["--hierarchical", "bench.cpp"]),
+        "raster_module" => command.args(["--hierarchical", "bench.cpp"]),
+        _ => command.args(["--hierarchical", "-CFLAGS"]).arg(format!("-DRASTERIZER={MODULES}")).arg("bench.cpp"),
     };
     let output = command.output()?;
     if !output.status.success() {
@@ -276,14 +280,13 @@ impl ModuleBench {
         Self::compile(simulator, folder, format, parameters)
     }
 
-    /// Compiles some modules, of a power of two, and their arbiter for a format with Verilator, from the files of a folder,
-    /// which keeps the compiled program.
+    /// Compiles [`MODULES`] modules and their arbiter for a format with Verilator, from the files of a folder, which
+    /// keeps the compiled program.
     ///
     /// # Errors
     /// Returns an error if Verilator is missing or fails.
-    pub fn compile_rasterizer(folder: &Path, format: Format, modules: u32) -> Result<Self> {
-        let parameters = [format!("-GMODULES={modules}"), "-CFLAGS".to_owned(), format!("-DRASTERIZER={modules}")];
-        Ok(Self { program: build(folder, "rasterizer", format, &parameters)?, format })
+    pub fn compile_rasterizer(folder: &Path, format: Format) -> Result<Self> {
+        Ok(Self { program: build(folder, "rasterizer", format, &[])?, format })
     }
 
     /// Compiles a module for a format from the files of a folder, which keeps the compiled program. `parameters` are the
