@@ -192,8 +192,8 @@ impl EncodedScene {
             }
             Decoding::Codebook { table } => Values::Codebook(Box::new(self.codebook(table, finish))),
         };
-        let Stream { bytes, stride } = &self.streams[attribute.stream];
-        Components { bytes, stride: *stride, offset: attribute.offset, form: attribute.form, fields, values, finish }
+        let stream = &self.streams[attribute.stream];
+        Components { stream, offset: attribute.offset, form: attribute.form, fields, values, finish }
     }
 
     /// The codebook at place `table` of the numbers, passed through `finish`.
@@ -273,8 +273,7 @@ fn fraction(code: u32, bits: u32) -> f64 {
 
 /// Reads the components of an attribute.
 struct Components<'a> {
-    bytes: &'a [u8],
-    stride: usize,
+    stream: &'a Stream,
     offset: usize,
     form: Form,
     /// The bits of the components in a word.
@@ -298,7 +297,7 @@ impl Components<'_> {
     /// The `N` components of a Gaussian.
     #[inline]
     fn get<const N: usize>(&self, index: usize) -> [f32; N] {
-        let bytes = &self.bytes[self.stride * index + self.offset..];
+        let bytes = &self.stream.bytes[self.stream.stride * index + self.offset..];
         if self.form == Form::Floats {
             return std::array::from_fn(|component| float(&bytes[4 * component..]));
         }
