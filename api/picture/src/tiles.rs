@@ -175,7 +175,7 @@ impl<T: Number> Filter<T> {
     }
 }
 
-/// What is filtered: values, of which the first one is at `middle`, with neighbours that are `step` apart.
+/// The values that are filtered, of which the first one is at `middle`, with neighbours that are `step` apart.
 #[derive(Clone, Copy, Debug)]
 struct Pass<'a, T> {
     values: &'a [T],

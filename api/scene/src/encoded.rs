@@ -1,7 +1,7 @@
 //! Scenes as compressed files have them: integers, and the tables that say what these stand for.
 //!
-//! A device draws them with the feature `attributeDecoding`, in a quarter of the memory. [`EncodedScene::decode`] computes the same
-//! numbers on the host: in binary64, rounded to binary32 once.
+//! A device draws them with the feature `attributeDecoding`, in a quarter to a third of the memory. [`EncodedScene::decode`]
+//! computes the same numbers on the host: in binary64, rounded to binary32 once.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ pub struct Attribute {
     pub offset: usize,
     /// The form of its components.
     pub form: Form,
-    /// What they stand for.
+    /// The meaning of its integers.
     pub decoding: Decoding,
 }
 
@@ -92,7 +92,7 @@ pub enum Form {
     Word,
 }
 
-/// What the integers of an attribute stand for. Tables are given by their first place in [`EncodedScene::numbers`].
+/// The meaning of an attribute's integers. Tables are given by their first place in [`EncodedScene::numbers`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decoding {
     /// They are numbers as they are; an integer of 8 bits is a fraction of 255.
@@ -283,7 +283,7 @@ struct Components<'a> {
     finish: fn(f64) -> f32,
 }
 
-/// What codes stand for.
+/// The meaning of codes.
 enum Values<'a> {
     /// Fractions.
     Fractions,

@@ -279,8 +279,8 @@ struct Write {
     moved: u64,
 }
 
-/// What a module did, apart from the work that does not depend on when it is done: bytes, and cycles by activity as in
-/// [`ModuleCycles`](crate::raster::ModuleCycles).
+/// The bytes of a module, and its cycles by activity as in [`ModuleCycles`](crate::raster::ModuleCycles), without the work
+/// that does not depend on when it is done.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
     bytes_in: u64,

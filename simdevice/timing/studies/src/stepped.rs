@@ -47,7 +47,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
     report
 }
 
-/// What modules share.
+/// The state that modules share.
 struct SharedState<'a> {
     raster: &'a Rasterizer,
     rates: Rates,
