@@ -280,15 +280,27 @@ impl Vision {
     }
 
     /// Takes the nearest step of sRGB of each value, or any step of a value beyond 0 to 1. Returns false if one is no step.
+    ///
+    /// It goes by groups of values, of which compilers make vectors wherever it is inlined.
     #[inline(always)]
     fn take_steps(values: &[f32], steps: &mut Vec<u8>) -> bool {
+        const GROUP: usize = 32;
         steps.resize(values.len(), 0);
-        let mut are_steps = true;
-        for (step, &value) in steps.iter_mut().zip(values) {
-            *step = (value * 255.0 + power::WHOLE).to_bits() as u8;
-            are_steps &= f32::from(*step) / 255.0 == value;
+        let (groups, rest) = values.as_chunks::<GROUP>();
+        let (groups_steps, rest_steps) = steps.as_chunks_mut::<GROUP>();
+        let mut others = [0; GROUP];
+        for (steps, group) in groups_steps.iter_mut().zip(groups) {
+            for lane in 0..GROUP {
+                let step = nearest_step(group[lane]);
+                steps[lane] = step as u8;
+                others[lane] |= u32::from(step as f32 / 255.0 != group[lane]);
+            }
         }
-        are_steps
+        for (step, &value) in rest_steps.iter_mut().zip(rest) {
+            *step = nearest_step(value) as u8;
+            others[0] |= u32::from(f32::from(*step) / 255.0 != value);
+        }
+        others == [0; GROUP]
     }
 
     /// Filters a row of the tile as human vision does.
@@ -416,6 +428,12 @@ fn balanced(weights: Vec<f64>) -> Vec<f64> {
     let negative: f64 = -weights.iter().filter(|w| **w < 0.0).sum::<f64>();
     let scale = |w: &f64| w / if *w < 0.0 { negative } else { positive };
     weights.iter().map(scale).collect()
+}
+
+/// The nearest step of sRGB of a value from 0 to 1, and any step of one beyond.
+#[inline(always)]
+fn nearest_step(value: f32) -> u32 {
+    (value * 255.0 + power::WHOLE).to_bits() & 0xFF
 }
 
 fn srgb_to_linear(value: f32) -> f64 {

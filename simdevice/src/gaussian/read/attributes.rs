@@ -3,7 +3,7 @@
 use super::decoding::{Codebooks, Decoder, Encoded, Finish, quaternion};
 use crate::format::Format;
 use crate::gaussian::lanes::F32_LANES;
-use crate::packet::{Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding};
+use crate::packet::{Activations, AttributeStream, Decoding, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding};
 
 /// The attributes of a group's Gaussians as they are read from the streams: an array per component, an element per
 /// lane.
@@ -270,16 +270,15 @@ impl Fetcher {
         out: &mut [[f32; F32_LANES]; 3],
     ) {
         let decodings = &streams.activations.decodings;
+        let is_signed_log = decodings.signed_log_position && decodings.position != Decoding::None;
         let positions = Encoded {
             stream: &streams.position,
             decoding: decodings.position,
             table: streams.tables.as_ref().and_then(|tables| tables.position.as_ref()),
-            finish: if decodings.signed_log_position { Finish::SignedExponential } else { Finish::None },
+            finish: if is_signed_log { Finish::SignedExponential } else { Finish::None },
         };
-        match Decoder::of_lengths(&positions, &mut self.codebooks) {
-            None => self.read(&streams.position, group, out.each_mut()),
-            Some(decoder) => self.decode(&decoder, &streams.position, group, out.each_mut()),
-        }
+        let decoder = Decoder::of_lengths(&positions, &mut self.codebooks);
+        self.read_encoded(&positions, decoder, group, out.each_mut());
     }
 
     /// The same as [`Self::read_own`] where decodings or activations are applied: `exp` to logarithms of scales, the logistic
@@ -295,13 +294,8 @@ impl Fetcher {
             table: tables.and_then(|tables| tables.scale.as_ref()),
             finish: if *log_scale { Finish::Exponential } else { Finish::None },
         };
-        match Decoder::of_lengths(&scales, &mut self.codebooks) {
-            Some(decoder) => self.decode(&decoder, &streams.scale, group, out.scale.each_mut()),
-            None => {
-                self.read(&streams.scale, group, out.scale.each_mut());
-                out.scale.iter_mut().for_each(|lanes| apply(scales.finish, &mut lanes[..group.len]));
-            }
-        }
+        let decoder = Decoder::of_lengths(&scales, &mut self.codebooks);
+        self.read_encoded(&scales, decoder, group, out.scale.each_mut());
         match decodings.rotation {
             RotationDecoding::None => self.read(&streams.rotation, group, out.rotation.each_mut()),
             decoding => self.decode_rotations(decoding, &streams.rotation, group, &mut out.rotation),
@@ -312,11 +306,28 @@ impl Fetcher {
             table: tables.and_then(|tables| tables.opacity.as_ref()),
             finish: if *logit_opacity { Finish::Logistic } else { Finish::None },
         };
-        match Decoder::of_opacities(&opacities, &mut self.codebooks) {
-            Some(decoder) => self.decode(&decoder, &streams.opacity, group, [&mut out.opacity]),
-            None => {
-                self.read(&streams.opacity, group, [&mut out.opacity]);
-                apply(opacities.finish, &mut out.opacity[..group.len]);
+        let decoder = Decoder::of_opacities(&opacities, &mut self.codebooks);
+        self.read_encoded(&opacities, decoder, group, [&mut out.opacity]);
+    }
+
+    /// Reads lanes `0..group.len` of an attribute into `out[component][lane]`: what the decoder makes of the elements, or, without
+    /// a decoder, the finished elements.
+    fn read_encoded<const COMPONENTS: usize>(
+        &mut self,
+        encoded: &Encoded<'_, '_>,
+        decoder: Option<Decoder<'_, COMPONENTS>>,
+        group: &GroupVertices<'_>,
+        mut out: [&mut [f32; F32_LANES]; COMPONENTS],
+    ) {
+        if let Some(decoder) = decoder {
+            return self.decode(&decoder, encoded.stream, group, out);
+        }
+        self.read(encoded.stream, group, out.each_mut().map(|lanes| &mut **lanes));
+        if encoded.finish != Finish::None {
+            for lanes in out {
+                let lanes = &mut lanes[..group.len];
+                let numbers: [f64; F32_LANES] = std::array::from_fn(|lane| lanes.get(lane).copied().map_or(0.0, f64::from));
+                encoded.finish.values(&numbers[..lanes.len()], lanes);
             }
         }
     }
@@ -407,12 +418,5 @@ impl Fetcher {
         if self.bytes.len() < bytes {
             self.bytes.resize(bytes, 0);
         }
-    }
-}
-
-/// Finishes all values.
-fn apply(finish: Finish, lanes: &mut [f32]) {
-    for value in lanes {
-        *value = finish.value(f64::from(*value));
     }
 }

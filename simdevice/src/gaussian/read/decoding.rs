@@ -1,5 +1,6 @@
 //! Decoding: the values that integers in memory stand for, in binary64.
 
+use super::exponential::{fast_exp, fast_exp_m1, round_all};
 use crate::format::Format;
 use crate::gaussian::lanes::F32_LANES;
 use crate::packet::{AttributeStream, Decoding, RotationDecoding};
@@ -102,6 +103,24 @@ impl Finish {
         };
         value as f32
     }
+
+    /// The values of several numbers: those of [`Self::value`], bit for bit.
+    pub(super) fn values(self, numbers: &[f64], out: &mut [f32]) {
+        let exact = |number| self.value(number);
+        match self {
+            Self::None | Self::Coefficient => {
+                for (out, number) in out.iter_mut().zip(numbers) {
+                    *out = self.value(*number);
+                }
+            }
+            Self::SignedExponential => {
+                let fast = |number: f64| fast_exp_m1(number.abs()).copysign(number);
+                round_all(numbers, out, fast, exact);
+            }
+            Self::Exponential => round_all(numbers, out, fast_exp, exact),
+            Self::Logistic => round_all(numbers, out, |number| 1.0 / (1.0 + fast_exp(-number)), exact),
+        }
+    }
 }
 
 /// The values of the numbers in a codebook. Those that its buffer does not have are zero.
@@ -160,15 +179,48 @@ impl Codebooks {
 }
 
 /// The numbers that an attribute's integers select or lie between.
-enum Values<'a, const COMPONENTS: usize> {
-    Chunks {
-        table: &'a AttributeStream,
-        is_binary64: bool,
-        /// The vertices of a chunk.
-        size: u32,
-    },
+enum Values<'a> {
+    Chunks(Chunks<'a>),
     /// Finished values.
     Codebook(Arc<[f32; CODEBOOK]>),
+}
+
+/// The table of chunks' bounds.
+struct Chunks<'a> {
+    table: &'a AttributeStream,
+    is_binary64: bool,
+    /// The vertices of a chunk.
+    size: u32,
+}
+
+impl Chunks<'_> {
+    /// The bounds of the chunk of a vertex, which are then the last ones.
+    fn bounds_of<const COMPONENTS: usize>(
+        &self,
+        vertex: u64,
+        last: &mut Option<ChunkBounds<COMPONENTS>>,
+    ) -> ChunkBounds<COMPONENTS> {
+        match last {
+            Some(bounds) if bounds.has(vertex) => *bounds,
+            _ => *last.insert(self.read(vertex / u64::from(self.size))),
+        }
+    }
+
+    /// Reads the bounds of a chunk. They are zeros if the table does not have all of them.
+    fn read<const COMPONENTS: usize>(&self, chunk: u64) -> ChunkBounds<COMPONENTS> {
+        let size = number_size(self.is_binary64);
+        let mut bytes = [0; 8 * 2 * 3];
+        let bytes = &mut bytes[..(2 * COMPONENTS * size).min(8 * 2 * 3)];
+        self.table.read(chunk, bytes);
+        let at = |index: usize| bytes.get(index * size..).map_or(0.0, |bytes| number(bytes, self.is_binary64));
+        let first = chunk * u64::from(self.size);
+        ChunkBounds {
+            first,
+            end: first.saturating_add(self.size.into()),
+            low: std::array::from_fn(at),
+            high: std::array::from_fn(|component| at(COMPONENTS + component)),
+        }
+    }
 }
 
 /// The bounds of a chunk.
@@ -185,12 +237,19 @@ impl<const COMPONENTS: usize> ChunkBounds<COMPONENTS> {
     fn has(&self, vertex: u64) -> bool {
         (self.first..self.end).contains(&vertex)
     }
+
+    /// The number of a component of an element, which lies between the bounds.
+    #[inline(always)]
+    fn number(&self, component: usize, field: Field, element: u64) -> f64 {
+        let t = field.fraction(element);
+        self.low[component] * (1.0 - t) + self.high[component] * t
+    }
 }
 
 /// Decodes an attribute.
 pub(super) struct Decoder<'a, const COMPONENTS: usize> {
     fields: [Field; COMPONENTS],
-    values: Values<'a, COMPONENTS>,
+    values: Values<'a>,
     finish: Finish,
 }
 
@@ -209,7 +268,7 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         let values = match (encoded.decoding, encoded.table) {
             (Decoding::None, _) | (_, None) => return None,
             (Decoding::Chunk { size, is_binary64 }, Some(table)) => {
-                Values::Chunks { table, is_binary64, size: size.max(1) }
+                Values::Chunks(Chunks { table, is_binary64, size: size.max(1) })
             }
             (Decoding::Codebook { is_binary64 }, Some(table)) => {
                 Values::Codebook(codebooks.values(table, is_binary64, finish))
@@ -225,12 +284,14 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         element: u64,
         last: &mut Option<ChunkBounds<COMPONENTS>>,
     ) -> [f32; COMPONENTS] {
-        let mut values = [0.0; COMPONENTS];
-        let bounds = self.bounds(vertex, last);
-        for (component, value) in values.iter_mut().enumerate() {
-            self.decode_component(component, bounds.as_ref(), &[element], std::slice::from_mut(value));
+        match &self.values {
+            Values::Codebook(values) => self.fields.map(|field| selected(values, field, element)),
+            Values::Chunks(chunks) => {
+                let bounds = chunks.bounds_of(vertex, last);
+                let number = |component| bounds.number(component, self.fields[component], element);
+                std::array::from_fn(|component| self.finish.value(number(component)))
+            }
         }
-        values
     }
 
     /// The values of several vertices, of which `vertex` gives the numbers, and `elements` what they hold: an array for each
@@ -241,71 +302,52 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         elements: &[u64],
         out: &mut [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
+        match &self.values {
+            Values::Codebook(values) => {
+                for (out, field) in out.iter_mut().zip(self.fields) {
+                    for (value, element) in out.iter_mut().zip(elements) {
+                        *value = selected(values, field, *element);
+                    }
+                }
+            }
+            Values::Chunks(chunks) => {
+                let numbers = self.numbers(chunks, vertex, elements);
+                for (out, numbers) in out.iter_mut().zip(&numbers) {
+                    self.finish.values(&numbers[..elements.len()], &mut out[..elements.len()]);
+                }
+            }
+        }
+    }
+
+    /// The numbers between chunks' bounds of several vertices, as [`Self::decode_all`] has them.
+    fn numbers(
+        &self,
+        chunks: &Chunks<'_>,
+        vertex: impl Fn(usize) -> u64,
+        elements: &[u64],
+    ) -> [[f64; F32_LANES]; COMPONENTS] {
+        let mut numbers = [[0.0; F32_LANES]; COMPONENTS];
         let mut last = None;
         let mut start = 0;
         while start < elements.len() {
-            let bounds = self.bounds(vertex(start), &mut last);
-            let mut end = elements.len();
-            if let Some(bounds) = &bounds {
-                end = (start + 1..end).find(|lane| !bounds.has(vertex(*lane))).unwrap_or(end);
-            }
-            for (component, out) in out.iter_mut().enumerate() {
-                self.decode_component(component, bounds.as_ref(), &elements[start..end], &mut out[start..end]);
+            let bounds: ChunkBounds<COMPONENTS> = chunks.bounds_of(vertex(start), &mut last);
+            let of_chunk = (start + 1..elements.len()).find(|lane| !bounds.has(vertex(*lane)));
+            let end = of_chunk.unwrap_or(elements.len());
+            for (component, (numbers, field)) in numbers.iter_mut().zip(self.fields).enumerate() {
+                for (number, element) in numbers[start..end].iter_mut().zip(&elements[start..end]) {
+                    *number = bounds.number(component, field, *element);
+                }
             }
             start = end;
         }
-    }
-
-    /// The values of a component in elements of one chunk, whose bounds are given, or of a codebook.
-    fn decode_component(
-        &self,
-        component: usize,
-        bounds: Option<&ChunkBounds<COMPONENTS>>,
-        elements: &[u64],
-        out: &mut [f32],
-    ) {
-        let field = self.fields[component];
-        match (&self.values, bounds) {
-            (Values::Codebook(values), _) => {
-                for (value, element) in out.iter_mut().zip(elements) {
-                    *value = values[usize::from(field.code(*element)) % CODEBOOK];
-                }
-            }
-            (Values::Chunks { .. }, None) => out.fill(0.0),
-            (Values::Chunks { .. }, Some(bounds)) => {
-                let (low, high) = (bounds.low[component], bounds.high[component]);
-                for (value, element) in out.iter_mut().zip(elements) {
-                    let t = field.fraction(*element);
-                    *value = self.finish.value(low * (1.0 - t) + high * t);
-                }
-            }
-        }
-    }
-
-    /// The bounds of a vertex, which are then the last ones; `None` for a codebook.
-    fn bounds(&self, vertex: u64, last: &mut Option<ChunkBounds<COMPONENTS>>) -> Option<ChunkBounds<COMPONENTS>> {
-        let Values::Chunks { table, is_binary64, size } = &self.values else {
-            return None;
-        };
-        if !last.is_some_and(|last| last.has(vertex)) {
-            let size = u64::from(*size);
-            let chunk = vertex / size;
-            let [low, high] = bounds(table, *is_binary64, chunk);
-            let first = chunk * size;
-            *last = Some(ChunkBounds { first, end: first.saturating_add(size), low, high });
-        }
-        *last
+        numbers
     }
 }
 
-/// The minima and the maxima of a chunk; zeros if the table does not have all of them.
-fn bounds<const COMPONENTS: usize>(table: &AttributeStream, is_binary64: bool, chunk: u64) -> [[f64; COMPONENTS]; 2] {
-    let size = number_size(is_binary64);
-    let mut bytes = [0; 8 * 2 * 3];
-    let bytes = &mut bytes[..(2 * COMPONENTS * size).min(8 * 2 * 3)];
-    table.read(chunk, bytes);
-    let at = |index: usize| bytes.get(index * size..).map_or(0.0, |bytes| number(bytes, is_binary64));
-    [0, COMPONENTS].map(|first| std::array::from_fn(|component| at(first + component)))
+/// The value of a codebook that an element selects.
+#[inline(always)]
+fn selected(values: &[f32; CODEBOOK], field: Field, element: u64) -> f32 {
+    values[usize::from(field.code(element)) % CODEBOOK]
 }
 
 impl<'a> Decoder<'a, 3> {
@@ -351,5 +393,53 @@ pub(super) fn quaternion(decoding: RotationDecoding, element: u64) -> [f64; 4] {
         1 => [a, greatest, b, c],
         2 => [a, b, greatest, c],
         _ => [a, b, c, greatest],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Finish;
+
+    /// Numbers of all sizes, of which few are near a rounded value's edge, and special ones.
+    fn numbers() -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut numbers = vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 5e-324, 88.8, -103.9];
+        for _ in 0..100_000 {
+            numbers.push(40.0 * (random() - 0.5));
+            numbers.push(220.0 * (random() - 0.5));
+            numbers.push((random() - 0.5) * libm::ldexp(1.0, -(160.0 * random()) as i32));
+        }
+        // Logarithms of numbers in the middle between two of binary32, where only the exact function can round.
+        for step in 0..1000 {
+            let low = f32::from_bits(0x3F80_0000 + step * 8191);
+            let middle = (f64::from(low) + f64::from(low.next_up())) / 2.0;
+            numbers.extend([libm::log(middle), libm::log1p(middle), -libm::log1p(middle)]);
+        }
+        numbers
+    }
+
+    #[gaurast_runner::test]
+    fn values_of_many_numbers_are_those_of_each() {
+        let numbers = numbers();
+        let finishes = [
+            Finish::None,
+            Finish::SignedExponential,
+            Finish::Exponential,
+            Finish::Logistic,
+            Finish::Coefficient,
+        ];
+        for finish in finishes {
+            let mut values = vec![0.0; numbers.len()];
+            finish.values(&numbers, &mut values);
+            for (number, value) in numbers.iter().zip(values) {
+                let expected = finish.value(*number);
+                let is_equal = value.to_bits() == expected.to_bits() || value.is_nan() && expected.is_nan();
+                assert!(is_equal, "{finish:?} of {number:e}: {value:e}, not {expected:e}");
+            }
+        }
     }
 }

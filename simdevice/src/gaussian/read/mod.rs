@@ -4,6 +4,7 @@ pub(crate) mod attributes;
 pub(crate) mod cluster_cache;
 pub(crate) mod clusters;
 pub(crate) mod decoding;
+mod exponential;
 pub(crate) mod fingerprint;
 pub(crate) mod group;
 pub(crate) mod harmonics;
