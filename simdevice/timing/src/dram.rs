@@ -3,7 +3,7 @@
 //!
 //! A bank has one open row. A burst of the open row takes the data bus for its length. Another row must be closed and
 //! the new one opened first: precharge and activation of a bank overlap the bursts of others. Refreshes are left out;
-//! they take 3 to 4 % of the time ([`Timings::LPDDR5`] has the source).
+//! a bank's take 3 to 4 % of the time ([`Timings::LPDDR5`] has the source).
 
 use serde::{Deserialize, Serialize};
 
@@ -32,8 +32,10 @@ pub struct Timings {
 }
 
 impl Timings {
-    /// LPDDR5 at 2133 MHz (4267 MT/s), 128 bits: eight channels of 16 bits. JESD209-5: bursts of 16, 16 banks, tRCD 18
-    /// ns, tRP 18 ns, tRAS 42 ns, rows of 2 kB; the read latency of about 25 ns includes the controller's.
+    /// LPDDR5 at 2133 MHz (4267 MT/s), 128 bits: eight channels of 16 bits, bursts of 16, 16 banks, rows of 2 kB, tRCD
+    /// and tRP 18 ns, tRAS 42 ns, a read latency of 25 ns. The standard, JESD209-5, was not read. Ramulator 2
+    /// (`src/dram/impl/LPDDR5.cpp`, 0b89cad) has the same shape, and 15, 15, 34 and 20 cycles of 1.25 ns at 6400 MT/s.
+    /// It refreshes a bank in 120 to 140 ns (8 and 16 Gb), once in 3906 ns.
     pub const LPDDR5: Self = Self {
         channels: 8,
         banks: 16,

@@ -2,7 +2,7 @@
 //! data set: `paper_scenes FOLDER [VIEWS] > simdevice/timing/studies/generated_scenes.toml`. FOLDER has bicycle.json,
 //! garden.json, room.json and bonsai.json, which are cameras.json files of the original 3DGS code.
 //!
-//! The scenes are generated gardens. They share only the published counts and picture sizes with the paper's scenes. A
+//! The scenes are generated gardens. They share only picture sizes with the paper's scenes, and within 4 % the counts. A
 //! path is moved and scaled so that it goes around the garden's centre at the distance for which the garden is made.
 
 use std::error::Error;

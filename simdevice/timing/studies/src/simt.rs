@@ -24,30 +24,37 @@ const fn parameter(name: &'static str, value: f64, source: &'static str) -> Para
 const SCHEDULERS: Parameter = parameter(
     "warp schedulers of an SM",
     4.0,
-    "NVIDIA Ampere GA102 white paper: four partitions, each issues a warp's instruction in a cycle",
+    "CUDA C++ Programming Guide, compute capability 8.x, architecture: four, and each issues an instruction at a time",
 );
-const WARP: Parameter = parameter("lanes of a warp", 32.0, "CUDA C++ Programming Guide");
-const BATCH: Parameter =
-    parameter("Gaussians of a batch", 256.0, "the original 3DGS code: a thread fetches one for its block");
+const WARP: Parameter =
+    parameter("lanes of a warp", 32.0, "CUDA C++ Programming Guide; a device query of an Orin NX prints it");
+const BATCH: Parameter = parameter(
+    "Gaussians of a batch",
+    256.0,
+    "the original 3DGS code (forward.cu, lines 314-320): a thread fetches one for its block",
+);
 const SPECIAL: Parameter = parameter(
     "lanes of special functions of an SM",
     16.0,
-    "CUDA C++ Programming Guide, arithmetic throughput, compute capability 8.7",
+    "CUDA C++ Programming Guide, compute capability 8.x, architecture: 16 special function units",
 );
 const LOAD_STORE: Parameter = parameter(
     "lanes of loads and stores of an SM",
     32.0,
-    "NVIDIA Ampere GA102 white paper has 16 in each of four partitions; that half of them reach shared memory is assumed",
+    "CUDA C++ Programming Guide, shared memory: 32 banks of 32 bits a cycle; that main memory's loads have as many lanes \
+     is assumed",
 );
 const RESIDENT: Parameter = parameter(
     "blocks of 256 threads in an SM",
     6.0,
-    "CUDA C++ Programming Guide: 1536 threads, compute capability 8.7; that registers allow them is assumed",
+    "1536 threads in a multiprocessor, as a device query of an Orin NX prints; that registers allow them is assumed",
 );
 const DEPENDENT: Parameter = parameter(
     "cycles between dependent instructions of a warp",
     4.0,
-    "Abdelkhalik et al., \"Demystifying the Nvidia Ampere Architecture through Microbenchmarking\", 2022",
+    "Abdelkhalik et al., \"Demystifying the Nvidia Ampere Architecture through Microbenchmarking and Instruction-level \
+     Analysis\", 2022 (arXiv 2208.11174), as others quote it: an fp32 addition on A100; that Orin takes as many is \
+     assumed",
 );
 const SKIPPED: Parameter = parameter(
     "instructions of a warp in which no lane blends",
@@ -73,15 +80,20 @@ const BATCH_LATENCY: Parameter = parameter(
 const CACHE: Parameter = parameter(
     "bytes of L2",
     4.0 * 1024.0 * 1024.0,
-    "NVIDIA Jetson AGX Orin technical brief: 4 MB; that Orin NX has as much is assumed",
+    "assumed: AGX Orin's 4 MB, of NVIDIA's technical brief; a device query of an Orin NX prints 2 MB",
 );
-const ENTRY_BYTES: Parameter = parameter("bytes of a list's entry", 4.0, "the original 3DGS code: an index");
-const GAUSSIAN_BYTES: Parameter =
-    parameter("bytes of a Gaussian that a batch reads", 24.0, "the original 3DGS code: centre, conic and opacity");
+const ENTRY_BYTES: Parameter =
+    parameter("bytes of a list's entry", 4.0, "the original 3DGS code (rasterizer_impl.h, line 61): an index");
+const GAUSSIAN_BYTES: Parameter = parameter(
+    "bytes of a Gaussian that a batch reads",
+    24.0,
+    "the original 3DGS code (forward.cu, lines 319-320): centre, conic and opacity",
+);
 const COLOR_BYTES: Parameter = parameter(
     "bytes of a colour, in a sector of L2",
     32.0,
-    "the original 3DGS code reads 12 bytes where a warp blends; a sector has 32 (NVIDIA's profiler's documentation)",
+    "the original 3DGS code (forward.cu, lines 354-355) reads 12 bytes where a warp blends; a sector has 32 (NVIDIA's \
+     forum, topic 312884)",
 );
 
 /// The machine's numbers. The preset gives the number of SMs, clock and bandwidth.
@@ -103,8 +115,11 @@ pub const MACHINE: [Parameter; 16] = [
     COLOR_BYTES,
     WARPS_OF_A_BLOCK,
 ];
-const WARPS_OF_A_BLOCK: Parameter =
-    parameter("warps of a block", 8.0, "the original 3DGS code: 16x16 threads, so that a warp is two rows of a tile");
+const WARPS_OF_A_BLOCK: Parameter = parameter(
+    "warps of a block",
+    8.0,
+    "the original 3DGS code (auxiliary.h, lines 18-19): 16x16 threads, so that a warp is two rows of a tile",
+);
 
 /// The time of stage 3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -7,7 +7,7 @@ use timing::config::Config;
 use timing::fast;
 use timing::simulate::even_frame;
 
-/// The measurements that `samples/examples/paper_scenes.rs` writes.
+/// The measurements that `tests/bench/examples/paper_scenes.rs` writes.
 const MEASURED: &str = include_str!("../../generated_scenes.toml");
 
 #[derive(Deserialize)]
@@ -73,8 +73,8 @@ pub fn section() -> Option<Section> {
     }
     (!rows.is_empty()).then(|| Section {
         title: "Pairs of generated scenes",
-        text: "An illustration only: generated gardens with the published counts of Gaussians and sizes of pictures, drawn \
-               along camera paths of the data set (stump along garden's, counter and kitchen along room's, which alone are \
+        text: "An illustration only: generated gardens with the scenes' sizes of pictures and within 4 % of their counts of \
+               Gaussians, drawn along camera paths of the data set (stump along garden's, counter and kitchen along room's, which alone are \
                at hand), turned and scaled to go around the garden. What lies in front of what decides how many \
                pairs are needed, and in a garden that is another matter, so that nothing here confirms or refutes the pairs that the times imply. Measured by \
                `cargo run --release -p gaurast-bench --example paper_scenes -- CAMERAS > \

@@ -42,8 +42,8 @@ the model uses it; **cited**, another source says it; **assumed**, nobody does; 
 the paper's numbers by arithmetic; **contradiction**, the paper's numbers don't fit together, and the note has the arithmetic;
 **predicted**, the model says it without having been told; **fit**, a regression over the paper's own numbers, in which no machine is
 simulated; **bound**, no machine can pass it, so that it predicts nothing; **illustration**, it is of
-generated scenes that have the published counts and sizes and nothing else of the paper's; **not testable**, it would need what is
-not at hand.
+generated scenes that have the scenes' sizes, nearly their counts and nothing else of the paper's; **not testable**, it would
+need what is not at hand.
 
 No trained model of the Mip-NeRF 360 scenes is used here, so pairs of tiles and Gaussians are solved from the published
 times, not measured. A prediction from them tests the model's overheads and its energy, not the scenes' work.

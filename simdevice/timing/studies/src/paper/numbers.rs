@@ -11,10 +11,11 @@ pub struct Scene {
     pub baseline_ms: f64,
     /// Stage 3 on GauRast, in ms.
     pub gaurast_ms: f64,
-    /// Gaussians of the 3DGS authors' trained model, in millions: the vertices of its file of 30,000 iterations, as
-    /// public evaluation scripts that cap the number of Gaussians at it repeat them.
+    /// Gaussians of the 3DGS authors' trained model, in millions: the vertices of its file of 30,000 iterations. The
+    /// files were not opened. DirectXSplat's benchmark (`benches/README.md`, cdaba92) lists the points of the files
+    /// `iteration_30000/point_cloud.ply`, and AAA-Gaussians (`full_eval.py`, 30e7aa4) has the same seven numbers.
     pub gaussians: f64,
-    /// Pixels of the published images.
+    /// Pixels of the data set's images; the same list of DirectXSplat has them.
     pub size: [u32; 2],
 }
 
@@ -92,18 +93,38 @@ pub fn inputs() -> Section {
             "speed-up of GSCore over a mobile GPU",
             "15.86x",
             Label::Cited,
-            "GSCore's own abstract (ASPLOS 2024); enters nothing",
+            "GSCore's own abstract (ASPLOS 2024): on average; enters nothing",
         ),
         Row::input("SoC of the evaluation", "Jetson Orin NX, 10 W mode"),
-        Row::without_paper("shader cores, 10 W mode", "4 SM, 612 MHz", Label::Cited, "NVIDIA's power mode table"),
-        Row::without_paper("bandwidth, 10 W mode", "68.3 GB/s", Label::Cited, "NVIDIA's data sheet"),
-        Row::without_paper("shader cores, maximum mode", "8 SM, 918 MHz", Label::Cited, "NVIDIA's power mode table"),
-        Row::without_paper("bandwidth, maximum mode", "102.4 GB/s", Label::Cited, "NVIDIA's data sheet"),
+        Row::without_paper(
+            "shader cores, 10 W mode",
+            "4 SM, 612 MHz",
+            Label::Cited,
+            "NVIDIA's power modes of Orin NX 16 GB (nvpmodel_p3767_0000.conf), mode 10W: two TPCs, 612 MHz",
+        ),
+        Row::without_paper(
+            "bandwidth, 10 W mode",
+            "68.3 GB/s",
+            Label::Cited,
+            "the same: memory at 2133 MHz, two transfers a cycle of 128 bits",
+        ),
+        Row::without_paper(
+            "shader cores, maximum mode",
+            "8 SM, 918 MHz",
+            Label::Cited,
+            "the same, mode MAXN: four TPCs; a device query of an Orin NX 16 GB prints 8 multiprocessors and 918 MHz",
+        ),
+        Row::without_paper(
+            "bandwidth, maximum mode",
+            "102.4 GB/s",
+            Label::Cited,
+            "NVIDIA's data sheet of Orin NX, as others quote it",
+        ),
         Row::without_paper(
             "tile side",
             "16 pixels",
             Label::Cited,
-            "the original 3DGS code; that the hardware's tiles are as large is assumed",
+            "the original 3DGS code (config.h); that the hardware's tiles are as large is assumed",
         ),
         Row::without_paper(
             "cycles between pixels of a PE",
@@ -115,7 +136,8 @@ pub fn inputs() -> Section {
             "Gaussians of the scenes",
             "1.22-6.13 M",
             Label::Cited,
-            "vertices of the 3DGS authors' trained models, 30,000 iterations; that the paper draws these is assumed",
+            "vertices of the 3DGS authors' trained models, 30,000 iterations, as two public repositories list them \
+             (docs/simulator.md, Sources); that the paper draws these is assumed",
         ),
     ];
     Section {

@@ -210,8 +210,7 @@ fn others(config: &Config) -> Section {
     Section {
         title: "Other ways to draw Gaussians",
         text: "First quads on the unmodified rasterizer and ROPs (`gaurast simulate` shows them for any scene), then what others say \
-               of their own hardware. These are of different scenes, sizes and baselines and do not compare; a number is blank where \
-               its source was not read."
+               of their own hardware. These are of different scenes, sizes and baselines and do not compare."
             .to_owned(),
         rows,
     }

@@ -21,7 +21,7 @@ const fn assumed(field: &'static str, low: &'static str, high: &'static str) -> 
 }
 
 /// The assumed fields. Energies and areas are halved and doubled.
-const FIELDS: [Assumed; 27] = [
+const FIELDS: [Assumed; 28] = [
     assumed("rasterizer.saturation", "none", "reached"),
     assumed("rasterizer.triangle_traversal", "reached", "tile"),
     assumed("rasterizer.hierarchical_depth", "false", "true"),
@@ -37,6 +37,7 @@ const FIELDS: [Assumed; 27] = [
     assumed("shader.memory_per_cycle", "16", "64"),
     assumed("shader.efficiency", "0.4", "0.8"),
     assumed("baseline.efficiency", "0.7", "1"),
+    assumed("soc.area_mm2", "400", "500"),
     assumed("soc.node_scaling", "3", "8"),
     assumed("energy.scale", "1", "3"),
     assumed("energy.leakage_w_per_mm2", "0.1", "0.8"),
