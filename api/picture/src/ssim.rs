@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use rayon::prelude::*;
 
 use crate::tiles::{Filter, Form, Tile, sum, tiles};
@@ -148,13 +148,13 @@ impl Memory {
                 for channel in 0..3 {
                     for row in 0..tile.rows(RADIUS) {
                         // A row is taken when it is first needed, and is still in a cache when it is filtered.
-                        self.take_row(images, tile, row, channel, border);
+                        self.take_row(simd, images, tile, row, channel, border);
                         let Some(row) = row.checked_sub(2 * RADIUS) else { continue };
                         for (plane, filtered) in self.planes.iter().zip(&mut self.filtered) {
                             filter.correlate(simd, plane, (row + RADIUS) * stride, stride, &mut self.down);
                             filter.correlate(simd, &self.down, RADIUS, 1, filtered);
                         }
-                        self.compute_values();
+                        self.compute_values(simd);
                         sums.all += sum(&self.values[..tile.width]);
                         if inner_rows.contains(&row) {
                             sums.inside += sum(&self.values[inner_columns.clone()]);
@@ -168,7 +168,15 @@ impl Memory {
 
     /// Fills a row of the planes with a channel of the images.
     #[inline(always)]
-    fn take_row(&mut self, images: Images<'_>, tile: Tile, row: usize, channel: usize, border: Border) {
+    fn take_row<S: Simd>(
+        &mut self,
+        simd: S,
+        images: Images<'_>,
+        tile: Tile,
+        row: usize,
+        channel: usize,
+        border: Border,
+    ) {
         let stride = tile.stride(RADIUS);
         let [a, b, both, squares] = self.planes.each_mut().map(|plane| &mut plane[row * stride..][..stride]);
         let y = (tile.top + row) as isize - RADIUS as isize;
@@ -180,22 +188,28 @@ impl Memory {
                 values.fill(0.0);
             }
         }
-        for at in 0..stride {
-            both[at] = a[at] * b[at];
-            squares[at] = a[at] * a[at] + b[at] * b[at];
+        let [a, b] = [&*a, &*b].map(|values| values.chunks_exact(8));
+        let [both, squares] = [both, squares].map(|values| values.chunks_exact_mut(8));
+        for ((a, b), (both, squares)) in a.zip(b).zip(both.zip(squares)) {
+            let [a, b] = [a, b].map(|values| f64x8::from_slice(simd, values));
+            (a * b).store_slice(both);
+            (a * a + b * b).store_slice(squares);
         }
     }
 
     /// Computes the values of a row's pixels from what is filtered.
     #[inline(always)]
-    fn compute_values(&mut self) {
-        let count = self.values.len();
-        let [mean_a, mean_b, both, squares] = self.filtered.each_ref().map(|row| &row[..count]);
-        for (at, value) in self.values.iter_mut().enumerate() {
-            let (x, y) = (mean_a[at], mean_b[at]);
-            let covariance = both[at] - x * y;
-            let variances = squares[at] - (x * x + y * y);
-            *value = (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2));
+    fn compute_values<S: Simd>(&mut self, simd: S) {
+        let [mean_a, mean_b, both, squares] = self.filtered.each_ref().map(|row| row.chunks_exact(8));
+        let means = mean_a.zip(mean_b);
+        for (value, ((x, y), (both, squares))) in self.values.chunks_exact_mut(8).zip(means.zip(both.zip(squares))) {
+            let [x, y, both, squares] = [x, y, both, squares].map(|values| f64x8::from_slice(simd, values));
+            let product = x * y;
+            let of_means = x * x + y * y;
+            let covariance = both - product;
+            let variances = squares - of_means;
+            let similar = (product * 2.0 + C1) * (covariance * 2.0 + C2);
+            (similar / ((of_means + C1) * (variances + C2))).store_slice(value);
         }
     }
 }

@@ -73,7 +73,7 @@ pub(crate) fn sum<T: Copy + Into<f64>>(values: &[T]) -> f64 {
 
 /// The numbers of a filter.
 pub(crate) trait Number: SimdElement + Default {
-    /// Half as many as are filtered together, which is at most half of a group.
+    /// As many as are filtered together, which divide a group.
     type Vector<S: Simd>: SimdBase<S, Element = Self>;
 }
 
@@ -139,8 +139,8 @@ impl<T: Number> Filter<T> {
         );
     }
 
-    /// Correlates two vectors at a time. `both` makes what a weight multiplies of the values before, those in the middle and those
-    /// after.
+    /// Correlates with a weight after the other, so that each loop goes along rows. `both` makes what a weight multiplies of the
+    /// values before, those in the middle and those after.
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -150,26 +150,24 @@ impl<T: Number> Filter<T> {
         both: impl Fn(T::Vector<S>, T::Vector<S>, T::Vector<S>) -> T::Vector<S>,
     ) {
         let length = T::Vector::<S>::LEN;
-        let zero = T::Vector::<S>::splat(simd, T::default());
-        for (number, output) in output.chunks_exact_mut(2 * length).enumerate() {
-            let at = pass.middle + number * 2 * length;
-            let centre = pass.load(simd, at);
-            let mut sums = [zero; 2];
-            if self.form == Form::Even {
-                for part in 0..2 {
-                    sums[part] = centre[part] * self.weights[0];
-                }
-            }
-            for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
-                let weight = T::Vector::<S>::splat(simd, weight);
-                let before = pass.load(simd, at - distance * pass.step);
-                let after = pass.load(simd, at + distance * pass.step);
-                for part in 0..2 {
-                    sums[part] += weight * both(before[part], centre[part], after[part]);
-                }
-            }
-            for part in 0..2 {
-                sums[part].store_slice(&mut output[part * length..][..length]);
+        let count = output.len();
+        let row = |first: usize| pass.values[first..][..count].chunks_exact(length);
+        let centre = row(pass.middle);
+        let weight = if self.form == Form::Even { self.weights[0] } else { T::default() };
+        let weight = T::Vector::<S>::splat(simd, weight);
+        for (output, centre) in output.chunks_exact_mut(length).zip(centre.clone()) {
+            (T::Vector::<S>::from_slice(simd, centre) * weight).store_slice(output);
+        }
+        for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
+            let weight = T::Vector::<S>::splat(simd, weight);
+            let (before, after) = (row(pass.middle - distance * pass.step), row(pass.middle + distance * pass.step));
+            let rows = before.zip(centre.clone()).zip(after);
+            for (output, ((before, centre), after)) in output.chunks_exact_mut(length).zip(rows) {
+                let sum = T::Vector::<S>::from_slice(simd, output);
+                let before = T::Vector::<S>::from_slice(simd, before);
+                let centre = T::Vector::<S>::from_slice(simd, centre);
+                let after = T::Vector::<S>::from_slice(simd, after);
+                (sum + weight * both(before, centre, after)).store_slice(output);
             }
         }
     }
@@ -181,16 +179,6 @@ struct Pass<'a, T> {
     values: &'a [T],
     middle: usize,
     step: usize,
-}
-
-impl<T: Number> Pass<'_, T> {
-    /// The two vectors of values from `at` on.
-    #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, at: usize) -> [T::Vector<S>; 2] {
-        let length = T::Vector::<S>::LEN;
-        let (first, second) = self.values[at..][..2 * length].split_at(length);
-        [T::Vector::<S>::from_slice(simd, first), T::Vector::<S>::from_slice(simd, second)]
-    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! data set: `paper_scenes FOLDER [VIEWS] > simdevice/timing/studies/generated_scenes.toml`. FOLDER has bicycle.json,
 //! garden.json, room.json and bonsai.json, which are cameras.json files of the original 3DGS code.
 //!
-//! The scenes are generated gardens. They share only picture sizes with the paper's scenes, and within 4 % the counts. A
+//! The scenes are generated gardens. They share only the counts of Gaussians and picture sizes with the paper's scenes. A
 //! path is moved and scaled so that it goes around the garden's centre at the distance for which the garden is made.
 
 use std::error::Error;
@@ -12,15 +12,15 @@ use gaurast_render::Renderer;
 use gaurast_scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Name, Gaussians in millions, picture size, and the scene whose camera path is used.
-const SCENES: [(&str, f64, [u32; 2], &str); 7] = [
-    ("bicycle", 6.06, [1237, 822], "bicycle"),
-    ("stump", 4.82, [1245, 825], "garden"),
-    ("garden", 5.71, [1297, 840], "garden"),
-    ("room", 1.55, [1557, 1038], "room"),
-    ("counter", 1.19, [1558, 1038], "room"),
-    ("kitchen", 1.78, [1558, 1039], "room"),
-    ("bonsai", 1.24, [1559, 1039], "bonsai"),
+/// Name, Gaussians, picture size, and the scene whose camera path is used.
+const SCENES: [(&str, usize, [u32; 2], &str); 7] = [
+    ("bicycle", 6_131_954, [1237, 822], "bicycle"),
+    ("stump", 4_961_797, [1245, 825], "garden"),
+    ("garden", 5_834_784, [1297, 840], "garden"),
+    ("room", 1_593_376, [1557, 1038], "room"),
+    ("counter", 1_222_956, [1558, 1038], "room"),
+    ("kitchen", 1_852_335, [1558, 1039], "room"),
+    ("bonsai", 1_244_819, [1559, 1039], "bonsai"),
 ];
 
 /// The counters that are kept, by category and name, and their names in the output.
@@ -36,13 +36,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = arguments.next().ok_or("a folder of cameras.json files")?;
     let views: usize = arguments.next().map_or(Ok(8), |text| text.parse())?;
     println!("# Means over {views} views of generated gardens; written by tests/bench/examples/paper_scenes.rs.");
-    for (name, millions, size, path) in SCENES {
+    for (name, count, size, path) in SCENES {
         let file = Path::new(&folder).join(format!("{path}.json"));
         let path_cameras: Vec<_> =
             gaurast_scene::camera_files::load(&file, size)?.into_iter().map(|view| view.camera).collect();
         let cameras = around_the_garden(&path_cameras, size, views)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
-        let count = (millions * 1e6) as usize;
         // The host's copy is dropped once the device has its own.
         let scene = renderer.upload(&gaurast_scene::garden::scene(1, count), Some(0))?;
         let mut sums = [0.0; KEPT.len()];

@@ -15,7 +15,7 @@ mod reference;
 
 use std::f64::consts::PI;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, prelude::*, u32x16};
 use rayon::prelude::*;
 
 use crate::tiles::{Filter, Form, Tile, sum, tiles};
@@ -47,6 +47,9 @@ const fn relative_to(white: f64, [r, g, b]: [f64; 3], divisor: f64) -> [f64; 3] 
 
 /// The greatest colour difference, which is that from green to blue.
 const GREATEST_DIFFERENCE: f64 = 203.301654592;
+
+/// The steps of sRGB values of eight bits.
+const STEPS: usize = 256;
 
 /// Weights below this do not change a sum.
 const LEAST_WEIGHT: f64 = 1e-10;
@@ -106,8 +109,8 @@ struct Vision {
     edge: Filter<f32>,
     point: Filter<f32>,
     smooth: Filter<f32>,
-    /// The linear values of sRGB's 256 steps.
-    linear: [f64; 256],
+    /// The linear values of sRGB's steps.
+    linear: [f64; STEPS],
 }
 
 /// The memory of a thread, used again for each tile.
@@ -137,7 +140,7 @@ struct Seen {
 #[derive(Debug, Default)]
 struct Rows {
     /// The sRGB steps of a row of an image in the tile and its border, all channels of a pixel after one another.
-    steps: Vec<u8>,
+    steps: Vec<u32>,
     /// The linear red, green and blue of a row and its border.
     linear: [Vec<f64>; 3],
     /// A row and its border after a filter along columns, and after the smoothing one.
@@ -169,19 +172,27 @@ impl Memory {
 impl Seen {
     /// Takes a row of the tile and its border, of linear red, green and blue.
     #[inline(always)]
-    fn take(&mut self, row: usize, stride: usize, linear: &[Vec<f64>; 3]) {
-        let [red, green, blue] = linear.each_ref().map(|values| &values[..stride]);
-        let [y, cx, cz] = self.opponent.each_mut().map(|plane| &mut plane[row * stride..][..stride]);
-        for at in 0..stride {
-            let (r, g, b) = (red[at], green[at], blue[at]);
-            let x_of_white = X_OF_WHITE[0] * r + X_OF_WHITE[1] * g + X_OF_WHITE[2] * b;
-            let y_of_white = Y_OF_WHITE[0] * r + Y_OF_WHITE[1] * g + Y_OF_WHITE[2] * b;
-            let z_of_white = Z_OF_WHITE[0] * r + Z_OF_WHITE[1] * g + Z_OF_WHITE[2] * b;
-            y[at] = (116.0 * y_of_white - 16.0) as f32;
-            cx[at] = (500.0 * (x_of_white - y_of_white)) as f32;
-            cz[at] = (200.0 * (y_of_white - z_of_white)) as f32;
+    fn take<S: Simd>(&mut self, simd: S, row: usize, stride: usize, linear: &[Vec<f64>; 3]) {
+        let [y, cx, cz] = self.opponent.each_mut().map(|plane| plane[row * stride..][..stride].chunks_exact_mut(8));
+        let [red, green, blue] = linear.each_ref().map(|values| values[..stride].chunks_exact(8));
+        for ((y, (cx, cz)), (red, (green, blue))) in y.zip(cx.zip(cz)).zip(red.zip(green.zip(blue))) {
+            let red = f64x8::from_slice(simd, red);
+            let green = f64x8::from_slice(simd, green);
+            let blue = f64x8::from_slice(simd, blue);
+            let x_of_white = red * X_OF_WHITE[0] + green * X_OF_WHITE[1] + blue * X_OF_WHITE[2];
+            let y_of_white = red * Y_OF_WHITE[0] + green * Y_OF_WHITE[1] + blue * Y_OF_WHITE[2];
+            let z_of_white = red * Z_OF_WHITE[0] + green * Z_OF_WHITE[1] + blue * Z_OF_WHITE[2];
+            round_to(y, (y_of_white * 116.0 - 16.0).into());
+            round_to(cx, ((x_of_white - y_of_white) * 500.0).into());
+            round_to(cz, ((y_of_white - z_of_white) * 200.0).into());
         }
     }
+}
+
+/// Rounds numbers to binary32.
+#[inline(always)]
+fn round_to(values: &mut [f32], numbers: [f64; 8]) {
+    values.copy_from_slice(&numbers.map(|number| number as f32));
 }
 
 impl Vision {
@@ -236,13 +247,14 @@ impl Vision {
                     // A row is taken when it is first needed, and is still in a cache when it is filtered.
                     for (image, seen) in [(reference, &mut memory.reference), (test, &mut memory.test)] {
                         let y = (tile.top + row).saturating_sub(self.border).min(image.len() / width - 1);
-                        self.take_linear(&image[y * width..][..width], tile, &mut memory.rows);
-                        seen.take(row, stride, &memory.rows.linear);
+                        self.take_linear(simd, &image[y * width..][..width], tile, &mut memory.rows);
+                        seen.take(simd, row, stride, &memory.rows.linear);
                     }
                     if let Some(row) = row.checked_sub(2 * self.border) {
                         self.see(simd, &mut memory.reference, row, stride, &mut memory.rows);
                         self.see(simd, &mut memory.test, row, stride, &mut memory.rows);
-                        compare(&memory.reference, &memory.test, &mut memory.errors[row * columns..][..columns]);
+                        let errors = &mut memory.errors[row * columns..][..columns];
+                        compare(simd, &memory.reference, &memory.test, errors);
                     }
                 }
             },
@@ -251,17 +263,17 @@ impl Vision {
 
     /// Takes the linear values of a row of an image in the tile and its border.
     #[inline(always)]
-    fn take_linear<const N: usize>(&self, pixels: &[[f32; N]], tile: Tile, rows: &mut Rows) {
+    fn take_linear<S: Simd, const N: usize>(&self, simd: S, pixels: &[[f32; N]], tile: Tile, rows: &mut Rows) {
         let stride = tile.stride(self.border);
         let place = |at: usize| (tile.left + at).saturating_sub(self.border).min(pixels.len() - 1);
         let (first, end) = (place(0), place(stride - 1) + 1);
         let [red, green, blue] = rows.linear.each_mut().map(|row| &mut row[..stride]);
-        if Self::take_steps(pixels[first..end].as_flattened(), &mut rows.steps) {
+        if take_steps(simd, pixels[first..end].as_flattened(), &mut rows.steps) {
             for at in 0..stride {
                 let of_pixel = &rows.steps[(place(at) - first) * N..][..3];
-                red[at] = self.linear[usize::from(of_pixel[0])];
-                green[at] = self.linear[usize::from(of_pixel[1])];
-                blue[at] = self.linear[usize::from(of_pixel[2])];
+                red[at] = self.linear[of_pixel[0] as usize % STEPS];
+                green[at] = self.linear[of_pixel[1] as usize % STEPS];
+                blue[at] = self.linear[of_pixel[2] as usize % STEPS];
             }
         } else {
             for at in 0..stride {
@@ -275,32 +287,8 @@ impl Vision {
 
     /// The linear value of an sRGB value, of which `step` is the nearest step.
     #[inline(always)]
-    fn linear_of(&self, value: f32, step: u8) -> f64 {
-        if f32::from(step) / 255.0 == value { self.linear[usize::from(step)] } else { srgb_to_linear(value) }
-    }
-
-    /// Takes the nearest step of sRGB of each value, or any step of a value beyond 0 to 1. Returns false if one is no step.
-    ///
-    /// It goes by groups of values, of which compilers make vectors wherever it is inlined.
-    #[inline(always)]
-    fn take_steps(values: &[f32], steps: &mut Vec<u8>) -> bool {
-        const GROUP: usize = 32;
-        steps.resize(values.len(), 0);
-        let (groups, rest) = values.as_chunks::<GROUP>();
-        let (groups_steps, rest_steps) = steps.as_chunks_mut::<GROUP>();
-        let mut others = [0; GROUP];
-        for (steps, group) in groups_steps.iter_mut().zip(groups) {
-            for lane in 0..GROUP {
-                let step = nearest_step(group[lane]);
-                steps[lane] = step as u8;
-                others[lane] |= u32::from(step as f32 / 255.0 != group[lane]);
-            }
-        }
-        for (step, &value) in rest_steps.iter_mut().zip(rest) {
-            *step = nearest_step(value) as u8;
-            others[0] |= u32::from(f32::from(*step) / 255.0 != value);
-        }
-        others == [0; GROUP]
+    fn linear_of(&self, value: f32, step: u32) -> f64 {
+        if step as f32 / 255.0 == value { self.linear[step as usize % STEPS] } else { srgb_to_linear(value) }
     }
 
     /// Filters a row of the tile as human vision does.
@@ -313,90 +301,108 @@ impl Vision {
             for (weight, filter) in sensitivity {
                 filter.correlate(simd, plane, middle, stride, &mut rows.down);
                 filter.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
-                for (sum, value) in sums.iter_mut().zip(&rows.along) {
-                    *sum += weight * value;
+                for (sum, value) in sums.chunks_exact_mut(16).zip(rows.along.chunks_exact(16)) {
+                    let [so_far, value] = [&*sum, value].map(|values| f32x16::from_slice(simd, values));
+                    (so_far + value * *weight).store_slice(sum);
                 }
             }
         }
-        hunt_lab(color);
+        hunt_lab(simd, color);
         let luminance = &opponent[0];
         self.smooth.correlate(simd, luminance, middle, stride, &mut rows.smooth);
         for (across, strength) in [(&self.edge, edges), (&self.point, points)] {
             across.correlate(simd, luminance, middle, stride, &mut rows.down);
             self.smooth.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
             across.correlate(simd, &rows.smooth, self.border, 1, strength);
-            for (x, y) in strength.iter_mut().zip(&rows.along) {
+            for (x, y) in strength.chunks_exact_mut(16).zip(rows.along.chunks_exact(16)) {
+                let [across, along] = [&*x, y].map(|values| f32x16::from_slice(simd, values));
                 // Luminance is (Y + 16) / 116, and equal values have no strength.
-                *x = (*x * *x + y * y).sqrt() * (1.0 / 116.0);
+                ((across * across + along * along).sqrt() * (1.0 / 116.0)).store_slice(x);
             }
         }
     }
 }
 
-/// Computes the errors of a row's pixels.
-///
-/// In two loops, of which each reads few enough rows for compilers to make vectors of it.
+/// Takes the nearest step of sRGB of each value, or any step of a value beyond 0 to 1. Returns false if one is no step.
 #[inline(always)]
-fn compare(reference: &Seen, test: &Seen, errors: &mut [f32]) {
-    let count = errors.len();
-    let [l, a, b] = reference.color.each_ref().map(|row| &row[..count]);
-    let [test_l, test_a, test_b] = test.color.each_ref().map(|row| &row[..count]);
-    for at in 0..count {
-        errors[at] = color_error(l[at] - test_l[at], a[at] - test_a[at], b[at] - test_b[at]);
+fn take_steps<S: Simd>(simd: S, values: &[f32], steps: &mut Vec<u32>) -> bool {
+    steps.resize(values.len().next_multiple_of(16), 0);
+    let (groups, rest) = values.as_chunks::<16>();
+    let (group_steps, rest_steps) = steps.split_at_mut(16 * groups.len());
+    let mut others = u32x16::splat(simd, 0);
+    for (steps, group) in group_steps.chunks_exact_mut(16).zip(groups) {
+        let values = f32x16::from_slice(simd, group);
+        let nearest = (values * 255.0 + power::WHOLE).bitcast::<u32x16<S>>() & u32x16::splat(simd, 0xFF);
+        nearest.store_slice(steps);
+        others |= (f32x16::float_from(nearest) / 255.0).bitcast::<u32x16<S>>() ^ values.bitcast::<u32x16<S>>();
     }
-    let (edges, points) = (&reference.edges[..count], &reference.points[..count]);
-    let (test_edges, test_points) = (&test.edges[..count], &test.points[..count]);
-    for at in 0..count {
-        let (edge, point) = ((edges[at] - test_edges[at]).abs(), (points[at] - test_points[at]).abs());
-        // A root: the exponent of the feature difference is a half.
-        let feature_error = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
-        errors[at] = power(errors[at], 1.0 - feature_error);
+    let mut are_steps = <[u32; 16]>::from(others) == [0; 16];
+    for (step, &value) in rest_steps.iter_mut().zip(rest) {
+        *step = (value * 255.0 + power::WHOLE).to_bits() & 0xFF;
+        are_steps &= *step as f32 / 255.0 == value;
     }
+    are_steps
 }
 
-/// The error of colours of L*a*b* that differ so much.
+/// Computes the errors of a row's pixels.
 #[inline(always)]
-fn color_error(l: f32, a: f32, b: f32) -> f32 {
-    // The HyAB distance: city-block in lightness, Euclidean in the other two.
-    let difference = power(l.abs() + (a * a + b * b).sqrt(), QC as f32);
-    // Differences are mapped to 0 to 1, and most of the range to small ones.
-    let greatest = power(GREATEST_DIFFERENCE as f32, QC as f32);
-    let (knee, part) = (PC as f32 * greatest, PT as f32);
-    let beyond = part + (difference - knee) / (greatest - knee) * (1.0 - part);
-    if difference < knee { part / knee * difference } else { beyond }
+fn compare<S: Simd>(simd: S, reference: &Seen, test: &Seen, errors: &mut [f32]) {
+    // The colour difference that is mapped to the share PT, and the greatest one.
+    let greatest = GREATEST_DIFFERENCE.powf(QC) as f32;
+    let knee = PC as f32 * greatest;
+    for (group, errors) in errors.chunks_exact_mut(16).enumerate() {
+        let difference = |reference: &[f32], test: &[f32]| {
+            let [reference, test] = [reference, test].map(|row| f32x16::from_slice(simd, &row[16 * group..][..16]));
+            reference - test
+        };
+        let [l, a, b] = [0, 1, 2].map(|channel| difference(&reference.color[channel], &test.color[channel]));
+        // The HyAB distance: city-block in lightness, Euclidean in the other two.
+        let color = power(simd, l.abs() + (a * a + b * b).sqrt(), f32x16::splat(simd, QC as f32));
+        // Differences are mapped to 0 to 1, and most of the range to small ones.
+        let part = PT as f32;
+        let beyond = (color - knee) / (greatest - knee) * (1.0 - part) + part;
+        let color_error = color.simd_lt(knee).select(color * (part / knee), beyond);
+        let edge = difference(&reference.edges, &test.edges).abs();
+        let point = difference(&reference.points, &test.points).abs();
+        // A root: the exponent of the feature difference is a half.
+        let feature_error = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
+        power(simd, color_error, f32x16::splat(simd, 1.0) - feature_error).store_slice(errors);
+    }
 }
 
 /// Changes a row of filtered colours of YCxCz to L*a*b*, with the Hunt effect: colours look more colourful where they are brighter.
 #[inline(always)]
-fn hunt_lab([y, cx, cz]: &mut [Vec<f32>; 3]) {
-    let count = y.len();
-    let (y_row, cx_row, cz_row) = (&mut y[..count], &mut cx[..count], &mut cz[..count]);
-    for at in 0..count {
-        let of_white = (y_row[at] + 16.0) * (1.0 / 116.0);
-        let x = (of_white + cx_row[at] * (1.0 / 500.0)) * WHITE[0] as f32;
+fn hunt_lab<S: Simd>(simd: S, color: &mut [Vec<f32>; 3]) {
+    let [y_row, cx_row, cz_row] = color.each_mut().map(|row| row.chunks_exact_mut(16));
+    let zero = f32x16::splat(simd, 0.0);
+    let one = f32x16::splat(simd, 1.0);
+    for (y_row, (cx_row, cz_row)) in y_row.zip(cx_row.zip(cz_row)) {
+        let of_white = (f32x16::from_slice(simd, y_row) + 16.0) * (1.0 / 116.0);
+        let x = (f32x16::from_slice(simd, cx_row) * (1.0 / 500.0) + of_white) * WHITE[0] as f32;
         let y = of_white * WHITE[1] as f32;
-        let z = (of_white - cz_row[at] * (1.0 / 200.0)) * WHITE[2] as f32;
-        let r = (3.241_003_3 * x - 1.537_398_9 * y - 0.498_615_86 * z).clamp(0.0, 1.0);
-        let g = (-0.969_224_33 * x + 1.875_930_1 * y + 0.041554224 * z).clamp(0.0, 1.0);
-        let b = (0.055639423 * x - 0.204_011_2 * y + 1.057_148_9 * z).clamp(0.0, 1.0);
-        let x = (10135552.0 / 24577794.0) * r + (8788810.0 / 24577794.0) * g + (4435075.0 / 24577794.0) * b;
-        let y = (2613072.0 / 12288897.0) * r + (8788810.0 / 12288897.0) * g + (887015.0 / 12288897.0) * b;
-        let z = (1425312.0 / 73733382.0) * r + (8788810.0 / 73733382.0) * g + (70074185.0 / 73733382.0) * b;
-        let (x, y, z) = (lab_root(x, WHITE[0]), lab_root(y, WHITE[1]), lab_root(z, WHITE[2]));
-        let l = 116.0 * y - 16.0;
-        y_row[at] = l;
-        cx_row[at] = 0.01 * l * (500.0 * (x - y));
-        cz_row[at] = 0.01 * l * (200.0 * (y - z));
+        let z = (of_white - f32x16::from_slice(simd, cz_row) * (1.0 / 200.0)) * WHITE[2] as f32;
+        let r = (x * 3.241_003_3 - y * 1.537_398_9 - z * 0.498_615_86).max(zero).min(one);
+        let g = (y * 1.875_930_1 - x * 0.969_224_33 + z * 0.041554224).max(zero).min(one);
+        let b = (x * 0.055639423 - y * 0.204_011_2 + z * 1.057_148_9).max(zero).min(one);
+        let x = r * (10135552.0 / 24577794.0) + g * (8788810.0 / 24577794.0) + b * (4435075.0 / 24577794.0);
+        let y = r * (2613072.0 / 12288897.0) + g * (8788810.0 / 12288897.0) + b * (887015.0 / 12288897.0);
+        let z = r * (1425312.0 / 73733382.0) + g * (8788810.0 / 73733382.0) + b * (70074185.0 / 73733382.0);
+        let x = lab_root(simd, x * (1.0 / WHITE[0]) as f32);
+        let y = lab_root(simd, y * (1.0 / WHITE[1]) as f32);
+        let z = lab_root(simd, z * (1.0 / WHITE[2]) as f32);
+        let l = y * 116.0 - 16.0;
+        l.store_slice(y_row);
+        (l * 0.01 * ((x - y) * 500.0)).store_slice(cx_row);
+        (l * 0.01 * ((y - z) * 200.0)).store_slice(cz_row);
     }
 }
 
-/// L*a*b*'s root of a value relative to that of white.
+/// L*a*b*'s roots of values relative to those of white.
 #[inline(always)]
-fn lab_root(value: f32, white: f64) -> f32 {
+fn lab_root<S: Simd>(simd: S, relative: f32x16<S>) -> f32x16<S> {
     const CUBED: f32 = 216.0 / 24389.0;
-    let relative = value * (1.0 / white) as f32;
-    let root = power(relative, 1.0 / 3.0);
-    if relative > CUBED { root } else { relative * (841.0 / 108.0) + 4.0 / 29.0 }
+    let root = power(simd, relative, f32x16::splat(simd, 1.0 / 3.0));
+    relative.simd_gt(CUBED).select(root, relative * (841.0 / 108.0) + 4.0 / 29.0)
 }
 
 /// The filter of a kernel of odd length, without what does not change a sum at its ends.
@@ -428,12 +434,6 @@ fn balanced(weights: Vec<f64>) -> Vec<f64> {
     let negative: f64 = -weights.iter().filter(|w| **w < 0.0).sum::<f64>();
     let scale = |w: &f64| w / if *w < 0.0 { negative } else { positive };
     weights.iter().map(scale).collect()
-}
-
-/// The nearest step of sRGB of a value from 0 to 1, and any step of one beyond.
-#[inline(always)]
-fn nearest_step(value: f32) -> u32 {
-    (value * 255.0 + power::WHOLE).to_bits() & 0xFF
 }
 
 fn srgb_to_linear(value: f32) -> f64 {

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Maps the units and a processing element to the cells of a library, and prints their areas and the times of their longest paths
-# as a table in Markdown: GAURAST_LIBERTY=FILE GAURAST_LIBERTY_NODE=45 bash silicon.sh [quick]. FILE is a library in Liberty's
-# format, such as NanGate45's, and the node its gate length in nm; `quick` maps one unit. Needs yosys and OpenSTA. Must be in the
-# folder of the modules' files.
+# Maps the units, a processing element and the arbiter of four modules to the cells of a library, and prints their areas and the
+# times of their longest paths as a table in Markdown: GAURAST_LIBERTY=FILE GAURAST_LIBERTY_NODE=45 bash silicon.sh [quick]. FILE
+# is a library in Liberty's format, such as NanGate45's, and the node its gate length in nm; `quick` maps one unit. Needs yosys
+# and OpenSTA. Must be in the folder of the modules' files.
 #
 # Wires have neither resistance nor capacitance, and a library is taken at its own voltage and temperature. Times at 28 nm are
 # taken to be shorter in proportion to the gate length.
@@ -11,7 +11,7 @@ cd "$(dirname "$0")"
 library=${GAURAST_LIBERTY:?names a Liberty file} node=${GAURAST_LIBERTY_NODE:?is the gate length of its process, in nm}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-SOURCES="delay.sv fp_round.sv fp_add.sv fp_mul.sv fp_div.sv fp_exp2.sv exp2_table.sv pe.sv"
+SOURCES="delay.sv fp_round.sv fp_add.sv fp_mul.sv fp_div.sv fp_exp2.sv exp2_table.sv pe.sv arbiter.sv round_robin.sv"
 # What drives the inputs, and what the outputs drive, in fF.
 flop=$(grep -oE 'cell *\("?[A-Za-z0-9_]*(DFF_X1|dfxtp_1)"?\)' "$library" | head -1 | sed 's/.*(\"\{0,1\}\([A-Za-z0-9_]*\).*/\1/')
 printf 'set_driving_cell %s\nset_load 3.0 [all_outputs]\n' "$flop" >"$work/constraints"
@@ -57,3 +57,4 @@ for format in fp32 fp16; do
     map "$format PE, triangles" pe "$bits -chparam GAUSSIANS 0"
     map "$format PE, and Gaussians" pe "$bits -chparam GAUSSIANS 1"
 done
+map "arbiter of four modules" arbiter ""

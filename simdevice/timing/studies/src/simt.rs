@@ -79,8 +79,8 @@ const BATCH_LATENCY: Parameter = parameter(
 );
 const CACHE: Parameter = parameter(
     "bytes of L2",
-    4.0 * 1024.0 * 1024.0,
-    "assumed: AGX Orin's 4 MB, of NVIDIA's technical brief; a device query of an Orin NX prints 2 MB",
+    2.0 * 1024.0 * 1024.0,
+    "a device query of an Orin NX prints 2,097,152; AGX Orin has twice as many",
 );
 const ENTRY_BYTES: Parameter =
     parameter("bytes of a list's entry", 4.0, "the original 3DGS code (rasterizer_impl.h, line 61): an index");
