@@ -191,7 +191,7 @@ impl Memory {
         let [a, b] = [&*a, &*b].map(|values| values.chunks_exact(8));
         let [both, squares] = [both, squares].map(|values| values.chunks_exact_mut(8));
         for ((a, b), (both, squares)) in a.zip(b).zip(both.zip(squares)) {
-            let [a, b] = [a, b].map(|values| f64x8::from_slice(simd, values));
+            let (a, b) = (f64x8::from_slice(simd, a), f64x8::from_slice(simd, b));
             (a * b).store_slice(both);
             (a * a + b * b).store_slice(squares);
         }
@@ -203,11 +203,11 @@ impl Memory {
         let [mean_a, mean_b, both, squares] = self.filtered.each_ref().map(|row| row.chunks_exact(8));
         let means = mean_a.zip(mean_b);
         for (value, ((x, y), (both, squares))) in self.values.chunks_exact_mut(8).zip(means.zip(both.zip(squares))) {
-            let [x, y, both, squares] = [x, y, both, squares].map(|values| f64x8::from_slice(simd, values));
+            let (x, y) = (f64x8::from_slice(simd, x), f64x8::from_slice(simd, y));
             let product = x * y;
             let of_means = x * x + y * y;
-            let covariance = both - product;
-            let variances = squares - of_means;
+            let covariance = f64x8::from_slice(simd, both) - product;
+            let variances = f64x8::from_slice(simd, squares) - of_means;
             let similar = (product * 2.0 + C1) * (covariance * 2.0 + C2);
             (similar / ((of_means + C1) * (variances + C2))).store_slice(value);
         }

@@ -110,7 +110,7 @@ impl<T: Number> Filter<T> {
     ///
     /// It is a function of its own for each level, since it is called in many places, with a row each.
     pub(crate) fn correlate<S: Simd>(&self, simd: S, values: &[T], middle: usize, step: usize, output: &mut [T]) {
-        let pass = Pass { values, middle, step };
+        let pass = Pass { values, middle, step, count: output.len() };
         simd.vectorize(
             #[inline(always)]
             || match self.form {
@@ -139,7 +139,7 @@ impl<T: Number> Filter<T> {
         );
     }
 
-    /// Correlates with a weight after the other, so that each loop goes along rows. `both` makes what a weight multiplies of the
+    /// Correlates some weights after the others, so that their loops go along rows. `both` makes what a weight multiplies of the
     /// values before, those in the middle and those after.
     #[inline(always)]
     fn run<S: Simd>(
@@ -147,30 +147,35 @@ impl<T: Number> Filter<T> {
         simd: S,
         pass: Pass<'_, T>,
         output: &mut [T],
-        both: impl Fn(T::Vector<S>, T::Vector<S>, T::Vector<S>) -> T::Vector<S>,
+        both: impl Fn(T::Vector<S>, T::Vector<S>, T::Vector<S>) -> T::Vector<S> + Copy,
     ) {
-        let length = T::Vector::<S>::LEN;
-        let count = output.len();
-        let row = |first: usize| pass.values[first..][..count].chunks_exact(length);
-        let centre = row(pass.middle);
-        let weight = if self.form == Form::Even { self.weights[0] } else { T::default() };
-        let weight = T::Vector::<S>::splat(simd, weight);
-        for (output, centre) in output.chunks_exact_mut(length).zip(centre.clone()) {
-            (T::Vector::<S>::from_slice(simd, centre) * weight).store_slice(output);
-        }
-        for (distance, &weight) in self.weights.iter().enumerate().skip(1) {
-            let weight = T::Vector::<S>::splat(simd, weight);
-            let (before, after) = (row(pass.middle - distance * pass.step), row(pass.middle + distance * pass.step));
-            let rows = before.zip(centre.clone()).zip(after);
-            for (output, ((before, centre), after)) in output.chunks_exact_mut(length).zip(rows) {
-                let sum = T::Vector::<S>::from_slice(simd, output);
-                let before = T::Vector::<S>::from_slice(simd, before);
-                let centre = T::Vector::<S>::from_slice(simd, centre);
-                let after = T::Vector::<S>::from_slice(simd, after);
-                (sum + weight * both(before, centre, after)).store_slice(output);
+        let middle = if self.form == Form::Even { self.weights[0] } else { T::default() };
+        let middle = T::Vector::<S>::splat(simd, middle);
+        for (output, centre) in output.as_chunks_mut::<LANES>().0.iter_mut().zip(pass.groups(0)) {
+            for part in 0..LANES / T::Vector::<S>::LEN {
+                (load(simd, centre, part) * middle).store_slice(place::<T, S>(output, part));
             }
         }
+        let (fours, rest) = self.weights[1..].as_chunks::<4>();
+        for (number, weights) in fours.iter().enumerate() {
+            pass.add(simd, 1 + 4 * number, weights, output, both);
+        }
+        for (number, weight) in rest.iter().enumerate() {
+            pass.add(simd, 1 + 4 * fours.len() + number, std::array::from_ref(weight), output, both);
+        }
     }
+}
+
+/// The vector of a number in a group.
+#[inline(always)]
+fn load<T: Number, S: Simd>(simd: S, group: &[T; LANES], number: usize) -> T::Vector<S> {
+    T::Vector::<S>::from_slice(simd, &group[number * T::Vector::<S>::LEN..][..T::Vector::<S>::LEN])
+}
+
+/// The place of a vector in a group.
+#[inline(always)]
+fn place<T: Number, S: Simd>(group: &mut [T; LANES], number: usize) -> &mut [T] {
+    &mut group[number * T::Vector::<S>::LEN..][..T::Vector::<S>::LEN]
 }
 
 /// The values that are filtered, of which the first one is at `middle`, with neighbours that are `step` apart.
@@ -179,6 +184,46 @@ struct Pass<'a, T> {
     values: &'a [T],
     middle: usize,
     step: usize,
+    /// The number of values.
+    count: usize,
+}
+
+impl<'a, T: Number> Pass<'a, T> {
+    /// The groups of the neighbours at a distance, which is negative before the middle.
+    #[inline(always)]
+    fn groups(&self, distance: isize) -> &'a [[T; LANES]] {
+        let first = self.middle.wrapping_add_signed(distance * self.step as isize);
+        self.values[first..][..self.count].as_chunks().0
+    }
+
+    /// Adds what consecutive weights multiply, of which the first is at `distance`. There are several of them, so that sums are
+    /// loaded and stored less often.
+    #[inline(always)]
+    fn add<S: Simd, const COUNT: usize>(
+        self,
+        simd: S,
+        distance: usize,
+        weights: &[T; COUNT],
+        output: &mut [T],
+        both: impl Fn(T::Vector<S>, T::Vector<S>, T::Vector<S>) -> T::Vector<S>,
+    ) {
+        let neighbours = |sign: isize| -> [&[[T; LANES]]; COUNT] {
+            std::array::from_fn(|number| self.groups(sign * (distance + number) as isize))
+        };
+        let (before, centre, after) = (neighbours(-1), self.groups(0), neighbours(1));
+        let weights: [T::Vector<S>; COUNT] = std::array::from_fn(|number| T::Vector::<S>::splat(simd, weights[number]));
+        for (at, output) in output.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            for part in 0..LANES / T::Vector::<S>::LEN {
+                let mut sum = load(simd, output, part);
+                let centre = load(simd, &centre[at], part);
+                for number in 0..COUNT {
+                    let (before, after) = (load(simd, &before[number][at], part), load(simd, &after[number][at], part));
+                    sum += weights[number] * both(before, centre, after);
+                }
+                sum.store_slice(place::<T, S>(output, part));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -182,17 +182,20 @@ impl Seen {
             let x_of_white = red * X_OF_WHITE[0] + green * X_OF_WHITE[1] + blue * X_OF_WHITE[2];
             let y_of_white = red * Y_OF_WHITE[0] + green * Y_OF_WHITE[1] + blue * Y_OF_WHITE[2];
             let z_of_white = red * Z_OF_WHITE[0] + green * Z_OF_WHITE[1] + blue * Z_OF_WHITE[2];
-            round_to(y, (y_of_white * 116.0 - 16.0).into());
-            round_to(cx, ((x_of_white - y_of_white) * 500.0).into());
-            round_to(cz, ((y_of_white - z_of_white) * 200.0).into());
+            round_to(y, y_of_white * 116.0 - 16.0);
+            round_to(cx, (x_of_white - y_of_white) * 500.0);
+            round_to(cz, (y_of_white - z_of_white) * 200.0);
         }
     }
 }
 
 /// Rounds numbers to binary32.
 #[inline(always)]
-fn round_to(values: &mut [f32], numbers: [f64; 8]) {
-    values.copy_from_slice(&numbers.map(|number| number as f32));
+fn round_to<S: Simd>(values: &mut [f32], numbers: f64x8<S>) {
+    let numbers: [f64; 8] = numbers.into();
+    for (value, number) in values.iter_mut().zip(numbers) {
+        *value = number as f32;
+    }
 }
 
 impl Vision {
@@ -302,8 +305,8 @@ impl Vision {
                 filter.correlate(simd, plane, middle, stride, &mut rows.down);
                 filter.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
                 for (sum, value) in sums.chunks_exact_mut(16).zip(rows.along.chunks_exact(16)) {
-                    let [so_far, value] = [&*sum, value].map(|values| f32x16::from_slice(simd, values));
-                    (so_far + value * *weight).store_slice(sum);
+                    let value = f32x16::from_slice(simd, value);
+                    (f32x16::from_slice(simd, sum) + value * *weight).store_slice(sum);
                 }
             }
         }
@@ -315,7 +318,7 @@ impl Vision {
             self.smooth.correlate(simd, &rows.down, self.border, 1, &mut rows.along);
             across.correlate(simd, &rows.smooth, self.border, 1, strength);
             for (x, y) in strength.chunks_exact_mut(16).zip(rows.along.chunks_exact(16)) {
-                let [across, along] = [&*x, y].map(|values| f32x16::from_slice(simd, values));
+                let (across, along) = (f32x16::from_slice(simd, x), f32x16::from_slice(simd, y));
                 // Luminance is (Y + 16) / 116, and equal values have no strength.
                 ((across * across + along * along).sqrt() * (1.0 / 116.0)).store_slice(x);
             }
@@ -351,23 +354,28 @@ fn compare<S: Simd>(simd: S, reference: &Seen, test: &Seen, errors: &mut [f32]) 
     let greatest = GREATEST_DIFFERENCE.powf(QC) as f32;
     let knee = PC as f32 * greatest;
     for (group, errors) in errors.chunks_exact_mut(16).enumerate() {
-        let difference = |reference: &[f32], test: &[f32]| {
-            let [reference, test] = [reference, test].map(|row| f32x16::from_slice(simd, &row[16 * group..][..16]));
-            reference - test
-        };
-        let [l, a, b] = [0, 1, 2].map(|channel| difference(&reference.color[channel], &test.color[channel]));
+        let l = difference(simd, group, &reference.color[0], &test.color[0]);
+        let a = difference(simd, group, &reference.color[1], &test.color[1]);
+        let b = difference(simd, group, &reference.color[2], &test.color[2]);
         // The HyAB distance: city-block in lightness, Euclidean in the other two.
         let color = power(simd, l.abs() + (a * a + b * b).sqrt(), f32x16::splat(simd, QC as f32));
         // Differences are mapped to 0 to 1, and most of the range to small ones.
         let part = PT as f32;
         let beyond = (color - knee) / (greatest - knee) * (1.0 - part) + part;
         let color_error = color.simd_lt(knee).select(color * (part / knee), beyond);
-        let edge = difference(&reference.edges, &test.edges).abs();
-        let point = difference(&reference.points, &test.points).abs();
+        let edge = difference(simd, group, &reference.edges, &test.edges).abs();
+        let point = difference(simd, group, &reference.points, &test.points).abs();
         // A root: the exponent of the feature difference is a half.
         let feature_error = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
         power(simd, color_error, f32x16::splat(simd, 1.0) - feature_error).store_slice(errors);
     }
+}
+
+/// The difference of a group of two rows.
+#[inline(always)]
+fn difference<S: Simd>(simd: S, group: usize, reference: &[f32], test: &[f32]) -> f32x16<S> {
+    let place = 16 * group..16 * group + 16;
+    f32x16::from_slice(simd, &reference[place.clone()]) - f32x16::from_slice(simd, &test[place])
 }
 
 /// Changes a row of filtered colours of YCxCz to L*a*b*, with the Hunt effect: colours look more colourful where they are brighter.

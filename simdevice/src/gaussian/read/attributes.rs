@@ -3,7 +3,9 @@
 use super::decoding::{Codebooks, Decoder, Encoded, Finish, quaternion};
 use crate::format::Format;
 use crate::gaussian::lanes::F32_LANES;
-use crate::packet::{Activations, AttributeStream, Decoding, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding};
+use crate::packet::{
+    Activations, AttributeStream, Decoding, GaussianAppend, GaussianAttributes, IndexStream, RotationDecoding,
+};
 
 /// The attributes of a group's Gaussians as they are read from the streams: an array per component, an element per
 /// lane.
@@ -326,7 +328,8 @@ impl Fetcher {
         if encoded.finish != Finish::None {
             for lanes in out {
                 let lanes = &mut lanes[..group.len];
-                let numbers: [f64; F32_LANES] = std::array::from_fn(|lane| lanes.get(lane).copied().map_or(0.0, f64::from));
+                let numbers: [f64; F32_LANES] =
+                    std::array::from_fn(|lane| lanes.get(lane).copied().map_or(0.0, f64::from));
                 encoded.finish.values(&numbers[..lanes.len()], lanes);
             }
         }

@@ -407,7 +407,8 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let mut numbers = vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 5e-324, 88.8, -103.9];
+        let mut numbers =
+            vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 5e-324, 88.8, -103.9];
         for _ in 0..100_000 {
             numbers.push(40.0 * (random() - 0.5));
             numbers.push(220.0 * (random() - 0.5));
@@ -425,13 +426,8 @@ mod tests {
     #[gaurast_runner::test]
     fn values_of_many_numbers_are_those_of_each() {
         let numbers = numbers();
-        let finishes = [
-            Finish::None,
-            Finish::SignedExponential,
-            Finish::Exponential,
-            Finish::Logistic,
-            Finish::Coefficient,
-        ];
+        let finishes =
+            [Finish::None, Finish::SignedExponential, Finish::Exponential, Finish::Logistic, Finish::Coefficient];
         for finish in finishes {
             let mut values = vec![0.0; numbers.len()];
             finish.values(&numbers, &mut values);

@@ -66,12 +66,7 @@ pub(super) fn fast_exp_m1(x: f64) -> f64 {
 /// Rounds values to binary32: those of `fast`, whose relative errors are at most [`ERROR`], or those of `exact`, where the error
 /// may change the rounded value.
 #[inline(always)]
-pub(super) fn round_all(
-    numbers: &[f64],
-    out: &mut [f32],
-    fast: impl Fn(f64) -> f64,
-    exact: impl Fn(f64) -> f32,
-) {
+pub(super) fn round_all(numbers: &[f64], out: &mut [f32], fast: impl Fn(f64) -> f64, exact: impl Fn(f64) -> f32) {
     let (groups, rest) = numbers.as_chunks::<AT_ONCE>();
     let (out_groups, out_rest) = out.as_chunks_mut::<AT_ONCE>();
     for (numbers, out) in groups.iter().zip(out_groups) {

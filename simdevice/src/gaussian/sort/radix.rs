@@ -105,8 +105,8 @@ fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [
     }
 }
 
-/// The most pairs of all buffers that are kept together.
-const MOST_KEPT: usize = 1 << 23;
+/// The most pairs of all buffers that are kept together: more would take memory while tiles are binned, and save little time.
+const MOST_KEPT: usize = 1 << 22;
 
 /// Memory of earlier sorts, which later ones use again: zeros need not be written to it first.
 #[derive(Debug, Default)]

@@ -19,8 +19,6 @@ const SHOWN: [(Label, &[&str]); 6] = [
             "end-to-end speed-up, 1.0 listed a needed pair",
             "FPS, 1.5 listed a needed pair",
             "end-to-end speed-up, 1.5 listed a needed pair",
-            "mean error: SIMT machine, each warp blends",
-            "mean error: SIMT machine, no warp blends",
         ],
     ),
     (Label::Fit, &["mean error: line through the other scenes (null)"]),
