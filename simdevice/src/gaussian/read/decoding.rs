@@ -284,14 +284,20 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         element: u64,
         last: &mut Option<ChunkBounds<COMPONENTS>>,
     ) -> [f32; COMPONENTS] {
+        let mut out = [0.0; COMPONENTS];
+        let components = out.iter_mut().zip(self.fields).enumerate();
         match &self.values {
-            Values::Codebook(values) => self.fields.map(|field| selected(values, field, element)),
+            Values::Codebook(values) => {
+                components.for_each(|(_, (value, field))| *value = selected(values, field, element));
+            }
             Values::Chunks(chunks) => {
                 let bounds = chunks.bounds_of(vertex, last);
-                let number = |component| bounds.number(component, self.fields[component], element);
-                std::array::from_fn(|component| self.finish.value(number(component)))
+                for (component, (value, field)) in components {
+                    *value = self.finish.value(bounds.number(component, field, element));
+                }
             }
         }
+        out
     }
 
     /// The values of several vertices, of which `vertex` gives the numbers, and `elements` what they hold: an array for each

@@ -2,11 +2,12 @@
 
 use super::attributes::GroupVertices;
 use super::decoding::{CODEBOOK, ChunkBounds, Codebooks, Decoder, Encoded, Finish};
+use crate::gaussian::spherical_harmonics::MAX_COEFFICIENTS;
 use crate::packet::{AttributeStream, GaussianAttributes, HarmonicsCodes, HarmonicsDecoding};
 use std::cell::Cell;
 use std::sync::Arc;
 
-/// The most bytes from the first to the last code of a vertex that are read with one copy.
+/// The most bytes from the first to the last code of a vertex that are read with one copy: a place among them is a byte.
 const SPAN: usize = 256;
 
 /// Decodes the spherical harmonics of a draw.
@@ -25,6 +26,36 @@ struct CodeReader<'a> {
     values: Arc<[f32; CODEBOOK]>,
     /// The labels of a palette's entries, if there is one.
     labels: Option<&'a AttributeStream>,
+    span: Option<CodeSpan>,
+}
+
+/// The places of a vertex's codes, if they lie near one another.
+struct CodeSpan {
+    /// The bytes from the first code on that have all of them.
+    length: usize,
+    /// The places of red, green and blue of each coefficient after the first, in these bytes.
+    places: [[u8; 3]; MAX_COEFFICIENTS],
+}
+
+impl CodeSpan {
+    /// The places of the codes of these streams; `None` if they are too far apart, or in several buffers.
+    fn new(streams: &[AttributeStream], component_stride: u64) -> Option<Self> {
+        let first = streams.first()?;
+        let mut span = Self { length: 0, places: [[0; 3]; MAX_COEFFICIENTS] };
+        for (places, stream) in span.places.iter_mut().zip(streams) {
+            if !Arc::ptr_eq(&stream.buffer.memory, &first.buffer.memory) || stream.buffer.offset != first.buffer.offset
+            {
+                return None;
+            }
+            let mut place = u64::from(stream.offset.checked_sub(first.offset)?);
+            for of_component in places {
+                *of_component = u8::try_from(place).ok()?;
+                span.length = span.length.max(usize::from(*of_component) + 1);
+                place = place.saturating_add(component_stride);
+            }
+        }
+        Some(span)
+    }
 }
 
 impl<'a> HarmonicsDecoder<'a> {
@@ -34,7 +65,9 @@ impl<'a> HarmonicsDecoder<'a> {
         let decodings = &attributes.activations.decodings;
         let mut reader = |codes: HarmonicsCodes, labels| {
             let values = codebooks.values(tables.harmonics.as_ref()?, codes.is_binary64, Finish::None);
-            Some(CodeReader { component_stride: codes.component_stride.into(), values, labels })
+            let component_stride = codes.component_stride.into();
+            let streams = attributes.spherical_harmonics.get(1..).unwrap_or_default();
+            Some(CodeReader { component_stride, values, labels, span: CodeSpan::new(streams, component_stride) })
         };
         let codes = match decodings.harmonics {
             HarmonicsDecoding::None => None,
@@ -90,26 +123,18 @@ impl CodeReader<'_> {
             None => Some(vertex),
             Some(labels) => label(labels, vertex),
         };
-        let ([first, ..], [.., last], Some(entry)) = (streams, streams, entry) else {
+        let (Some(first), Some(entry)) = (streams.first(), entry) else {
             return out.fill([0.0; 3]);
         };
-        // All codes lie between the first and the last of red, and those of blue after them.
-        let start = u64::from(first.offset);
-        let length = u64::from(last.offset)
-            .checked_sub(start)
-            .map_or(u64::MAX, |between| between + 2 * self.component_stride + 1);
-        let mut span = [0_u8; SPAN];
-        let is_one_buffer = first.buffer.offset == last.buffer.offset;
-        if is_one_buffer
-            && length <= SPAN as u64
-            && let Some(place) = first.place(entry, length)
-            && first.buffer.memory.read(place, &mut span[..length as usize]).is_ok()
+        let mut bytes = [0_u8; SPAN];
+        if let Some(span) = &self.span
+            && let Some(place) = first.place(entry, span.length as u64)
+            && first.buffer.memory.read(place, &mut bytes[..span.length]).is_ok()
         {
-            for (stream, out) in streams.iter().zip(out) {
-                let at = (u64::from(stream.offset) - start) as usize;
-                let stride = self.component_stride as usize;
-                let value = |component: usize| self.values[usize::from(span[at + component * stride])];
-                *out = [value(0), value(1), value(2)];
+            for (out, places) in out.iter_mut().zip(&span.places) {
+                for (out, place) in out.iter_mut().zip(places) {
+                    *out = self.values[usize::from(bytes[usize::from(*place)])];
+                }
             }
             return;
         }
