@@ -205,8 +205,8 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
         sort_into(&slices, other, sorted);
         settle(sorted);
     });
-    for group in groups {
-        buffers.keep(group.pairs);
+    if count <= MOST_KEPT {
+        groups.into_iter().for_each(|group| buffers.keep(group.pairs));
     }
     SortedPairs { buffer: pairs, len: count }
 }

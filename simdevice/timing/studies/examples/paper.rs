@@ -1,5 +1,5 @@
 //! Prints PAPER.md.
 
 fn main() {
-    print!("{}", timing_studies::paper::markdown());
+    print!("{}", timing_studies::paper::markdown(&timing_studies::paper::report()));
 }

@@ -1,12 +1,16 @@
 //! Tests that PAPER.md is generated, complete and up to date.
 
-use timing_studies::paper::{AT_A_GLANCE, Label, TORNADO};
+use std::sync::LazyLock;
+use timing_studies::paper::{AT_A_GLANCE, Label, Section, TORNADO};
+
+/// The report, which takes ten seconds.
+static REPORT: LazyLock<Vec<Section>> = LazyLock::new(timing_studies::paper::report);
 
 #[gaurast_runner::test]
 fn the_report_in_the_repository_is_up_to_date() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/PAPER.md");
     let stored = std::fs::read_to_string(path).unwrap();
-    let generated = timing_studies::paper::markdown();
+    let generated = timing_studies::paper::markdown(&REPORT);
     for (line, (stored, generated)) in stored.lines().zip(generated.lines()).enumerate() {
         assert_eq!(
             stored,
@@ -20,11 +24,8 @@ fn the_report_in_the_repository_is_up_to_date() {
 
 #[gaurast_runner::test]
 fn every_number_of_the_papers_evaluation_has_a_row() {
-    let rows: Vec<_> = timing_studies::paper::report()
-        .into_iter()
-        .filter(|section| section.title != AT_A_GLANCE)
-        .flat_map(|section| section.rows)
-        .collect();
+    let rows: Vec<_> =
+        REPORT.iter().filter(|section| section.title != AT_A_GLANCE).flat_map(|section| &section.rows).collect();
     let scenes = [
         ("bicycle", "321 ms", "15 ms"),
         ("stump", "149 ms", "6 ms"),
@@ -80,8 +81,7 @@ fn every_number_of_the_papers_evaluation_has_a_row() {
 
 #[gaurast_runner::test]
 fn the_first_screen_has_predictions_then_assumptions_fits_and_inputs() {
-    let report = timing_studies::paper::report();
-    let (first, others) = report.split_first().expect("a section");
+    let (first, others) = REPORT.split_first().expect("a section");
     assert_eq!(first.title, AT_A_GLANCE);
     // A screen has fifty lines.
     assert!(first.rows.len() <= 40, "{}", first.rows.len());
@@ -109,12 +109,12 @@ fn the_first_screen_has_predictions_then_assumptions_fits_and_inputs() {
         assert_eq!(below.any(|other| other == row), !is_together, "{}", row.item);
     }
     // No row that should be shown is missing: these, and the raster times.
-    assert_eq!(first.rows.len(), 34);
+    assert_eq!(first.rows.len(), 32);
 }
 
 #[gaurast_runner::test]
 fn the_first_rows_are_predictions_and_say_how_far_off_they_are() {
-    let report = timing_studies::paper::report().split_off(1);
+    let report = &REPORT[1..];
     assert_eq!(report[0].title, "Frames, predicted");
     for row in &report[0].rows {
         // A bound is held against nothing.
