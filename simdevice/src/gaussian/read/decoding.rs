@@ -285,14 +285,15 @@ impl<'a, const COMPONENTS: usize> Decoder<'a, COMPONENTS> {
         last: &mut Option<ChunkBounds<COMPONENTS>>,
     ) -> [f32; COMPONENTS] {
         let mut out = [0.0; COMPONENTS];
-        let components = out.iter_mut().zip(self.fields).enumerate();
         match &self.values {
             Values::Codebook(values) => {
-                components.for_each(|(_, (value, field))| *value = selected(values, field, element));
+                for (value, field) in out.iter_mut().zip(self.fields) {
+                    *value = selected(values, field, element);
+                }
             }
             Values::Chunks(chunks) => {
                 let bounds = chunks.bounds_of(vertex, last);
-                for (component, (value, field)) in components {
+                for (component, (value, field)) in out.iter_mut().zip(self.fields).enumerate() {
                     *value = self.finish.value(bounds.number(component, field, element));
                 }
             }
