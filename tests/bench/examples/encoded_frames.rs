@@ -1,11 +1,15 @@
 //! Times the first frames of compressed scenes as they lie and decoded: `encoded_frames RUNS FILE...` prints a row of the table in
 //! docs/files.md for each file, medians of the runs. The ways take turns.
 
+#[path = "../src/bin/gaurast-bench/median.rs"]
+mod median;
+
 use std::error::Error;
 use std::path::Path;
 
 use gaurast_render::Renderer;
 use gaurast_scene::{Camera, Loaded, Options};
+use median::median;
 
 /// The frames of a run. Those after the first build clusters; later ones read them.
 const FRAMES: usize = 12;
@@ -32,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         let name = path.file_name().unwrap_or_default().display();
-        let cells = times.map(|mut times| format!("{:.1}", median(&mut times)));
+        let cells = times.map(|times| format!("{:.1}", median(times)));
         println!("| {name} | {} |", cells.join(" | "));
     }
     Ok(())
@@ -51,9 +55,4 @@ fn draw(path: &Path, decoded: bool) -> Result<Vec<f64>, Box<dyn Error>> {
     };
     let frame = |_| Ok(renderer.render(&scene, &camera)?.time.as_secs_f64() * 1e3);
     (0..FRAMES).map(frame).collect()
-}
-
-fn median(times: &mut [f64]) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
 }

@@ -1,6 +1,6 @@
 //! Exponential functions of many numbers in binary64, for values that are rounded to binary32.
 //!
-//! The functions have no branches, so that compilers make vectors of them. Their errors are bounded by [`ERROR`]; where that is
+//! The functions have no branches, so that neighbouring numbers overlap. Their errors are bounded by [`ERROR`]; where that is
 //! not enough to round a value, another function gives it (Ziv's rounding test). So the values do not depend on these functions.
 
 /// A bound of the relative error of [`fast_exp`], [`fast_exp_m1`], and of a few operations on their values.
