@@ -4,7 +4,7 @@
 /*
 ** The extensions of GauRast:
 **
-** VK_GAURAST_gaussian_primitive_topology, revision 2
+** VK_GAURAST_gaussian_primitive_topology, revision 3
 ** VK_GAURAST_driver_options, revision 1
 **
 ** Include after <vulkan/vulkan.h>, or let this file do it. C11 and C++17. The meaning of every name is in the extension's
@@ -22,7 +22,7 @@ extern "C" {
 #endif
 
 #define VK_GAURAST_gaussian_primitive_topology 1
-#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 2
+#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 3
 #define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_EXTENSION_NAME "VK_GAURAST_gaussian_primitive_topology"
 
 /* A location that the pipeline does not use. */
@@ -41,6 +41,7 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_UNSCENTED_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997008)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997009)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST ((VkStructureType)1000997010)
+#define VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST ((VkStructureType)1000997011)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
 #define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
@@ -82,6 +83,12 @@ typedef enum VkGaussianPrecisionGAURAST {
     VK_GAUSSIAN_PRECISION_FLOAT16_GAURAST = 1,
     VK_GAUSSIAN_PRECISION_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkGaussianPrecisionGAURAST;
+
+typedef enum VkGaussianPrecisionClassGAURAST {
+    VK_GAUSSIAN_PRECISION_CLASS_FULL_GAURAST = 0,
+    VK_GAUSSIAN_PRECISION_CLASS_RELAXED_GAURAST = 1,
+    VK_GAUSSIAN_PRECISION_CLASS_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianPrecisionClassGAURAST;
 
 typedef enum VkGaussianAntialiasingGAURAST {
     VK_GAUSSIAN_ANTIALIASING_DILATE_GAURAST = 0,
@@ -181,6 +188,7 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianDistortion;
     VkBool32           unscentedParameters;
     VkBool32           attributeDecoding;
+    VkBool32           gaussian2DCutOff;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -192,6 +200,12 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
     uint64_t              maxGaussiansPerDraw;
     uint64_t              maxGaussiansPerSet;
 } VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
+
+typedef struct VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST {
+    VkStructureType                    sType;
+    void*                              pNext;
+    VkGaussianPrecisionClassGAURAST    precisionClass;
+} VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST;
 
 typedef struct VkGaussianAttributeLocationsGAURAST {
     uint32_t    position;

@@ -15,7 +15,7 @@ use gaurast_testkit::{
 use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Settings, for_people};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, ToClip, depth_format, held};
-use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
+use gaurast_tests::oracle::{DepthCodes, OracleCamera, OracleTests, render_tested, sample_tests::compare};
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_workloads::models::Model;
 use glam::{DMat3, DVec3, Vec3};
@@ -150,7 +150,7 @@ impl Hybrid {
         for (at, color) in pane.color.iter().enumerate().filter(|(_, c)| c[3] == 1.0) {
             let depth = pane.stored.depth[at];
             let known = drawn.depth[at].as_deref().unwrap_or_default();
-            let passes = |&stored: &u32| compare(self.compare, depth, stored);
+            let passes = |stored: &DepthCodes| compare(self.compare, depth, stored.nominal);
             let color = color.map(f64::from);
             match (known.iter().any(passes), known.iter().all(passes)) {
                 _ if known.is_empty() => {

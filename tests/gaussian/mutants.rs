@@ -12,6 +12,7 @@ use gaurast_conformance::{Case as Conformance, all, cases};
 use gaurast_mutants::MUTANTS;
 use gaurast_runner::{Case, Need, is_long, shards};
 use gaurast_testkit::loader::with_mutants;
+use gaurast_tests::oracle::error_model::PrecisionClass;
 
 /// The least number of mutants.
 const LEAST: usize = 200;
@@ -30,7 +31,7 @@ fn catches(case: &Case, answers: &Answers, extent: Extent) -> Vec<Catch> {
 #[gaurast_runner::test(needs = [Need::VulkanLoader], each = shards(2))]
 fn a_case_catches_each_mutant(case: &Case) {
     with_mutants(case, || {
-        let faults = catches(case, &Answers::new(all()), Extent::UntilCaught);
+        let faults = catches(case, &Answers::new(all(), PrecisionClass::Full), Extent::UntilCaught);
         let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
         assert!(faults.is_empty(), "{faults:#?}");
     });
@@ -45,7 +46,7 @@ fn the_layer_alone_fails_no_case(case: &Case) {
         let chapters = ["draws", "sets", "vertex_input", "views", "passes", "updates", "descriptors", "queries"];
         let mut failures = Vec::new();
         for one in all().iter().filter(|one| chapters.contains(&one.chapter)) {
-            if let Outcome::Fail(failure) = run(one, &device) {
+            if let Outcome::Fail(failure) = run(one, &device, PrecisionClass::Full) {
                 failures.push(format!("{}: {}", one.path(), failure.message));
             }
         }
@@ -75,7 +76,7 @@ fn the_page_is_what_fails(case: &Case) {
         return the_page_has_every_mutant();
     }
     with_mutants(case, || {
-        let answers = Answers::new(all());
+        let answers = Answers::new(all(), PrecisionClass::Full);
         let rows = MUTANTS.iter().map(|mutant| {
             let caught = catch("loader", mutant, &answers, Extent::EveryTenth);
             caught.unwrap_or_else(|error| panic!("{}", error.0)).row() + "\n"

@@ -151,7 +151,7 @@ fn chapters() -> Vec<Variant> {
 fn the_second_passes_the_conformance_cases(case: &Case) {
     let mut failures = Vec::new();
     for one in all().iter().filter(|one| one.chapter == case.variant()) {
-        if let Outcome::Fail(failure) = run(one, &Second) {
+        if let Outcome::Fail(failure) = run(one, &Second, Second.precision()) {
             failures.push(format!("{}: {}", one.path(), failure.message));
         }
     }

@@ -408,6 +408,13 @@ fn report_every_statement() {
     let features = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
     let unscented = with_features_of_gaussians(features.gaussian_primitive_topology(true).unscented_projection(true));
     let other_points = pointing(|points| points.alpha(0.5));
+    let flat =
+        with_features_of_gaussians(features.gaussian_primitive_topology(true).gaussian_2d(true).gaussian_cut_off(true));
+    let cut_disc = Graphics {
+        gaussian: with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)).gaussian,
+        ..within(GaussianCutOffGAURAST::TILE_RECTANGLE, 3.33, 0.0)
+    };
+    heard(of_feature("gaussian2DCutOff"), refused(&flat, &cut_disc, absent, "a cut-off of discs"));
     heard(of_feature("unscentedParameters"), refused(&unscented, &other_points, absent, "other sigma points"));
     heard(of_feature("resolveFragmentShader"), with_a_fragment_stage(&bare));
     heard(of_feature("gaussianPrimitiveTopology"), without_the_topology());

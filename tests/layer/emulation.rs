@@ -5,7 +5,7 @@ use gaurast::vk::{
     GaussianCameraDistortionGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
-use gaurast_conformance::{Device, Outcome, all, cases, run};
+use gaurast_conformance::{Device, Implementation, Outcome, all, cases, run};
 use gaurast_runner::{Case, Need, Variant};
 use gaurast_testkit::loader::with_emulation;
 use gaurast_testkit::scene::splats;
@@ -14,6 +14,7 @@ use gaurast_testkit::{
     TargetOptions, depth_test, over,
 };
 use gaurast_tests::long_run::memory;
+use gaurast_tests::oracle::error_model::PrecisionClass;
 use gaurast_tests::scenes;
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -54,7 +55,7 @@ fn holds(case: &Case) {
     let mut failures = Vec::new();
     let mut passed = 0;
     for one in all().iter().filter(|one| patterns.iter().any(|pattern| cases::fits(&one.path(), pattern))) {
-        match run(one, &device) {
+        match run(one, &device, device.precision()) {
             Outcome::Pass(_) => passed += 1,
             Outcome::Fail(failure) => failures.push(format!("{}: {}", one.path(), failure.message)),
             Outcome::NotSupported(_) => {}
@@ -67,6 +68,16 @@ fn holds(case: &Case) {
 #[gaurast_runner::test(needs = [Need::Lavapipe], each = parts())]
 fn lavapipe_draws_gaussians(case: &Case) {
     with_emulation(case, &[], || holds(case));
+}
+
+/// In binary32 alone the device says so, and every part's cases are within the bounds of the relaxed precision.
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = parts())]
+fn lavapipe_draws_gaussians_in_binary32(case: &Case) {
+    with_emulation(case, &[("GAURAST_EMULATION_PRECISION", "relaxed")], || {
+        let device = Device::open("llvmpipe").unwrap_or_else(|error| panic!("{}", error.0));
+        assert_eq!(device.precision(), PrecisionClass::Relaxed);
+        holds(case);
+    });
 }
 
 /// Pairs that do not fit are looked for by every tile: the pictures are as right.

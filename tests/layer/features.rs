@@ -91,6 +91,17 @@ fn of_states() -> Vec<Mistake> {
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
             || footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0),
         ),
+        mistake(
+            "a cut-off of 2D Gaussians without its feature",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2DCutOff-90102",
+            |stage| {
+                let request = Graphics {
+                    gaussian: with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)).gaussian,
+                    ..footprint(GaussianCutOffGAURAST::TILE_RECTANGLE, 3.33, 0.0)
+                };
+                creation(&stage.resolving, &request)
+            },
+        ),
         bare(
             "a floor of compensation without its feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",

@@ -210,6 +210,14 @@ fn numbers() -> Vec<Mistake> {
             },
         ),
         pipeline(
+            "an ellipse that cuts off 2D Gaussians",
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
+            || Graphics {
+                gaussian: with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)).gaussian,
+                ..footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0)
+            },
+        ),
+        pipeline(
             "sigma points at their mean",
             "VUID-VkPipelineGaussianUnscentedStateCreateInfoGAURAST-alpha-90091",
             || sigma_points(|points| points.alpha(0.0)),

@@ -19,7 +19,7 @@ pub struct Stage {
     pub full: Gpu,
     /// Without the optional modes of the extension.
     pub bare: Gpu,
-    /// With fragment stages and the unscented transform as the only optional features.
+    /// With fragment stages, the unscented transform, 2D Gaussians and cut-offs as the only optional features.
     pub resolving: Gpu,
     /// Without the topology.
     pub without: Gpu,
@@ -56,7 +56,9 @@ impl Stage {
                 Features::default()
                     .gaussian_primitive_topology(true)
                     .resolve_fragment_shader(true)
-                    .unscented_projection(true),
+                    .unscented_projection(true)
+                    .gaussian_2d(true)
+                    .gaussian_cut_off(true),
             )),
             without: open(Some(Features::default())),
             plain: Gpu::open(&Opening {

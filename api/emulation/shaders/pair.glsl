@@ -1,7 +1,13 @@
 // Numbers as sums of two binary32: x is the sum, rounded, and y is the rest. Sums and products are Knuth's and Dekker's, of operations
 // that round to nearest. Every operation is `precise`: a compiler that contracts or reorders one makes the rest wrong.
 
+// True if numbers are binary32 alone: rests are 0.
+layout(constant_id = 31) const bool IS_RELAXED = false;
+
 vec2 two_sum(float a, float b) {
+    if (IS_RELAXED) {
+        return vec2(a + b, 0.0);
+    }
     precise float s = a + b;
     precise float t = s - a;
     precise float e = (a - (s - t)) + (b - t);
@@ -10,6 +16,9 @@ vec2 two_sum(float a, float b) {
 
 // The same, for |a| >= |b|.
 vec2 quick_two_sum(float a, float b) {
+    if (IS_RELAXED) {
+        return vec2(a + b, 0.0);
+    }
     precise float s = a + b;
     precise float e = b - (s - a);
     return vec2(s, e);
@@ -24,6 +33,9 @@ vec2 split(float a) {
 }
 
 vec2 two_product(float a, float b) {
+    if (IS_RELAXED) {
+        return vec2(a * b, 0.0);
+    }
     precise float p = a * b;
     vec2 x = split(a), y = split(b);
     precise float e = ((x.x * y.x - p) + x.x * y.y + x.y * y.x) + x.y * y.y;
@@ -31,6 +43,9 @@ vec2 two_product(float a, float b) {
 }
 
 vec2 add(vec2 a, vec2 b) {
+    if (IS_RELAXED) {
+        return vec2(a.x + b.x, 0.0);
+    }
     vec2 s = two_sum(a.x, b.x), t = two_sum(a.y, b.y);
     precise float y = s.y + t.x;
     s = quick_two_sum(s.x, y);
@@ -43,18 +58,27 @@ vec2 sub(vec2 a, vec2 b) {
 }
 
 vec2 mul(vec2 a, vec2 b) {
+    if (IS_RELAXED) {
+        return vec2(a.x * b.x, 0.0);
+    }
     vec2 p = two_product(a.x, b.x);
     precise float e = p.y + (a.x * b.y + a.y * b.x);
     return quick_two_sum(p.x, e);
 }
 
 vec2 mul(vec2 a, float b) {
+    if (IS_RELAXED) {
+        return vec2(a.x * b, 0.0);
+    }
     vec2 p = two_product(a.x, b);
     precise float e = p.y + a.y * b;
     return quick_two_sum(p.x, e);
 }
 
 vec2 div(vec2 a, vec2 b) {
+    if (IS_RELAXED) {
+        return vec2(a.x / b.x, 0.0);
+    }
     precise float q = a.x / b.x;
     vec2 r = sub(a, mul(b, q));
     precise float q2 = r.x / b.x;
@@ -67,6 +91,9 @@ vec2 div(vec2 a, vec2 b) {
 vec2 root(vec2 a) {
     if (!(a.x > 0.0)) {
         return vec2(0.0);
+    }
+    if (IS_RELAXED) {
+        return vec2(sqrt(a.x), 0.0);
     }
     float x = inversesqrt(a.x);
     precise float y = a.x * x;

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ash::vk;
 
 use crate::next::Next;
+use crate::precision;
 use crate::scratch::Memory;
 
 macro_rules! spirv {
@@ -292,7 +293,10 @@ pub(crate) unsafe fn layout(
     unsafe { next.create_pipeline_layout(&info, None) }
 }
 
-/// A compute pipeline, with the module's specialization constants in the order of their numbers.
+/// The number of the constant that is true with a relaxed precision.
+const IS_RELAXED: u32 = 31;
+
+/// A compute pipeline, with the module's specialization constants in the order of their numbers, and that of the precision.
 ///
 /// # Safety
 /// The device, the module and the layout live.
@@ -302,9 +306,11 @@ pub(crate) unsafe fn compute(
     layout: vk::PipelineLayout,
     constants: &[u32],
 ) -> Result<vk::Pipeline, vk::Result> {
-    let entry = |index: u32| vk::SpecializationMapEntry { constant_id: index, offset: 4 * index, size: 4 };
-    let entries: Vec<vk::SpecializationMapEntry> = (0..constants.len() as u32).map(entry).collect();
-    let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(constants));
+    let numbers = (0..constants.len() as u32).chain([IS_RELAXED]);
+    let values: Vec<u32> = constants.iter().copied().chain([u32::from(precision::is_relaxed())]).collect();
+    let entry = |(place, constant_id)| vk::SpecializationMapEntry { constant_id, offset: 4 * place, size: 4 };
+    let entries: Vec<vk::SpecializationMapEntry> = (0_u32..).zip(numbers).map(entry).collect();
+    let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
     let stage = vk::PipelineShaderStageCreateInfo::default()
         .stage(vk::ShaderStageFlags::COMPUTE)
         .module(module)

@@ -32,6 +32,7 @@
 //! | `set`, `work`, `made` | a sorted set that is recorded, its dispatches, and what they make |
 //! | `kernels`, `scratch` | the kernels, and the memory that they work in |
 //! | `times` | the times of a set's stages |
+//! | `precision` | the class of precision: pairs, or binary32 alone |
 //! | `self_test`, `pair` | the test of a device's arithmetic |
 //!
 //! The reason for all `unsafe` in `hooks` is the same. These are Vulkan's commands: the application keeps their valid usage, so
@@ -58,6 +59,7 @@ mod next;
 mod pair;
 mod pass;
 mod pipeline;
+mod precision;
 mod proc_addr;
 mod projecting;
 mod recording;

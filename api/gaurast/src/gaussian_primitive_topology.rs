@@ -24,7 +24,7 @@ use crate::vk::{
 pub const NAME: &CStr = c"VK_GAURAST_gaussian_primitive_topology";
 
 /// The revision of the extension that this crate describes.
-pub const SPEC_VERSION: u32 = 2;
+pub const SPEC_VERSION: u32 = 3;
 
 /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
 ///

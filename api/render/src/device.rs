@@ -141,6 +141,7 @@ struct PhysicalDevice {
     distorts: bool,
     /// True if it has the unscented transform with any sigma points.
     has_sigma_points: bool,
+    has_surfel_cut_off: bool,
     /// True if it decodes attributes, and buffers have addresses, at which tables are.
     decodes: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
@@ -260,6 +261,11 @@ impl Device {
     /// Returns true if the device has the unscented transform with any sigma points.
     pub(super) fn has_sigma_points(&self) -> bool {
         self.physical.has_sigma_points
+    }
+
+    /// Returns true if the device cuts off 2D Gaussians.
+    pub(super) fn has_surfel_cut_off(&self) -> bool {
+        self.physical.has_surfel_cut_off
     }
 
     /// The first memory type allowed by `type_bits` that fits one of `preferences`, tried in order.
@@ -431,6 +437,7 @@ impl PhysicalDevice {
             max_sh_degree: gaussian.max_spherical_harmonics_degree,
             distorts: features.gaussian_distortion == vk::TRUE,
             decodes: [features.attribute_decoding, addresses.buffer_device_address] == [vk::TRUE; 2],
+            has_surfel_cut_off: features.gaussian_2d_cut_off == vk::TRUE,
             has_sigma_points: [features.unscented_projection, features.unscented_parameters] == [vk::TRUE; 2],
             // SAFETY: the handle is the instance's.
             memory: unsafe { instance.get_physical_device_memory_properties(handle) },

@@ -7,7 +7,7 @@ use ash::vk;
 use bytemuck::Pod;
 use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
-use gaurast_scene::{Camera, EncodedScene, GaussianShape, MAX_SH_DEGREE, Scene, SceneArrays};
+use gaurast_scene::{Camera, EncodedScene, GaussianShape, Geometry, MAX_SH_DEGREE, Scene, SceneArrays};
 use glam::{DMat3, DVec3};
 
 use crate::arrays::Arrays;
@@ -18,7 +18,7 @@ use crate::encoded::{EncodedVertices, Encoding, Tables};
 use crate::error::RenderError;
 use crate::listed::{self, List};
 use crate::mesh::{self, DeviceMesh, MeshPipeline};
-use crate::modes::Kept;
+use crate::modes::{CutOff, Kept};
 use crate::options::DeviceOptions;
 use crate::pipeline::{BINDINGS, GaussianPipeline, VertexLayout};
 use crate::process_stats::processor_time;
@@ -261,6 +261,10 @@ impl Renderer {
     ) -> Result<GaussianPipeline, RenderError> {
         if settings.sigma_points.is_some() && !self.device.has_sigma_points() {
             return Err(RenderError::Combination("the device has no unscented transform with other sigma points"));
+        }
+        let cuts_discs = settings.cut_off != CutOff::None && settings.geometry == Geometry::Surfel;
+        if cuts_discs && !self.device.has_surfel_cut_off() {
+            return Err(RenderError::Combination("the device has no cut-off of flat Gaussians (2d)"));
         }
         settings.sh_degree = settings.sh_degree.min(stored_degree).min(self.device.max_sh_degree());
         GaussianPipeline::new(&self.device, layout, settings, COLOR_FORMAT, over_mesh)

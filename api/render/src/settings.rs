@@ -143,8 +143,9 @@ impl Settings {
             (half && per_pixel, "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel"),
             (half && panorama, "panoramas are not drawn in binary16 (fp16)"),
             (
-                self.cut_off != CutOff::None && (surfels || half),
-                "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32)",
+                self.cut_off != CutOff::None && (surfels && self.cut_off != CutOff::TileRectangle || half),
+                "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32); flat Gaussians (2d) have \
+                 gsplat's alone",
             ),
             (self.kept().is_some() && half, "depths are not kept in binary16 (fp16)"),
             (self.kept().is_some() && per_pixel, "depths are not kept in the order per-pixel"),

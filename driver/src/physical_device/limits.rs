@@ -446,6 +446,7 @@ fn find_properties() -> Properties {
         gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,
         max_gaussians_per_set: MAX_GAUSSIANS,
+        precision_class: gaurast::vk::GaussianPrecisionClassGAURAST::FULL,
         allow_command_buffer_query_copies: false,
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
     }

@@ -353,6 +353,7 @@ features! {
         gaussianDistortion => gaussian_distortion: true;
         unscentedParameters => unscented_parameters: true;
         attributeDecoding => attribute_decoding: true;
+        gaussian2DCutOff => gaussian_2d_cut_off: true;
     }
     structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
         performanceCounterQueryPools => performance_counter_query_pools: true;

@@ -330,6 +330,9 @@ properties! {
         maxGaussiansPerDraw => max_gaussians_per_draw: u64;
         maxGaussiansPerSet => max_gaussians_per_set: u64;
     }
+    structure gaurast::vk::PhysicalDeviceGaussianPrecisionPropertiesGAURAST {
+        precisionClass => precision_class: gaurast::vk::GaussianPrecisionClassGAURAST;
+    }
     structure vk::PhysicalDevicePerformanceQueryPropertiesKHR {
         allowCommandBufferQueryCopies => allow_command_buffer_query_copies: bool;
     }

@@ -49,17 +49,18 @@ impl OtherRenderer {
         let is_gsplat = matches!(self, Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented);
         let (cut_off, cut_off_deviations) = match self {
             Self::Inria => (CutOff::TileSquare, 3.0),
-            // The device has no cut-off of 2D Gaussians.
-            _ if is_gsplat && is_surfel => (CutOff::None, 3.33),
             Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => (CutOff::TileRectangle, 3.33),
             Self::Gltf => (CutOff::Ellipse, 3.0),
             Self::Usd => (CutOff::None, 3.0),
         };
         let is_compensated = settings.antialiasing == Antialiasing::Compensated;
-        let (mut is_other_depth, mut distorts) = (is_surfel, false);
+        // What is listed by z has no near plane at the device: gsplat's rays meet discs, and its lenses see sigma points, anywhere
+        // in front of the eye.
+        let (mut is_other_depth, mut distorts) = (is_surfel || self == Self::GsplatUnscented, false);
         for camera in cameras {
             is_other_depth |= camera.model == Model::Fisheye;
             distorts |= !camera.distortion.is_none();
+            is_other_depth |= distorts;
         }
         Settings {
             alpha_floor: 1.0 / 255.0,

@@ -4,9 +4,12 @@ use std::ffi::{CStr, c_void};
 use std::path::Path;
 
 use ash::vk;
+use gaurast::vk::GaussianPrecisionClassGAURAST;
+use gaurast::vk::PhysicalDeviceGaussianPrecisionPropertiesGAURAST as PrecisionProperties;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
 use gaurast_oracle::oracle::Stored;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_testkit::gpu::Driver;
 use gaurast_testkit::{Gpu, OpenError, Opening};
 
@@ -24,6 +27,8 @@ pub struct Device {
     pub features: Features<'static>,
     /// The extension's properties.
     pub properties: Properties<'static>,
+    /// The class of precision of its pictures.
+    precision: PrecisionClass,
     /// The optional extensions that are enabled.
     optional: Vec<&'static CStr>,
     has_draw_indirect_count: bool,
@@ -87,7 +92,9 @@ impl Device {
         let mut vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
         let mut features_2 = vk::PhysicalDeviceFeatures2::default().push_next(&mut features).push_next(&mut vulkan_1_2);
         let mut properties = Properties::default();
-        let mut properties_2 = vk::PhysicalDeviceProperties2::default().push_next(&mut properties);
+        let mut precision = PrecisionProperties::default();
+        let mut properties_2 =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut properties).push_next(&mut precision);
         // SAFETY: the physical device is the instance's, and has the extension of these structures.
         unsafe {
             let (instance, device) = (gpu.instance(), gpu.physical_device());
@@ -97,7 +104,11 @@ impl Device {
         features.p_next = std::ptr::null_mut();
         properties.p_next = std::ptr::null_mut();
         let has_draw_indirect_count = vulkan_1_2.draw_indirect_count != vk::FALSE;
-        Self { gpu, features, properties, optional, has_draw_indirect_count }
+        let precision = match precision.precision_class {
+            GaussianPrecisionClassGAURAST::RELAXED => PrecisionClass::Relaxed,
+            _ => PrecisionClass::Full,
+        };
+        Self { gpu, features, properties, precision, optional, has_draw_indirect_count }
     }
 
     /// The first of some features, of the extension or of Vulkan, that the device lacks.
@@ -165,6 +176,10 @@ impl Device {
 impl Implementation for Device {
     fn name(&self) -> &str {
         self.gpu.name()
+    }
+
+    fn precision(&self) -> PrecisionClass {
+        self.precision
     }
 
     fn missing(&self, draw: &Draw) -> Option<&'static str> {

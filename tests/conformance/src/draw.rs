@@ -6,6 +6,7 @@ use gaurast::vk::{
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
     PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance, Rules};
 use gaurast_oracle::scenes::{self, SceneBuffers};
 
@@ -195,6 +196,14 @@ impl ColorFormat {
             Self::Unorm8 => 0.501 / 255.0,
         }
     }
+
+    /// The possible error of a blend: a step of integers, which devices blend as such.
+    pub(crate) fn blending(self, greatest: f64) -> f64 {
+        match self {
+            Self::Unorm8 => 1.0 / 255.0,
+            Self::Float32 | Self::Float16 => self.rounding(greatest),
+        }
+    }
 }
 
 /// A depth and stencil attachment: its format, its initial contents, and the tests.
@@ -232,6 +241,13 @@ impl Depth {
 }
 
 impl Draw {
+    /// The same draw, held to a class of precision.
+    #[must_use]
+    pub fn held_to(mut self, precision: PrecisionClass) -> Self {
+        self.rules.precision = precision;
+        self
+    }
+
     /// A draw of the whole scene in the default state over an empty picture, with the front camera.
     pub fn new(scene: SceneBuffers) -> Self {
         let count = scene.positions.len() as u32;

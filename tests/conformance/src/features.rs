@@ -14,7 +14,7 @@ use crate::draw::Draw;
 pub type Feature = (&'static str, fn(&Features<'_>) -> vk::Bool32);
 
 /// All features of the extension, in the order of the structure.
-pub const FEATURES: [Feature; 29] = [
+pub const FEATURES: [Feature; 30] = [
     ("gaussianPrimitiveTopology", |has| has.gaussian_primitive_topology),
     ("vertexShaderProjection", |has| has.vertex_shader_projection),
     ("resolveFragmentShader", |has| has.resolve_fragment_shader),
@@ -44,6 +44,7 @@ pub const FEATURES: [Feature; 29] = [
     ("gaussianDistortion", |has| has.gaussian_distortion),
     ("unscentedParameters", |has| has.unscented_parameters),
     ("attributeDecoding", |has| has.attribute_decoding),
+    ("gaussian2DCutOff", |has| has.gaussian_2d_cut_off),
 ];
 
 /// The names of the features that a draw needs.
@@ -71,6 +72,7 @@ pub fn needs(draw: &Draw) -> Vec<&'static str> {
         (draw.samples > 1, "gaussianMultisample"),
         (draw.approximation.is_some_and(|numbers| numbers != [0.0; 2]), "gaussianApproximation"),
         (footprint.cut_off != CutOff::NONE, "gaussianCutOff"),
+        (footprint.cut_off != CutOff::NONE && state.geometry == Geometry::GAUSSIAN_2D, "gaussian2DCutOff"),
         (footprint.compensation_floor != 0.0, "opacityCompensationFloor"),
         (draw.distortion.is_some(), "gaussianDistortion"),
         (draw.unscented.is_some(), "unscentedParameters"),

@@ -1,6 +1,7 @@
 //! The interface of implementations under test.
 
 use gaurast_oracle::oracle::Stored;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 
 use gaurast_testkit::Gpu;
 
@@ -16,6 +17,11 @@ pub struct Error(pub String);
 pub trait Implementation {
     /// The name of the implementation.
     fn name(&self) -> &str;
+
+    /// The class of precision that it keeps.
+    fn precision(&self) -> PrecisionClass {
+        PrecisionClass::Full
+    }
 
     /// The first feature, limit or format that a draw needs and the implementation lacks.
     fn missing(&self, draw: &Draw) -> Option<&'static str>;

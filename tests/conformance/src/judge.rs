@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use ash::vk;
 use gaurast::vk::GaussianPrecisionGAURAST as Precision;
 use gaurast_oracle::compare::{Accuracy, Limits};
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::{
-    OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference, Stored,
+    DepthCodes, OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference, Stored,
     render_binary16, render_bounded, render_tested,
 };
 use gaurast_oracle::scenes::SceneBuffers;
@@ -17,7 +18,12 @@ use crate::draw::{Blend, Call, ColorFormat, Draw, Equation};
 use crate::picture::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
-pub(crate) const CONTRACT: f64 = 5e-6;
+pub(crate) fn contract(class: PrecisionClass) -> f64 {
+    match class {
+        PrecisionClass::Full => 5e-6,
+        PrecisionClass::Relaxed => 5e-5,
+    }
+}
 
 /// The contents that the attachments may have after a draw.
 #[derive(Clone, Debug)]
@@ -27,7 +33,7 @@ pub struct Expected {
     /// Distance that a colour may have from the envelope.
     pub distance: f64,
     /// The depths that each pixel may store, `None` if they are not known; empty if depths are not compared.
-    pub depth: Vec<Option<Vec<u32>>>,
+    pub depth: Vec<Option<Vec<DepthCodes>>>,
     /// The stencils that each pixel may store; empty if stencils are not compared.
     pub stencil: Vec<Vec<u8>>,
 }
@@ -67,6 +73,7 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
         height: draw.size[1],
         nominal: vec![stored_color(draw, draw.behind.map(f64::from)); pixels],
         alternatives: BTreeMap::new(),
+        slack: vec![0.0; pixels],
         exhausted: 0,
         skips: Default::default(),
         undecidable_keys: 0,
@@ -89,7 +96,7 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
         } else {
             render_bounded(&scene, &camera, &state)
         };
-        blend(draw, &mut color, &drawn);
+        blend(draw, &mut color, &drawn, greatest);
     }
     if draw.depth.as_ref().is_some_and(|depth| !depth.has_stencil()) {
         stencil.clear();
@@ -113,9 +120,9 @@ fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     // binary16 is defined to the bit; only the blending of its fragments may differ.
     let exact = match draw.state.precision {
         Precision::FLOAT16 => 3e-7,
-        _ => CONTRACT,
+        _ => contract(draw.rules.precision),
     };
-    let stored = draw.format.rounding(2.0 * range) * (1 + sets) as f64;
+    let stored = draw.format.rounding(2.0 * range) + draw.format.blending(2.0 * range) * sets as f64;
     range * exact + approximate + stored
 }
 
@@ -246,8 +253,8 @@ fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
     }
 }
 
-/// Blends a set's fragments over the attachment's contents.
-fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
+/// Blends a set's fragments over the attachment's contents. No colour is greater than `range`.
+fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference, range: f64) {
     let [left, top] = Covered::of(&draw.viewport()).first;
     let inside = |rectangle: Option<vk::Rect2D>, [x, y]: [i64; 2]| {
         rectangle.is_none_or(|vk::Rect2D { offset, extent }| {
@@ -276,6 +283,8 @@ fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
                 outcomes.push([0, 1, 2, 3].map(mix));
             }
         }
+        // A factor of a blend is at most 1, or a colour.
+        held.slack[at] += range * drawn.slack[source];
         held.nominal[at] = outcomes.remove(0);
         if outcomes.is_empty() {
             held.alternatives.remove(&at);
@@ -355,7 +364,7 @@ impl Expected {
         Picture {
             color: self.color.to_f32(),
             stored: Stored {
-                depth: depth.map(|code| code.copied().unwrap_or(0)).collect(),
+                depth: depth.map(|codes| codes.map_or(0, |codes| codes.nominal)).collect(),
                 stencil: stencil.collect(),
             },
         }
@@ -375,7 +384,7 @@ impl Expected {
         }
         let place = |at: usize| [at % self.color.width as usize, at / self.color.width as usize];
         for (at, (allowed, code)) in self.depth.iter().zip(&picture.stored.depth).enumerate() {
-            if allowed.as_ref().is_some_and(|allowed| !allowed.contains(code)) {
+            if allowed.as_ref().is_some_and(|allowed| !allowed.iter().any(|codes| codes.contains(*code))) {
                 let place = place(at);
                 return Some(format!("depths: {code:#x} at {place:?}, not one of {allowed:x?}"));
             }

@@ -6,11 +6,12 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use gaurast_conformance::mutants::{self, Answers, Extent};
 use gaurast_conformance::report::{Counts, Result, junit};
 use gaurast_conformance::{Case, Implementation, Outcome, cases, mistakes, open, run};
 use gaurast_mutants::MUTANTS;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
@@ -22,6 +23,9 @@ struct Arguments {
     /// the oracle itself; `loader`, the loader's first device that draws Gaussians; or a part of such a device's name
     #[arg(long, value_name = "NAME|ICD.json", default_value = "embedded")]
     driver: String,
+    /// Holds pictures to this class of precision, not to the one that the device says
+    #[arg(long, value_enum, value_name = "CLASS")]
+    precision: Option<Class>,
     /// Lists the cases and runs none
     #[arg(long)]
     list: bool,
@@ -56,6 +60,24 @@ struct Arguments {
     large: bool,
 }
 
+/// A class of precision.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Class {
+    /// Projection in binary64 or an equivalent
+    Full,
+    /// binary32 throughout
+    Relaxed,
+}
+
+impl From<Class> for PrecisionClass {
+    fn from(class: Class) -> Self {
+        match class {
+            Class::Full => Self::Full,
+            Class::Relaxed => Self::Relaxed,
+        }
+    }
+}
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A driver's panic is an outcome of a case, with its message. One of this program ends it.
@@ -76,6 +98,7 @@ fn main() -> ExitCode {
 /// Does what the arguments say.
 fn test(arguments: &Arguments) -> ExitCode {
     let mut cases = if arguments.large { cases::with_largest() } else { cases::all() };
+    let precision = arguments.precision.map(PrecisionClass::from);
     if !arguments.case.is_empty() {
         cases.retain(|case| arguments.case.iter().any(|pattern| cases::fits(&case.path(), pattern)));
     }
@@ -86,7 +109,7 @@ fn test(arguments: &Arguments) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     if arguments.mistakes {
-        return catch_mistakes(&cases);
+        return catch_mistakes(&cases, precision.unwrap_or_default());
     }
     if let Some(folder) = &arguments.mutants {
         return catch_mutants(cases, folder, arguments);
@@ -98,8 +121,9 @@ fn test(arguments: &Arguments) -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    println!("{} cases on {}", cases.len(), device.name());
-    let results: Vec<Result> = cases.iter().map(|case| tell(&*device, case, arguments)).collect();
+    let precision = precision.unwrap_or_else(|| device.precision());
+    println!("{} cases on {}, held to {precision:?} precision", cases.len(), device.name());
+    let results: Vec<Result> = cases.iter().map(|case| tell(&*device, case, precision, arguments)).collect();
     for chapter in cases::chapters() {
         let own: Vec<&Result> = results.iter().filter(|result| result.chapter == chapter).collect();
         let counts = Counts::of(own.iter().copied());
@@ -120,8 +144,8 @@ fn test(arguments: &Arguments) -> ExitCode {
 }
 
 /// Prints the number of cases that catch each mistake.
-fn catch_mistakes(cases: &[Case]) -> ExitCode {
-    let catches = match mistakes::catches(cases) {
+fn catch_mistakes(cases: &[Case], precision: PrecisionClass) -> ExitCode {
+    let catches = match mistakes::catches(cases, precision) {
         Ok(catches) => catches,
         Err(message) => {
             eprintln!("{message}");
@@ -140,7 +164,8 @@ fn catch_mutants(cases: Vec<Case>, folder: &Path, arguments: &Arguments) -> Exit
     unsafe { std::env::set_var("VK_ADD_LAYER_PATH", folder) };
     let chosen =
         |name: &str| arguments.mutant.is_empty() || arguments.mutant.iter().any(|one| one.eq_ignore_ascii_case(name));
-    let answers = Answers::new(cases);
+    let precision = arguments.precision.map(PrecisionClass::from);
+    let answers = Answers::new(cases, precision.unwrap_or_default());
     let extent = if arguments.every_case { Extent::EveryCase } else { Extent::UntilCaught };
     let (mut all, mut faults) = (0, 0);
     for mutant in MUTANTS.iter().filter(|mutant| chosen(mutant.name)) {
@@ -168,9 +193,9 @@ fn line(counts: Counts) -> String {
 }
 
 /// Runs a case and prints its outcome.
-fn tell(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
+fn tell(device: &dyn Implementation, case: &Case, precision: PrecisionClass, arguments: &Arguments) -> Result {
     let start = Instant::now();
-    let outcome = run(case, device);
+    let outcome = run(case, device, precision);
     let time = start.elapsed();
     match &outcome {
         Outcome::Pass(distance) if arguments.verbose => {

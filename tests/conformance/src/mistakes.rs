@@ -12,6 +12,7 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff,
     GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
 };
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_oracle::oracle::rules::{ColorDirection, FrontOfTies, KeyRounding, MedianHalf, WeighedBy};
 
 use crate::cases::Case;
@@ -340,17 +341,17 @@ impl Catches {
     }
 }
 
-/// The numbers of cases that catch each of [`MISTAKES`].
+/// The numbers of cases that catch each of [`MISTAKES`], by a class of precision.
 ///
 /// # Errors
 /// A sentence if a case fails without a mistake.
-pub fn catches(cases: &[Case]) -> Result<Vec<Catches>, String> {
+pub fn catches(cases: &[Case], precision: PrecisionClass) -> Result<Vec<Catches>, String> {
     let mut all = vec![Catches::default(); MISTAKES.len()];
     for case in cases {
         let Some(draw) = case.draw() else {
             continue;
         };
-        let expectation = Expectation::of_draw(draw);
+        let expectation = Expectation::of_draw(draw.held_to(precision));
         if let Outcome::Fail(failure) = expectation.judge(&Oracle::default()) {
             return Err(format!("without a mistake {} fails: {}", case.path(), failure.message));
         }

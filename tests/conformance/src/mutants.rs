@@ -5,6 +5,8 @@ use std::ffi::CStr;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use gaurast_oracle::oracle::error_model::PrecisionClass;
+
 use gaurast_mutants::environment::{MUTANT, REPORT};
 use gaurast_mutants::{MUTANTS, Mutant};
 
@@ -18,13 +20,14 @@ pub const LAYER: &CStr = c"VK_LAYER_GAURAST_mutants";
 
 /// Cases with the oracle's answers, which are computed once for all mutants.
 pub struct Answers {
+    precision: PrecisionClass,
     cases: Vec<(Case, OnceLock<Expectation>)>,
 }
 
 impl Answers {
-    /// The answers to cases.
-    pub fn new(cases: Vec<Case>) -> Self {
-        Self { cases: cases.into_iter().map(|case| (case, OnceLock::new())).collect() }
+    /// The answers to cases, by a class of precision.
+    pub fn new(cases: Vec<Case>, precision: PrecisionClass) -> Self {
+        Self { precision, cases: cases.into_iter().map(|case| (case, OnceLock::new())).collect() }
     }
 }
 
@@ -107,7 +110,7 @@ pub fn catch(driver: &str, mutant: &'static Mutant, answers: &Answers, extent: E
             if !is_run || missing(case, &device).is_some() {
                 continue;
             }
-            let expectation = expectation.get_or_init(|| Expectation::new(case));
+            let expectation = expectation.get_or_init(|| Expectation::new(case, answers.precision));
             if let Outcome::Fail(_) = expectation.judge(&device) {
                 failures.push((case.chapter, case.name.clone()));
                 if extent == Extent::UntilCaught {

@@ -1,6 +1,7 @@
 //! Cases that are programs: Vulkan commands that a device executes, and the pictures that they must leave.
 
 use gaurast_oracle::oracle::Stored;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_testkit::{Commands, Gpu, Graphics};
 
 use crate::draw::Draw;
@@ -14,15 +15,18 @@ pub(crate) enum Answer {
     /// That of a draw, however the program records it.
     Draw(Box<Draw>),
     /// Another one.
-    Picture(Box<dyn Fn() -> Expected + Send + Sync>),
+    Picture(Box<dyn Fn(PrecisionClass) -> Expected + Send + Sync>),
 }
 
 impl Answer {
     /// The contents that the attachments may have.
-    pub(crate) fn expected(&self) -> Expected {
+    pub(crate) fn expected(&self, precision: PrecisionClass) -> Expected {
         match self {
-            Self::Draw(draw) => expected(draw, &stored_before(draw)),
-            Self::Picture(expected) => expected(),
+            Self::Draw(draw) => {
+                let draw = Draw::clone(draw).held_to(precision);
+                expected(&draw, &stored_before(&draw))
+            }
+            Self::Picture(expected) => expected(precision),
         }
     }
 }
@@ -100,8 +104,8 @@ impl Program {
     }
 
     /// The contents that the attachments may have, by picture.
-    pub(crate) fn expected(&self) -> Vec<Expected> {
-        self.answers.iter().map(Answer::expected).collect()
+    pub(crate) fn expected(&self, precision: PrecisionClass) -> Vec<Expected> {
+        self.answers.iter().map(|answer| answer.expected(precision)).collect()
     }
 
     /// Executes it.

@@ -1,10 +1,11 @@
 //! Inputs of resolve shaders, which a case shows as colours, by the oracle.
 
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_oracle::oracle::resolve::{Resolved, resolve_scene};
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleScene, OracleTests};
 
 use crate::draw::{Camera, Draw, Shown};
-use crate::judge::{CONTRACT, combined_scene, oracle_camera, oracle_state, sets};
+use crate::judge::{combined_scene, contract, oracle_camera, oracle_state, sets};
 use crate::picture::Picture;
 
 /// The inputs of a draw's resolve shader, and those that it shows.
@@ -12,6 +13,8 @@ use crate::picture::Picture;
 pub(crate) struct Inputs {
     shown: Shown,
     camera: Camera,
+    /// The class of precision to which the inputs are held.
+    precision: PrecisionClass,
     /// The colour where there is no fragment.
     behind: [f32; 4],
     /// Width of the picture in pixels.
@@ -39,7 +42,8 @@ impl Inputs {
             stencil: None,
         };
         let pixels = resolve_scene(&scene, &camera, &oracle_state(draw), &tests);
-        Self { shown, camera: draw.camera, behind: draw.behind, width: draw.size[0], members, pixels }
+        let precision = draw.rules.precision;
+        Self { shown, precision, camera: draw.camera, behind: draw.behind, width: draw.size[0], members, pixels }
     }
 
     /// The distance from its envelope of the farthest number that a picture shows.
@@ -101,27 +105,33 @@ impl Inputs {
             return Ok(0.0);
         }
         let [x, y, ..] = color.map(f64::from);
+        let greatest = |of: fn(&Resolved) -> f64| ways.iter().fold(0.0, |most: f64, way| most.max(of(way)));
+        let contract = contract(self.precision);
+        let slack = greatest(|way| way.slack);
+        // A mean divides by the weights.
+        let of_mean = greatest(|way| 2.0 * way.slack / way.accumulated[3]);
+        let [of_depth, of_distance] = [greatest(|way| way.errors[0]), greatest(|way| way.errors[1])];
         match self.shown {
             Shown::Accumulated => {
                 let mut farthest = 0.0_f64;
                 for (channel, value) in color.into_iter().enumerate() {
                     let values = ways.iter().map(|way| way.accumulated[channel]);
-                    farthest = farthest.max(within(values, value, CONTRACT)?);
+                    farthest = farthest.max(within(values, value, contract + slack)?);
                 }
                 Ok(farthest)
             }
             Shown::Depths => {
                 let expected = ways.iter().map(|way| way.expected_depth);
                 let medians = ways.iter().flat_map(|way| &way.median_depths);
-                self.is_median(&ways, medians.copied(), y, 1e-7)?;
-                within(expected, color[0], CONTRACT)
+                self.is_median(&ways, medians.copied(), y, 1e-7 + of_depth)?;
+                within(expected, color[0], contract + of_mean + of_depth)
             }
             Shown::LinearDepths => {
                 let expected = ways.iter().map(|way| way.expected_distance);
                 let medians = ways.iter().flat_map(|way| &way.median_gaussians);
-                self.is_median(&ways, medians.map(|median| median.1.into()), y, 0.0)?;
+                self.is_median(&ways, medians.map(|median| median.1.into()), y, of_distance)?;
                 let greatest = expected.clone().fold(x.abs(), |most, z| most.max(z.abs()));
-                within(expected, color[0], CONTRACT * greatest.max(1.0))
+                within(expected, color[0], (contract + of_mean) * greatest.max(1.0) + of_distance)
             }
             Shown::Gaussians => {
                 let (median, nearest) = ([color[0], color[1]], [color[2], color[3]]);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use gaurast_oracle::compare::write_difference;
 use gaurast_oracle::oracle::Stored;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 
 use crate::cases::{Case, Subject};
 use crate::draw::Draw;
@@ -86,12 +87,12 @@ fn compared(expected: &Expected, picture: Picture) -> Outcome {
 }
 
 impl Expectation {
-    /// The oracle's answer to a case.
-    pub fn new(case: &Case) -> Self {
+    /// The oracle's answer to a case, which a device of a class of precision must give.
+    pub fn new(case: &Case, precision: PrecisionClass) -> Self {
         match case.subject() {
-            Subject::Draw(draw) => Self::of_draw(*draw),
+            Subject::Draw(draw) => Self::of_draw(draw.held_to(precision)),
             Subject::Program(program) => {
-                let expected = program.expected();
+                let expected = program.expected(precision);
                 Self::Program(Box::new(program), expected)
             }
         }
@@ -167,10 +168,10 @@ pub fn missing(case: &Case, implementation: &dyn Implementation) -> Option<&'sta
     }
 }
 
-/// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
-pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
+/// Lets an implementation draw the case, and judges the picture by a class of precision. An unsupported case is not drawn.
+pub fn run(case: &Case, implementation: &dyn Implementation, precision: PrecisionClass) -> Outcome {
     match missing(case, implementation) {
         Some(feature) => Outcome::NotSupported(feature),
-        None => Expectation::new(case).judge(implementation),
+        None => Expectation::new(case, precision).judge(implementation),
     }
 }

@@ -183,7 +183,7 @@ impl<'a> Model<'a> {
                         outcome.slack += GAUSSIAN_SLACK + BLEND_SLACK;
                     }
                     match &reference.depth[at] {
-                        Some(depths) => outcome.depths.clone_from(depths),
+                        Some(depths) => outcome.depths = depths.iter().map(|codes| codes.nominal).collect(),
                         None => outcome.is_unknown = true,
                     }
                     match &mut after {

@@ -74,6 +74,11 @@ pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_DECODING_STATE_CREATE_INFO_GAURAST: v
 pub const STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_010);
 
+/// `VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST")]
+pub const STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_011);
+
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
 pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState = vk::DynamicState::from_raw(1_000_997_000);
@@ -202,6 +207,19 @@ vk_enum! {
         /// [`GaussianOrderGAURAST::PER_PIXEL`]. Needs `rasterizationFloat16`.
         #[doc(alias = "VK_GAUSSIAN_PRECISION_FLOAT16_GAURAST")]
         FLOAT16 = 1,
+    }
+}
+
+vk_enum! {
+    /// The bounds of rounding that pictures keep.
+    #[doc(alias = "VkGaussianPrecisionClassGAURAST")]
+    pub struct GaussianPrecisionClassGAURAST {
+        /// Those of binary32 with positions, projection and covariances in binary64 or an equivalent.
+        #[doc(alias = "VK_GAUSSIAN_PRECISION_CLASS_FULL_GAURAST")]
+        FULL = 0,
+        /// Those of binary32 throughout.
+        #[doc(alias = "VK_GAUSSIAN_PRECISION_CLASS_RELAXED_GAURAST")]
+        RELAXED = 1,
     }
 }
 
@@ -465,6 +483,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     /// [`PipelineGaussianDecodingStateCreateInfoGAURAST`] with a decoding other than none:
     /// attributes that are stored as the codes of compressed files.
     pub attribute_decoding: vk::Bool32,
+    /// [`GaussianCutOffGAURAST::TILE_RECTANGLE`] with 2D Gaussians.
+    pub gaussian_2d_cut_off: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -511,6 +531,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             gaussian_distortion: vk::Bool32::default(),
             unscented_parameters: vk::Bool32::default(),
             attribute_decoding: vk::Bool32::default(),
+            gaussian_2d_cut_off: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -547,6 +568,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_distortion,
         unscented_parameters,
         attribute_decoding,
+        gaussian_2d_cut_off,
     }
 }
 
@@ -611,6 +633,50 @@ impl PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
         gaussian_sample_counts: vk::SampleCountFlags,
         max_gaussians_per_draw: u64,
         max_gaussians_per_set: u64,
+    }
+}
+
+/// The precision of the device's pictures.
+///
+/// Chain it to `VkPhysicalDeviceProperties2`. A device that does not know it leaves it as it
+/// is.
+#[doc(alias = "VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone)]
+#[cfg_attr(feature = "debug", derive(Debug))]
+#[must_use]
+pub struct PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *mut c_void,
+    /// The class whose bounds [`GaussianPrecisionGAURAST::FLOAT32`] keeps.
+    pub precision_class: GaussianPrecisionClassGAURAST,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    PhysicalDeviceGaussianPrecisionPropertiesGAURAST =
+        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST,
+    vk::ExtendsPhysicalDeviceProperties2
+);
+
+impl Default for PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null_mut(),
+            precision_class: GaussianPrecisionClassGAURAST::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_> {
+    setters! {
+        precision_class: GaussianPrecisionClassGAURAST,
     }
 }
 

@@ -136,6 +136,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, attribute_decoding),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussian2DCutOff)",
+        offset_of!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, gaussian_2d_cut_off),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -166,6 +170,22 @@ pub const LAYOUT: &[(&str, usize)] = &[
     (
         "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, maxGaussiansPerSet)",
         offset_of!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, max_gaussians_per_set),
+    ),
+    (
+        "sizeof(VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST)",
+        size_of::<PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST, sType)",
+        offset_of!(PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST, pNext)",
+        offset_of!(PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrecisionPropertiesGAURAST, precisionClass)",
+        offset_of!(PhysicalDeviceGaussianPrecisionPropertiesGAURAST<'_>, precision_class),
     ),
     ("sizeof(VkGaussianAttributeLocationsGAURAST)", size_of::<GaussianAttributeLocationsGAURAST>()),
     (
@@ -608,6 +628,10 @@ pub const VALUES: &[(&str, i64)] = &[
         "VK_STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST",
         STRUCTURE_TYPE_GAUSSIAN_DECODING_TABLES_GAURAST.as_raw() as i64,
     ),
+    (
+        "VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST",
+        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRECISION_PROPERTIES_GAURAST.as_raw() as i64,
+    ),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST", DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64),
     ("VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST", DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64),
     (
@@ -647,6 +671,8 @@ pub const VALUES: &[(&str, i64)] = &[
     ("VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST", GaussianOrderGAURAST::PER_PIXEL.as_raw() as i64),
     ("VK_GAUSSIAN_PRECISION_FLOAT32_GAURAST", GaussianPrecisionGAURAST::FLOAT32.as_raw() as i64),
     ("VK_GAUSSIAN_PRECISION_FLOAT16_GAURAST", GaussianPrecisionGAURAST::FLOAT16.as_raw() as i64),
+    ("VK_GAUSSIAN_PRECISION_CLASS_FULL_GAURAST", GaussianPrecisionClassGAURAST::FULL.as_raw() as i64),
+    ("VK_GAUSSIAN_PRECISION_CLASS_RELAXED_GAURAST", GaussianPrecisionClassGAURAST::RELAXED.as_raw() as i64),
     ("VK_GAUSSIAN_ANTIALIASING_DILATE_GAURAST", GaussianAntialiasingGAURAST::DILATE.as_raw() as i64),
     (
         "VK_GAUSSIAN_ANTIALIASING_OPACITY_COMPENSATED_GAURAST",

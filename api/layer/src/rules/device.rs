@@ -40,6 +40,7 @@ pub(crate) fn named(features: &Features) -> [(&'static str, bool); 29] {
         ("gaussianDistortion", f.gaussian_distortion),
         ("unscentedParameters", f.unscented_parameters),
         ("attributeDecoding", f.attribute_decoding),
+        ("gaussian2DCutOff", f.gaussian_2d_cut_off),
     ]
     .map(|(name, is_on)| (name, is_on != 0))
 }

@@ -266,12 +266,16 @@ fn check_footprint(gaussian: &GaussianState, footprint: &Footprint, facts: &Fact
     );
     let is_flat = state::is_fixed(gaussian) && gaussian.geometry == Geometry::GAUSSIAN_2D;
     faults.require(
-        !cuts || gaussian.precision == GaussianPrecisionGAURAST::FLOAT32 && !is_flat,
+        !cuts
+            || gaussian.precision == GaussianPrecisionGAURAST::FLOAT32
+                && (!is_flat || cut_off == CutOff::TILE_RECTANGLE),
         "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
-        || format!("cutOff is {cut_off:?}, but that needs FLOAT32 and GAUSSIAN_3D"),
+        || format!("cutOff is {cut_off:?}, but that needs FLOAT32 and, unless it is TILE_RECTANGLE, GAUSSIAN_3D"),
     );
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074";
     faults.require(!cuts || facts.features.gaussian_cut_off != 0, id, || state::absent(id));
+    let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2DCutOff-90102";
+    faults.require(!cuts || !is_flat || facts.features.gaussian_2d_cut_off != 0, id, || state::absent(id));
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075";
     let has_floor = facts.features.opacity_compensation_floor != 0;
     faults.require(floor == 0.0 || has_floor, id, || state::absent(id));

@@ -140,7 +140,7 @@ impl GaussianPipeline {
         modes(gaussian, enabled)?;
         numbers(gaussian)?;
         let approximation = approximation(graphics)?;
-        let footprint = footprint(graphics, enabled)?;
+        let footprint = footprint(graphics, gaussian, enabled)?;
         let unscented = unscented(graphics, gaussian, enabled)?;
         fixed_state(graphics, enabled)?;
         let mut fragments = FixedFunctionState::of_gaussians(graphics)?;

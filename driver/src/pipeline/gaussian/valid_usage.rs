@@ -134,6 +134,11 @@ pub(super) const CUT_OFF: Feature = Feature {
     name: "gaussianCutOff",
     vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
 };
+pub(super) const SURFEL_CUT_OFF: Feature = Feature {
+    is_enabled: |features| features.gaussian_2d_cut_off,
+    name: "gaussian2DCutOff",
+    vuid: "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2DCutOff-90102",
+};
 pub(super) const COMPENSATION_FLOOR: Feature = Feature {
     is_enabled: |features| features.opacity_compensation_floor,
     name: "opacityCompensationFloor",
@@ -207,7 +212,7 @@ pub(super) struct Modes {
     /// The fragment stage has a camera for an input.
     reads_camera: bool,
     /// There is a cut-off.
-    is_cut: bool,
+    cut_off: GaussianCutOffGAURAST,
 }
 
 impl Modes {
@@ -229,10 +234,10 @@ impl Modes {
                     .into_iter()
                     .any(is_used),
             reads_camera: resolves && is_used(inputs.first_camera),
-            is_cut: graphics
+            cut_off: graphics
                 .pre_rasterization
                 .footprint
-                .is_some_and(|footprint| footprint.cut_off != GaussianCutOffGAURAST::NONE),
+                .map_or(GaussianCutOffGAURAST::NONE, |footprint| footprint.cut_off),
         }
     }
 
@@ -285,9 +290,11 @@ impl Modes {
                 "firstCamera is used, but projectionMode is VERTEX_SHADER, which has no camera",
             ),
             (
-                self.is_cut && (!shaded && flat || half),
+                self.cut_off != GaussianCutOffGAURAST::NONE
+                    && (!shaded && flat && self.cut_off != GaussianCutOffGAURAST::TILE_RECTANGLE || half),
                 "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
-                "there is a cut-off, but geometry is GAUSSIAN_2D or precision is FLOAT16, which have none",
+                "there is a cut-off, but precision is FLOAT16, which has none, or geometry is GAUSSIAN_2D, which has \
+                 TILE_RECTANGLE alone",
             ),
         ];
         match rules.iter().find(|(is_broken, ..)| *is_broken) {
@@ -618,7 +625,11 @@ pub(super) fn fixed_state(graphics: &GraphicsState, enabled: &Enabled) -> Result
 }
 
 /// Validates and converts the chain's structure of footprints, if it has one.
-pub(super) fn footprint(graphics: &GraphicsState, enabled: &Enabled) -> Result<GaussianFootprint, Error> {
+pub(super) fn footprint(
+    graphics: &GraphicsState,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST<'_>,
+    enabled: &Enabled,
+) -> Result<GaussianFootprint, Error> {
     let Some(given) = graphics.pre_rasterization.footprint else {
         return Ok(GaussianFootprint::default());
     };
@@ -630,6 +641,9 @@ pub(super) fn footprint(graphics: &GraphicsState, enabled: &Enabled) -> Result<G
     })?;
     if cut_off != GaussianCutOff::None {
         require(enabled, &CUT_OFF, "cutOff is not NONE")?;
+        if !is_shaded(gaussian) && gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D {
+            require(enabled, &SURFEL_CUT_OFF, "cutOff is not NONE and geometry is GAUSSIAN_2D")?;
+        }
         values::CUT_OFF_DEVIATIONS.check(
             given.cut_off_deviations,
             "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",

@@ -3,6 +3,7 @@
 
 use crate::gaussian::linear_algebra::length;
 use crate::gaussian::splats::binary16::{LEAST_HALF_FACTOR, binary16_headroom};
+use crate::gaussian::splats::surfel::UNIT;
 use crate::gaussian::view::constants::ViewConstants;
 use crate::gaussian::view::distortion::Lens;
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianPrecision};
@@ -51,6 +52,9 @@ pub(crate) struct Sides {
 /// The sides of a camera's frustum for Gaussians whose opacities are at most `opacity`.
 pub(crate) fn sides(projection: &ViewConstants, opacity: f32) -> Sides {
     let log2_range = libm::log2(opacity.max(1.0).into()) - projection.log2_floor;
+    // The middle of a disc's rectangle, about which its filter is, lies within one standard deviation.
+    let least = if projection.surfel_cut_off.is_some() { UNIT } else { f64::NEG_INFINITY };
+    let log2_range = log2_range.max(least);
     let is_half = projection.precision == GaussianPrecision::Float16;
     let extent = if is_half {
         ScreenExtent::in_half(log2_range, projection.low_pass)

@@ -7,6 +7,9 @@ use crate::gaussian::splats::surfel::Surfel;
 use crate::gaussian::view::constants::ViewConstants;
 use crate::state::gaussian::CameraModel;
 
+/// The least square of half a side of a disc's rectangle, in px^2.
+const LEAST_SQUARE: f64 = 1e-4;
+
 /// A disc in camera space, and the camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Disc {
@@ -19,6 +22,29 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
+    /// The rectangle of the disc's outline at one standard deviation: its middle, in pixels from the mean, and half its sides, at
+    /// least a hundredth of a pixel. `None` if the outline touches the eye's plane. Beyond that plane the same formulas go on, as in
+    /// gsplat.
+    fn rectangle(&self) -> Option<[[f64; 2]; 2]> {
+        let [a, b] = self.axes;
+        let t = self.centre;
+        let is_parallel = self.model == CameraModel::Orthographic;
+        // The outline is where a quadratic form of the rows of [a b t] is 0; of the third row with itself it is the divisor.
+        let divisor = if is_parallel { -1.0 } else { a[2] * a[2] + b[2] * b[2] - t[2] * t[2] };
+        if divisor == 0.0 {
+            return None;
+        }
+        let sides = [0, 1].map(|i| {
+            let slope = if is_parallel { 0.0 } else { t[i] / t[2] };
+            let along = |axis: [f64; 3]| self.focal[i] * (axis[i] - axis[2] * slope);
+            let (along_a, along_b) = (along(a), along(b));
+            let middle = if is_parallel { 0.0 } else { (along_a * a[2] + along_b * b[2]) / divisor };
+            let square = middle * middle - (along_a * along_a + along_b * along_b) / divisor;
+            [middle, square.max(LEAST_SQUARE).sqrt()]
+        });
+        Some([[sides[0][0], sides[1][0]], [sides[0][1], sides[1][1]]])
+    }
+
     /// The surfel of a disc, which is not placed in the picture yet.
     pub(crate) fn surfel(&self) -> Surfel {
         let [a, b] = self.axes;
@@ -72,7 +98,15 @@ pub(crate) fn surfel_of(view: &ViewConstants, at: usize, scratch: &Scratch) -> S
     let log2_range = screen.log2_opacity[at] - view.log2_floor;
     let extent = (log2_range + log2_range.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
     let mean = [screen.mean[0][at], screen.mean[1][at]];
-    disc.surfel().placed(mean, extent, view.low_pass)
+    let surfel = disc.surfel();
+    let Some(cut_off) = &view.surfel_cut_off else {
+        return surfel.placed(mean, extent, view.low_pass);
+    };
+    let Some([filter, halves]) = disc.rectangle() else {
+        return Surfel::default();
+    };
+    let tiles = cut_off.rectangle([mean[0] + filter[0], mean[1] + filter[1]], halves);
+    Surfel { filter, tiles, ..surfel }.placed(mean, extent, view.low_pass)
 }
 
 #[cfg(test)]

@@ -262,7 +262,7 @@ fn find_tiles_by<S: Simd>(
         }
     });
     if let Some(cut_off) = &view.list_cut_off {
-        clip(cut_off, scratch, &mut projected.spans, &mut reached);
+        clip(view, cut_off, scratch, &mut projected.spans, &mut reached);
     }
     scratch.reached.clear();
     reached.for_each(|at| scratch.reached.push(at));

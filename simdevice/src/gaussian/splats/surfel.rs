@@ -36,8 +36,12 @@ pub(crate) struct Surfel {
     pub(crate) limit: f64,
     /// The squared distance from which on alpha is below the floor.
     pub(crate) extent: f64,
-    /// The radius of the low-pass filter's circle out to that distance, in pixels; zero without a filter.
+    /// The centre of the low-pass filter's circle, in pixels from the mean.
+    pub(crate) filter: [f64; 2],
+    /// The radius of that circle out to that distance, in pixels; zero without a filter.
     pub(crate) radius: f64,
+    /// The first tile of the cut-off, and the one after the last, along x and y, if there is a cut-off.
+    pub(crate) tiles: [[f64; 2]; 2],
     /// The part of the picture in which rays meet the disc nearer than that distance.
     pub(crate) outline: Outline,
 }
@@ -111,7 +115,8 @@ impl Surfel {
 
     /// The circle of the filter, if there is a filter.
     fn circle(&self) -> Option<Ellipse> {
-        let circle = Ellipse { mean: self.mean, half: [self.radius; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
+        let mean = [0, 1].map(|axis| self.mean[axis] + self.filter[axis]);
+        let circle = Ellipse { mean, half: [self.radius; 2], slope: 0.0, narrowing: 1.0, peak: 0.0 };
         (self.radius > 0.0).then_some(circle)
     }
 
@@ -214,6 +219,7 @@ impl Surfel {
         let infinite = f64x8::splat(simd, f64::INFINITY);
         let mut distance = meets.select((u * u + v * v) / square, infinite);
         if let Some(inverse) = inverse_low_pass {
+            let (dx, dy) = (dx - self.filter[0], dy - self.filter[1]);
             let filter = (dx * dx + dy * dy) * inverse;
             distance = distance.simd_lt(filter).select(distance, filter);
         }

@@ -54,6 +54,8 @@ pub(crate) struct ViewConstants {
     pub(crate) is_tracked: bool,
     /// The cut-off by which tiles are left out.
     pub(crate) list_cut_off: Option<TileCutOff>,
+    /// The cut-off of discs, in lists or at pixels.
+    pub(crate) surfel_cut_off: Option<TileCutOff>,
 }
 
 impl ViewConstants {
@@ -103,6 +105,8 @@ impl ViewConstants {
             depth,
             is_tracked: false,
             list_cut_off: list_cut_off(state, camera, viewport),
+            surfel_cut_off: TileCutOff::of(state, [viewport.x, viewport.y].map(f64::from))
+                .filter(|_| state.geometry == GaussianGeometry::Surfel),
             optimizations,
         }
     }

@@ -62,16 +62,20 @@ impl TileCutOff {
                 [libm::floor((mean - radius) / CUT_TILE), libm::floor((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE)]
             });
         }
-        let radii = [xx, yy].map(|variance| libm::ceil(self.deviations * variance.sqrt()));
+        self.rectangle(mean, [xx, yy].map(f64::sqrt))
+    }
+
+    /// The first tile, and the one after the last, along x and y, of a rectangle about a place in framebuffer pixels. `halves` are
+    /// half its sides for one standard deviation.
+    pub(crate) fn rectangle(&self, middle: [f64; 2], halves: [f64; 2]) -> [[f64; 2]; 2] {
         [0, 1].map(|axis| {
-            let (mean, radius) = (from_corner[axis], radii[axis]);
-            [libm::floor((mean - radius) / CUT_TILE), libm::ceil((mean + radius) / CUT_TILE)]
+            let (middle, radius) = (middle[axis] - self.corner[axis], libm::ceil(self.deviations * halves[axis]));
+            [libm::floor((middle - radius) / CUT_TILE), libm::ceil((middle + radius) / CUT_TILE)]
         })
     }
 
-    /// The same as [`TileCutOff::tiles`], numbered as the device's tiles, which the cut-off's own must be.
-    pub(crate) fn device_tiles(&self, mean: [f64; 2], factor: [f64; 3]) -> [[f64; 2]; 2] {
-        let tiles = self.tiles(mean, factor);
+    /// The same tiles, numbered as the device's, which the cut-off's own must be.
+    pub(crate) fn device_tiles(&self, tiles: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         [0, 1].map(|axis| {
             let first = self.corner[axis] / CUT_TILE;
             tiles[axis].map(|tile| tile + first)

@@ -3,9 +3,19 @@
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::splats::splat::Splat;
+use crate::gaussian::splats::surfel::Surfel;
 use crate::gaussian::view::cut_off::TileCutOff;
 use crate::state::gaussian::GaussianCutOff;
 use fearless_simd::{Simd, f64x8, prelude::*};
+
+/// A block of a tile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockPlace {
+    /// The tile's upper left pixel.
+    pub(crate) corner: [u32; 2],
+    /// The block's number in it.
+    pub(crate) block: usize,
+}
 
 /// The cut-off of a draw.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +39,8 @@ impl CutOff {
 
     /// The lanes of a block, in the tile at `corner`, whose pixels' centres lie within the cut-off of a Gaussian, a bit each.
     #[inline(always)]
-    pub(crate) fn lanes<S: Simd>(&self, simd: S, splat: &Splat, corner: [u32; 2], block: usize) -> u64 {
+    pub(crate) fn lanes<S: Simd>(&self, simd: S, splat: &Splat, surfel: Option<&Surfel>, place: BlockPlace) -> u64 {
+        let BlockPlace { corner, block } = place;
         let middle = [f64::from(corner[0]) + BLOCK_X[block], f64::from(corner[1]) + BLOCK_Y[block]];
         match self {
             Self::Ellipse(most) => {
@@ -37,7 +48,7 @@ impl CutOff {
                 low | half_within(simd, splat, middle, *most, 8) << 8
             }
             Self::Tiles(cut_off) => {
-                let tiles = cut_off.tiles(splat.mean, splat.factor);
+                let tiles = surfel.map_or_else(|| cut_off.tiles(splat.mean, splat.factor), |surfel| surfel.tiles);
                 (0..BLOCK_PIXELS).fold(0, |bits, lane| {
                     let centre = [middle[0] + LANE_X_64[lane], middle[1] + LANE_Y_64[lane]];
                     let is_within = [0, 1].into_iter().all(|axis| {

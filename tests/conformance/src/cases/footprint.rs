@@ -2,14 +2,16 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff,
-    GaussianLinearizationGAURAST as Linearization,
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCutOffGAURAST as CutOff, GaussianGeometryGAURAST as Geometry,
+    GaussianLinearizationGAURAST as Linearization, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use super::chapter::Chapter;
 use super::modes::ORDERS;
-use super::scenes::{Gaussian, ball, cameras, cloud, dense, layered, many, strange};
+use super::scenes::{Gaussian, ball, cameras, cloud, dense, layered, many, parallels, pinholes, strange};
 use crate::draw::{Depth, Draw, Footprint};
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 const CUT_OFFS: [(&str, CutOff); 3] =
     [("ellipse", CutOff::ELLIPSE), ("tile_square", CutOff::TILE_SQUARE), ("tile_rectangle", CutOff::TILE_RECTANGLE)];
@@ -90,6 +92,7 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
             ..Draw::new(dense(313, 0)).within(cut_off, 1.0)
         });
     }
+    discs(chapter);
     for floor in [0.000_025, 0.1, 0.5, 1.0] {
         for low_pass in [0.05, 0.3, 1.0] {
             chapter.add(format!("floor_{floor}.low_pass_{low_pass}"), move || Draw {
@@ -103,5 +106,37 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
     chapter.add("floor_without_compensation", || Draw {
         footprint: Some(Footprint::default().compensation_floor(1.0)),
         ..Draw::new(cloud(315, 800, 0))
+    });
+}
+
+/// 2D Gaussians in the tiles of their rectangles, about whose middle the low-pass is.
+fn discs(chapter: &mut Chapter<'_>) {
+    let flat = |state: State, filter| state.geometry(Geometry::GAUSSIAN_2D).low_pass_variance(filter);
+    let cut_off = CutOff::TILE_RECTANGLE;
+    for (name, camera) in pinholes().into_iter().chain(parallels()) {
+        for filter in [0.0, 0.5, 8.0] {
+            chapter.add(format!("disc.{name}.filter_{filter}"), move || {
+                Draw::new(dense(316, 1)).in_state(|state| flat(state, filter)).seen_by(camera).within(cut_off, 1.5)
+            });
+        }
+    }
+    for deviations in [0.25, 1.0, 3.33] {
+        chapter.add(format!("disc.deviations_{deviations}"), move || {
+            Draw::new(cloud(317, 800, 0)).in_state(|state| flat(state, 0.5)).within(cut_off, deviations)
+        });
+    }
+    for seed in 318..322 {
+        chapter.add(format!("disc.strange_{seed}"), move || {
+            Draw::new(strange(seed)).in_state(|state| flat(state, 0.5)).within(cut_off, 2.0)
+        });
+    }
+    for (order_name, order) in ORDERS {
+        chapter.add(format!("disc.{order_name}"), move || {
+            Draw::new(layered(322, 0)).in_state(|state| flat(state, 0.5).order(order)).within(cut_off, 1.0)
+        });
+    }
+    chapter.add("disc.viewport", move || Draw {
+        viewport: Some(vk::Viewport::default().x(13.0).y(7.0).width(61.0).height(58.0).max_depth(1.0)),
+        ..Draw::new(dense(323, 0)).in_state(|state| flat(state, 2.0)).within(cut_off, 1.0)
     });
 }

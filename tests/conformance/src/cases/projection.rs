@@ -6,8 +6,9 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianOrderGAURAST as Order,
     GaussianProjectionModeGAURAST as ProjectionMode, GaussianVertexOutputLocationsGAURAST as Locations,
 };
-use gaurast_oracle::oracle::OracleState;
+use gaurast_oracle::oracle::error_model::PrecisionClass;
 use gaurast_oracle::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
+use gaurast_oracle::oracle::{OracleState, Rules};
 use gaurast_testkit::shader::words;
 use gaurast_testkit::{
     Attachments, Bindings, Buffer, Commands, GaussianOptions, Gpu, Graphics, Pass, Pipeline, Resource, Shader, Target,
@@ -17,7 +18,7 @@ use gaurast_testkit::{
 use super::chapter::Chapter;
 use super::scenes::dense;
 use crate::draw::{SIZE, State};
-use crate::judge::{CONTRACT, Expected};
+use crate::judge::{Expected, contract};
 use crate::program::{Answer, Program, colors};
 use crate::rendering::{Rendering, colors_by_layer, layers};
 
@@ -54,12 +55,18 @@ fn vertices(outputs: &[OracleOutputs]) -> Vec<Vertex> {
 
 /// What the pictures of outputs may be.
 fn answer(outputs: Vec<OracleOutputs>, viewport: OracleViewport, state: State) -> Answer {
-    Answer::Picture(Box::new(move || Expected {
-        color: render_shaded(&outputs, SIZE, &viewport, &OracleState::from(&state)),
-        distance: CONTRACT,
+    Answer::Picture(Box::new(move |precision| Expected {
+        color: render_shaded(&outputs, SIZE, &viewport, &oracle_state(&state, precision)),
+        distance: contract(precision),
         depth: Vec::new(),
         stencil: Vec::new(),
     }))
+}
+
+/// The state that a device of a class of precision follows.
+fn oracle_state(state: &State, precision: PrecisionClass) -> OracleState {
+    let state = OracleState::from(state);
+    OracleState { rules: Rules { precision, ..state.rules }, ..state }
 }
 
 /// The viewport that is the attachment.

@@ -150,6 +150,7 @@ mod tests {
             height: 100,
             nominal: vec![[0.5; 4]; 10_000],
             alternatives: BTreeMap::from([(7, vec![[0.25, 0.5, 0.25, 0.25]])]),
+            slack: vec![0.0; 10_000],
             exhausted: 0,
             skips: SkipCounts::default(),
             undecidable_keys: 0,

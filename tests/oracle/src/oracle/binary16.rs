@@ -325,6 +325,7 @@ pub fn render_binary16(scene: &OracleScene, camera: &OracleCamera, state: &Oracl
         height: camera.height,
         nominal: pixels.iter().map(|pixel| pixel.nominal.rgba()[0]).collect(),
         alternatives: with_alternatives.filter_map(|(index, alternatives)| Some((index, alternatives?))).collect(),
+        slack: vec![0.0; pixels.len()],
         exhausted: pixels.iter().filter(|pixel| pixel.exhausted).count(),
         skips: projected.skips,
         undecidable_keys: 0,

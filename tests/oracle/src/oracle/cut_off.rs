@@ -4,7 +4,7 @@
 //! radius before it is rounded up, as many of the magnitudes that a side of a box is a sum of, and the error that alpha has,
 //! of the ellipse.
 
-use super::error_model::UNIT_ROUNDOFF;
+use super::error_model::{PrecisionClass, Rounding, UNIT_ROUNDOFF};
 use super::{OracleCutOff, OracleState};
 
 /// Pixels along a tile's side.
@@ -13,8 +13,8 @@ const TILE: f64 = 16.0;
 /// The least square of half the difference of the eigenvalues that a square is found of, in px^4.
 const LEAST_SPREAD: f64 = 0.1;
 
-/// Relative error of radii and sides.
-const ERROR: f64 = 16.0 * UNIT_ROUNDOFF;
+/// Relative roundings of radii and sides.
+const ROUNDINGS: f64 = 16.0;
 
 /// The place of a pixel's centre about a Gaussian.
 pub(super) struct Place {
@@ -28,6 +28,28 @@ pub(super) struct Place {
     pub(super) q: f64,
     /// The relative error of alpha there.
     pub(super) error: f64,
+    /// The roundings of its projection.
+    pub(super) rounding: Rounding,
+}
+
+impl Place {
+    /// The relative error of radii.
+    fn of_radius(&self) -> f64 {
+        UNIT_ROUNDOFF
+            * match self.rounding.class {
+                PrecisionClass::Full => ROUNDINGS,
+                PrecisionClass::Relaxed => ROUNDINGS.max(self.rounding.of_lengths()),
+            }
+    }
+
+    /// The error of a side of a box: `magnitude` is the sum of what it is a sum of.
+    fn of_side(&self, axis: usize, magnitude: f64) -> f64 {
+        let rounded = ROUNDINGS * UNIT_ROUNDOFF * magnitude;
+        match self.rounding.class {
+            PrecisionClass::Full => rounded,
+            PrecisionClass::Relaxed => rounded + UNIT_ROUNDOFF * self.rounding.place[axis],
+        }
+    }
 }
 
 /// Tells if a Gaussian is cut off at a pixel, and if that could be decided otherwise.
@@ -38,7 +60,7 @@ pub(super) fn is_cut(place: &Place, state: &OracleState) -> (bool, bool) {
         OracleCutOff::Ellipse => {
             let most = k * k;
             // An error of the exponent q / 2 is a relative one of alpha.
-            let near = (place.q - most).abs() <= 2.0 * place.error + ERROR * most;
+            let near = (place.q - most).abs() <= 2.0 * place.error + place.of_radius() * most;
             (place.q > most, near)
         }
         OracleCutOff::TileSquare | OracleCutOff::TileRectangle => {
@@ -59,8 +81,8 @@ pub(super) fn is_cut(place: &Place, state: &OracleState) -> (bool, bool) {
 fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
     let k = f64::from(state.cut_off_deviations);
     let [xx, xy, yy] = place.covariance;
-    let radius = |variance: f64| (k * variance.sqrt() * (1.0 + slack * ERROR)).ceil();
-    let side = |mean: f64, radius: f64| slack * ERROR * (mean.abs() + radius + TILE);
+    let radius = |variance: f64| (k * variance.sqrt() * (1.0 + slack * place.of_radius())).ceil();
+    let side = |axis: usize, mean: f64, radius: f64| slack * place.of_side(axis, mean.abs() + radius + TILE);
     if state.cut_off == OracleCutOff::TileSquare {
         // The longer axis of the ellipse; pixel centres are whole numbers.
         let half_difference = 0.5 * (xx - yy);
@@ -68,13 +90,13 @@ fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
         let radius = radius(0.5 * (xx + yy) + spread.sqrt());
         return [0, 1].map(|axis| {
             let mean = place.mean[axis] - 0.5;
-            let slack = side(mean, radius);
+            let slack = side(axis, mean, radius);
             [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack + (TILE - 1.0)) / TILE).floor()]
         });
     }
     [0, 1].map(|axis| {
         let (mean, radius) = (place.mean[axis], radius([xx, yy][axis]));
-        let slack = side(mean, radius);
+        let slack = side(axis, mean, radius);
         [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack) / TILE).ceil()]
     })
 }

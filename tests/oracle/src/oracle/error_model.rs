@@ -27,6 +27,16 @@
 //! exponent may contain the logarithm of the opacity. Opacity compensation multiplies by `|m0 x m1| / sqrt(det S)`,
 //! whose relative error is `c u b_0 b_1 / |m0 x m1|`.
 //!
+//! # Relaxed
+//!
+//! With [`PrecisionClass::Relaxed`] the projection is in binary32 as well. Let `S` be the length of the vector of sums of
+//! magnitudes that the centre relative to the eye is a difference of, `|A||p| + |b| + |e|`, and `h = 1 + S / z` the
+//! *nearness*. Each of its components is wrong by a few u S, a direction and the Jacobian relatively by a few u h, and the
+//! mean by a few u of `M_i`: the picture's side, the principal point, the mean itself, and `|j_i| S`. Constants are larger,
+//! for Vulkan grants 2.5 ulp to a division, 2 to an inverse root, and 3 + 2 |x| to a power of two. Colours come from a
+//! direction that is wrong by u h. What errors of alpha and of colours make of a pixel's colour is their sum over its
+//! Gaussians, each times T.
+//!
 //! # Transmittance
 //!
 //! `T' = T (1 - alpha)` has an absolute error bound:
@@ -42,6 +52,83 @@ pub const FIXED: f64 = 48.0;
 /// Number of roundings allowed for the projected covariance and the quadratic form.
 pub const GEOMETRY: f64 = 8.0;
 
+/// A precision class of the extension.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PrecisionClass {
+    /// Positions, projection and covariances in binary64 or an equivalent, the rest in binary32.
+    #[default]
+    Full,
+    /// binary32 throughout.
+    Relaxed,
+}
+
+/// The roundings that [`PrecisionClass::Relaxed`] grants, in units of roundoff.
+pub mod relaxed {
+    /// As [`FIXED`](super::FIXED).
+    pub const FIXED: f64 = 256.0;
+    /// As [`GEOMETRY`](super::GEOMETRY), of which a Gaussian's nearness is a factor.
+    pub const GEOMETRY: f64 = 32.0;
+    /// Of a mean's magnitudes.
+    pub const PLACE: f64 = 16.0;
+    /// Of the magnitudes that a depth variable is a sum of.
+    pub const DEPTH: f64 = 8.0;
+    /// Of the magnitudes that a colour is a sum of.
+    pub const COLOR: f64 = 64.0;
+    /// Of a determinant's products, where a vertex shader gives the covariance.
+    pub const DETERMINANT: f64 = 8.0;
+    /// Of a depth's magnitudes.
+    pub const MAPPING: f64 = 8.0;
+}
+
+/// The roundings of a Gaussian's projection.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounding {
+    /// The possible error of the mean, in units of roundoff and pixels.
+    pub place: [f64; 2],
+    /// The possible error of a sigma point, in the same units; 0 without the unscented transform.
+    pub points: [f64; 2],
+    /// How many times more roundings the direction to the Gaussian has than one that is not a difference: 1, or with
+    /// [`PrecisionClass::Relaxed`] more where the eye and the centre are much farther from the origin than from each other.
+    pub nearness: f64,
+    /// The possible error of the depth variable beyond binary64's.
+    pub depth: f64,
+    /// The possible relative error of the determinant, in units of roundoff, where it is a difference of products.
+    pub determinant: f64,
+    /// The possible error of the colour beyond the contract's, per unit of the greatest colour.
+    pub color: f64,
+    /// The class.
+    pub class: PrecisionClass,
+}
+
+impl Rounding {
+    /// The roundings of [`PrecisionClass::Full`].
+    pub const FULL: Self = Self {
+        place: [GEOMETRY; 2],
+        points: [0.0; 2],
+        nearness: 1.0,
+        depth: 0.0,
+        determinant: 0.0,
+        color: 0.0,
+        class: PrecisionClass::Full,
+    };
+
+    /// Relative roundings of lengths in the picture, in units of roundoff.
+    pub fn of_lengths(&self) -> f64 {
+        match self.class {
+            PrecisionClass::Full => GEOMETRY,
+            PrecisionClass::Relaxed => relaxed::GEOMETRY * self.nearness,
+        }
+    }
+
+    /// The relative error of alpha that is allowed for every Gaussian, in units of roundoff.
+    pub fn fixed(&self) -> f64 {
+        match self.class {
+            PrecisionClass::Full => FIXED,
+            PrecisionClass::Relaxed => relaxed::FIXED,
+        }
+    }
+}
+
 /// The part of the model that belongs to one Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub struct ErrorModel {
@@ -49,21 +136,30 @@ pub struct ErrorModel {
     spread: [f64; 2],
     /// The part that is the same for all pixels, in units of roundoff.
     fixed: f64,
+    rounding: Rounding,
 }
 
 impl ErrorModel {
     /// The model of a Gaussian: `spread` is `b_0, b_1`; `area` is `|m0 x m1|` if opacity is compensated.
-    pub(super) fn new(spread: [f64; 2], opacity: f64, area: Option<f64>) -> Self {
+    pub(super) fn new(spread: [f64; 2], opacity: f64, area: Option<f64>, rounding: Rounding) -> Self {
         let folded = if opacity > 0.0 { 2.0 * opacity.log2().abs() } else { 0.0 };
-        let compensation = area.map_or(0.0, |area| GEOMETRY * spread[0] * spread[1] / area);
-        Self { spread, fixed: FIXED + folded + compensation }
+        let compensation = area.map_or(0.0, |area| rounding.of_lengths() * spread[0] * spread[1] / area);
+        Self { spread, fixed: rounding.fixed() + folded + compensation, rounding }
+    }
+
+    /// The roundings of the Gaussian's projection.
+    pub(super) fn rounding(&self) -> &Rounding {
+        &self.rounding
     }
 
     /// Bound on the relative error of alpha, at most 1, with `w = S^-1 d` and `q = d . w`.
     pub fn alpha(&self, w: [f64; 2], q: f64) -> f64 {
         let root = q.sqrt();
-        let geometry = w[0].abs() * (self.spread[0] * root + 1.0) + w[1].abs() * (self.spread[1] * root + 1.0);
-        (UNIT_ROUNDOFF * (self.fixed + GEOMETRY * geometry)).min(1.0)
+        let of_lengths = self.rounding.of_lengths();
+        let Rounding { place, points, .. } = self.rounding;
+        let part = |i: usize| w[i].abs() * ((of_lengths * self.spread[i] + points[i]) * root + place[i]);
+        let of_determinant = 0.5 * q * self.rounding.determinant;
+        (UNIT_ROUNDOFF * (self.fixed + part(0) + part(1) + of_determinant)).min(1.0)
     }
 
     /// Bound on [`ErrorModel::alpha`] over all pixels whose quadratic form is at most `q`.

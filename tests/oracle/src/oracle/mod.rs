@@ -42,6 +42,9 @@
 //!
 //! A Gaussian whose mean is very near the fold of a lens, or behind a place that may be one, may be drawn or not ([`lens`]).
 //!
+//! With a relaxed precision ([`error_model::PrecisionClass`]) the granted errors are greater, so that orders of Gaussians and
+//! depth tests are undecidable, too, and are followed both ways.
+//!
 //! Four more decisions exist and are not followed both ways:
 //! - The depth key is `t.z` rounded to binary32. If the binary64 value is within its own error of the midpoint of two
 //!   binary32 values, the key could be either. This happens to about one Gaussian in 10^8 and matters only if another
@@ -90,5 +93,7 @@ pub use lens::OracleLens;
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
 pub use rules::Rules;
-pub use sample_tests::{OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested};
+pub use sample_tests::{
+    DepthCodes, OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested,
+};
 pub use skips::{SkipCounts, SkipReason};

@@ -1,7 +1,7 @@
 //! Step 7: compositing front to back. Decisions that cannot be required of binary32 are followed both ways.
 
 use super::OracleState;
-use super::error_model::{Transmittance, UNIT_ROUNDOFF};
+use super::error_model::{PrecisionClass, Transmittance, UNIT_ROUNDOFF};
 use super::rules::{MedianHalf, WeighedBy};
 use super::splat::{Alpha, Splat};
 
@@ -12,6 +12,7 @@ pub const MAX_DECISIONS: u32 = 6;
 #[derive(Clone, Copy, Debug, Default)]
 struct Median {
     z: f32,
+    z_error: f64,
     distance: f32,
     index: usize,
 }
@@ -60,12 +61,16 @@ pub struct Outcome {
     pub rgba: [f64; 4],
     /// True if a Gaussian contributed.
     pub covered: bool,
-    /// Depth variables that the median may have, if covered.
-    pub medians: Vec<f32>,
+    /// Depth variables that the median may have, if covered, and their possible errors.
+    pub medians: Vec<(f32, f64)>,
     /// True if the list of medians is incomplete.
     pub medians_exhausted: bool,
     /// The sums of weighted depths and of weights.
     pub depths: [f64; 2],
+    /// The greatest possible errors of the depths and of the depth variables.
+    pub depth_errors: [f64; 2],
+    /// The error that the errors of alphas and colours make, per unit of the greatest colour; 0 with full precision.
+    pub slack: f64,
     /// The sum of weighted depth variables.
     pub distances: f64,
     /// The first Gaussian that contributed, by its place in primitive order, if one did.
@@ -84,6 +89,10 @@ struct Path {
     nearest: Option<usize>,
     depths: [f64; 2],
     distances: f64,
+    /// The greatest possible errors of the depths and depth variables that contributed.
+    depth_errors: [f64; 2],
+    /// The sum of T times the possible errors of alphas and colours, per unit of the greatest colour; 0 with full precision.
+    slack: f64,
     finished: bool,
     /// Undecidable decisions taken so far, each of which was followed both ways.
     decisions: u32,
@@ -94,10 +103,16 @@ impl Path {
         color: [0.0; 3],
         transmittance: Transmittance::ONE,
         covered: false,
-        medians: Medians { of: [Median { z: 0.0, distance: 0.0, index: 0 }; MAX_MEDIANS], count: 0, exhausted: false },
+        medians: Medians {
+            of: [Median { z: 0.0, z_error: 0.0, distance: 0.0, index: 0 }; MAX_MEDIANS],
+            count: 0,
+            exhausted: false,
+        },
         nearest: None,
         depths: [0.0; 2],
         distances: 0.0,
+        depth_errors: [0.0; 2],
+        slack: 0.0,
         finished: false,
         decisions: 0,
     };
@@ -107,9 +122,11 @@ impl Path {
         Outcome {
             rgba: self.rgba(),
             covered: self.covered,
-            medians: medians.iter().map(|median| median.z).collect(),
+            medians: medians.iter().map(|median| (median.z, median.z_error)).collect(),
             medians_exhausted: self.medians.exhausted,
             depths: self.depths,
+            depth_errors: self.depth_errors,
+            slack: self.slack,
             distances: self.distances,
             nearest: self.nearest,
             median_gaussians: (medians.iter()).map(|median| (median.index, median.distance)).collect(),
@@ -150,7 +167,14 @@ impl Pixel {
         }
         let mut step = Step {
             color: splat.color,
-            median: Median { z: splat.z, distance: splat.distance, index: splat.index },
+            median: Median {
+                z: splat.z,
+                z_error: splat.error.rounding().depth,
+                distance: splat.distance,
+                index: splat.index,
+            },
+            color_error: splat.error.rounding().color,
+            depth_error: splat.depth_error,
             depth: splat.depth,
             alpha,
             state,
@@ -182,6 +206,11 @@ impl Pixel {
         self.nominal.rgba()
     }
 
+    /// The greatest error of a path that the errors of alphas and colours make, per unit of the greatest colour.
+    pub fn slack(&self) -> f64 {
+        self.alternatives.iter().fold(self.nominal.slack, |most, path| most.max(path.slack))
+    }
+
     /// The results of the other paths.
     pub fn alternatives(&self) -> Vec<[f64; 4]> {
         self.alternatives.iter().map(Path::rgba).collect()
@@ -203,6 +232,8 @@ struct Step<'a> {
     color: [f64; 3],
     median: Median,
     depth: f64,
+    color_error: f64,
+    depth_error: f64,
     alpha: Alpha,
     state: &'a OracleState,
     /// Paths that branch off at this Gaussian, which is already added to them.
@@ -275,6 +306,11 @@ impl Step<'_> {
         for (sum, color) in path.color.iter_mut().zip(self.color) {
             *sum += weight * color;
         }
+        if self.state.rules.precision == PrecisionClass::Relaxed {
+            path.slack += path.transmittance.value * (self.alpha.error + self.alpha.value * self.color_error);
+        }
+        path.depth_errors[0] = path.depth_errors[0].max(self.depth_error);
+        path.depth_errors[1] = path.depth_errors[1].max(self.median.z_error);
         path.depths[0] += weight * self.depth;
         path.depths[1] += weight;
         path.distances += weight * f64::from(self.median.distance);

@@ -1,6 +1,6 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
-use super::error_model::{self, ErrorModel};
+use super::error_model::{ErrorModel, PrecisionClass, Rounding, UNIT_ROUNDOFF, relaxed};
 use super::instance::Model;
 use super::own_axes::OwnAxes;
 use super::panorama;
@@ -8,10 +8,12 @@ use super::projection::{depth_variable, ideal_radius, mean_and_jacobian};
 use super::rules::ColorDirection;
 use super::spherical_harmonics;
 use super::splat::{Cholesky, Splat};
-use super::surfel::Surfel;
+use super::surfel::{self, Surfel};
 use super::unscented::{self, Deviation, Transformed};
 use super::vectors::{dot, length, multiply_row, subtract, transform};
-use super::{OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason};
+use super::{
+    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason,
+};
 
 /// Projects Gaussian `index`, or returns the reason for which it is not drawn.
 pub fn project(
@@ -45,6 +47,12 @@ pub fn project(
         OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
     };
 
+    // The magnitudes of the operands whose difference is the offset.
+    let operands = length([0, 1, 2].map(|i| {
+        let terms = model.linear[i].iter().zip(position).map(|(a, p)| (a * p).abs()).sum::<f64>();
+        terms + model.translation[i].abs() + camera.eye[i].abs()
+    }));
+
     // Step 3. The mean and the Jacobian of the projection.
     let radius = ideal_radius(camera, rules, t);
     let fold = camera.lens.filter(|_| rules.lenses_fold).map(|lens| lens.fold());
@@ -67,15 +75,17 @@ pub fn project(
         let row = model.row(multiply_row(row, &rotation));
         length(row) * largest_scale
     });
+    let (mut steepest, mut weights) = (jacobian.map(length), None);
     if state.unscented && model.is_regular() {
         let axes = [0, 1, 2].map(|k| {
             let axis = [axes[k], axes[3 + k], axes[6 + k]].map(|c| c * scale[k]);
             transform(&rotation, model.vector(axis))
         });
         match unscented::transform(camera, state, t, &axes) {
-            Transformed::Moments(sigma_mean, deviations) => {
-                spread = [0, 1].map(|i| deviations.iter().map(|d| d.at[i].abs()).sum());
-                (mean, columns) = (sigma_mean, deviations);
+            Transformed::Moments(moments) => {
+                spread = [0, 1].map(|i| moments.deviations.iter().map(|d| d.at[i].abs()).sum());
+                (steepest, weights) = (moments.steepest, Some(moments.weights));
+                (mean, columns) = (moments.mean, moments.deviations);
             }
             Transformed::Unseen => {}
             Transformed::OutsidePicture => return Err(SkipReason::OutsidePicture),
@@ -112,6 +122,30 @@ pub fn project(
     let direction = toward.map(|c| c / length(toward));
     let color = spherical_harmonics::color(scene.degree(), direction, scene.coefficients(index));
 
+    let rounding = match rules.precision {
+        PrecisionClass::Full => Rounding::FULL,
+        PrecisionClass::Relaxed => {
+            let nearness = 1.0 + operands / depth.abs();
+            let sides = [camera.width, camera.height].map(f64::from);
+            let magnitudes = [0, 1].map(|i| {
+                let still = sides[i] + f64::from(camera.principal[i]).abs() + mean[i].abs();
+                still + steepest[i] * operands
+            });
+            let place = magnitudes.map(|magnitude| relaxed::PLACE * weights.unwrap_or(1.0) * magnitude);
+            let coefficients = scene.coefficients(index).iter();
+            let terms = coefficients.map(|triple| triple.iter().fold(0.0, |most: f64, c| most.max(c.abs().into())));
+            Rounding {
+                place,
+                points: if weights.is_some() { place } else { [0.0; 2] },
+                nearness,
+                depth: relaxed::DEPTH * UNIT_ROUNDOFF * operands,
+                determinant: 0.0,
+                color: relaxed::COLOR * UNIT_ROUNDOFF * nearness * (1.0 + terms.sum::<f64>()),
+                class: PrecisionClass::Relaxed,
+            }
+        }
+    };
+
     // The rounding errors of a model matrix's products and sums. Without a matrix there is only a difference, rounded
     // once.
     let instance = scene.instance(index);
@@ -122,6 +156,18 @@ pub fn project(
         4.0 * f64::EPSILON * (length(terms) + length(model.translation) + length(camera.eye))
     };
     let area_for_opacity = compensation.map(|[_, area]| area);
+    let disc = [0, 1].map(|axis| {
+        let own = [axes[axis], axes[3 + axis], axes[6 + axis]];
+        transform(&rotation, own.map(|c| c * scale[axis]))
+    });
+    let (mut middle, mut rectangle) = (mean, None);
+    if is_flat && state.cut_off == OracleCutOff::TileRectangle {
+        let Some([shift, halves]) = surfel::rectangle(camera, disc, t) else {
+            return Err(SkipReason::DegenerateCovariance);
+        };
+        middle = [0, 1].map(|axis| mean[axis] + shift[axis]);
+        rectangle = Some(halves.map(|half| half * half));
+    }
     Ok(Splat {
         index,
         mean,
@@ -135,22 +181,24 @@ pub fn project(
         z,
         distance: z,
         depth: 0.0,
+        depth_error: 0.0,
         surfel: is_flat.then(|| Surfel {
             camera: *camera,
-            axes: [0, 1].map(|axis| {
-                let own = [axes[axis], axes[3 + axis], axes[6 + axis]];
-                transform(&rotation, own.map(|c| c * scale[axis]))
-            }),
+            axes: disc,
             centre: t,
-            mean,
+            mean: middle,
+            rectangle,
             low_pass,
             beyond: if rules.discs_begin_at_near { camera.near.into() } else { f64::NEG_INFINITY },
-            fixed: error_model::FIXED + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
+            fixed: rounding.fixed() + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
+            operands,
+            rounding,
         }),
         own_axes: OwnAxes::new(&axes, scale, offset),
         may_be_folded: fold.is_some_and(|fold| radius >= fold.least),
         key_undecidable: state.order.has_keys() && key_is_undecidable(&rotation, offset, lost, sort_by),
-        error: ErrorModel::new(spread, opacity, area_for_opacity),
+        key_terms: [0, 1, 2].map(|i| rotation[6 + i] * model.point(position)[i]),
+        error: ErrorModel::new(spread, opacity, area_for_opacity, rounding),
     })
 }
 

@@ -14,8 +14,13 @@ pub fn rounded(depth: f64) -> f64 {
 
 /// Composites the Gaussians that reach a pixel in every order that their depths allow, the binary64 order first.
 ///
-/// `reached` is in the order of the draw; `add` adds one of it to a pixel.
-pub(super) fn composite<T>(reached: &[(RayDepth, T)], add: impl Fn(&mut Pixel, &T)) -> Pixel {
+/// `reached` is in the order of the draw; `add` adds one of it to a pixel. Two of which `are_tied` is true are in the order of
+/// the draw.
+pub(super) fn composite<T>(
+    reached: &[(RayDepth, T)],
+    are_tied: impl Fn(&T, &T) -> bool,
+    add: impl Fn(&mut Pixel, &T),
+) -> Pixel {
     let mut nominal: Vec<usize> = (0..reached.len()).collect();
     let key = |index: usize| rounded(reached[index].0.value);
     nominal.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
@@ -27,7 +32,10 @@ pub(super) fn composite<T>(reached: &[(RayDepth, T)], add: impl Fn(&mut Pixel, &
         pixel
     };
     let mut pixel = draw(&nominal);
-    let swaps: Vec<usize> = (1..nominal.len()).filter(|&at| may_swap(reached, nominal[at - 1], nominal[at])).collect();
+    let swap = |first: usize, second: usize| {
+        may_swap(reached, first, second) && !are_tied(&reached[first].1, &reached[second].1)
+    };
+    let swaps: Vec<usize> = (1..nominal.len()).filter(|&at| swap(nominal[at - 1], nominal[at])).collect();
     let followed = swaps.len().min(MAX_DECISIONS as usize);
     for which in 1..1usize << followed {
         let mut order = nominal.clone();

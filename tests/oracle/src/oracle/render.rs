@@ -5,11 +5,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::error_model::PrecisionClass;
+use super::own_axes::RayDepth;
 use super::pixel::Pixel;
 use super::project::project;
 use super::rays;
 use super::rules::FrontOfTies;
-use super::splat::Splat;
+use super::splat::{Alpha, Splat};
 use super::{OracleCamera, OracleOrder, OracleScene, OracleState, SkipCounts, SkipReason};
 
 /// The margin, in px, that [`render_bounded`] adds around the ellipse on which alpha reaches its floor. It covers the
@@ -27,6 +29,8 @@ pub struct Reference {
     pub nominal: Vec<[f64; 4]>,
     /// The further outcomes of undecidable pixels, by index into `nominal`.
     pub alternatives: BTreeMap<usize, Vec<[f64; 4]>>,
+    /// By how much each pixel's envelope is wider, per unit of the greatest colour: 0 with full precision.
+    pub slack: Vec<f64>,
     /// Undecidable pixels where more decisions were met than are followed.
     pub exhausted: usize,
     /// Gaussians that were not drawn.
@@ -45,9 +49,11 @@ impl Reference {
     /// Least and greatest of each channel over all outcomes of pixel `index`.
     pub fn envelope(&self, index: usize) -> ([f64; 4], [f64; 4]) {
         let start = (self.nominal[index], self.nominal[index]);
-        self.outcomes(index).fold(start, |(least, greatest), rgba| {
+        let (least, greatest) = self.outcomes(index).fold(start, |(least, greatest), rgba| {
             (std::array::from_fn(|c| least[c].min(rgba[c])), std::array::from_fn(|c| greatest[c].max(rgba[c])))
-        })
+        });
+        let slack = self.slack[index];
+        (least.map(|c| c - slack), greatest.map(|c| c + slack))
     }
 
     /// Every outcome blended (`ONE`, `ONE_MINUS_SRC_ALPHA`) over `behind`, the pixels behind it.
@@ -81,13 +87,13 @@ pub fn render_literal(scene: &OracleScene, camera: &OracleCamera, state: &Oracle
         return render_per_pixel(camera, state, &projected, |_, _| 0..camera.width);
     }
     let rows = (0..camera.height).map(|y| {
-        let mut row = vec![Pixel::EMPTY; camera.width as usize];
+        let mut row = vec![Sorted::new(state); camera.width as usize];
         for (x, pixel) in (0..).zip(&mut row) {
             for splat in &projected.splats {
                 pixel.add(splat, splat.alpha(x, y, state), state);
             }
         }
-        row
+        row.into_iter().map(|pixel| pixel.finish(state)).collect()
     });
     let rows: Vec<Vec<Pixel>> = rows.collect();
     collect([camera.width, camera.height], &projected, || rows.iter().flatten())
@@ -133,7 +139,7 @@ pub(super) fn bounded_pixels(projected: &Projected, [width, height]: [u32; 2], s
         .enumerate()
         .map(|(y, members)| {
             let y = y as u32;
-            let mut row = vec![Pixel::EMPTY; width as usize];
+            let mut row = vec![Sorted::new(state); width as usize];
             for &index in members {
                 let splat = &projected.splats[index];
                 for x in bounds[index].columns(y, width) {
@@ -143,9 +149,54 @@ pub(super) fn bounded_pixels(projected: &Projected, [width, height]: [u32; 2], s
                     }
                 }
             }
-            row
+            row.into_iter().map(|pixel| pixel.finish(state)).collect()
         })
         .collect()
+}
+
+/// A pixel to which Gaussians are added nearest first. Where keys have errors, it is composited in every order that they allow.
+#[derive(Clone)]
+pub(super) enum Sorted<'a> {
+    Certain(Pixel),
+    Uncertain(Vec<(RayDepth, (&'a Splat, Alpha))>),
+}
+
+impl<'a> Sorted<'a> {
+    pub(super) fn new(state: &OracleState) -> Self {
+        match state.rules.precision {
+            PrecisionClass::Relaxed if state.order.has_keys() => Self::Uncertain(Vec::new()),
+            _ => Self::Certain(Pixel::EMPTY),
+        }
+    }
+
+    pub(super) fn is_finished(&self) -> bool {
+        matches!(self, Self::Certain(pixel) if pixel.is_finished())
+    }
+
+    /// Adds the next Gaussian.
+    pub(super) fn add(&mut self, splat: &'a Splat, alpha: Alpha, state: &OracleState) {
+        match self {
+            Self::Certain(pixel) => pixel.add(splat, alpha, state),
+            Self::Uncertain(reached) => {
+                if alpha.value + alpha.error >= f64::from(state.alpha_floor) {
+                    let depth = RayDepth { value: splat.key, error: splat.error.rounding().depth };
+                    reached.push((depth, (splat, alpha)));
+                }
+            }
+        }
+    }
+
+    /// The pixel with all of them.
+    pub(super) fn finish(self, state: &OracleState) -> Pixel {
+        match self {
+            Self::Certain(pixel) => pixel,
+            Self::Uncertain(reached) => rays::composite(
+                &reached,
+                |(a, _), (b, _)| a.has_key_of(b),
+                |pixel, (splat, alpha)| pixel.add(splat, *alpha, state),
+            ),
+        }
+    }
 }
 
 /// Draws in the per-pixel order: every Gaussian, by its index, in those columns of a row that it may reach.
@@ -168,9 +219,7 @@ fn render_per_pixel(
             }
         }
         row.into_iter().map(|reached| {
-            rays::composite(&reached, |pixel, (splat, alpha)| {
-                pixel.add(splat, *alpha, state);
-            })
+            rays::composite(&reached, |_, _| false, |pixel, (splat, alpha)| pixel.add(splat, *alpha, state))
         })
     };
     let pixels: Vec<Pixel> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
@@ -221,6 +270,7 @@ pub(super) fn collect<'a, I: Iterator<Item = &'a Pixel>>(
             .enumerate()
             .filter(|(_, alternatives)| !alternatives.is_empty())
             .collect(),
+        slack: pixels().map(Pixel::slack).collect(),
         exhausted: pixels().filter(|pixel| pixel.is_exhausted()).count(),
         skips: projected.skips,
         undecidable_keys: projected.splats.iter().filter(|splat| splat.key_undecidable).count(),

@@ -19,6 +19,10 @@ pub struct Resolved {
     pub expected_depth: f64,
     /// The possible median depths.
     pub median_depths: Vec<f64>,
+    /// The possible errors of a depth and of a depth variable.
+    pub errors: [f64; 2],
+    /// By how much the envelope of the accumulated colour is wider, per unit of the greatest colour.
+    pub slack: f64,
     /// True if the list of medians is incomplete.
     pub medians_exhausted: bool,
     /// The mean of the contributing centres' depth variables, weighted by T alpha.
@@ -31,7 +35,7 @@ pub struct Resolved {
 
 impl Resolved {
     fn new(outcome: &Outcome, depth: impl Fn(f32) -> f64) -> Self {
-        let median_depths: Vec<f64> = outcome.medians.iter().map(|&z| depth(z)).collect();
+        let median_depths: Vec<f64> = outcome.medians.iter().map(|&(z, _)| depth(z)).collect();
         let [depths, weights] = outcome.depths;
         let last = median_depths.last().copied().unwrap_or(0.0);
         let last_distance = outcome.median_gaussians.last().map_or(0.0, |m| m.1.into());
@@ -40,6 +44,8 @@ impl Resolved {
             covered: outcome.covered,
             expected_depth: if weights > 0.0 { depths / weights } else { last },
             median_depths,
+            errors: outcome.depth_errors,
+            slack: outcome.slack,
             medians_exhausted: outcome.medians_exhausted,
             expected_distance: if weights > 0.0 { outcome.distances / weights } else { last_distance },
             median_gaussians: outcome.median_gaussians.clone(),
@@ -54,8 +60,9 @@ fn resolve(
     size: [u32; 2],
     state: &OracleState,
     depth: impl Fn(f32) -> f64,
+    error: impl Fn(&Splat) -> f64,
 ) -> Vec<Vec<Resolved>> {
-    let set_depth = |splat: &mut Splat| splat.depth = depth(splat.z);
+    let set_depth = |splat: &mut Splat| (splat.depth, splat.depth_error) = (depth(splat.z), error(splat));
     projected.splats.iter_mut().for_each(set_depth);
     let pixels = bounded_pixels(&projected, size, state);
     let ways = |pixel: &Pixel| {
@@ -74,7 +81,11 @@ pub fn resolve_scene(
 ) -> Vec<Vec<Resolved>> {
     let projected = Projected::new(scene, camera, state);
     let depth = |z| tests.format.depth(tests.code(camera.model, &state.rules, z));
-    resolve(projected, [camera.width, camera.height], state, depth)
+    let error = |splat: &Splat| {
+        let codes = tests.codes(camera.model, &state.rules, (splat.z, splat.error.rounding().depth));
+        tests.format.depth(codes.greatest) - tests.format.depth(codes.least)
+    };
+    resolve(projected, [camera.width, camera.height], state, depth, error)
 }
 
 /// The resolve shader's inputs after vertex-shader projection, with a viewport of depths from 0 to 1 and binary32
@@ -86,5 +97,5 @@ pub fn resolve_shaded(
     state: &OracleState,
 ) -> Vec<Vec<Resolved>> {
     let all = outputs.iter().map(|one| project(one, viewport, state));
-    resolve(Projected::sort(all, state), size, state, f64::from)
+    resolve(Projected::sort(all, state), size, state, f64::from, |_| 0.0)
 }

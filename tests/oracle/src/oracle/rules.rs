@@ -1,10 +1,14 @@
 //! Rules of the text that are plain data here, so that a test can follow others and see if somebody notices.
 
-/// The rules that the steps follow. The defaults are the text's.
+use super::error_model::PrecisionClass;
+
+/// The rules that the steps follow, and the precision to which they are followed. The defaults are the text's.
 ///
 /// Steps 6 and 7 in binary16 always follow the text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
+    /// The class that tells which roundings are granted.
+    pub precision: PrecisionClass,
     /// Step 2: the rounding of depths and distances to sort keys.
     pub key_rounding: KeyRounding,
     /// Step 3: the share of the viewport's side by which a pinhole's slope may exceed the viewport before it is clamped.
@@ -43,6 +47,7 @@ pub struct Rules {
 impl Default for Rules {
     fn default() -> Self {
         Self {
+            precision: PrecisionClass::Full,
             key_rounding: KeyRounding::Binary32,
             slope_margin: 0.15,
             panorama_repeats: true,

@@ -6,6 +6,7 @@
 use ash::vk;
 use rayon::prelude::*;
 
+use super::error_model::{PrecisionClass, UNIT_ROUNDOFF, relaxed};
 use super::own_axes::RayDepth;
 use super::pixel::{Outcome, Pixel};
 use super::rays;
@@ -112,6 +113,59 @@ impl OracleTests {
     }
 }
 
+impl OracleTests {
+    /// The depths that a centre may have in the attachment, if its depth variable has the error `z_error`.
+    pub fn codes(&self, model: OracleModel, rules: &Rules, (z, z_error): (f32, f64)) -> DepthCodes {
+        let nominal = self.code(model, rules, z);
+        if rules.precision == PrecisionClass::Full {
+            return DepthCodes { nominal, least: nominal, greatest: nominal };
+        }
+        let [c0, c1] = self.depth_coefficients.map(|c| f64::from(c).abs());
+        let [near, far] = self.depth_range.map(f64::from);
+        let z_error = z_error + UNIT_ROUNDOFF * f64::from(z).abs();
+        let (varying, by_z) = match model {
+            OracleModel::Orthographic => (c1 * f64::from(z).abs(), c1),
+            _ => (c1 / f64::from(z).abs(), c1 / f64::from(z).powi(2)),
+        };
+        let relative = relaxed::MAPPING * UNIT_ROUNDOFF;
+        let error =
+            (by_z * z_error + relative * (c0 + varying)) * (far - near).abs() + relative * near.abs().max(far.abs());
+        let depth = self.format.depth(nominal);
+        let code = |depth: f64| self.format.code(depth);
+        DepthCodes { nominal, least: code(depth - error), greatest: code(depth + error) }
+    }
+}
+
+/// The depths that a Gaussian may have in an attachment, as its format holds them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DepthCodes {
+    /// That of binary64.
+    pub nominal: u32,
+    /// The least.
+    pub least: u32,
+    /// The greatest.
+    pub greatest: u32,
+}
+
+impl DepthCodes {
+    /// The one depth of a pixel that stores what it stored before.
+    fn stored(code: u32) -> Self {
+        Self { nominal: code, least: code, greatest: code }
+    }
+
+    /// Reports whether a depth may be stored.
+    pub fn contains(&self, code: u32) -> bool {
+        (self.least..=self.greatest).contains(&code)
+    }
+
+    /// The nominal result of the comparison with a stored depth, and whether it may be decided otherwise.
+    fn compare(&self, op: vk::CompareOp, stored: u32) -> (bool, bool) {
+        let nominal = compare(op, self.nominal, stored);
+        let equal = self.contains(stored) && compare(op, stored, stored) != nominal;
+        (nominal, equal || [self.least, self.greatest].iter().any(|&code| compare(op, code, stored) != nominal))
+    }
+}
+
 /// `reference op stored`.
 pub fn compare<T: PartialOrd>(op: vk::CompareOp, reference: T, stored: T) -> bool {
     match op {
@@ -142,7 +196,7 @@ pub struct TestedReference {
     /// Its colours.
     pub color: Reference,
     /// Every depth that it may store afterwards, the binary64 one among them; `None` if that is not known.
-    pub depth: Vec<Option<Vec<u32>>>,
+    pub depth: Vec<Option<Vec<DepthCodes>>>,
     /// Every stencil that it may store afterwards.
     pub stencil: Vec<Vec<u8>>,
     /// Samples that have a fragment for certain, and those that may have one.
@@ -152,7 +206,7 @@ pub struct TestedReference {
 /// One sample while Gaussians are added to it.
 struct Sample<'a> {
     pixel: Pixel,
-    /// In the per-pixel order: the Gaussians that have passed and are not sorted yet.
+    /// In the per-pixel order, or where keys have errors: the Gaussians that have passed and are not sorted yet.
     passed: Vec<(RayDepth, (&'a Splat, Alpha))>,
     stored: (u32, u8),
     /// True if depth bounds and stencil let it pass.
@@ -191,16 +245,16 @@ impl Sample<'_> {
     }
 
     /// The values that it may store afterwards: depths, if known, and stencils.
-    fn after(&self, tests: &OracleTests, rules: &Rules, code: impl Fn(f32) -> u32) -> (Option<Vec<u32>>, Vec<u8>) {
+    fn after(&self, tests: &OracleTests, rules: &Rules, model: OracleModel) -> (Option<Vec<DepthCodes>>, Vec<u8>) {
         let writes = tests.depth.is_some_and(|(_, write)| write);
         let (mut depths, mut stencils) = (Some(Vec::new()), Vec::new());
         for outcome in self.pixel.outcomes() {
             let Outcome { covered, medians, .. } = &outcome;
             match &mut depths {
                 Some(depths) if *covered && writes => {
-                    depths.extend(medians.iter().map(|&z| code(z)));
+                    depths.extend(medians.iter().map(|&median| tests.codes(model, rules, median)));
                 }
-                Some(depths) => depths.push(self.stored.0),
+                Some(depths) => depths.push(DepthCodes::stored(self.stored.0)),
                 None => {}
             }
             if *covered && writes && outcome.medians_exhausted {
@@ -241,9 +295,11 @@ pub fn render_tested(
 ) -> TestedReference {
     let projected = Projected::new(scene, camera, state);
     let rules = &state.rules;
-    let codes: Vec<u32> = projected.splats.iter().map(|splat| tests.code(camera.model, rules, splat.z)).collect();
+    let codes = |splat: &Splat| tests.codes(camera.model, rules, (splat.z, splat.error.rounding().depth));
+    let codes: Vec<DepthCodes> = projected.splats.iter().map(codes).collect();
     let bounds: Vec<Bound> = projected.splats.iter().map(|splat| Bound::new(splat, state)).collect();
     let per_pixel = state.order == OracleOrder::PerPixel;
+    let has_uncertain_keys = rules.precision == PrecisionClass::Relaxed && state.order.has_keys();
     let row = |y: u32| {
         let first = (y * camera.width) as usize;
         let mut row: Vec<Sample> = (first..first + camera.width as usize)
@@ -263,28 +319,43 @@ pub fn render_tested(
                 }
                 let alpha = splat.alpha(x, y, state);
                 sample.reach(alpha, state);
-                let passes =
-                    sample.stencil_passes && tests.depth.is_none_or(|(op, _)| compare(op, code, sample.stored.0));
-                if passes && per_pixel {
+                if !sample.stencil_passes {
+                    continue;
+                }
+                let (passes, is_uncertain) =
+                    tests.depth.map_or((true, false), |(op, _)| code.compare(op, sample.stored.0));
+                if !passes && !is_uncertain {
+                    continue;
+                }
+                let alpha = Alpha {
+                    is_cut: alpha.is_cut || !passes,
+                    cut_undecidable: alpha.cut_undecidable || is_uncertain,
+                    ..alpha
+                };
+                if per_pixel {
                     let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
                     let depth = splat.own_axes.depth(camera, center);
                     sample.passed.push((depth, (splat, alpha)));
-                } else if passes && !sample.pixel.is_finished() {
+                } else if has_uncertain_keys {
+                    let depth = RayDepth { value: splat.key, error: splat.error.rounding().depth };
+                    sample.passed.push((depth, (splat, alpha)));
+                } else if !sample.pixel.is_finished() {
                     sample.pixel.add(splat, alpha, state);
                 }
             }
         }
-        for sample in row.iter_mut().filter(|_| per_pixel) {
+        for sample in row.iter_mut().filter(|_| per_pixel || has_uncertain_keys) {
             let passed = std::mem::take(&mut sample.passed);
-            sample.pixel = rays::composite(&passed, |pixel, (splat, alpha)| {
-                pixel.add(splat, *alpha, state);
-            });
+            sample.pixel = rays::composite(
+                &passed,
+                |(a, _), (b, _)| has_uncertain_keys && a.has_key_of(b),
+                |pixel, (splat, alpha)| pixel.add(splat, *alpha, state),
+            );
         }
         row
     };
     let samples: Vec<Sample> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
-    let (depth, stencil) =
-        samples.iter().map(|sample| sample.after(tests, rules, |z| tests.code(camera.model, rules, z))).unzip();
+    let (depth, stencil) = samples.iter().map(|sample| sample.after(tests, rules, camera.model)).unzip();
     let covered = |sample: &Sample| -> Vec<bool> {
         let outcomes = sample.pixel.outcomes();
         outcomes.map(|outcome| outcome.covered).collect()

@@ -1,6 +1,6 @@
 //! Vertex-shader projection: from a vertex shader's outputs for a Gaussian to the numbers that a pixel needs.
 
-use super::error_model::ErrorModel;
+use super::error_model::{ErrorModel, PrecisionClass, Rounding, relaxed};
 use super::own_axes::OwnAxes;
 use super::render::{Projected, Reference, bounded};
 use super::splat::{Cholesky, Splat};
@@ -74,6 +74,15 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         opacity *= factor;
     }
     let area_for_opacity = compensation.map(|[_, area]| area);
+    let rounding = match state.rules.precision {
+        PrecisionClass::Full => Rounding::FULL,
+        PrecisionClass::Relaxed => Rounding {
+            place: [0, 1].map(|axis| relaxed::PLACE * (f64::from(viewport.size[axis]) + mean[axis].abs())),
+            determinant: relaxed::DETERMINANT * (s_xx * s_yy / determinant).abs(),
+            class: PrecisionClass::Relaxed,
+            ..Rounding::FULL
+        },
+    };
     Ok(Splat {
         index: 0,
         distance: w as f32,
@@ -94,8 +103,10 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         },
         z: (z / w) as f32,
         depth: 0.0,
+        depth_error: 0.0,
         key_undecidable: false,
-        error: ErrorModel::new([covariance[0].sqrt(), covariance[2].sqrt()], opacity, area_for_opacity),
+        key_terms: [0.0; 3],
+        error: ErrorModel::new([covariance[0].sqrt(), covariance[2].sqrt()], opacity, area_for_opacity, rounding),
     })
 }
 

@@ -34,12 +34,17 @@ pub struct Splat {
     pub distance: f32,
     /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
     pub depth: f64,
+    /// The possible error of that depth beyond binary64's.
+    pub depth_error: f64,
     /// Its disc in camera axes, if it is a disc.
     pub surfel: Option<Surfel>,
     /// The source of its depths along rays.
     pub own_axes: OwnAxes,
     /// True if the key is within its own error of the midpoint of two keys.
     pub key_undecidable: bool,
+    /// The products that the depth variable of perspective is a sum of, but for the eye's: Gaussians that have the same have
+    /// the same key, whatever is rounded.
+    pub key_terms: [f64; 3],
     /// True if its mean may lie beyond the fold of the lens, so that it may be drawn or not.
     pub may_be_folded: bool,
     /// The bound on the error of a binary32 implementation for this Gaussian.
@@ -100,6 +105,11 @@ impl Alpha {
 }
 
 impl Splat {
+    /// Reports whether the key is certainly another Gaussian's, too.
+    pub(super) fn has_key_of(&self, other: &Self) -> bool {
+        self.key_terms == other.key_terms && self.key == other.key
+    }
+
     /// Step 6 at the centre of pixel (x, y).
     pub fn alpha(&self, x: u32, y: u32, state: &OracleState) -> Alpha {
         let dx = f64::from(x) + 0.5 - self.mean[0];
@@ -115,13 +125,12 @@ impl Splat {
             }
         };
         let centre = [f64::from(x) + 0.5, f64::from(y) + 0.5];
-        let place = Place {
-            centre,
-            mean: [centre[0] - d[0], centre[1] - d[1]],
-            covariance: self.covariance,
-            q,
-            error: relative,
+        let of_disc = self.surfel.and_then(|surfel| Some((surfel.mean, surfel.rectangle?)));
+        let (mean, covariance) = match of_disc {
+            Some((middle, [xx, yy])) => (middle, [xx, 0.0, yy]),
+            None => ([centre[0] - d[0], centre[1] - d[1]], self.covariance),
         };
+        let place = Place { centre, mean, covariance, q, error: relative, rounding: *self.error.rounding() };
         let (is_cut, cut_undecidable) = is_cut(&place, state);
         let cut_undecidable = cut_undecidable || self.may_be_folded;
         let whole = Alpha { is_cut, cut_undecidable, ..Alpha::NOTHING };

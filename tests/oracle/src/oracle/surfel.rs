@@ -5,10 +5,10 @@
 //! b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the plane
 //! (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
 
-use super::error_model::UNIT_ROUNDOFF;
+use super::error_model::{PrecisionClass, Rounding, UNIT_ROUNDOFF};
 use super::{OracleCamera, OracleModel};
 
-/// Number of binary64 roundings allowed for the numerators and for `w`.
+/// Number of roundings, of binary64 or with a relaxed precision of binary32, allowed for the numerators and for `w`.
 const ROUNDINGS: f64 = 64.0;
 
 /// A disc in camera axes.
@@ -19,14 +19,20 @@ pub struct Surfel {
     pub(super) axes: [[f64; 3]; 2],
     /// `t`.
     pub(super) centre: [f64; 3],
-    /// The centre's pixel.
+    /// The middle of the filter, which is the centre's pixel without a cut-off.
     pub(super) mean: [f64; 2],
+    /// The squares of half the sides of its rectangle at one standard deviation, if it has a cut-off.
+    pub(super) rectangle: Option<[f64; 2]>,
     /// The filter's variance.
     pub(super) low_pass: f64,
     /// The depth beyond which a pinhole's rays meet it.
     pub(super) beyond: f64,
     /// Relative error of alpha that is allowed for every disc.
     pub(super) fixed: f64,
+    /// The magnitude of the operands whose difference the centre is.
+    pub(super) operands: f64,
+    /// The roundings of its projection.
+    pub(super) rounding: Rounding,
 }
 
 impl Surfel {
@@ -48,18 +54,28 @@ impl Surfel {
             OracleModel::Orthographic => w != 0.0,
             _ => w != 0.0 && depth > self.beyond,
         };
-        let unit = 0.5 * f64::EPSILON * ROUNDINGS;
+        let (unit, reach) = match self.rounding.class {
+            PrecisionClass::Full => (0.5 * f64::EPSILON * ROUNDINGS, length(self.centre)),
+            PrecisionClass::Relaxed => (UNIT_ROUNDOFF * ROUNDINGS, length(self.centre) + self.operands),
+        };
         let (size_a, size_b) = (length(a), length(b));
         let error_w = unit * size_a * size_b * length(direction) / w.abs();
-        let error_uv = unit * (size_a + size_b) * (length(self.centre) + length(origin)) * length(direction) / w.abs();
+        let error_uv = unit * (size_a + size_b) * (reach + length(origin)) * length(direction) / w.abs();
         let met = u * u + v * v;
         let met_error = 2.0 * met.sqrt() * error_uv + 2.0 * met * error_w;
         let d = [x - self.mean[0], y - self.mean[1]];
         let filter = (d[0] * d[0] + d[1] * d[1]) / self.low_pass;
+        let filter_error = match self.rounding.class {
+            PrecisionClass::Full => 0.0,
+            PrecisionClass::Relaxed => {
+                let place = self.rounding.place;
+                2.0 * UNIT_ROUNDOFF * (d[0].abs() * place[0] + d[1].abs() * place[1]) / self.low_pass
+            }
+        };
         let (distance, error) = if is_met && !(self.low_pass > 0.0 && filter < met) {
             (met, met_error)
         } else if self.low_pass > 0.0 {
-            (filter, 0.0)
+            (filter, filter_error)
         } else {
             (f64::INFINITY, 0.0)
         };
@@ -93,6 +109,27 @@ impl Surfel {
         }
         bounds
     }
+}
+
+/// The rectangle of the outline of a disc of one standard deviation: its middle, in pixels from the centre's, and half its sides.
+/// `None` if the outline touches the eye's plane.
+pub(super) fn rectangle(camera: &OracleCamera, [a, b]: [[f64; 3]; 2], t: [f64; 3]) -> Option<[[f64; 2]; 2]> {
+    let is_parallel = camera.model == OracleModel::Orthographic;
+    let divisor = a[2] * a[2] + b[2] * b[2] - t[2] * t[2];
+    if !is_parallel && divisor == 0.0 {
+        return None;
+    }
+    let sides = [0, 1].map(|i| {
+        let focal = f64::from(camera.focal[i]);
+        if is_parallel {
+            return [0.0, focal * a[i].hypot(b[i])];
+        }
+        let [along_a, along_b] = [a, b].map(|axis| focal * (axis[i] - axis[2] * t[i] / t[2]));
+        let middle = (along_a * a[2] + along_b * b[2]) / divisor;
+        let square = middle * middle - (along_a * along_a + along_b * along_b) / divisor;
+        [middle, square.max(1e-4).sqrt()]
+    });
+    Some([[sides[0][0], sides[1][0]], [sides[0][1], sides[1][1]]])
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -17,11 +17,24 @@ pub struct Deviation {
     pub sign: f64,
 }
 
+/// The moments of the sigma points' places.
+#[derive(Clone, Debug)]
+pub struct Moments {
+    /// The mean.
+    pub mean: [f64; 2],
+    /// The points less their mean.
+    pub deviations: Vec<Deviation>,
+    /// The sum of the magnitudes of the weights in the mean.
+    pub weights: f64,
+    /// The greatest length of a point's Jacobian, by row.
+    pub steepest: [f64; 2],
+}
+
 /// The picture of a Gaussian by its sigma points.
 #[derive(Clone, Debug)]
 pub enum Transformed {
-    /// The mean, and the points less their mean. The covariance is the sum of their squares.
-    Moments([f64; 2], Vec<Deviation>),
+    /// The covariance is the sum of the deviations' squares.
+    Moments(Moments),
     /// A sigma point is not visible together with the mean.
     Unseen,
     /// Too few points lie in the picture.
@@ -82,7 +95,16 @@ pub fn transform(camera: &OracleCamera, state: &OracleState, t: [f64; 3], axes: 
         let root = weight.abs().sqrt();
         Deviation { at: [0, 1].map(|axis| root * (place[axis] - mean[axis])), sign: weight.signum() }
     });
-    Transformed::Moments(mean, deviations.collect())
+    let steepest = |axis: usize| {
+        let rows = points.iter().map(|&point| length(mean_and_jacobian(camera, rules, point).1[axis]));
+        rows.fold(0.0, f64::max)
+    };
+    Transformed::Moments(Moments {
+        mean,
+        deviations: deviations.collect(),
+        weights: (0..points.len()).map(|index| in_mean(index).abs()).sum(),
+        steepest: [0, 1].map(steepest),
+    })
 }
 
 /// True if a pixel lies in the viewport or its margin.

@@ -2,6 +2,7 @@
 
 use crate::gaussian::splats::splat::SplatIndex;
 use crate::gaussian::splats::surfel::Surfel;
+use crate::raster::gaussian::cut_off::BlockPlace;
 use crate::raster::gaussian::exponent::neg_log2_alphas_f64;
 use crate::raster::gaussian::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use crate::raster::gaussian::inputs::TileInputs;
@@ -18,7 +19,8 @@ pub(crate) fn neg_log2_alphas<S: Simd>(simd: S, inputs: &TileInputs<'_>, index: 
     let Some(cut_off) = inputs.kernel.cut_off() else {
         return neg_log2_alpha;
     };
-    let lanes = cut_off.lanes(simd, index.of(inputs.splats), inputs.corner, block);
+    let place = BlockPlace { corner: inputs.corner, block };
+    let lanes = cut_off.lanes(simd, index.of(inputs.splats), inputs.kernel.surfel(index), place);
     mask32x16::from_bitmask(simd, lanes).select(neg_log2_alpha, f32x16::splat(simd, CUT))
 }
 
