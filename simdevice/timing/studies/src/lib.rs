@@ -18,4 +18,5 @@ pub mod scene;
 pub mod sensitivity;
 pub mod simt;
 pub mod stepped;
+pub mod techniques;
 pub mod what_if;
