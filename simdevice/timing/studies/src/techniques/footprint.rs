@@ -74,10 +74,11 @@ impl Footprint {
     }
 
     /// The square around the circle of three standard deviations of the longer axis, rounded up to pixels, to which the
-    /// original 3DGS code bins.
+    /// original 3DGS code bins. That code rounds the far corner down to a pixel.
     pub fn square(&self) -> Rectangle {
         let ([longer, _], _) = self.axes();
-        Rectangle::around(self.mean, [(3.0 * longer).ceil(); 2])
+        let square = Rectangle::around(self.mean, [(3.0 * longer).ceil(); 2]);
+        Rectangle { high: square.high.map(f64::floor), ..square }
     }
 }
 

@@ -15,7 +15,7 @@ use timing::work::{DrawWork, FrameWork, Mode};
 /// The counts of a scene's view and of a path that begins there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measured {
+pub struct SceneWork {
     /// The scene's name.
     pub scene: String,
     /// Width and height of the picture in pixels.
@@ -57,7 +57,7 @@ pub struct Stored {
     /// The command that measures them.
     pub command: String,
     /// The scenes.
-    pub scenes: Vec<Measured>,
+    pub scenes: Vec<SceneWork>,
 }
 
 impl Stored {
@@ -80,7 +80,7 @@ fn gaussian_draw(frame: &FrameWork) -> Option<&DrawWork> {
 ///
 /// # Errors
 /// Returns a [`ConfigError`] if a preset can't be read.
-pub fn measure(view: &View, frame: &FrameWork) -> Result<Option<Measured>, ConfigError> {
+pub fn measure(view: &View, frame: &FrameWork) -> Result<Option<SceneWork>, ConfigError> {
     let Some((draw, conditional)) = gaussian_draw(frame).and_then(|draw| Some((draw, Conditional::of(draw)?))) else {
         return Ok(None);
     };
@@ -94,7 +94,7 @@ pub fn measure(view: &View, frame: &FrameWork) -> Result<Option<Measured>, Confi
         });
         counter.end_tile();
     }
-    Ok(Some(Measured {
+    Ok(Some(SceneWork {
         size: view.size,
         gaussians: draw.primitives,
         drawn: draw.drawn,
@@ -108,6 +108,6 @@ pub fn measure(view: &View, frame: &FrameWork) -> Result<Option<Measured>, Confi
         row_work,
         conditional,
         scaling: Scaling::of(frame)?,
-        ..Measured::default()
+        ..SceneWork::default()
     }))
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use timing::config::{Config, ConfigError};
 use timing::fast;
-use timing::work::FrameWork;
+use timing::work::{FrameWork, Saturation};
 
 /// The numbers of rasterizers, from Vorion's prototype to its scaled design.
 pub const RASTERIZERS: [u32; 4] = [2, 4, 8, 16];
@@ -11,10 +11,10 @@ pub const RASTERIZERS: [u32; 4] = [2, 4, 8, 16];
 /// Milliseconds of stage 3 with each number of [`RASTERIZERS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scaling {
-    /// Milliseconds with the main memory of the preset.
-    pub raster_ms: [f64; RASTERIZERS.len()],
-    /// Milliseconds with a main memory a hundred times as fast.
-    pub fast_memory_ms: [f64; RASTERIZERS.len()],
+    /// Milliseconds if whole tiles are evaluated, as in the paper's machine.
+    pub tiles_ms: [f64; RASTERIZERS.len()],
+    /// Milliseconds if only unfinished blocks that a Gaussian reaches are evaluated.
+    pub blocks_ms: [f64; RASTERIZERS.len()],
 }
 
 impl Scaling {
@@ -30,16 +30,16 @@ impl Scaling {
             let time = |config: &Config| {
                 fast::rasterize(frame, config, 0.0).milliseconds(config.rasterizer.clock_ghz)
             };
-            scaling.raster_ms[index] = time(&config);
-            config.memory.bandwidth_gb_s *= 100.0;
-            scaling.fast_memory_ms[index] = time(&config);
+            scaling.tiles_ms[index] = time(&config);
+            config.rasterizer.saturation = Saturation::Reached;
+            scaling.blocks_ms[index] = time(&config);
         }
         Ok(scaling)
     }
 
-    /// The speed-ups of eight times the rasterizers, with the preset's memory and with the fast one.
+    /// The speed-ups of eight times the rasterizers, with whole tiles and with blocks.
     pub fn speed_ups(&self) -> [f64; 2] {
-        [self.raster_ms, self.fast_memory_ms].map(|times| times[0] / times[RASTERIZERS.len() - 1])
+        [self.tiles_ms, self.blocks_ms].map(|times| times[0] / times[RASTERIZERS.len() - 1])
     }
 }
 
@@ -50,10 +50,15 @@ mod tests {
 
     #[test]
     fn even_work_scales_until_memory_limits() {
-        // Long lists of whole tiles: 16 cycles a Gaussian, and 36 bytes.
-        let scaling = Scaling::of(&even_frame([1280, 640], 1_600_000, 0.2)).unwrap();
-        let [limited, free] = scaling.speed_ups();
-        assert!(free > 7.5 && free <= 8.05, "{scaling:?}");
-        assert!(limited <= free && limited > 1.0, "{scaling:?}");
+        // Long lists: 16 cycles and 40 bytes a Gaussian, and one cycle if it reaches one block.
+        let mut frame = even_frame([1280, 640], 1_600_000, 0.2);
+        for tile in &mut frame.draws[0].tiles {
+            tile.runs[0].reached = tile.listed;
+        }
+        let scaling = Scaling::of(&frame).unwrap();
+        let [tiles, blocks] = scaling.speed_ups();
+        assert!(tiles > 7.5 && tiles <= 8.05, "{scaling:?}");
+        assert!(blocks < tiles && blocks > 1.0, "{scaling:?}");
+        assert!(scaling.blocks_ms[0] < scaling.tiles_ms[0]);
     }
 }
