@@ -79,7 +79,8 @@ fn drawn(scene: &Scene, camera: &Camera) -> Result<FrameWork, Box<dyn Error>> {
 fn view(buffers: &SceneBuffers, camera: &Camera) -> Result<View, Box<dyn Error>> {
     let camera = OracleCamera::new(&camera.to_vulkan(), SIZE).ok_or("a camera")?;
     let (scene, state) = (buffers.as_oracle(), OracleState::default());
-    let mut splats: Vec<_> = (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok()).collect();
+    let mut splats: Vec<_> =
+        (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok()).collect();
     splats.sort_by(|a, b| a.key.total_cmp(&b.key));
     let footprint = |splat: &gaurast_oracle::oracle::splat::Splat| Footprint {
         id: splat.index as u32,
@@ -87,7 +88,10 @@ fn view(buffers: &SceneBuffers, camera: &Camera) -> Result<View, Box<dyn Error>>
         covariance: splat.covariance,
         opacity: splat.opacity,
     };
-    Ok(View { size: SIZE, footprints: splats.iter().map(footprint).filter(|footprint| footprint.cut() >= 0.0).collect() })
+    Ok(View {
+        size: SIZE,
+        footprints: splats.iter().map(footprint).filter(|footprint| footprint.cut() >= 0.0).collect(),
+    })
 }
 
 /// The reuse of lists along a path around the middle of the picture.

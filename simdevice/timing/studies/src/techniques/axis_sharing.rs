@@ -94,6 +94,20 @@ mod tests {
     }
 
     #[test]
+    fn shared_terms_sum_to_the_exponent() {
+        let ([a, b, c], log_opacity) = ([-0.2, 0.07, -0.1], -0.4);
+        let (dx, dy) = ([0.5f64, 1.5, -3.0], [2.0f64, -1.25, 0.75]);
+        let columns = dx.map(|dx| [a * dx * dx, b * dx]);
+        let rows = dy.map(|dy| [c * dy * dy + log_opacity, dy]);
+        for (dx, [square, product]) in dx.into_iter().zip(columns) {
+            for [rest, dy] in rows {
+                let direct = (a * dx + b * dy) * dx + c * dy * dy + log_opacity;
+                assert!((square + product * dy + rest - direct).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
     fn columns_and_rows_of_blocks_are_counted_once() {
         let footprint = Footprint { id: 0, mean: [0.0; 2], covariance: [1.0, 0.0, 1.0], opacity: 1.0 };
         let open = Mask::of(|_, _| true);

@@ -94,10 +94,7 @@ pub struct Rectangle {
 impl Rectangle {
     /// The rectangle from a middle to both sides.
     pub fn around(middle: [f64; 2], reach: [f64; 2]) -> Self {
-        Self {
-            low: [middle[0] - reach[0], middle[1] - reach[1]],
-            high: [middle[0] + reach[0], middle[1] + reach[1]],
-        }
+        Self { low: [middle[0] - reach[0], middle[1] - reach[1]], high: [middle[0] + reach[0], middle[1] + reach[1]] }
     }
 
     /// The square of pixels from a corner.

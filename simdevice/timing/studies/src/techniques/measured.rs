@@ -111,3 +111,28 @@ pub fn measure(view: &View, frame: &FrameWork) -> Result<Option<SceneWork>, Conf
         ..SceneWork::default()
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::footprint::Footprint;
+    use super::*;
+    use timing::work::TileWork;
+
+    #[test]
+    fn a_view_is_counted_once_and_needs_ids() {
+        let opaque = Footprint { id: 0, mean: [8.0; 2], covariance: [1e6, 0.0, 1e6], opacity: 1.0 };
+        let view = View { size: [16, 16], footprints: vec![opaque; 5] };
+        let mut tile = TileWork::open([0, 0], 5);
+        tile.runs[0].primitives = 3;
+        let draw = DrawWork { primitives: 9, drawn: 5, tiles: vec![tile], ..DrawWork::default() };
+        let mut frame = FrameWork { size: view.size, draws: vec![draw], ..FrameWork::default() };
+        assert_eq!(measure(&view, &frame).unwrap(), None);
+        frame.draws[0].tiles[0].ids = (0..5).collect();
+        let work = measure(&view, &frame).unwrap().unwrap();
+        assert_eq!((work.gaussians, work.drawn, work.trace_pairs), (9, 5, [5, 3]));
+        // Three layers finish the tile.
+        assert_eq!((work.merging.fragments, work.merging.open_fragments), (5 * 256, 3 * 256));
+        assert_eq!((work.sharing.pairs, work.row_work.rows), (3, 3 * 16));
+        assert_eq!((work.conditional.listed, work.conditional.fetched), (5, 3));
+    }
+}

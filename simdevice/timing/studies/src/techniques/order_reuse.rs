@@ -97,7 +97,10 @@ mod tests {
         let mut reuse = OrderReuse::default();
         // 7 moves from the front to the end, and the others by one place each.
         reuse.add_tile(&[7, 1, 2, 3], &[1, 2, 3, 7]);
-        assert_eq!((reuse.kept.as_slice(), reuse.moved_among_kept.as_slice()), ([1.0].as_slice(), [1, 1, 1, 3].as_slice()));
+        assert_eq!(
+            (reuse.kept.as_slice(), reuse.moved_among_kept.as_slice()),
+            ([1.0].as_slice(), [1, 1, 1, 3].as_slice())
+        );
         assert_eq!(reuse.moved, [3, 1, 1, 1]);
     }
 

@@ -87,9 +87,7 @@ fn quads(scenes: &[SceneWork], config: &Config) -> Vec<Row> {
     let mut rows = vec![
         Row::new(VR_PIPE, "fragments, early termination", Unit::Times, each(&|scene| scene.merging.termination()))
             .paper(2.52, "its evaluation; a summary's key results")
-            .reason(
-                "the scenes: little lies behind the finished pixels of an object, more behind those of a garden",
-            ),
+            .reason("the scenes: little lies behind the finished pixels of an object, more behind those of a garden"),
     ];
     for (index, bin) in BINS.into_iter().enumerate() {
         let row = Row::new(
@@ -137,33 +135,54 @@ fn axes(scenes: &[SceneWork]) -> Vec<Row> {
 fn shapes(scenes: &[SceneWork]) -> Vec<Row> {
     let each = |of: &dyn Fn(&SceneWork) -> f64| scenes.iter().map(of).collect::<Vec<_>>();
     vec![
-        Row::new(GSCORE, "pairs, squares over boxes", Unit::Times, each(&|scene| {
-            ratio(scene.shape_tests.squares, scene.shape_tests.boxes)
-        }))
+        Row::new(
+            GSCORE,
+            "pairs, squares over boxes",
+            Unit::Times,
+            each(&|scene| ratio(scene.shape_tests.squares, scene.shape_tests.boxes)),
+        )
         .reason("boxes of three deviations along each ellipse's axes"),
-        Row::new(GSCORE, "pairs, squares over boxes of long ellipses", Unit::Times, each(&|scene| {
-            ratio(scene.shape_tests.squares, scene.shape_tests.long_boxes)
-        }))
+        Row::new(
+            GSCORE,
+            "pairs, squares over boxes of long ellipses",
+            Unit::Times,
+            each(&|scene| ratio(scene.shape_tests.squares, scene.shape_tests.long_boxes)),
+        )
         .reason("boxes where an axis is twice the other, squares elsewhere"),
-        Row::new(GSCORE, "pairs, squares over the device's exact lists", Unit::Times, each(&|scene| {
-            ratio(scene.shape_tests.squares, scene.shape_tests.exact)
-        }))
+        Row::new(
+            GSCORE,
+            "pairs, squares over the device's exact lists",
+            Unit::Times,
+            each(&|scene| ratio(scene.shape_tests.squares, scene.shape_tests.exact)),
+        )
         .reason("the exact test knows the opacity: faint Gaussians end before three deviations"),
-        Row::new(GSCORE, "subtiles of 8x8 skipped, of boxes' pairs", Unit::Percent, each(&|scene| {
-            1.0 - ratio(scene.shape_tests.box_subtiles_8, 4 * scene.shape_tests.boxes)
-        }))
+        Row::new(
+            GSCORE,
+            "subtiles of 8x8 skipped, of boxes' pairs",
+            Unit::Percent,
+            each(&|scene| 1.0 - ratio(scene.shape_tests.box_subtiles_8, 4 * scene.shape_tests.boxes)),
+        )
         .reason("the corners of tiles that a box touches"),
-        Row::new(GSCORE, "subtiles of 4x4 skipped, of boxes' pairs", Unit::Percent, each(&|scene| {
-            1.0 - ratio(scene.shape_tests.box_subtiles_4, 16 * scene.shape_tests.boxes)
-        }))
+        Row::new(
+            GSCORE,
+            "subtiles of 4x4 skipped, of boxes' pairs",
+            Unit::Percent,
+            each(&|scene| 1.0 - ratio(scene.shape_tests.box_subtiles_4, 16 * scene.shape_tests.boxes)),
+        )
         .reason("of the size of this project's blocks"),
-        Row::new(GSCORE, "blocks of 4x4 skipped, of exact pairs", Unit::Percent, each(&|scene| {
-            1.0 - ratio(scene.shape_tests.exact_blocks, 16 * scene.shape_tests.exact)
-        }))
+        Row::new(
+            GSCORE,
+            "blocks of 4x4 skipped, of exact pairs",
+            Unit::Percent,
+            each(&|scene| 1.0 - ratio(scene.shape_tests.exact_blocks, 16 * scene.shape_tests.exact)),
+        )
         .reason("`saturation = reached` of this project's machine"),
-        Row::new(GSCORE, "entries that are never sorted", Unit::Percent, each(&|scene| {
-            1.0 - ratio(scene.chunk_sorting.sorted, scene.chunk_sorting.listed)
-        }))
+        Row::new(
+            GSCORE,
+            "entries that are never sorted",
+            Unit::Percent,
+            each(&|scene| 1.0 - ratio(scene.chunk_sorting.sorted, scene.chunk_sorting.listed)),
+        )
         .reason("chunks of 256 after the tile's end; only long lists have one"),
     ]
 }
@@ -176,17 +195,28 @@ fn reuse(scenes: &[SceneWork]) -> Vec<Row> {
         let degrees = scenes[0].reuse[step].step_degrees;
         let place = "six Tanks and Temples scenes; a review and a digest of its text";
         rows.extend([
-            Row::new(NEO, format!("tiles that keep more than 78 %, step {degrees} deg"), Unit::Percent, each(|f| f.tiles_above))
-                .paper(0.90, place)
-                .reason("the step of its paths and its tiles' size, which could not be read"),
-            Row::new(NEO, format!("places moved, 99th percentile, step {degrees} deg"), Unit::Places, each(|f| {
-                f64::from(f.moved)
-            }))
+            Row::new(
+                NEO,
+                format!("tiles that keep more than 78 %, step {degrees} deg"),
+                Unit::Percent,
+                each(|f| f.tiles_above),
+            )
+            .paper(0.90, place)
+            .reason("the step of its paths and its tiles' size, which could not be read"),
+            Row::new(
+                NEO,
+                format!("places moved, 99th percentile, step {degrees} deg"),
+                Unit::Places,
+                each(|f| f64::from(f.moved)),
+            )
             .paper(31.0, place)
             .reason("the same; what comes and goes in front moves all behind it"),
-            Row::new(NEO, format!("places moved among those that stay, step {degrees} deg"), Unit::Places, each(|f| {
-                f64::from(f.moved_among_kept)
-            }))
+            Row::new(
+                NEO,
+                format!("places moved among those that stay, step {degrees} deg"),
+                Unit::Places,
+                each(|f| f64::from(f.moved_among_kept)),
+            )
             .paper(31.0, place)
             .reason("which of the two it counts could not be read; this one is what remains to be sorted"),
         ]);
@@ -200,9 +230,12 @@ fn scaling(scenes: &[SceneWork]) -> Vec<Row> {
         Row::new(VORION, "speed-up from 2 to 16 rasterizers", Unit::Times, each(&|scene| scene.scaling.speed_ups()[0]))
             .paper(8.0, "19 FPS with 2: abstract. 152 FPS with 16: in no text that could be read")
             .reason("a Gaussian takes 16 cycles of a module, so that 16 of them ask for less than main memory moves"),
-        Row::new(VORION, "the same, if only reached blocks are evaluated", Unit::Times, each(&|scene| {
-            scene.scaling.speed_ups()[1]
-        }))
+        Row::new(
+            VORION,
+            "the same, if only reached blocks are evaluated",
+            Unit::Times,
+            each(&|scene| scene.scaling.speed_ups()[1]),
+        )
         .paper(8.0, "the same")
         .reason("a Gaussian takes about half of the cycles, so that main memory limits 16 modules"),
     ]
@@ -212,27 +245,40 @@ fn rows_of_pixels(scenes: &[SceneWork]) -> Vec<Row> {
     let each = |of: &dyn Fn(&SceneWork) -> f64| scenes.iter().map(of).collect::<Vec<_>>();
     let operations = |scene: &SceneWork| scene.row_work.operations(EXPONENT);
     vec![
-        Row::new(GBU, "operations of a covered pixel's exponent", Unit::Times, each(&|scene| {
-            let [_, covered, rows] = operations(scene);
-            covered / rows
-        }))
+        Row::new(
+            GBU,
+            "operations of a covered pixel's exponent",
+            Unit::Times,
+            each(&|scene| {
+                let [_, covered, rows] = operations(scene);
+                covered / rows
+            }),
+        )
         .paper(5.5, "11 become 2; page 7, a digest of its text")
         .reason("10 become 2 here, and each row of a Gaussian has 11 more: rows have few covered pixels"),
         Row::new(GBU, "covered pixels, of exact pairs", Unit::Percent, each(&|scene| scene.row_work.covered()))
             .paper(0.137, "static scenes; page 5, the same digest")
             .reason("its lists are those of squares, which are longer"),
-        Row::new(GBU, "covered pixels, of squares' pairs", Unit::Percent, each(&|scene| {
-            scene.row_work.covered() * ratio(scene.shape_tests.exact, scene.shape_tests.squares)
-        }))
+        Row::new(
+            GBU,
+            "covered pixels, of squares' pairs",
+            Unit::Percent,
+            each(&|scene| scene.row_work.covered() * ratio(scene.shape_tests.exact, scene.shape_tests.squares)),
+        )
         .paper(0.137, "the same")
         .reason("as there, if the end of a tile shortens both lists alike"),
         Row::new(GBU, "lanes busy, a row each", Unit::Percent, each(&|scene| scene.row_work.lanes_busy()))
             .paper(0.189, "static scenes on the GPU; page 7, the same digest")
             .reason("16 lanes that wait for the longest row of a tile; a warp there has 32"),
-        Row::new(GBU, "operations of the exponent, whole tiles over rows", Unit::Times, each(&|scene| {
-            let [tiles, _, rows] = operations(scene);
-            tiles / rows
-        }))
+        Row::new(
+            GBU,
+            "operations of the exponent, whole tiles over rows",
+            Unit::Times,
+            each(&|scene| {
+                let [tiles, _, rows] = operations(scene);
+                tiles / rows
+            }),
+        )
         .reason("the bound of what a row engine would save of this machine's exponent"),
     ]
 }
@@ -240,27 +286,70 @@ fn rows_of_pixels(scenes: &[SceneWork]) -> Vec<Row> {
 fn preprocessing(scenes: &[SceneWork]) -> Vec<Row> {
     let each = |of: &dyn Fn(&SceneWork) -> f64| scenes.iter().map(of).collect::<Vec<_>>();
     vec![
-        Row::new(GCC, "preprocessed Gaussians that no tile fetches", Unit::Percent, each(&|scene| scene.conditional.unused()))
-            .paper(0.60, "up to, in GSCore; a summary of its introduction")
-            .reason("the greatest of its scenes, which could not be read; little of an object or a low garden is hidden"),
+        Row::new(
+            GCC,
+            "preprocessed Gaussians that no tile fetches",
+            Unit::Percent,
+            each(&|scene| scene.conditional.unused()),
+        )
+        .paper(0.60, "up to, in GSCore; a summary of its introduction")
+        .reason("the greatest of its scenes, which could not be read; little of an object or a low garden is hidden"),
         Row::new(GCC, "loads of a fetched Gaussian", Unit::Times, each(&|scene| scene.conditional.loads()))
             .reason("what Gaussian-wise rendering loads once; its figure could not be read"),
-        Row::new(GCC, "bytes of stage 1 that are saved", Unit::Percent, each(&|scene| {
-            scene.conditional.saved_bytes(scene.gaussians, scene.degree)
-        }))
+        Row::new(
+            GCC,
+            "bytes of stage 1 that are saved",
+            Unit::Percent,
+            each(&|scene| scene.conditional.saved_bytes(scene.gaussians, scene.degree)),
+        )
         .reason("the colours of those that no tile fetches"),
     ]
 }
 
 /// Figures for which nothing here is comparable.
 const UNTESTABLE: [[&str; 4]; 7] = [
-    [GSCORE, "15.86x over a mobile consumer GPU", "abstract, last sentence", "needs that GPU, its scenes, and its whole pipeline"],
-    [VR_PIPE, "2.07x on average", "a summary of its text", "needs trained models of its scenes: the ratio of fragments is the scenes'"],
-    [AXES, "1.33 to 1.88x over accelerators", "abstract of version 2", "most of it is order-independent transmittance, whose pictures are others"],
-    [NEO, "10.0x and 5.6x, 94.5 % of DRAM traffic", "abstract, last sentences", "needs videos of its six scenes and a sorting engine; only its premise is tested above"],
-    [VORION, "19 FPS, 38.6 iterations a second", "abstract, last sentences", "needs its scene, its SIMT cores, and training"],
-    [GBU, "1.72x on the GPU, 12.8 to 91.5 FPS with the unit", "abstract; Table V, page 10, a digest", "needs a GPU's timing of another kernel, and its cache"],
-    [GCC, "faster than GSCore", "abstract, last sentence", "the abstract has no number, and needs both accelerators whole"],
+    [
+        GSCORE,
+        "15.86x over a mobile consumer GPU",
+        "abstract, last sentence",
+        "needs that GPU, its scenes, and its whole pipeline",
+    ],
+    [
+        VR_PIPE,
+        "2.07x on average",
+        "a summary of its text",
+        "needs trained models of its scenes: the ratio of fragments is the scenes'",
+    ],
+    [
+        AXES,
+        "1.33 to 1.88x over accelerators",
+        "abstract of version 2",
+        "most of it is order-independent transmittance, whose pictures are others",
+    ],
+    [
+        NEO,
+        "10.0x and 5.6x, 94.5 % of DRAM traffic",
+        "abstract, last sentences",
+        "needs videos of its six scenes and a sorting engine; only its premise is tested above",
+    ],
+    [
+        VORION,
+        "19 FPS, 38.6 iterations a second",
+        "abstract, last sentences",
+        "needs its scene, its SIMT cores, and training",
+    ],
+    [
+        GBU,
+        "1.72x on the GPU, 12.8 to 91.5 FPS with the unit",
+        "abstract; Table V, page 10, a digest",
+        "needs a GPU's timing of another kernel, and its cache",
+    ],
+    [
+        GCC,
+        "faster than GSCore",
+        "abstract, last sentence",
+        "the abstract has no number, and needs both accelerators whole",
+    ],
 ];
 
 const HEAD: &str = "\

@@ -27,9 +27,7 @@ impl Scaling {
         for (index, modules) in RASTERIZERS.into_iter().enumerate() {
             let mut config = Config::preset("paper-15x16", &[])?;
             config.rasterizer.modules = modules;
-            let time = |config: &Config| {
-                fast::rasterize(frame, config, 0.0).milliseconds(config.rasterizer.clock_ghz)
-            };
+            let time = |config: &Config| fast::rasterize(frame, config, 0.0).milliseconds(config.rasterizer.clock_ghz);
             scaling.tiles_ms[index] = time(&config);
             config.rasterizer.saturation = Saturation::Reached;
             scaling.blocks_ms[index] = time(&config);

@@ -92,10 +92,7 @@ impl ChunkSorting {
     /// The entries of a draw.
     pub fn of(draw: &DrawWork) -> Self {
         let sorted = |listed: u32, needed: u32| u64::from(needed.next_multiple_of(CHUNK).min(listed));
-        Self {
-            listed: draw.pairs(),
-            sorted: draw.tiles.iter().map(|tile| sorted(tile.listed, tile.needed())).sum(),
-        }
+        Self { listed: draw.pairs(), sorted: draw.tiles.iter().map(|tile| sorted(tile.listed, tile.needed())).sum() }
     }
 }
 

@@ -44,8 +44,7 @@ impl View {
     ) -> Vec<List> {
         let [columns, rows] = self.size.map(|side| side.div_ceil(TILE_SIDE));
         let at = |number: u32| [number % columns, number / columns];
-        let mut lists: Vec<_> =
-            (0..columns * rows).map(|number| List { at: at(number), places: Vec::new() }).collect();
+        let mut lists: Vec<_> = (0..columns * rows).map(|number| List { at: at(number), places: Vec::new() }).collect();
         for (place, footprint) in self.footprints.iter().enumerate() {
             let bounds = bounds(footprint);
             let range = |axis: usize, tiles: u32| {
