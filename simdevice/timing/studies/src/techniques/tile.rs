@@ -107,16 +107,14 @@ pub fn composite(view: &View, list: &List, mut visit: impl FnMut(&Pair)) {
         let covered = Mask::of(|x, y| inside.has(x, y) && form(x, y) <= cut);
         let pair = Pair { footprint, covered, open };
         visit(&pair);
-        for y in 0..TILE_SIDE as usize {
-            for x in 0..TILE_SIDE as usize {
-                if covered.has(x, y) && open.has(x, y) {
-                    let alpha = (footprint.opacity * (-0.5 * form(x, y)).exp()).min(ALPHA_CEILING);
-                    let rest = transmittance[y][x] * (1.0 - alpha);
-                    if rest < TRANSMITTANCE_FLOOR {
-                        open.0[y] &= !(1 << x);
-                    } else {
-                        transmittance[y][x] = rest;
-                    }
+        for (y, row) in transmittance.iter_mut().enumerate() {
+            for (x, left) in row.iter_mut().enumerate().filter(|(x, _)| covered.has(*x, y) && pair.open.has(*x, y)) {
+                let alpha = (footprint.opacity * (-0.5 * form(x, y)).exp()).min(ALPHA_CEILING);
+                let rest = *left * (1.0 - alpha);
+                if rest < TRANSMITTANCE_FLOOR {
+                    open.0[y] &= !(1 << x);
+                } else {
+                    *left = rest;
                 }
             }
         }

@@ -59,3 +59,19 @@ fn the_trace_and_the_geometry_count_the_same() {
         assert!(scene.conditional.fetches <= scene.trace_pairs[0] && scene.conditional.listed <= scene.drawn);
     }
 }
+
+#[gaurast_runner::test]
+fn the_ratios_in_the_simulators_page_are_those_of_the_table() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/simulator.md");
+    let text = std::fs::read_to_string(path).expect("the document");
+    let (_, rest) = text.split_once("**Techniques of other accelerators.**").expect("a paragraph");
+    let (table, _) = rest.split_once("\n\n**").expect("a paragraph after it");
+    let page = page::markdown(&stored()).expect("presets");
+    // The paper's ratio of Vorion is written with a decimal less.
+    let is_ratio = |word: &&str| word.ends_with('x') && word.contains('.') && *word != "8.0x";
+    let ratios: Vec<_> = table.split([' ', ',', ';']).filter(is_ratio).collect();
+    assert!(ratios.len() > 15, "{ratios:?}");
+    for ratio in ratios {
+        assert!(page.contains(&format!(" {ratio} ")), "{ratio}");
+    }
+}
