@@ -43,7 +43,35 @@ const FRAGMENT: ShaderWork =
 const VERTEX: ShaderWork =
     ShaderWork { float: 12.0, integer: 4.0, special: 0.0, wide: 0.0, memory: 9.0, image: 0.0, other: 4.0, bytes: 0.0 };
 
+/// The work of drawing quads.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fragments {
+    /// Fragments that are shaded.
+    pub shaded: f64,
+    /// Fragments that the ROPs blend.
+    pub blended: f64,
+    /// Gaussians, of which each is a rectangle.
+    pub gaussians: f64,
+}
+
 impl Quads {
+    /// The time of such work in a picture of this size, on the configuration's GPU without GauRast.
+    pub fn of(fragments: &Fragments, size: [u32; 2], config: &Config) -> Self {
+        let Fragments { shaded, blended, gaussians } = *fragments;
+        let screen = f64::from(size[0]) * f64::from(size[1]);
+        let mut work = FRAGMENT.times(shaded).plus(&VERTEX.times(4.0 * gaussians));
+        work.bytes = INSTANCE_BYTES * gaussians + PIXEL_BYTES * screen;
+        let roofline = shader_cores::roofline(&work, &config.shader, &config.memory);
+        let cycles_per_ms = config.shader.clock_ghz * 1e6;
+        Self {
+            fragments: shaded,
+            shade_ms: roofline.compute_ms,
+            setup_ms: 2.0 * gaussians / SETUPS_PER_CYCLE / cycles_per_ms,
+            blend_ms: blended / BLENDS_PER_CYCLE / cycles_per_ms,
+            memory_ms: roofline.memory_ms,
+        }
+    }
+
     /// Milliseconds of the whole: the units work in parallel, and the slowest of them decides.
     pub fn milliseconds(&self) -> f64 {
         [self.shade_ms, self.setup_ms, self.blend_ms, self.memory_ms].into_iter().fold(0.0, f64::max)
@@ -79,18 +107,7 @@ pub fn quads(frame: &FrameWork, config: &Config) -> Quads {
     let draws = || frame.draws.iter().filter(|draw| draw.mode == Mode::Gaussian);
     let fragments = draws().map(pixels).sum::<f64>() * RECTANGLE;
     let gaussians = draws().map(|draw| draw.drawn as f64).sum::<f64>();
-    let screen = f64::from(frame.size[0]) * f64::from(frame.size[1]);
-    let mut work = FRAGMENT.times(fragments).plus(&VERTEX.times(4.0 * gaussians));
-    work.bytes = INSTANCE_BYTES * gaussians + PIXEL_BYTES * screen;
-    let roofline = shader_cores::roofline(&work, &config.shader, &config.memory);
-    let cycles_per_ms = config.shader.clock_ghz * 1e6;
-    Quads {
-        fragments,
-        shade_ms: roofline.compute_ms,
-        setup_ms: 2.0 * gaussians / SETUPS_PER_CYCLE / cycles_per_ms,
-        blend_ms: fragments / BLENDS_PER_CYCLE / cycles_per_ms,
-        memory_ms: roofline.memory_ms,
-    }
+    Quads::of(&Fragments { shaded: fragments, blended: fragments, gaussians }, frame.size, config)
 }
 
 /// A published number of another way to draw Gaussians.

@@ -2,6 +2,7 @@
 
 mod models;
 mod paper;
+mod rivals;
 mod sensitivity;
 mod trace;
 
