@@ -25,7 +25,7 @@ impl View {
     /// Opens the scene of a file, seen from a camera that has its middle in the picture.
     pub fn open(path: &Path, size: [u32; 2]) -> Self {
         let scene = gaurast_scene::open(path).expect("a scene");
-        let camera = gaurast_scene::frame_middle(&scene, 60f64.to_radians(), size);
+        let camera = gaurast_scene::frame_middle(&scene, 60.0, size);
         let camera = OracleCamera::new(&camera.to_vulkan(), size).expect("a camera");
         let (buffers, state) = (SceneBuffers::from(&scene), OracleState::default());
         let oracle = buffers.as_oracle();
