@@ -627,12 +627,12 @@ mod tests {
         // A request in cycle 1, two registers and 100 ns; eight records of 40 bytes by 16; the controller's cycle; 16 cycles a
         // primitive; the pipeline and two cycles; 3072 bytes of pixels by 16.
         let first = 1 + 2 + 100 + 20 + 1;
-        assert_eq!(cycles(&[24], &[]), f64::from(first + 24 * 16 + 34 + 2 + 192));
+        assert_eq!(cycles(&[24], &[]), f64::from(first + 24 * 16 + 37 + 2 + 192));
         // Pixels are written while the next tile is evaluated, whose pieces have come.
-        assert_eq!(cycles(&[24, 24], &[]), f64::from(first + 24 * 16 + 1 + 24 * 16 + 34 + 2 + 192));
+        assert_eq!(cycles(&[24, 24], &[]), f64::from(first + 24 * 16 + 1 + 24 * 16 + 37 + 2 + 192));
         // The third tile of one Gaussian waits for the pixels of the first to be written, by a port of half the width.
         let narrow = ["port_bytes_per_cycle=8"];
-        let written = |count: u32| f64::from(1 + 2 + 100 + 6 + 1 + 16 + 34 + 2 + count * 384);
+        let written = |count: u32| f64::from(1 + 2 + 100 + 6 + 1 + 16 + 37 + 2 + count * 384);
         assert_eq!([cycles(&[1], &narrow), cycles(&[1; 2], &narrow)], [written(1), written(2)]);
         assert_eq!(cycles(&[1; 3], &narrow), written(3));
     }

@@ -28,7 +28,7 @@ const MUTANTS: &[Mutant] = &[
     mutant("no sticky bit of the sum", "fp_add.sv", "{aligned[WIDTH-1:1], aligned[0] | lost}", "aligned"),
     mutant("no carry of the rounding", "fp_round.sv", "assign carry = rounded[MANTISSA+1];", "assign carry = 1'b0;"),
     mutant("the sign of a cancellation", "fp_add.sv", "zero && vanished2 ? 1'b0 : sign2", "sign2"),
-    mutant("the exponential's slope", "fp_exp2.sv", "slope2 <= slope1 + bend;", "slope2 <= slope1;"),
+    mutant("the exponential's slope", "fp_exp2.sv", "slope4 <= (SLOPE+1)'(bent >> BEND);", "slope4 <= slope3;"),
     mutant("the product's exponent", "fp_mul.sv", "{{(EXPONENT+1){1'b0}}, high}", "{(EXPONENT+2){1'b0}}"),
     mutant("no remainder of the quotient", "fp_div.sv", "rest[STAGES*(SIZE+1)+:SIZE+1] != 0}", "1'b0}"),
     mutant("no ceiling of alpha", "pe.sv", "power > alpha_ceiling ? alpha_ceiling : power", "power"),

@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 CYCLES=${1:-18}
-SOURCES="delay.sv fp_round.sv fp_add.sv fp_mul.sv fp_div.sv fp_exp2.sv exp2_table.sv pe.sv pixel_buffer.sv primitive_buffer.sv"
+SOURCES="delay.sv multiply_add.sv fp_round.sv fp_add.sv fp_mul.sv fp_div.sv fp_exp2.sv exp2_table.sv pe.sv pixel_buffer.sv primitive_buffer.sv"
 yosys -q -p "read_verilog -DFORMAL -formal -sv -I. formal.sv $SOURCES raster_module.sv; hierarchy -top formal;
     cutpoint */t:*pe */t:*pixel_buffer */t:*primitive_buffer; prep -top formal -flatten; memory_map;
     setundef -undriven -anyseq; opt; techmap; opt_clean; dffunmap; simplemap; abc -g AND -fast; opt_clean;

@@ -13,6 +13,7 @@ const HARDWARE: &[(&str, &str)] = &[
     ("unit_latencies.svh", include_str!("../rtl/unit_latencies.svh")),
     ("latencies.svh", include_str!("../rtl/latencies.svh")),
     ("delay.sv", include_str!("../rtl/delay.sv")),
+    ("multiply_add.sv", include_str!("../rtl/multiply_add.sv")),
     ("fp_round.sv", include_str!("../rtl/fp_round.sv")),
     ("fp_add.sv", include_str!("../rtl/fp_add.sv")),
     ("fp_mul.sv", include_str!("../rtl/fp_mul.sv")),
@@ -38,6 +39,7 @@ const BENCHES: &[(&str, &str)] = &[
     ("formal.sv", include_str!("../rtl/formal.sv")),
     ("prove.sh", include_str!("../rtl/prove.sh")),
     ("silicon.sh", include_str!("../rtl/silicon.sh")),
+    ("fan_out.awk", include_str!("../rtl/fan_out.awk")),
     ("README.md", include_str!("../rtl/README.md")),
 ];
 
@@ -94,11 +96,11 @@ impl Latencies {
         let (add, mul) = (3, 3);
         let div = (format.mantissa + 3) / 2 + 2;
         let exp = match exponential {
-            Exponential::Table => 4,
-            Exponential::Polynomial if format.mantissa > 10 => 7,
+            Exponential::Table => 6,
+            Exponential::Polynomial if format.mantissa > 10 => 12,
             Exponential::Polynomial => 5,
         };
-        let alpha = 4 * add + 2 * mul + exp;
+        let alpha = 4 * add + 2 * mul + exp + 1;
         Self {
             gaussian: alpha + 2 * add + 2 * mul,
             triangle: mul + 2 * add + div + mul + 2 * add,
