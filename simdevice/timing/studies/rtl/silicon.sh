@@ -7,40 +7,18 @@
 # Wires have neither resistance nor capacitance, and a library is taken at its own voltage and temperature. Times at 28 nm are
 # taken to be shorter in proportion to the gate length.
 set -euo pipefail
-cd "$(dirname "$0")"
-library=${GAURAST_LIBERTY:?names a Liberty file} node=${GAURAST_LIBERTY_NODE:?is the gate length of its process, in nm}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-SOURCES="delay.sv fp_round.sv fp_add.sv fp_mul.sv fp_div.sv fp_exp2.sv exp2_table.sv pe.sv arbiter.sv round_robin.sv"
-# What drives the inputs, and what the outputs drive, in fF.
-flop=$(grep -oE 'cell *\("?[A-Za-z0-9_]*(DFF_X1|dfxtp_1)"?\)' "$library" | head -1 | sed 's/.*(\"\{0,1\}\([A-Za-z0-9_]*\).*/\1/')
-printf 'set_driving_cell %s\nset_load 3.0 [all_outputs]\n' "$flop" >"$work/constraints"
+source "$(dirname "$0")/cells.sh"
 
 map() { # map NAME TOP PARAMETERS
-    yosys -q -p "read_verilog -sv -I. $SOURCES; hierarchy -top $2 $3; synth -flatten -top $2; rename -top mapped;
-        dfflibmap -liberty $library; abc -liberty $library -D 600 -constr $work/constraints; setundef -zero; splitnets -ports; opt_clean -purge;
-        tee -o $work/area stat -liberty $library; write_verilog -noattr -noexpr $work/netlist.v" >"$work/log" 2>&1 ||
-        { cat "$work/log" >&2; exit 1; }
-    cat >"$work/times" <<END
-read_liberty $library
-read_verilog $work/netlist.v
-link_design mapped
-create_clock -name clk -period 1 [get_ports clk]
-report_checks -path_delay max -digits 3
-END
-    sta -exit "$work/times" >"$work/paths" 2>&1
-    awk -v name="$1" -v node="$node" '
-        /Chip area/ { area = $NF }
-        /data arrival time/ { if (!time) time = $1 }
-        END {
-            if (!area || !time) exit 1
-            printf "| %s | %.0f | %.2f | %.2f |\n", name, area, time, node / (28 * time)
-        }' "$work/area" "$work/paths" || { cat "$work/paths" >&2; exit 1; }
+    netlist "$2" "$3"
+    longest_path
+    awk -v name="$1" -v node="$node" -v area="$cell_area" -v time="$cell_time" 'BEGIN {
+        printf "| %s | %.0f | %.2f | %.2f |\n", name, area, time, node / (28 * time)
+    }'
 }
 
 echo "| unit | area, um2 | longest path, ns | GHz at 28 nm |"
 echo "|---|---:|---:|---:|"
-single="-chparam EXPONENT 8 -chparam MANTISSA 23" half="-chparam EXPONENT 5 -chparam MANTISSA 10"
 if [ "${1:-}" = quick ]; then
     map "fp16 adder" fp_add "$half"
     exit
