@@ -1,7 +1,7 @@
-"""Computes the energy of a processing element that was mapped to cells: power.py LIBERTY NODE NETLIST RECORD.
+"""Computes the energy of a module that was mapped to cells: power.py LIBERTY NODE NETLIST RECORD OUTPUT...
 
-NETLIST is yosys's JSON, RECORD a file of record.sv: a PE's inputs and outputs, a line for each cycle. The netlist is simulated with
-the functions of the library, and its outputs must be those of the record. A number has a bit for each cycle, so that a cell is
+NETLIST is yosys's JSON, RECORD a file as record.sv writes it: inputs and outputs, a line for each cycle. The netlist is simulated with
+the functions of the library, and the named outputs must be those of the record. A number has a bit for each cycle, so that a cell is
 evaluated for all cycles at once, again until no register changes.
 
 A toggle costs the internal energy of its cell (`internal_power`, at a slew and the load of pins) and C V^2 / 2 of the pins that it
@@ -268,16 +268,15 @@ def energy(netlist, values, counts, window, clock_net, volts):
     spent = dict.fromkeys(("internal", "loads", "clock", "clock loads", "leakage"), 0.0)
 
     def share(condition, cell, nets):
-        # The clock is high half of the time.
+        known = {pin: values[net] for pin, net in nets.items()}
+        for pin in cell.outputs:
+            # A register's output that drives nothing is the inverse of the other.
+            known.setdefault(pin, ~next((known[other] for other in cell.outputs if other in known), 0))
         total = 0
+        # The clock is high half of the time.
         for level in (0, window):
-            operands = [level if nets.get(pin) == clock_net else values.get(nets.get(pin)) for pin in cell.inputs + cell.outputs]
-            inverse = {pin: operands[index] for index, pin in enumerate(cell.inputs + cell.outputs)}
-            for index, pin in enumerate(cell.inputs + cell.outputs):
-                if operands[index] is None:
-                    # An output that drives nothing is the inverse of the other one.
-                    operands[index] = ~inverse[cell.outputs[1 - cell.outputs.index(pin)]]
-            total += condition(window, *operands).bit_count()
+            known.update((pin, level) for pin, net in nets.items() if net == clock_net)
+            total += condition(window, *(known[pin] for pin in cell.inputs + cell.outputs)).bit_count()
         return total / (2 * cycles)
 
     def weighted(conditions, cell, nets, value):
@@ -343,13 +342,11 @@ CYCLES = 2048
 SLEW = 0.7e-3
 # The steps of time, likewise.
 STEP = 0.2e-3
-# The outputs of a mode.
-OUTPUTS = {"1": ("reaches", "open", "next_transmittance", "next_color"), "0": ("fragment", "covered")}
 
 
-def compare(mapped, values, recorded, mode, window):
-    """The number of the mode's outputs, which are those of the record."""
-    outputs = [port for port in mapped.outputs if port.split("[")[0] in OUTPUTS[mode]]
+def compare(mapped, values, recorded, names, window):
+    """The number of bits of the outputs with these names, which are those of the record."""
+    outputs = [port for port in mapped.outputs if port.split("[")[0] in names]
     for port in outputs:
         if (values[mapped.ports[port]] ^ recorded[port]) & window:
             sys.exit(f"{port} of the netlist differs from the record")
@@ -357,7 +354,7 @@ def compare(mapped, values, recorded, mode, window):
 
 
 def main():
-    liberty, node, netlist, record = sys.argv[1:]
+    liberty, node, netlist, record, *compared = sys.argv[1:]
     node, text = float(node), open(liberty).read()
     used = {cell["type"] for cell in json.load(open(netlist))["modules"]["mapped"]["cells"].values()}
     head = text[:re.search(r"\bcell\s*\(", text).start()]
@@ -372,7 +369,7 @@ def main():
     recorded = columns(names, rows, mapped.ports)
     inputs = {port: value for port, value in recorded.items() if port not in mapped.outputs} | {"clk": 0}
     values = mapped.settled(inputs, mask)
-    compared = compare(mapped, values, recorded, rows[0][1], window)
+    bits = compare(mapped, values, recorded, compared, window)
     clock = mapped.ports["clk"]
     settled = {net: counted([(0, value << 1), (0, value)], window) for net, value in values.items()}
     spent = [energy(mapped, values, counts, window, clock, volts)
@@ -387,7 +384,7 @@ def main():
     _, parts, most = each
     clocked = (idle["clock"] + idle["clock loads"]) * picojoules / window.bit_count()
     print(low, middle, high + most["loads"] + most["clock loads"], parts["internal"], parts["loads"],
-          parts["clock"] + parts["clock loads"], clocked, spent[0]["leakage"] * milliwatts, compared,
+          parts["clock"] + parts["clock loads"], clocked, spent[0]["leakage"] * milliwatts, bits,
           pixels / window.bit_count(), 28 / node * (0.9 / volts) ** 2)
 
 

@@ -37,7 +37,14 @@ const BENCHES: &[(&str, &str)] = &[
     ("properties.svh", include_str!("../rtl/properties.svh")),
     ("formal.sv", include_str!("../rtl/formal.sv")),
     ("prove.sh", include_str!("../rtl/prove.sh")),
+    ("cells.sh", include_str!("../rtl/cells.sh")),
     ("silicon.sh", include_str!("../rtl/silicon.sh")),
+    ("power.sh", include_str!("../rtl/power.sh")),
+    ("power.py", include_str!("../rtl/power.py")),
+    ("module.py", include_str!("../rtl/module.py")),
+    ("record.sv", include_str!("../rtl/record.sv")),
+    ("coverage.sh", include_str!("../rtl/coverage.sh")),
+    ("coverage.py", include_str!("../rtl/coverage.py")),
     ("README.md", include_str!("../rtl/README.md")),
 ];
 
