@@ -58,7 +58,7 @@ def main():
     print()
     print("| numbers | increase of the PEs by Gaussians | of the module with memories |")
     print("|---|---:|---:|")
-    for numbers in BITS:
+    for numbers in dict.fromkeys(numbers for numbers, _ in cells):
         before, after = (cells[numbers, pe][0] * PES for pe in ("triangles", "both"))
         memory = MEMORIES[node](numbers)
         both = [(after + extra) / (before + extra) - 1 for extra in (memory["tiles"] + 2 * memory["pixels"], memory["tiles"] + memory["pixels"])]

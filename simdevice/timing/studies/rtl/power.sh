@@ -29,7 +29,7 @@ measure() {
     # shellcheck disable=SC2086
     python3 power.py "$library" "$node" "$work/netlist.json" "$work/$1-$3/record.txt" $outputs >"$work/energy"
     awk -v name="| $1 | $2 | $3 |" '{
-        printf "%s %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.2f | %.1f - %.1f - %.1f | %d | %.0f %% |\n", name, $1, $2, $3, $4, $5, $6,
+        printf "%s %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.2g | %.1f - %.1f - %.1f | %d | %.0f %% |\n", name, $1, $2, $3, $4, $5, $6,
             $7, $8, $1 * $11, $2 * $11, $3 * $11, $9, $10 * 100
     }' "$work/energy"
     echo "$1 $2 $3 $cell_area $cell_time $(cat "$work/energy")" >>"$work/figures"
