@@ -117,9 +117,9 @@ class Cell:
         self.outputs = [name for name, pin in pins.items() if pin.attributes["direction"] == "output"]
         self.capacitance = {name: pins[name].number("capacitance") for name in self.inputs}
         flops = group.of("ff")
-        self.clock = python(flops[0].attributes["clocked_on"]) if flops else None
+        self.is_register = bool(flops)
         if flops:
-            self.state, self.inverse = re.findall(r"\w+", flops[0].name)
+            self.state, _ = re.findall(r"\w+", flops[0].name)
             self.next = self.compiled(flops[0].attributes["next_state"], self.inputs)
         else:
             self.functions = {name: self.compiled(pins[name].attributes["function"], self.inputs) for name in self.outputs}
@@ -174,9 +174,9 @@ class Netlist:
 
     def order(self):
         """Sorts cells: registers, then the others, each after those that drive it."""
-        driver = {nets[pin]: index for index, (cell, nets) in enumerate(self.cells) if not cell.clock
+        driver = {nets[pin]: index for index, (cell, nets) in enumerate(self.cells) if not cell.is_register
                   for pin in cell.outputs if pin in nets}
-        registers = [entry for entry in self.cells if entry[0].clock]
+        registers = [entry for entry in self.cells if entry[0].is_register]
         others, seen, done = [], set(), set()
         for first in driver.values():
             stack = [first]
@@ -221,7 +221,7 @@ class Netlist:
                     continue
                 net = nets[pin]
                 delay = max(1, round(mean(cell.delays[pin], self.load.get(net, 0.0)) / step))
-                if cell.clock:
+                if cell.is_register:
                     before, after = waves[net]
                     waves[net] = [before, (delay, after[1])]
                 else:
