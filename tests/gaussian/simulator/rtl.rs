@@ -403,6 +403,53 @@ fn a_cell_library_gives_areas_and_times() {
     }
 }
 
+/// The figures of an adder in binary16 that was mapped to cells, for a record of its operands and of the model's sums, of which one
+/// bit may be wrong.
+fn energy_of_an_adder(folder: &Path, pairs: &[[u32; 2]], wrong: u32) -> Option<Vec<f64>> {
+    let latencies = std::fs::read_to_string(folder.join("unit_latencies.svh")).expect("latencies");
+    let (_, rest) = latencies.split_once("ADD = ").expect("an adder's latency");
+    let latency: usize = rest.split_once(';').and_then(|(cycles, _)| cycles.parse().ok()).expect("cycles");
+    let sums = pairs.iter().map(|&[a, b]| Format::HALF.add(a, b));
+    let mut record = "issue a b sum\n".to_owned();
+    for ([a, b], sum) in pairs.iter().zip(std::iter::repeat_n(0, latency).chain(sums)) {
+        writeln!(record, "1 {a:04x} {b:04x} {:04x}", sum ^ wrong).expect("a string");
+    }
+    let path = folder.join("adder.txt");
+    std::fs::write(&path, record).expect("a record");
+    let mut command = Command::new("bash");
+    command.current_dir(folder).arg("power.sh").arg(&path).arg("adder");
+    let output = command.output().expect("bash");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(said.contains("differs from the record"), wrong != 0, "{said}");
+    let figures = String::from_utf8_lossy(&output.stdout);
+    output
+        .status
+        .success()
+        .then(|| figures.split_whitespace().map(|number| number.parse().expect("a number")).collect())
+}
+
+#[gaurast_runner::test(needs = [Need::Program("yosys"), Need::Program("python3")])]
+fn toggles_of_cells_give_energy() {
+    if std::env::var_os("GAURAST_LIBERTY").is_none() {
+        ignore(Missing::Capability, "GAURAST_LIBERTY names no cell library");
+    }
+    let folder = folder().join("power");
+    rtl::write(&folder).expect("files");
+    let moving = pairs(Format::HALF, 1000);
+    let figures = energy_of_an_adder(&folder, &moving, 0).expect("figures");
+    let &[low, middle, high, internal, loads, clock, idle, leakage, bits, busy, _] = figures.as_slice() else {
+        panic!("{figures:?}");
+    };
+    assert!(low < middle && middle < high && idle < low && leakage > 0.0, "{figures:?}");
+    assert!((internal + loads + clock - middle).abs() < 1e-9 * middle && internal > 0.0 && loads > 0.0, "{figures:?}");
+    assert_eq!((bits, busy), (16.0, 1.0));
+    // Where nothing moves, the clock alone costs.
+    let still = energy_of_an_adder(&folder, &[moving[0]; 1000], 0).expect("figures");
+    let clock_alone = still[..2].iter().all(|energy| (energy / still[6] - 1.0).abs() < 1e-9);
+    assert!(clock_alone && still[3] + still[4] == 0.0, "{still:?}");
+    assert_eq!(energy_of_an_adder(&folder, &moving, 1), None);
+}
+
 #[gaurast_runner::test(needs = [Need::Program("yosys")])]
 fn a_gate_count_gives_areas() {
     let folder = folder().join("area");

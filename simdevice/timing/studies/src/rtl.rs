@@ -38,8 +38,15 @@ const BENCHES: &[(&str, &str)] = &[
     ("properties.svh", include_str!("../rtl/properties.svh")),
     ("formal.sv", include_str!("../rtl/formal.sv")),
     ("prove.sh", include_str!("../rtl/prove.sh")),
+    ("cells.sh", include_str!("../rtl/cells.sh")),
     ("silicon.sh", include_str!("../rtl/silicon.sh")),
     ("fan_out.awk", include_str!("../rtl/fan_out.awk")),
+    ("power.sh", include_str!("../rtl/power.sh")),
+    ("power.py", include_str!("../rtl/power.py")),
+    ("module.py", include_str!("../rtl/module.py")),
+    ("record.sv", include_str!("../rtl/record.sv")),
+    ("coverage.sh", include_str!("../rtl/coverage.sh")),
+    ("coverage.py", include_str!("../rtl/coverage.py")),
     ("README.md", include_str!("../rtl/README.md")),
 ];
 
@@ -182,6 +189,45 @@ fn build_icarus(folder: &Path, format: Format, parameters: &[String]) -> Result<
     Ok(program)
 }
 
+/// The words of a bench's file IN, as `bench.cpp` says: lists that a module draws one after the other with a memory.
+pub fn bench_input(format: Format, lists: &[List], module: &Module, memory: Memory) -> Vec<u32> {
+    let thresholds = &module.thresholds;
+    let mut words = vec![
+        lists.len() as u32,
+        memory.latency,
+        memory.interval,
+        memory.stalls,
+        thresholds.alpha_floor,
+        thresholds.alpha_ceiling,
+        thresholds.transmittance_floor,
+        module.depth[0],
+        module.depth[1],
+        u32::from(module.groups == Groups::Blocks),
+        if module.skips_groups { 2 } else { 1 },
+    ];
+    let mut contents = Vec::new();
+    for list in lists {
+        let count = list.primitives.len() as u32;
+        words.extend([u32::from(list.mode == Mode::Gaussian), contents.len() as u32, count]);
+        store(format, list, &mut contents);
+    }
+    let (contents, _) = contents.as_chunks();
+    words.extend(contents.iter().map(|&bytes| u32::from_le_bytes(bytes)));
+    words
+}
+
+/// Appends a list to memory, padded to a multiple of 16 bytes.
+fn store(format: Format, list: &List, memory: &mut Vec<u8>) {
+    let bytes = format.bits() as usize / 8;
+    for primitive in &list.primitives {
+        memory.extend(u32::from(primitive.groups()).to_le_bytes());
+        for number in primitive.numbers() {
+            memory.extend(&number.to_le_bytes()[..bytes]);
+        }
+    }
+    memory.resize(memory.len().next_multiple_of(16), 0);
+}
+
 /// Runs a bench on input words. Returns its output words.
 fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
     let folder = program.parent().unwrap_or(Path::new("."));
@@ -309,28 +355,7 @@ impl ModuleBench {
     /// # Errors
     /// Returns an error if the program can't be run.
     pub fn run(&self, lists: &[List], module: &Module, memory: Memory) -> Result<Rasterized> {
-        let thresholds = &module.thresholds;
-        let mut words = vec![
-            lists.len() as u32,
-            memory.latency,
-            memory.interval,
-            memory.stalls,
-            thresholds.alpha_floor,
-            thresholds.alpha_ceiling,
-            thresholds.transmittance_floor,
-            module.depth[0],
-            module.depth[1],
-            u32::from(module.groups == Groups::Blocks),
-            if module.skips_groups { 2 } else { 1 },
-        ];
-        let mut contents = Vec::new();
-        for list in lists {
-            let count = list.primitives.len() as u32;
-            words.extend([u32::from(list.mode == Mode::Gaussian), contents.len() as u32, count]);
-            self.store(list, &mut contents);
-        }
-        let (contents, _) = contents.as_chunks();
-        words.extend(contents.iter().map(|&bytes| u32::from_le_bytes(bytes)));
+        let words = bench_input(self.format, lists, module, memory);
         let out = run(&self.program, &words)?;
         let (head, beats) = out.split_first_chunk::<9>().ok_or_else(|| Error::other("the bench wrote nothing"))?;
         let &[cycles, a, b, c, d, e, f, latency, requests] = head;
@@ -342,18 +367,6 @@ impl ModuleBench {
             requests,
             pixels: beats.chunks(per_tile).map(|tile| self.pixels(tile)).collect(),
         })
-    }
-
-    /// Appends a list to memory, padded to a multiple of 16 bytes.
-    fn store(&self, list: &List, memory: &mut Vec<u8>) {
-        let bytes = self.format.bits() as usize / 8;
-        for primitive in &list.primitives {
-            memory.extend(u32::from(primitive.groups()).to_le_bytes());
-            for number in primitive.numbers() {
-                memory.extend(&number.to_le_bytes()[..bytes]);
-            }
-        }
-        memory.resize(memory.len().next_multiple_of(16), 0);
     }
 
     /// A tile's pixels from the written words: for each group, the first numbers of all its pixels, then the second
