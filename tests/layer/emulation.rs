@@ -285,7 +285,7 @@ fn frames_take_no_more_memory(case: &Case) {
         let mut renderer = gaurast_render::Renderer::new(entry).expect("a renderer");
         let scene = gaurast_scene::garden::scene(7, 50);
         let camera = gaurast_scene::garden::camera(None, [32, 32]).expect("a camera");
-        let frames = if gaurast_runner::is_long() { 10_000 } else { 200 };
+        let frames = if is_long() { 10_000 } else { 200 };
         let mut early = None;
         for frame in 0..frames {
             renderer.draw(&scene, &camera).expect("a picture");

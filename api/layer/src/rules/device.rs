@@ -8,7 +8,7 @@ use crate::facts::Features;
 use crate::report::Faults;
 
 /// The features by name.
-pub(crate) fn named(features: &Features) -> [(&'static str, bool); 29] {
+pub(crate) fn named(features: &Features) -> [(&'static str, bool); 30] {
     let f = features;
     [
         ("gaussianPrimitiveTopology", f.gaussian_primitive_topology),
