@@ -1,7 +1,7 @@
 //! The conformance cases of the program `gaurast-conformance`: on this driver, one test for each chapter; and on oracles that
 //! make mistakes, one test for each mistake.
 
-use gaurast_conformance::{Expectation, MISTAKES, Oracle, Outcome, all, cases, open, run};
+use gaurast_conformance::{Expectation, MISTAKES, Mistake, Oracle, Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
 use gaurast_tests::oracle::error_model::PrecisionClass;
 
@@ -36,18 +36,25 @@ fn each_mistake() -> Vec<Variant> {
     MISTAKES.iter().map(|mistake| Variant::new(mistake.name)).collect()
 }
 
-/// Runs the cases of the mistake's chapter up to the first that catches it.
+/// Runs the cases of the mistake's chapter up to the first that catches it, in both classes of precision.
 #[gaurast_runner::test(each = each_mistake())]
 fn a_case_catches_each_mistake(case: &Case) {
     let mistake = MISTAKES.iter().find(|mistake| mistake.name == case.variant()).expect("a variant is a mistake");
+    is_caught(mistake, PrecisionClass::Full);
+    if !mistake.is_rounding() {
+        is_caught(mistake, PrecisionClass::Relaxed);
+    }
+}
+
+fn is_caught(mistake: &Mistake, precision: PrecisionClass) {
     let all = all();
     let mut expectations = all
         .iter()
         .filter(|case| case.chapter == mistake.chapter)
         .filter_map(|case| case.draw())
-        .map(Expectation::of_draw);
+        .map(|draw| Expectation::of_draw(draw.held_to(precision)));
     let caught = expectations.find(|expectation| mistake.is_caught(expectation));
-    let caught = caught.unwrap_or_else(|| panic!("no case of {} catches it", mistake.chapter));
+    let caught = caught.unwrap_or_else(|| panic!("no case of {} catches it: {precision:?}", mistake.chapter));
     assert!(matches!(caught.judge(&Oracle::default()), Outcome::Pass(_)), "the case fails without the mistake");
 }
 

@@ -10,7 +10,7 @@ use gaurast_conformance::features::FEATURES;
 use gaurast_conformance::mutants::{Answers, Catch, Extent, catch};
 use gaurast_conformance::{Case as Conformance, all, cases};
 use gaurast_mutants::MUTANTS;
-use gaurast_runner::{Case, Need, is_long, shards};
+use gaurast_runner::{Case, Missing, Need, ignore, is_long, shards};
 use gaurast_testkit::loader::with_mutants;
 use gaurast_tests::oracle::error_model::PrecisionClass;
 
@@ -32,6 +32,19 @@ fn catches(case: &Case, answers: &Answers, extent: Extent) -> Vec<Catch> {
 fn a_case_catches_each_mutant(case: &Case) {
     with_mutants(case, || {
         let faults = catches(case, &Answers::new(all(), PrecisionClass::Full), Extent::UntilCaught);
+        let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
+        assert!(faults.is_empty(), "{faults:#?}");
+    });
+}
+
+/// The same with pictures that are held to the relaxed class of precision, in a long run.
+#[gaurast_runner::test(needs = [Need::VulkanLoader], each = shards(2))]
+fn a_case_catches_each_mutant_at_a_relaxed_precision(case: &Case) {
+    if !is_long() {
+        ignore(Missing::Capability, "GAURAST_TEST_LONG is not 1");
+    }
+    with_mutants(case, || {
+        let faults = catches(case, &Answers::new(all(), PrecisionClass::Relaxed), Extent::UntilCaught);
         let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
         assert!(faults.is_empty(), "{faults:#?}");
     });

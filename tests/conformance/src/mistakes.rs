@@ -308,6 +308,11 @@ pub const MISTAKES: [Mistake; 41] = [
 ];
 
 impl Mistake {
+    /// Reports whether it is a rounding that the relaxed class of precision grants.
+    pub fn is_rounding(&self) -> bool {
+        ["eye_rounded", "keys_unrounded"].contains(&self.name)
+    }
+
     /// True if an oracle with this mistake fails the case whose answer is `expectation`.
     pub fn is_caught(&self, expectation: &Expectation) -> bool {
         matches!(expectation.judge(&Oracle { name: self.name, change: self.make }), Outcome::Fail(_))

@@ -141,17 +141,19 @@ fn fisheyes_of_gsplat() {
     Set { lens: Some(("FISHEYE", "")), ..Set::new("gsplat_fisheye", 4_096.0, GSPLAT) }.check();
 }
 
-/// gsplat cuts a 2D Gaussian off at tiles, and its filter is about the middle of a bounding box: neither is the device's.
+/// The pixels over 1/255 are those of radii that gsplat's binary32 rounds up to another whole number of pixels, and of discs a million
+/// times thinner than wide, whose cross products cancel in binary32.
 #[gaurast_runner::test(needs = NEEDS)]
 fn flat_pictures_of_gsplat() {
     let options = &["--as", "gsplat", "--near", "0.2", "--geometry", "2d"];
-    Set { least: 51.8, most: 5_900, ..Set::new("gsplat_2d", 4_096.0, options) }.check();
+    Set { least: 84.2, most: 6, ..Set::new("gsplat_2d", 4_096.0, options) }.check();
 }
 
+/// gsplat leaves out, and ends earlier, what its opacity would be if it were compensated for the low-pass: thin needles.
 #[gaurast_runner::test(needs = NEEDS)]
 fn unscented_pictures_of_gsplat() {
     let options = &["--as", "gsplat-unscented", "--near", "0.2"];
-    Set { least: 59.9, most: 3_260, views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
+    Set { least: 76.4, most: 35, views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
 }
 
 #[gaurast_runner::test(needs = NEEDS)]
