@@ -156,46 +156,43 @@ pub(super) fn bounded_pixels(projected: &Projected, [width, height]: [u32; 2], s
 
 /// A pixel to which Gaussians are added nearest first. Where keys have errors, it is composited in every order that they allow.
 #[derive(Clone)]
-pub(super) enum Sorted<'a> {
-    Certain(Pixel),
-    Uncertain(Vec<(RayDepth, (&'a Splat, Alpha))>),
+struct Sorted<'a> {
+    pixel: Pixel,
+    /// The Gaussians that reach it, where keys have errors.
+    reached: Option<Vec<(RayDepth, (&'a Splat, Alpha))>>,
 }
 
 impl<'a> Sorted<'a> {
-    pub(super) fn new(state: &OracleState) -> Self {
-        match state.rules.precision {
-            PrecisionClass::Relaxed if state.order.has_keys() => Self::Uncertain(Vec::new()),
-            _ => Self::Certain(Pixel::EMPTY),
-        }
+    fn new(state: &OracleState) -> Self {
+        let has_errors = state.rules.precision == PrecisionClass::Relaxed && state.order.has_keys();
+        Self { pixel: Pixel::EMPTY, reached: has_errors.then(Vec::new) }
     }
 
-    pub(super) fn is_finished(&self) -> bool {
-        matches!(self, Self::Certain(pixel) if pixel.is_finished())
+    fn is_finished(&self) -> bool {
+        self.pixel.is_finished()
     }
 
     /// Adds the next Gaussian.
-    pub(super) fn add(&mut self, splat: &'a Splat, alpha: Alpha, state: &OracleState) {
-        match self {
-            Self::Certain(pixel) => pixel.add(splat, alpha, state),
-            Self::Uncertain(reached) => {
-                if alpha.value + alpha.error >= f64::from(state.alpha_floor) {
-                    let depth = RayDepth { value: splat.key, error: splat.error.rounding().depth };
-                    reached.push((depth, (splat, alpha)));
-                }
-            }
+    fn add(&mut self, splat: &'a Splat, alpha: Alpha, state: &OracleState) {
+        let Some(reached) = &mut self.reached else {
+            return self.pixel.add(splat, alpha, state);
+        };
+        if alpha.value + alpha.error >= f64::from(state.alpha_floor) {
+            let depth = RayDepth { value: splat.key, error: splat.error.rounding().depth };
+            reached.push((depth, (splat, alpha)));
         }
     }
 
     /// The pixel with all of them.
-    pub(super) fn finish(self, state: &OracleState) -> Pixel {
-        match self {
-            Self::Certain(pixel) => pixel,
-            Self::Uncertain(reached) => rays::composite(
-                &reached,
-                |(a, _), (b, _)| a.has_key_of(b),
-                |pixel, (splat, alpha)| pixel.add(splat, *alpha, state),
-            ),
-        }
+    fn finish(self, state: &OracleState) -> Pixel {
+        let Some(reached) = self.reached else {
+            return self.pixel;
+        };
+        rays::composite(
+            &reached,
+            |(a, _), (b, _)| a.has_key_of(b),
+            |pixel, (splat, alpha)| pixel.add(splat, *alpha, state),
+        )
     }
 }
 
