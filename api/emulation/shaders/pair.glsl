@@ -6,7 +6,8 @@ layout(constant_id = 31) const bool IS_RELAXED = false;
 
 vec2 two_sum(float a, float b) {
     if (IS_RELAXED) {
-        return vec2(a + b, 0.0);
+        precise float only = a + b;
+        return vec2(only, 0.0);
     }
     precise float s = a + b;
     precise float t = s - a;
@@ -17,7 +18,8 @@ vec2 two_sum(float a, float b) {
 // The same, for |a| >= |b|.
 vec2 quick_two_sum(float a, float b) {
     if (IS_RELAXED) {
-        return vec2(a + b, 0.0);
+        precise float only = a + b;
+        return vec2(only, 0.0);
     }
     precise float s = a + b;
     precise float e = b - (s - a);
@@ -34,7 +36,8 @@ vec2 split(float a) {
 
 vec2 two_product(float a, float b) {
     if (IS_RELAXED) {
-        return vec2(a * b, 0.0);
+        precise float only = a * b;
+        return vec2(only, 0.0);
     }
     precise float p = a * b;
     vec2 x = split(a), y = split(b);
@@ -44,7 +47,8 @@ vec2 two_product(float a, float b) {
 
 vec2 add(vec2 a, vec2 b) {
     if (IS_RELAXED) {
-        return vec2(a.x + b.x, 0.0);
+        precise float only = a.x + b.x;
+        return vec2(only, 0.0);
     }
     vec2 s = two_sum(a.x, b.x), t = two_sum(a.y, b.y);
     precise float y = s.y + t.x;
@@ -59,7 +63,8 @@ vec2 sub(vec2 a, vec2 b) {
 
 vec2 mul(vec2 a, vec2 b) {
     if (IS_RELAXED) {
-        return vec2(a.x * b.x, 0.0);
+        precise float only = a.x * b.x;
+        return vec2(only, 0.0);
     }
     vec2 p = two_product(a.x, b.x);
     precise float e = p.y + (a.x * b.y + a.y * b.x);
@@ -68,7 +73,8 @@ vec2 mul(vec2 a, vec2 b) {
 
 vec2 mul(vec2 a, float b) {
     if (IS_RELAXED) {
-        return vec2(a.x * b, 0.0);
+        precise float only = a.x * b;
+        return vec2(only, 0.0);
     }
     vec2 p = two_product(a.x, b);
     precise float e = p.y + a.y * b;
@@ -77,7 +83,8 @@ vec2 mul(vec2 a, float b) {
 
 vec2 div(vec2 a, vec2 b) {
     if (IS_RELAXED) {
-        return vec2(a.x / b.x, 0.0);
+        precise float only = a.x / b.x;
+        return vec2(only, 0.0);
     }
     precise float q = a.x / b.x;
     vec2 r = sub(a, mul(b, q));

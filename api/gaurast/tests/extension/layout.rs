@@ -49,6 +49,7 @@ fn features() {
         gaussian_distortion: 120,
         unscented_parameters: 124,
         attribute_decoding: 128,
+        gaussian_2d_cut_off: 132,
     });
 }
 
@@ -250,7 +251,7 @@ fn camera() {
 #[gaurast_runner::test]
 fn names_and_values() {
     assert_eq!(NAME.to_str(), Ok("VK_GAURAST_gaussian_primitive_topology"));
-    assert_eq!(SPEC_VERSION, 2);
+    assert_eq!(SPEC_VERSION, 3);
     let first = 1_000_000_000 + (EXTENSION_NUMBER as i32 - 1) * 1000;
     assert_eq!(first, 1_000_997_000);
     assert_eq!(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw(), first);
