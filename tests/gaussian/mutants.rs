@@ -31,7 +31,7 @@ fn catches(case: &Case, answers: &Answers, extent: Extent) -> Vec<Catch> {
 #[gaurast_runner::test(needs = [Need::VulkanLoader], each = shards(2))]
 fn a_case_catches_each_mutant(case: &Case) {
     with_mutants(case, || {
-        let faults = catches(case, &Answers::new(all(), PrecisionClass::Full), Extent::UntilCaught);
+        let faults = catches(case, &Answers::new(all(), None), Extent::UntilCaught);
         let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
         assert!(faults.is_empty(), "{faults:#?}");
     });
@@ -44,7 +44,7 @@ fn a_case_catches_each_mutant_at_a_relaxed_precision(case: &Case) {
         ignore(Missing::Capability, "GAURAST_TEST_LONG is not 1");
     }
     with_mutants(case, || {
-        let faults = catches(case, &Answers::new(all(), PrecisionClass::Relaxed), Extent::UntilCaught);
+        let faults = catches(case, &Answers::new(all(), Some(PrecisionClass::Relaxed)), Extent::UntilCaught);
         let faults: Vec<_> = faults.iter().filter_map(Catch::fault).collect();
         assert!(faults.is_empty(), "{faults:#?}");
     });
@@ -89,7 +89,7 @@ fn the_page_is_what_fails(case: &Case) {
         return the_page_has_every_mutant();
     }
     with_mutants(case, || {
-        let answers = Answers::new(all(), PrecisionClass::Full);
+        let answers = Answers::new(all(), None);
         let rows = MUTANTS.iter().map(|mutant| {
             let caught = catch("loader", mutant, &answers, Extent::EveryTenth);
             caught.unwrap_or_else(|error| panic!("{}", error.0)).row() + "\n"

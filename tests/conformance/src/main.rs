@@ -164,8 +164,7 @@ fn catch_mutants(cases: Vec<Case>, folder: &Path, arguments: &Arguments) -> Exit
     unsafe { std::env::set_var("VK_ADD_LAYER_PATH", folder) };
     let chosen =
         |name: &str| arguments.mutant.is_empty() || arguments.mutant.iter().any(|one| one.eq_ignore_ascii_case(name));
-    let precision = arguments.precision.map(PrecisionClass::from);
-    let answers = Answers::new(cases, precision.unwrap_or_default());
+    let answers = Answers::new(cases, arguments.precision.map(PrecisionClass::from));
     let extent = if arguments.every_case { Extent::EveryCase } else { Extent::UntilCaught };
     let (mut all, mut faults) = (0, 0);
     for mutant in MUTANTS.iter().filter(|mutant| chosen(mutant.name)) {

@@ -12,7 +12,7 @@ use gaurast_mutants::{MUTANTS, Mutant};
 
 use crate::cases::Case;
 use crate::device::Device;
-use crate::implementation::Error;
+use crate::implementation::{Error, Implementation};
 use crate::run::{Expectation, Outcome, missing};
 
 /// The layer. The loader must find it, for example by `VK_ADD_LAYER_PATH`.
@@ -20,13 +20,13 @@ pub const LAYER: &CStr = c"VK_LAYER_GAURAST_mutants";
 
 /// Cases with the oracle's answers, which are computed once for all mutants.
 pub struct Answers {
-    precision: PrecisionClass,
+    precision: Option<PrecisionClass>,
     cases: Vec<(Case, OnceLock<Expectation>)>,
 }
 
 impl Answers {
-    /// The answers to cases, by a class of precision.
-    pub fn new(cases: Vec<Case>, precision: PrecisionClass) -> Self {
+    /// The answers to cases, by a class of precision, or by that of the device.
+    pub fn new(cases: Vec<Case>, precision: Option<PrecisionClass>) -> Self {
         Self { precision, cases: cases.into_iter().map(|case| (case, OnceLock::new())).collect() }
     }
 }
@@ -110,7 +110,8 @@ pub fn catch(driver: &str, mutant: &'static Mutant, answers: &Answers, extent: E
             if !is_run || missing(case, &device).is_some() {
                 continue;
             }
-            let expectation = expectation.get_or_init(|| Expectation::new(case, answers.precision));
+            let precision = answers.precision.unwrap_or_else(|| device.precision());
+            let expectation = expectation.get_or_init(|| Expectation::new(case, precision));
             if let Outcome::Fail(_) = expectation.judge(&device) {
                 failures.push((case.chapter, case.name.clone()));
                 if extent == Extent::UntilCaught {

@@ -214,10 +214,10 @@ vk_enum! {
     /// The bounds of rounding that pictures keep.
     #[doc(alias = "VkGaussianPrecisionClassGAURAST")]
     pub struct GaussianPrecisionClassGAURAST {
-        /// Those of binary32 with positions, projection and covariances in binary64 or an equivalent.
+        /// Bounds of binary32 with positions, projection and covariances in binary64 or an equivalent.
         #[doc(alias = "VK_GAUSSIAN_PRECISION_CLASS_FULL_GAURAST")]
         FULL = 0,
-        /// Those of binary32 throughout.
+        /// Bounds of binary32 throughout.
         #[doc(alias = "VK_GAUSSIAN_PRECISION_CLASS_RELAXED_GAURAST")]
         RELAXED = 1,
     }

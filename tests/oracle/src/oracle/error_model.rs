@@ -64,19 +64,19 @@ pub enum PrecisionClass {
 
 /// The roundings that [`PrecisionClass::Relaxed`] grants, in units of roundoff.
 pub mod relaxed {
-    /// As [`FIXED`](super::FIXED).
+    /// Relative error of alpha for every Gaussian, in place of [`FIXED`](super::FIXED).
     pub const FIXED: f64 = 256.0;
-    /// As [`GEOMETRY`](super::GEOMETRY), of which a Gaussian's nearness is a factor.
+    /// Roundings of lengths in the picture, in place of [`GEOMETRY`](super::GEOMETRY), of which a Gaussian's nearness is a factor.
     pub const GEOMETRY: f64 = 32.0;
-    /// Of a mean's magnitudes.
+    /// Roundings of a mean, of its magnitudes.
     pub const PLACE: f64 = 16.0;
-    /// Of the magnitudes that a depth variable is a sum of.
+    /// Roundings of a depth variable, of the magnitudes that it is a sum of.
     pub const DEPTH: f64 = 8.0;
-    /// Of the magnitudes that a colour is a sum of.
+    /// Roundings of a colour, of the magnitudes that it is a sum of.
     pub const COLOR: f64 = 64.0;
-    /// Of a determinant's products, where a vertex shader gives the covariance.
+    /// Roundings of a determinant, of its products, where a vertex shader gives the covariance.
     pub const DETERMINANT: f64 = 8.0;
-    /// Of a depth's magnitudes.
+    /// Roundings of a depth, of its magnitudes.
     pub const MAPPING: f64 = 8.0;
 }
 
@@ -87,7 +87,7 @@ pub struct Rounding {
     pub place: [f64; 2],
     /// The possible error of a sigma point, in the same units; 0 without the unscented transform.
     pub points: [f64; 2],
-    /// How many times more roundings the direction to the Gaussian has than one that is not a difference: 1, or with
+    /// The factor by which the direction to the Gaussian has more roundings than one that is not a difference: 1, or with
     /// [`PrecisionClass::Relaxed`] more where the eye and the centre are much farther from the origin than from each other.
     pub nearness: f64,
     /// The possible error of the depth variable beyond binary64's.

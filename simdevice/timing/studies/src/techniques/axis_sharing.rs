@@ -12,7 +12,7 @@ pub const EXPONENT: Operations = Operations { add: 5, mul: 5, div: 0, exp: 0 };
 const COLUMN: Operations = Operations { add: 1, mul: 3, div: 0, exp: 0 };
 /// The terms of a row: `dy`, and `c dy^2` by two products, to which the logarithm of the opacity is added.
 const ROW: Operations = Operations { add: 2, mul: 2, div: 0, exp: 0 };
-/// What is left for a pixel: the product of `b dx` and `dy`, and the sum of three.
+/// Operations that are left for a pixel: the product of `b dx` and `dy`, and the sum of three.
 const PIXEL: Operations = Operations { add: 2, mul: 1, div: 0, exp: 0 };
 
 /// The paper's counts of multiply-adds for a pixel's alpha: before sharing, and after it, over a tile of 16x16 pixels.
