@@ -73,9 +73,13 @@ const SEGMENT: u64 = 2048;
 /// The number of segments in a part. A part is set up before any of it is rendered.
 const PART_SEGMENTS: u64 = 512;
 
-/// The number of primitives in a segment if programs make others of them: of patches, and without tessellation.
+/// The number of patches in a segment.
 const SEGMENT_OF_PATCHES: u64 = 16;
+
+/// The least number of primitives in a segment of which a geometry program makes others, and the number of vertices that it
+/// may give for a larger one.
 const SEGMENT_OF_GEOMETRY: u64 = 256;
+const GEOMETRY_VERTICES: u64 = 8192;
 
 /// The number of such segments that are processed before the memory of the part is looked at.
 const STEP_SEGMENTS: u64 = 16;
@@ -141,7 +145,8 @@ impl<'a> FrontEnd<'a> {
         let mixes_instances = mixes_instances(draw);
         let segment = match (&draw.pipeline.tessellation, &draw.pipeline.geometry) {
             (Some(_), _) => SEGMENT_OF_PATCHES,
-            (None, Some(_)) => SEGMENT_OF_GEOMETRY,
+            // Large ones lie in memory as macro-tiles read them.
+            (None, Some(stage)) => (GEOMETRY_VERTICES / stage.most_vertices()).clamp(SEGMENT_OF_GEOMETRY, SEGMENT),
             (None, None) => SEGMENT,
         };
         let segments = if mixes_instances {
@@ -181,7 +186,9 @@ impl<'a> FrontEnd<'a> {
             return Ok(None);
         }
         let started = Instant::now();
-        let done = if self.segment == SEGMENT && self.capture.is_none() {
+        let pipeline = &self.draw.pipeline;
+        let makes_primitives = pipeline.tessellation.is_some() || pipeline.geometry.is_some();
+        let done = if !makes_primitives && self.capture.is_none() {
             let range = self.next..self.segments.min(self.next + PART_SEGMENTS);
             self.next = range.end;
             self.process(range, counters)

@@ -60,6 +60,14 @@ pub(crate) struct GeometryStage {
     pub corners: usize,
 }
 
+impl GeometryStage {
+    /// The most vertices that it gives for a primitive, at least 1.
+    pub fn most_vertices(&self) -> u64 {
+        let of_invocation = self.output_memory.stride / self.vertex_bytes.max(1);
+        (self.invocations as u64 * u64::from(of_invocation)).max(1)
+    }
+}
+
 impl PrimitiveStage {
     fn new(level: Level, stage: &PrimitiveProgram) -> Result<Self, InvalidProgram> {
         let options = Options {
