@@ -70,42 +70,78 @@ float nearest_float(uvec2 value, int power) {
     return uintBitsToFloat(base + kept.x + up);
 }
 
-// e^x as `value` 2^(`power` - 62), of an x from -110 to 110.
-void power_of_e(float x, out uvec2 value, out int power) {
-    power = int(floor(x * 1.44269504 - 0.001));
-    // x in units of 2^-64, and what is left of it without the logarithm of 2^power: both modulo 1.
+// x in units of 2^-64, modulo 1.
+uvec2 fixed_of(float x) {
     uint bits = floatBitsToUint(x), mantissa = bits & 0x7fffffu, biased = bits >> 23 & 0xffu;
     mantissa |= biased == 0u ? 0u : 0x800000u;
     int shift = int(max(biased, 1u)) - 150 + 64;
-    uvec2 fixed_ = shift >= 0 ? left64(uvec2(mantissa, 0u), uint(shift)) : right64(uvec2(mantissa, 0u), uint(-shift));
-    fixed_ = bits >> 31 != 0u ? difference64(uvec2(0u), fixed_) : fixed_;
+    uvec2 magnitude = shift >= 0 ? left64(uvec2(mantissa, 0u), uint(shift)) : right64(uvec2(mantissa, 0u), uint(-shift));
+    return bits >> 31 != 0u ? difference64(uvec2(0u), magnitude) : magnitude;
+}
+
+// The sum of a^n / (n + `first`)!, in units of 2^-62, of an a in units of 2^-64.
+uvec2 series(uvec2 a, int first) {
+    uvec2 value = FACTORS[17];
+    for (int n = 16; n >= first; n--) {
+        value = sum64(FACTORS[n], upper_product(a, value));
+    }
+    return value;
+}
+
+// e^x as `value` 2^(`power` - 62), of a pair from -110 to 110.
+void power_of_e(vec2 x, out uvec2 value, out int power) {
+    power = int(floor(x.x * 1.44269504 - 0.001));
+    // What is left of x without the logarithm of 2^power.
+    uvec2 fixed_ = sum64(fixed_of(x.x), fixed_of(x.y));
     uint whole = uint(abs(power)), high, low;
     umulExtended(LOG_2.x, whole, high, low);
     uvec2 multiple = uvec2(low, high + LOG_2.y * whole);
     uvec2 rest = power < 0 ? sum64(fixed_, multiple) : difference64(fixed_, multiple);
-    value = FACTORS[17];
-    for (int n = 16; n >= 0; n--) {
-        value = sum64(FACTORS[n], upper_product(rest, value));
-    }
+    value = series(rest, 0);
 }
 
-float scale_of_logarithm(float x) {
-    if (isnan(x)) {
-        return x;
+// A pair, or the bound that it is beyond.
+vec2 bounded(vec2 x) {
+    return abs(x.x) < 110.0 ? x : vec2(clamp(x.x, -110.0, 110.0), 0.0);
+}
+
+float scale_of_logarithm(vec2 x) {
+    if (isnan(x.x)) {
+        return x.x;
     }
     uvec2 value;
     int power;
-    power_of_e(clamp(x, -110.0, 110.0), value, power);
+    power_of_e(bounded(x), value, power);
     return nearest_float(value, power - 62);
 }
 
-float opacity_of_logit(float x) {
-    if (isnan(x)) {
-        return x;
+// sgn(x) (e^|x| - 1).
+float number_of_signed_logarithm(vec2 x) {
+    if (isnan(x.x)) {
+        return x.x;
+    }
+    vec2 a = bounded(x.x < 0.0 ? -x : x);
+    float number;
+    if (a.x < 0.25) {
+        uvec2 value = series(sum64(fixed_of(a.x), fixed_of(a.y)), 1);
+        vec2 quotient = quick_two_sum(ldexp(float(value.y >> 8), -22), ldexp(float((value.y & 255u) << 16 | value.x >> 16), -46));
+        number = whole_mul(a, quotient).x;
+    } else {
+        uvec2 value;
+        int power;
+        power_of_e(a, value, power);
+        number = nearest_float(difference64(value, right64(FACTORS[0], uint(max(power, 0)))), power - 62);
+    }
+    return x.x < 0.0 ? -number : number;
+}
+
+float opacity_of_logit(vec2 x) {
+    if (isnan(x.x)) {
+        return x.x;
     }
     uvec2 value;
     int power;
-    power_of_e(-min(abs(x), 110.0), value, power);
+    power_of_e(bounded(x.x < 0.0 ? x : -x), value, power);
     // 1 + t, in units of 2^-62, and its reciprocal, in units of 2^-63.
     uvec2 sum = sum64(FACTORS[0], right64(value, uint(-power)));
     float first = 1.0 / (float(sum.y) * 9.313225746154785e-10);
@@ -114,5 +150,5 @@ float opacity_of_logit(float x) {
         uvec2 error = difference64(uvec2(0u, 0x40000000u), upper_product(sum, inverse));
         inverse = left64(upper_product(inverse, error), 3u);
     }
-    return x < 0.0 ? nearest_float(upper_product(value, inverse), power - 61) : nearest_float(inverse, -63);
+    return x.x < 0.0 ? nearest_float(upper_product(value, inverse), power - 61) : nearest_float(inverse, -63);
 }

@@ -6,7 +6,7 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Wor
 const uint FLOAT32 = 0u, FLOAT16 = 1u, UNORM8 = 2u, SNORM8 = 3u, UNORM16 = 4u, SNORM16 = 5u, USCALED8 = 6u, SSCALED8 = 7u,
            USCALED16 = 8u, SSCALED16 = 9u, BGRA8 = 10u, A2B10G10R10_UNORM = 11u, A2B10G10R10_SNORM = 12u,
            A2R10G10B10_UNORM = 13u, A2R10G10B10_SNORM = 14u, A2B10G10R10_USCALED = 15u, A2B10G10R10_SSCALED = 16u,
-           A2R10G10B10_USCALED = 17u, A2R10G10B10_SSCALED = 18u, B10G11R11 = 19u;
+           A2R10G10B10_USCALED = 17u, A2R10G10B10_SSCALED = 18u, B10G11R11 = 19u, UINT8 = 20u, UINT16 = 21u, UINT32 = 22u;
 
 uvec2 advanced(uvec2 address, uint bytes) {
     uint carry;
@@ -48,6 +48,9 @@ uint format_bytes(uint format) {
     uint kind = format & 0xffu, components = format >> 8;
     if (kind == FLOAT32) {
         return 4u * components;
+    }
+    if (kind >= UINT8) {
+        return kind == UINT32 ? 4u : components << kind - UINT8;
     }
     if (kind >= BGRA8) {
         return 4u;

@@ -45,12 +45,31 @@ uint set_tiles(inout Record r, vec2 a, vec2 b, vec2 c, vec2 det, float reach, ve
     return reached;
 }
 
+// The opacity compensated for the low-pass, whose determinants before and after are `area` and `det`.
+float compensate(float opacity, vec2 area, vec2 det) {
+    vec2 ratio = div(area, det);
+    ratio = ratio.x < push.set.compensation_floor ? pair(push.set.compensation_floor) : ratio;
+    return mul(root(ratio), opacity).x;
+}
+
+// The deviations of a cut-off; negative if it leaves nothing. The opacity is the one that is drawn.
+float cut_deviations(float opacity, vec2 area, vec2 det) {
+    float deviations = push.set.cut_off_deviations, least = push.set.alpha_floor;
+    if (HAS_CUT_TILES && push.set.cut_off == TILE_RECTANGLE_COMPENSATED && least > 0.0) {
+        float compensated = push.set.compensated != 0u ? opacity : compensate(opacity, area, det);
+        if (!(compensated >= least)) {
+            return -1.0;
+        }
+        deviations = min(deviations, sqrt(max(0.0, 2.0 * log(compensated / least))));
+    }
+    return deviations;
+}
+
 // Sets the tiles of a cut-off, from the viewport's corner.
-void set_cut(inout Record r, vec2 a, vec2 b, vec2 c, int power) {
+void set_cut(inout Record r, vec2 a, vec2 b, vec2 c, float deviations, int power) {
     r.cut_radius = 0.0;
     r.cut_y = 0u;
     if (HAS_CUT_TILES) {
-        float deviations = push.set.cut_off_deviations;
         vec2 radius;
         if (push.set.cut_off == TILE_SQUARE) {
             vec2 half_difference = mul(sub(a, c), 0.5);

@@ -10,6 +10,7 @@
 #include "draws.glsl"
 #include "depths.glsl"
 #include "activation.glsl"
+#include "decoding.glsl"
 #include "angles.glsl"
 #include "cameras.glsl"
 #include "lens.glsl"
@@ -45,20 +46,49 @@ void main() {
         bool is_three = which == POSITION || which == SCALE, is_one = which == OPACITY || which == FACTOR;
         uint wanted = is_one ? 1u : IS_SURFEL && which == SCALE ? 2u : is_three ? 3u : 4u;
         values[which] = vec4(0.0);
-        if (is_used) {
+        bool is_decoded = HAS_DECODINGS && which < MATRIX && decoding_of(2u * which) != NOT_DECODED;
+        if (is_used && !is_decoded) {
             values[which] = read_attribute(draw, which, vertex, instance, d.first_instance, wanted);
         }
     }
     vec3 position = values[POSITION].xyz, scale = values[SCALE].xyz;
     vec4 rotation = values[ROTATION];
     float opacity = values[OPACITY].x;
+    // Functions take decoded numbers before they are rounded.
+    vec2 logarithms[3] = vec2[3](pair(scale.x), pair(scale.y), pair(scale.z)), logit = pair(opacity);
+    if (HAS_DECODINGS) {
+        vec2 numbers[3];
+        uint decoding = decoding_of(POSITION_CODES);
+        if (decoding != NOT_DECODED) {
+            decode(draw, POSITION, POSITION_TABLE, decoding, member, 3u, numbers);
+            for (int j = 0; j < 3; j++) {
+                bool is_logarithm = (push.set.decodings & SIGNED_LOGARITHMS) != 0u;
+                position[j] = is_logarithm ? number_of_signed_logarithm(numbers[j]) : numbers[j].x;
+            }
+        }
+        decoding = decoding_of(SCALE_CODES);
+        if (decoding != NOT_DECODED) {
+            decode(draw, SCALE, SCALE_TABLE, decoding, member, 3u, logarithms);
+            scale = vec3(logarithms[0].x, logarithms[1].x, logarithms[2].x);
+        }
+        decoding = decoding_of(ROTATION_CODES);
+        if (decoding != NOT_DECODED) {
+            rotation = decode_rotation(draw, decoding, member);
+        }
+        decoding = decoding_of(OPACITY_CODES);
+        if (decoding != NOT_DECODED) {
+            decode(draw, OPACITY, OPACITY_TABLE, decoding, member, 1u, numbers);
+            logit = numbers[0];
+            opacity = logit.x;
+        }
+    }
     if (HAS_LOGARITHMS) {
         for (int j = 0; j < (IS_SURFEL ? 2 : 3); j++) {
-            scale[j] = scale_of_logarithm(scale[j]);
+            scale[j] = scale_of_logarithm(logarithms[j]);
         }
     }
     if (HAS_LOGITS) {
-        opacity = opacity_of_logit(opacity);
+        opacity = opacity_of_logit(logit);
     }
     if (HAS_FACTOR) {
         precise float product = opacity * values[FACTOR].x;
@@ -350,12 +380,14 @@ void main() {
     }
     float least = max(push.set.alpha_floor, 1.2e-38);
     if (push.set.compensated != 0u) {
-        vec2 ratio = div(area, det);
-        ratio = ratio.x < push.set.compensation_floor ? pair(push.set.compensation_floor) : ratio;
-        opacity = mul(root(ratio), opacity).x;
+        opacity = compensate(opacity, area, det);
         if (!(opacity >= least)) {
             return;
         }
+    }
+    float deviations = cut_deviations(opacity, area, det);
+    if (deviations < 0.0) {
+        return;
     }
 
     // The ellipse in which alpha reaches the floor, a little larger, and its tiles.
@@ -429,6 +461,39 @@ void main() {
             halves = vec2(1e6);
         }
         float filtered = sqrt(reach * push.set.low_pass) * 1.001 + 0.01;
+        if (HAS_CUT_TILES) {
+            // The outline's rectangle at one standard deviation, about whose middle the filter is.
+            vec2 shifts[2], halves_of_one[2];
+            for (int j = 0; j < 2; j++) {
+                vec2 slope = j == 0 ? slope_x : slope_y;
+                vec2 along_a = mul(j == 0 ? a0 : a1, camera.focal_length[j]), along_b = mul(j == 0 ? b0 : b1, camera.focal_length[j]);
+                if (is_orthographic) {
+                    shifts[j] = vec2(0.0);
+                    halves_of_one[j] = root(add(mul(along_a, along_a), mul(along_b, along_b)));
+                } else {
+                    vec2 divisor = sub(add(mul(a2, a2), mul(b2, b2)), mul(t[2], t[2]));
+                    if (divisor.x == 0.0) {
+                        return;
+                    }
+                    along_a = sub(along_a, mul(mul(a2, slope), camera.focal_length[j]));
+                    along_b = sub(along_b, mul(mul(b2, slope), camera.focal_length[j]));
+                    shifts[j] = div(add(mul(along_a, a2), mul(along_b, b2)), divisor);
+                    vec2 across_ = div(add(mul(along_a, along_a), mul(along_b, along_b)), divisor);
+                    vec2 square = sub(mul(shifts[j], shifts[j]), across_);
+                    halves_of_one[j] = square.x < 1e-4 ? vec2(0.01, 2.2351741e-10) : root(square);
+                }
+            }
+            vec2 radius = ceil(vec2(mul(halves_of_one[0], deviations).x, mul(halves_of_one[1], deviations).x));
+            vec2 middle_x = add(mean_x, shifts[0]), middle_y = add(mean_y, shifts[1]);
+            if (!is_finite(middle_x.x) || !is_finite(middle_y.x) || isnan(radius.x) || isnan(radius.y)) {
+                return;
+            }
+            Rectangle rectangle = Rectangle(shifts[0], shifts[1], 0u, 0u);
+            rectangle.columns = cut_tiles(sub(middle_x, pair(push.set.viewport.x)).x, radius.x);
+            rectangle.rows = cut_tiles(sub(middle_y, pair(push.set.viewport.y)).x, radius.y);
+            push.set.rectangles.at[i] = rectangle;
+            halves = max(halves, abs(vec2(shifts[0].x, shifts[1].x)) + filtered);
+        }
         half_width = max(halves.x, filtered);
         half_height = max(halves.y, filtered);
     }
@@ -470,6 +535,15 @@ void main() {
             bool is_within = high == 0u
                 && lies_within(vertex, d.harmonics_stride, low, format_bytes(d.harmonics_format), d.harmonics_bytes, place);
             coefficient = element(d.harmonics, place, is_within, d.harmonics_format, 3u).xyz;
+        } else if (HAS_DECODINGS && f == 0u && decoding_of(COLOR_CODES) != NOT_DECODED) {
+            vec2 numbers[3];
+            decode(draw, HARMONICS, COLOR_TABLE, decoding_of(COLOR_CODES), member, 3u, numbers);
+            for (int j = 0; j < 3; j++) {
+                bool is_base = (push.set.decodings & BASE_COLORS) != 0u;
+                coefficient[j] = is_base ? coefficient_of_color(numbers[j]).x : numbers[j].x;
+            }
+        } else if (HAS_DECODINGS && f > 0u && decoding_of(HARMONICS_CODES) != NOT_DECODED) {
+            coefficient = decode_harmonics(draw, vertex, f);
         } else if (ARE_HARMONICS_EVEN) {
             bool is_within = first.is_within && first.bytes - first.offset >= f * step_ + 12u;
             coefficient = floats(first.address, first.offset + f * step_, is_within, 3u).xyz;
@@ -484,7 +558,7 @@ void main() {
     }
     color = clamp(color, vec3(0.0), vec3(3.4028235e38));
 
-    set_cut(r, a, b, c, HAS_LENS ? power : 0);
+    set_cut(r, a, b, c, deviations, HAS_LENS ? power : 0);
     set_factor(r, a, b, det, HAS_LENS ? power : 0);
     r.opacity = opacity;
     r.red = color.x;

@@ -63,12 +63,14 @@ void main() {
     }
     float least = max(push.set.alpha_floor, 1.2e-38);
     if (push.set.compensated != 0u) {
-        vec2 ratio = div(area, det);
-        ratio = ratio.x < push.set.compensation_floor ? pair(push.set.compensation_floor) : ratio;
-        opacity = mul(root(ratio), opacity).x;
+        opacity = compensate(opacity, area, det);
         if (!(opacity >= least)) {
             return;
         }
+    }
+    float deviations = cut_deviations(opacity, area, det);
+    if (deviations < 0.0) {
+        return;
     }
 
     // The ellipse in which alpha reaches the floor, a little larger, and its tiles.
@@ -78,7 +80,7 @@ void main() {
     if (reached == 0u) {
         return;
     }
-    set_cut(r, a, b, c, 0);
+    set_cut(r, a, b, c, deviations, 0);
     set_factor(r, a, b, det, 0);
     r.opacity = opacity;
     r.red = color.x;

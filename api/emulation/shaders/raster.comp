@@ -149,7 +149,14 @@ void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
         vec2 w = add(pair(1.0), add(mul(s.wx, x), mul(s.wy, y)));
         lines[slot] = vec4(add(mul(s.ux, x), mul(s.uy, y)).x, s.ux.x, s.uy.x, add(mul(s.vx, x), mul(s.vy, y)).x);
         planes[2u * slot] = vec4(s.vx.x, s.vy.x, w.x, s.wx.x);
-        planes[2u * slot + 1u] = vec4(s.wy.x, s.limit, x.x, y.x);
+        vec2 from_x = x, from_y = y;
+        if (HAS_CUT_TILES) {
+            Rectangle rectangle = push.set.rectangles.at[member];
+            from_x = sub(x, rectangle.shift_x);
+            from_y = sub(y, rectangle.shift_y);
+            cuts[slot] = uvec2(rectangle.columns, rectangle.rows);
+        }
+        planes[2u * slot + 1u] = vec4(s.wy.x, s.limit, from_x.x, from_y.x);
         bool turns = 32.0 * (abs(s.wx.x) + abs(s.wy.x)) > w.x;
         is_steep = turns || max(abs(s.ux.x) + abs(s.uy.x), abs(s.vx.x) + abs(s.vy.x)) > 2.0 * w.x;
         is_steep = (is_steep && s.limit > 0.0) || (push.set.low_pass > 0.0 && push.set.low_pass < 0.1);
@@ -163,7 +170,7 @@ void admit(uint slot, uint member, vec2 middle, float least, float ellipse) {
     if (HAS_TESTS || IS_RESOLVED) {
         depths[slot] = push.set.depths.at[HAS_ANGLES ? member & MEMBER : member];
     }
-    if (HAS_CUT_TILES) {
+    if (HAS_CUT_TILES && !IS_SURFEL) {
         cuts[slot] = uvec2(cut_tiles(sub(r.mean_x, pair(push.set.viewport.x)).x, r.cut_radius), r.cut_y);
     }
     if (HAS_ANGLES) {
@@ -349,12 +356,18 @@ void main() {
             if (IS_SURFEL) {
                 Surfel s = surfel_of(r);
                 vec4 u, v, w, square;
+                Rectangle rectangle = Rectangle(vec2(0.0), vec2(0.0), 0u, 0u);
+                if (HAS_CUT_TILES) {
+                    rectangle = push.set.rectangles.at[members[k]];
+                }
+                vec2 from_x = sub(x, rectangle.shift_x);
                 for (uint j = 0u; j < ROWS; j++) {
                     vec2 y = add(two_sum(rows[j], -r.mean_y.x), pair(-r.mean_y.y));
                     u[j] = add(mul(s.ux, x), mul(s.uy, y)).x;
                     v[j] = add(mul(s.vx, x), mul(s.vy, y)).x;
                     w[j] = add(pair(1.0), add(mul(s.wx, x), mul(s.wy, y))).x;
-                    square[j] = add(mul(x, x), mul(y, y)).x;
+                    vec2 from_y = sub(y, rectangle.shift_y);
+                    square[j] = add(mul(from_x, from_x), mul(from_y, from_y)).x;
                 }
                 exponent = surfel_exponent(u, v, w, s.limit, square);
             } else {

@@ -22,6 +22,13 @@ struct Record {
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Records { Record at[]; };
 
+// The cut-off of a 2D Gaussian.
+struct Rectangle {
+    vec2 shift_x, shift_y;           // from the mean to the filter's middle; pairs
+    uint columns, rows;              // tiles, from the viewport's corner: first | end << 16
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Rectangles { Rectangle at[]; };
+
 // VkGaussianCameraDataGAURAST; the eye is binary64.
 struct Camera {
     uvec2 eye[3];
@@ -63,6 +70,26 @@ struct Shaded {
     uint unused_;
 };
 
+// A table of numbers that decodings read; all are in bytes but the chunk's size.
+struct Table {
+    uvec2 address;
+    uint bytes, stride;
+    uint chunk_size;             // Gaussians
+    uint is_binary64;
+};
+
+// The bytes that name numbers of the codebook of harmonics.
+struct Codes {
+    uvec2 address;
+    uint bytes, stride, coefficient_stride, component_stride;
+};
+
+// The integers that name entries of a palette of harmonics.
+struct Labels {
+    uvec2 address;
+    uint bytes, stride;
+};
+
 struct Draw {
     uvec2 indices;               // their address
     uint index_bytes;            // 0 without an index buffer
@@ -78,6 +105,9 @@ struct Draw {
     uvec2 harmonics;             // address of the buffer of harmonics
     uint harmonics_bytes, harmonics_format, harmonics_stride, harmonics_coefficient_stride;
     Shaded shaded;
+    Table tables[5];             // see decoding.glsl
+    Codes codes;
+    Labels labels;
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Draws { Draw at[]; };
 
@@ -117,6 +147,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     Rows inputs;                 // of each sample: expected and median depth and depth variable; median and nearest Gaussian
     Pixels seen_by;              // the camera of each view, as a resolve shader reads it; or 0
     Lenses lenses;               // of each camera; or 0
+    Rectangles rectangles;       // of each 2D Gaussian that has a cut-off
+    uvec2 unused;
     ivec2 area_origin;           // pixels that the set may reach
     uvec2 area_size;
     vec4 viewport;               // x, y, width, height; not negative
@@ -137,6 +169,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Se
     uint is_shaded;              // a vertex shader projects
     vec2 center[2], half_size;   // of the viewport: pairs; the height's half is negative if it is
     Attribute attributes[33];
+    uint decodings;              // of attributes: see decoding.glsl
 };
 
 layout(push_constant) uniform Push {
@@ -151,7 +184,7 @@ const int PINHOLE = 0, ORTHOGRAPHIC = 1, FISHEYE = 2, EQUIRECTANGULAR = 3;
 // Orders.
 const uint VIEW_DEPTH = 0u, RADIAL_DISTANCE = 1u, PRIMITIVE = 2u;
 // Cut-offs.
-const uint NO_CUT_OFF = 0u, ELLIPSE = 1u, TILE_SQUARE = 2u, TILE_RECTANGLE = 3u;
+const uint NO_CUT_OFF = 0u, ELLIPSE = 1u, TILE_SQUARE = 2u, TILE_RECTANGLE = 3u, TILE_RECTANGLE_COMPENSATED = 4u;
 
 // Outcomes of the tests of a sample that no Gaussian takes part in: beyond the bounds, stencil failed, or neither.
 const uint OUT_OF_BOUNDS = 0u, STENCIL_FAILED = 1u, GOES_ON = 2u;

@@ -23,3 +23,5 @@ layout(constant_id = 12) const bool HAS_LOGITS = false;
 layout(constant_id = 13) const bool IS_RESOLVED = false;
 // A camera has a lens that distorts.
 layout(constant_id = 14) const bool HAS_LENS = false;
+// Attributes are decoded from integers.
+layout(constant_id = 15) const bool HAS_DECODINGS = false;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::bindings::Bindings;
+use crate::decoding::Tables;
 use crate::next::Next;
 
 /// A draw, as `shaders/set.glsl` has it.
@@ -32,6 +33,7 @@ pub(crate) struct Draw {
     pub(crate) harmonics_stride: u32,
     pub(crate) harmonics_coefficient_stride: u32,
     pub(crate) shaded: Shaded,
+    pub(crate) tables: Tables,
 }
 
 /// The outputs of a projecting shader, as `shaders/set.glsl` has them.

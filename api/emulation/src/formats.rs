@@ -61,6 +61,24 @@ pub(crate) fn code(format: vk::Format) -> Option<u32> {
     Some(kind | components << 8)
 }
 
+/// The format of integers that are decoded, likewise.
+pub(crate) fn code_of_integers(format: vk::Format) -> Option<u32> {
+    use vk::Format as F;
+    let (kind, components) = match format {
+        F::R8_UINT => (20, 1),
+        F::R8G8_UINT => (20, 2),
+        F::R8G8B8_UINT => (20, 3),
+        F::R8G8B8A8_UINT => (20, 4),
+        F::R16_UINT => (21, 1),
+        F::R16G16_UINT => (21, 2),
+        F::R16G16B16_UINT => (21, 3),
+        F::R16G16B16A16_UINT => (21, 4),
+        F::R32_UINT => (22, 1),
+        _ => return None,
+    };
+    Some(kind | components << 8)
+}
+
 /// Reports whether a format's code is that of 32-bit floats, with as many components as are wanted or more.
 pub(crate) fn is_float32(code: u32, wanted: u32) -> bool {
     code & 0xFF == 0 && code >> 8 >= wanted

@@ -73,13 +73,15 @@ pub(crate) struct Variant {
     pub(crate) is_resolved: bool,
     /// A camera has a lens that distorts.
     pub(crate) has_lens: bool,
+    /// Attributes are decoded from integers.
+    pub(crate) has_decodings: bool,
     /// A vertex shader projects: in another kernel.
     pub(crate) is_shaded: bool,
 }
 
 impl Variant {
     /// The specialization constants of the kernel that projects.
-    fn of_projection(&self) -> [u32; 15] {
+    fn of_projection(&self) -> [u32; 16] {
         [
             u32::from(self.has_matrix),
             u32::from(self.has_factor),
@@ -96,6 +98,7 @@ impl Variant {
             u32::from(self.has_logits),
             u32::from(self.is_resolved),
             u32::from(self.has_lens),
+            u32::from(self.has_decodings),
         ]
     }
 

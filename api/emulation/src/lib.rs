@@ -42,6 +42,7 @@ mod attachments;
 mod below;
 mod bindings;
 mod cameras;
+mod decoding;
 mod depth_stencil;
 mod device;
 mod draw_call;

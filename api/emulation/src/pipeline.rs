@@ -10,12 +10,14 @@ use gaurast::vk::{
     GaussianCameraSourceGAURAST as CameraSource, GaussianGeometryGAURAST as Geometry,
     GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
     GaussianPrecisionGAURAST as Precision, GaussianProjectionModeGAURAST as ProjectionMode,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST as State,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianDecodingStateCreateInfoGAURAST as DecodingState,
+    PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    PipelineGaussianStateCreateInfoGAURAST as State,
     PipelineGaussianUnscentedStateCreateInfoGAURAST as SigmaPointsInfo,
 };
 use gaurast_layer_interface::{find, slice};
 
+use crate::decoding::Decodings;
 use crate::depth_stencil::{self, TestState};
 use crate::draw_call::SHADED;
 use crate::formats;
@@ -85,6 +87,7 @@ pub(crate) struct Pipeline {
     pub(crate) sigma_points: SigmaPoints,
     /// The constants that the pipeline fixes in the kernels.
     pub(crate) variant: Variant,
+    pub(crate) decodings: Decodings,
     /// Bytes from a harmonic's attribute to the next one's.
     pub(crate) harmonics_step: u32,
     pub(crate) attributes: [Attribute; 33],
@@ -246,7 +249,11 @@ fn step(harmonics: &[Attribute]) -> Option<u32> {
 impl Attributes {
     /// # Safety
     /// The creation info is valid.
-    unsafe fn read(info: &vk::GraphicsPipelineCreateInfo<'_>, state: &State<'_>) -> Result<Self, String> {
+    unsafe fn read(
+        info: &vk::GraphicsPipelineCreateInfo<'_>,
+        state: &State<'_>,
+        decodings: Decodings,
+    ) -> Result<Self, String> {
         // SAFETY: the caller's promise.
         let (bindings, attributes, divisors) = unsafe {
             let Some(input) = info.p_vertex_input_state.as_ref() else {
@@ -279,6 +286,8 @@ impl Attributes {
         let at = &state.attribute_locations;
         let harmonics = if state.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
             0
+        } else if decodings.are_harmonics_decoded {
+            1
         } else {
             (state.spherical_harmonics_degree + 1).pow(2).min(25)
         };
@@ -295,7 +304,8 @@ impl Attributes {
             let attribute = attributes.iter().find(|attribute| attribute.location == location);
             let attribute =
                 attribute.ok_or_else(|| format!("no attribute has location {location}, which Gaussians use"))?;
-            let format = formats::code(attribute.format)
+            let code = if decodings.has_codes(place) { formats::code_of_integers } else { formats::code };
+            let format = code(attribute.format)
                 .ok_or_else(|| format!("attributes of format {:?} are not read", attribute.format))?;
             let binding = bindings.iter().find(|binding| binding.binding == attribute.binding);
             let binding = binding.ok_or_else(|| format!("there is no vertex binding {}", attribute.binding))?;
@@ -336,7 +346,9 @@ pub(crate) unsafe fn create(
             tell(&format!("a pipeline needs {feature}, which is not emulated"));
             return Err(vk::Result::ERROR_FEATURE_NOT_PRESENT);
         }
-        let attributes = match Attributes::read(info, state) {
+        let decodings = find::<DecodingState<'_>>(info.p_next).filter(|_| !is_shaded(state));
+        let decodings = decodings.map(Decodings::new).unwrap_or_default();
+        let attributes = match Attributes::read(info, state, decodings) {
             Ok(attributes) => attributes,
             Err(reason) => {
                 tell(&reason);
@@ -397,6 +409,7 @@ pub(crate) unsafe fn create(
                 is_surfel: state.geometry == Geometry::GAUSSIAN_2D,
                 has_logarithms: state.flags.contains(Flags::LOG_SCALE),
                 has_logits: state.flags.contains(Flags::LOGIT_OPACITY),
+                has_decodings: decodings.is_used(),
                 // What commands set is not known here either.
                 has_lens: false,
                 ..of_footprint
@@ -431,6 +444,7 @@ pub(crate) unsafe fn create(
             compensation_floor: footprint.map_or(0.0, |footprint| footprint.compensation_floor),
             sigma_points: SigmaPoints::new(&sigma_points),
             variant,
+            decodings,
             harmonics_step: attributes.harmonics_step.unwrap_or(0),
             attributes: attributes.list,
             sources: attributes.sources,

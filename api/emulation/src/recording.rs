@@ -8,6 +8,7 @@ use gaurast::vk::GaussianCameraSourceGAURAST as CameraSource;
 
 use crate::bindings::{Bindings, BoundSet, PushConstants};
 use crate::cameras::{Cameras, SeenBy};
+use crate::decoding::Tables;
 use crate::depth_stencil::{Outcome, TestState};
 use crate::draw_call::{Call, Draw, IndexBuffer, Shaded, ShaderDraw, VertexBuffer};
 use crate::emulation::Emulation;
@@ -76,6 +77,7 @@ pub(crate) struct Recording {
     pub(crate) vertex_buffers: BTreeMap<u32, VertexBuffer>,
     pub(crate) index_buffer: Option<IndexBuffer>,
     pub(crate) harmonics: Option<HarmonicsBuffer>,
+    pub(crate) tables: Option<Tables>,
     pub(crate) cameras: Vec<SeenBy>,
     pub(crate) values: DynamicValues,
     /// Depth and stencil tests, as commands have set them.
@@ -113,6 +115,7 @@ impl Recording {
             vertex_buffers: BTreeMap::new(),
             index_buffer: None,
             harmonics: None,
+            tables: None,
             cameras: Vec::new(),
             values: DynamicValues::default(),
             tests: TestState::default(),
@@ -278,6 +281,9 @@ impl Recording {
         if call.is_indexed && index.is_none() {
             return;
         }
+        let Some(tables) = pipeline.decodings.tables(self.tables.as_ref()) else {
+            return;
+        };
         let harmonics = self.harmonics.filter(|_| pipeline.has_harmonics_buffer());
         let sources = self.sources(pipeline);
         let gaussians = self.most(&call, pipeline, &sources);
@@ -306,6 +312,7 @@ impl Recording {
                 Some(_) => Self::shaded(&call, pipeline, &sources, gaussians),
                 None => Shaded::default(),
             },
+            tables,
         };
         let shader_draw = pipeline.projecting.as_ref().map(|_| ShaderDraw {
             call,

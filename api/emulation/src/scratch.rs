@@ -120,6 +120,8 @@ pub(crate) struct Extent {
     pub(crate) tested: u64,
     /// A resolve shader reads depths or Gaussians.
     pub(crate) has_inputs: bool,
+    /// 2D Gaussians have a cut-off.
+    pub(crate) has_rectangles: bool,
 }
 
 /// Offsets into scratch.
@@ -149,12 +151,15 @@ pub(crate) struct Places {
     pub(crate) copied_stencils: u64,
     pub(crate) stored: u64,
     pub(crate) outputs: u64,
+    pub(crate) rectangles: u64,
     /// The size of all.
     pub(crate) end: u64,
 }
 
 /// Bytes of a record of `shaders/set.glsl`.
 const RECORD: u64 = 96;
+/// Bytes of a rectangle of `shaders/set.glsl`.
+const RECTANGLE: u64 = 24;
 /// Keys of a workgroup in sorts and scans.
 const BLOCK: u64 = 2048;
 
@@ -193,6 +198,7 @@ impl Places {
         places.copied_stencils = take(4 * extent.tested);
         places.stored = take(8 * extent.tested);
         places.outputs = take(extent.outputs);
+        places.rectangles = take(if extent.has_rectangles { RECTANGLE * n } else { 0 });
         places.end = end;
         places
     }

@@ -80,7 +80,9 @@ pub(crate) fn answer_features(features: &mut Features<'_>, vertex_shaders_store:
         .gaussian_distortion(true)
         .unscented_parameters(true)
         .gaussian_multiview(true)
-        .opacity_compensation_floor(true);
+        .opacity_compensation_floor(true)
+        .attribute_decoding(true)
+        .gaussian_2d_cut_off(true);
     (features.s_type, features.p_next) = (s_type, p_next);
 }
 

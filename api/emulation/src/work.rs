@@ -64,6 +64,8 @@ struct Parameters {
     inputs: u64,
     seen_by: u64,
     lenses: u64,
+    rectangles: u64,
+    unused: [u32; 2],
     area_origin: [i32; 2],
     area_size: [u32; 2],
     viewport: [f32; 4],
@@ -98,7 +100,7 @@ struct Parameters {
     center: [Pair; 2],
     half_size: [f32; 2],
     attributes: [Attribute; 33],
-    padding: u32,
+    decodings: u32,
 }
 
 /// The push constants of kernels of a set.
@@ -404,6 +406,7 @@ impl Work {
             outputs: self.draws.iter().map(|draw| self.bytes_of_outputs(draw)).sum(),
             tested: if self.tests.is_some() { self.all_samples() } else { 0 },
             has_inputs: self.has_inputs(),
+            has_rectangles: self.pipeline.variant.is_surfel && self.pipeline.variant.has_cut_tiles,
         }
     }
 
@@ -471,6 +474,8 @@ impl Work {
             inputs: made + made_places.inputs,
             seen_by: if has_camera { made + made_places.cameras } else { 0 },
             lenses: if self.lenses.is_empty() { 0 } else { at(places.lenses) },
+            rectangles: at(places.rectangles),
+            unused: [0; 2],
             area_origin: self.area.origin,
             area_size: self.area.size,
             viewport: self.viewport,
@@ -508,7 +513,7 @@ impl Work {
             center: self.center.map(pair),
             half_size: self.half_size,
             attributes: pipeline.attributes,
-            padding: 0,
+            decodings: pipeline.decodings.word,
         }
     }
 

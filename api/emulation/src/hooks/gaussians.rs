@@ -5,12 +5,13 @@ use std::marker::PhantomData;
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraDistortionGAURAST as Distortion,
-    GaussianCameraGAURAST as Camera, GaussianOrderGAURAST as Order,
+    GaussianCameraGAURAST as Camera, GaussianDecodingTablesGAURAST as TablesInfo, GaussianOrderGAURAST as Order,
     GaussianSphericalHarmonicsBufferGAURAST as HarmonicsInfo,
 };
 use gaurast_layer_interface::{find, slice};
 
 use crate::cameras::{SeenBy, camera_data};
+use crate::decoding::Tables;
 use crate::hooks::site::record;
 use crate::lens;
 use crate::recording::HarmonicsBuffer;
@@ -79,6 +80,17 @@ pub(super) unsafe extern "system" fn cmd_bind_gaussian_spherical_harmonics(
             coefficient_stride: info.coefficient_stride,
         };
         record(commands, |_, recording| recording.harmonics = Some(bound), |_| {});
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_bind_gaussian_decoding_tables(
+    commands: vk::CommandBuffer,
+    tables: *const TablesInfo<'_>,
+) {
+    // SAFETY: see the crate.
+    unsafe {
+        let bound = Tables::new(&*tables);
+        record(commands, |_, recording| recording.tables = Some(bound), |_| {});
     }
 }
 

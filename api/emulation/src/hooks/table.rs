@@ -109,6 +109,7 @@ gaurast_layer_interface::hooks! {
     cmd_begin_gaussian_set
     cmd_end_gaussian_set
     cmd_bind_gaussian_spherical_harmonics
+    cmd_bind_gaussian_decoding_tables
     cmd_set_gaussian_order
     cmd_set_gaussian_antialiasing
     cmd_set_gaussian_low_pass_variance
