@@ -20,6 +20,8 @@ pub enum CutOff {
     TileSquare,
     /// The tiles that a rectangle touches, as gsplat has them.
     TileRectangle,
+    /// The same, of a rectangle that compensation makes smaller, as gsplat's unscented projection has them.
+    TileRectangleCompensated,
 }
 
 impl CutOff {
@@ -30,6 +32,7 @@ impl CutOff {
             Self::Ellipse => GaussianCutOffGAURAST::ELLIPSE,
             Self::TileSquare => GaussianCutOffGAURAST::TILE_SQUARE,
             Self::TileRectangle => GaussianCutOffGAURAST::TILE_RECTANGLE,
+            Self::TileRectangleCompensated => GaussianCutOffGAURAST::TILE_RECTANGLE_COMPENSATED,
         }
     }
 }

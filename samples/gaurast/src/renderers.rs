@@ -47,12 +47,6 @@ impl OtherRenderer {
     pub fn settings<'a>(self, settings: Settings, cameras: impl IntoIterator<Item = &'a Camera>) -> Settings {
         let is_surfel = settings.geometry == Geometry::Surfel;
         let is_gsplat = matches!(self, Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented);
-        let (cut_off, cut_off_deviations) = match self {
-            Self::Inria => (CutOff::TileSquare, 3.0),
-            Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => (CutOff::TileRectangle, 3.33),
-            Self::Gltf => (CutOff::Ellipse, 3.0),
-            Self::Usd => (CutOff::None, 3.0),
-        };
         let is_compensated = settings.antialiasing == Antialiasing::Compensated;
         // What is listed by z has no near plane at the device: gsplat's rays meet discs, and its lenses see sigma points, anywhere
         // in front of the eye.
@@ -62,6 +56,17 @@ impl OtherRenderer {
             distorts |= !camera.distortion.is_none();
             is_other_depth |= distorts;
         }
+        // gsplat draws lenses that distort by the unscented transform alone.
+        let is_unscented = self == Self::GsplatUnscented || (is_gsplat && distorts);
+        let (cut_off, cut_off_deviations) = match self {
+            Self::Inria => (CutOff::TileSquare, 3.0),
+            Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented if is_unscented => {
+                (CutOff::TileRectangleCompensated, 3.33)
+            }
+            Self::Gsplat | Self::Gsplat15 | Self::GsplatUnscented => (CutOff::TileRectangle, 3.33),
+            Self::Gltf => (CutOff::Ellipse, 3.0),
+            Self::Usd => (CutOff::None, 3.0),
+        };
         Settings {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: match self {
@@ -73,10 +78,10 @@ impl OtherRenderer {
             cut_off_deviations,
             compensation_floor: match self {
                 Self::Inria | Self::Gsplat if is_compensated => 0.000_025,
+                _ if is_unscented => 0.000_025,
                 _ => 0.0,
             },
-            // gsplat draws lenses that distort by the unscented transform alone.
-            sigma_points: (self == Self::GsplatUnscented || (is_gsplat && distorts)).then_some(SigmaPoints::GSPLAT),
+            sigma_points: is_unscented.then_some(SigmaPoints::GSPLAT),
             by_z: is_gsplat && settings.order == SortOrder::Depth && is_other_depth,
             ..settings
         }

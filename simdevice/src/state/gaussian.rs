@@ -181,6 +181,8 @@ pub enum GaussianCutOff {
     TileSquare,
     /// The tiles that a rectangle touches, whose half sides are standard deviations along x and y, rounded up so.
     TileRectangle,
+    /// The same, but of no more deviations than those at which alpha would reach its floor if opacity were compensated.
+    TileRectangleCompensated,
 }
 
 /// The pixels that Gaussians may reach, and what opacity they have at least. By default they reach all where their alpha
@@ -191,7 +193,7 @@ pub struct GaussianFootprint {
     pub cut_off: GaussianCutOff,
     /// Its size in standard deviations.
     pub deviations: f32,
-    /// The least ratio of determinants that compensation takes the root of, 0 to 1.
+    /// The least ratio of determinants that compensation, and the cut-off by it, take the root of, 0 to 1.
     pub compensation_floor: f32,
 }
 

@@ -29,6 +29,7 @@ fn settings(state: &OracleState) -> Settings {
             OracleCutOff::Ellipse => CutOff::Ellipse,
             OracleCutOff::TileSquare => CutOff::TileSquare,
             OracleCutOff::TileRectangle => CutOff::TileRectangle,
+            OracleCutOff::TileRectangleCompensated => CutOff::TileRectangleCompensated,
         },
         cut_off_deviations: state.cut_off_deviations,
         compensation_floor: state.compensation_floor,

@@ -328,6 +328,11 @@ vk_enum! {
         /// pixels, as in gsplat. Needs `gaussianCutOff`.
         #[doc(alias = "VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST")]
         TILE_RECTANGLE = 3,
+        /// The same rectangle, of no more deviations than those at which alpha reaches `alphaFloor` if
+        /// opacity is compensated, whether or not it is, as in gsplat's unscented projection. Needs
+        /// `gaussianCutOff`.
+        #[doc(alias = "VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_COMPENSATED_GAURAST")]
+        TILE_RECTANGLE_COMPENSATED = 4,
     }
 }
 

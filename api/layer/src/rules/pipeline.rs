@@ -246,7 +246,13 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
 /// Checks the footprint state.
 fn check_footprint(gaussian: &GaussianState, footprint: &Footprint, facts: &Facts, faults: &mut Faults) {
     let &Footprint { cut_off, cut_off_deviations: deviations, compensation_floor: floor } = footprint;
-    let known = [CutOff::NONE, CutOff::ELLIPSE, CutOff::TILE_SQUARE, CutOff::TILE_RECTANGLE];
+    let known = [
+        CutOff::NONE,
+        CutOff::ELLIPSE,
+        CutOff::TILE_SQUARE,
+        CutOff::TILE_RECTANGLE,
+        CutOff::TILE_RECTANGLE_COMPENSATED,
+    ];
     if !known.contains(&cut_off) {
         return faults.error(
             "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",

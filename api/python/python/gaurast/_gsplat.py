@@ -279,8 +279,9 @@ def rasterization(
         raise ValueError(f"version={version!r} is not one of {', '.join(_CEILINGS)}")
 
     has_colors = render_mode.startswith("RGB")
-    is_fisheye = camera_model == "fisheye"
-    is_scene = covars is None and sh_degree is not None and not is_fisheye and has_colors
+    # Rays and sigma points are drawn anywhere in front of the eye, so the list by z is cut at the near plane.
+    by_z = camera_model == "fisheye" or with_ut
+    is_scene = covars is None and sh_degree is not None and not by_z and has_colors
     scene = _scene_of(means, quats, scales, opacities, colors) if is_scene else None
 
     def taken(value: Any, name: str) -> Floats:
@@ -336,11 +337,11 @@ def rasterization(
         "sh_degree": sh_degree or 0,
         "alpha_ceiling": _CEILINGS[version],
         "antialiasing": "compensated" if rasterize_mode == "antialiased" else "off",
-        "cut_off": "TileRectangle",
+        "cut_off": "TileRectangleCompensated" if with_ut else "TileRectangle",
         "cut_off_deviations": 3.33,
         "low_pass_variance": float(eps2d),
         "compensation_floor": _COMPENSATION_FLOORS[version],
-        "by_z": is_fisheye,
+        "by_z": by_z,
         "sigma_points": sigma_points(ut_params) if with_ut else None,
     }
     model = _MODELS[camera_model]

@@ -23,7 +23,7 @@ _RENDERERS: dict[str, tuple[str, float, float, str, Optional[float]]] = {
     "inria": ("TileSquare", 3.0, 0.99, "depth", 0.2),
     "gsplat": ("TileRectangle", 3.33, 0.99, "depth", 0.01),
     "gsplat-1.5": ("TileRectangle", 3.33, 0.999, "depth", 0.01),
-    "gsplat-unscented": ("TileRectangle", 3.33, 0.99, "depth", 0.01),
+    "gsplat-unscented": ("TileRectangleCompensated", 3.33, 0.99, "depth", 0.01),
     "gltf": ("Ellipse", 3.0, 0.99, "distance", None),
     "usd": ("None", 3.0, 0.99, "depth", None),
 }
@@ -170,14 +170,17 @@ def render(
     shape = chosen("geometry", geometry, list(_GEOMETRIES), metadata["geometry"], "3d")
     settings["geometry"] = _GEOMETRIES.get(shape, shape)
     if as_ is not None and as_.startswith("gsplat"):
-        is_surfel = settings["geometry"] == "surfel"
-        if is_surfel:
-            settings["cut_off"] = "None"
-        is_other_depth = is_surfel or any(camera.model == "fisheye" for camera in cameras)
-        settings["by_z"] = is_other_depth and settings["order"] == "depth"
-        if as_ == "gsplat-unscented" or any(camera.distortion is not None for camera in cameras):
-            # gsplat draws lenses that distort by the unscented transform alone.
+        # gsplat draws lenses that distort by the unscented transform alone.
+        is_unscented = as_ == "gsplat-unscented" or any(camera.distortion is not None for camera in cameras)
+        if is_unscented:
             settings["sigma_points"] = sigma_points(None)
+            settings["cut_off"] = "TileRectangleCompensated"
+            settings["compensation_floor"] = 0.000_025
+        # gsplat's rays meet discs, and its lenses see sigma points, anywhere in front of the eye.
+        is_other_depth = (
+            is_unscented or settings["geometry"] == "surfel" or any(camera.model == "fisheye" for camera in cameras)
+        )
+        settings["by_z"] = is_other_depth and settings["order"] == "depth"
 
     drawing = device_of(threads, device)
     first = {**settings, "linear_depth": True} if depth else settings

@@ -31,6 +31,7 @@ pub(super) fn cut_off(value: GaussianCutOffGAURAST) -> Option<GaussianCutOff> {
         GaussianCutOffGAURAST::ELLIPSE => Some(GaussianCutOff::Ellipse),
         GaussianCutOffGAURAST::TILE_SQUARE => Some(GaussianCutOff::TileSquare),
         GaussianCutOffGAURAST::TILE_RECTANGLE => Some(GaussianCutOff::TileRectangle),
+        GaussianCutOffGAURAST::TILE_RECTANGLE_COMPENSATED => Some(GaussianCutOff::TileRectangleCompensated),
         _ => None,
     }
 }

@@ -24,7 +24,8 @@ pub(crate) fn clip(
             GaussianGeometry::Volume => {
                 let screen = &*scratch.screen;
                 let mean = [screen.mean[0][at], screen.mean[1][at]];
-                cut_off.tiles(mean, [0, 1, 2].map(|element| screen.factor[element][at]))
+                let factor = [0, 1, 2].map(|element| screen.factor[element][at]);
+                cut_off.tiles(mean, factor, screen.log2_opacity[at] as f32)
             }
         };
         let [columns, rows] = cut_off.device_tiles(tiles);

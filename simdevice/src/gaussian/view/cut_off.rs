@@ -5,6 +5,7 @@ use super::camera::period;
 use crate::limits::TILE_SIZE;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianCutOff, GaussianState};
+use std::f64::consts::LN_2;
 
 /// Pixels along a side of the tiles that cut-offs are rounded to.
 pub(crate) const CUT_TILE: f64 = 16.0;
@@ -19,20 +20,56 @@ pub(crate) struct TileCutOff {
     is_square: bool,
     /// Standard deviations.
     deviations: f64,
+    /// What makes the deviations fewer, if anything does.
+    compensation: Option<Compensation>,
     /// The upper left corner of the viewport's area, from which tiles count.
     corner: [f64; 2],
+}
+
+/// The compensation of opacity for the low-pass filter, which some cut-offs know whether or not it is drawn.
+#[derive(Clone, Copy, Debug)]
+struct Compensation {
+    /// True if the opacity that is drawn is compensated already.
+    is_drawn: bool,
+    /// The low-pass variance in px^2.
+    low_pass: f64,
+    /// The least ratio of determinants.
+    least_ratio: f64,
+    /// The logarithm of the alpha floor.
+    log2_floor: f64,
+}
+
+impl Compensation {
+    /// The deviations at which the alpha of a Gaussian, after compensation, reaches the floor; none if it is below it at the
+    /// mean. The covariance is the one after the filter, in px^2.
+    fn reach(&self, [xx, xy, yy]: [f64; 3], log2_opacity: f32) -> Option<f64> {
+        let mut log2_range = f64::from(log2_opacity) - self.log2_floor;
+        if !self.is_drawn {
+            let before = (xx - self.low_pass) * (yy - self.low_pass) - xy * xy;
+            let ratio = (before / (xx * yy - xy * xy)).max(self.least_ratio);
+            log2_range += 0.5 * libm::log2(ratio);
+        }
+        (log2_range >= 0.0).then(|| (2.0 * LN_2 * log2_range).sqrt())
+    }
 }
 
 impl TileCutOff {
     /// The cut-off of a state, if it is one in tiles.
     pub(crate) fn of(state: &GaussianState, viewport_corner: [f64; 2]) -> Option<Self> {
         let footprint = &state.footprint;
-        let is_square = match footprint.cut_off {
-            GaussianCutOff::TileSquare => true,
-            GaussianCutOff::TileRectangle => false,
+        let (is_square, knows_compensation) = match footprint.cut_off {
+            GaussianCutOff::TileSquare => (true, false),
+            GaussianCutOff::TileRectangle => (false, false),
+            GaussianCutOff::TileRectangleCompensated => (false, state.alpha_floor > 0.0),
             GaussianCutOff::None | GaussianCutOff::Ellipse => return None,
         };
-        Some(Self { is_square, deviations: footprint.deviations.into(), corner: viewport_corner })
+        let compensation = knows_compensation.then(|| Compensation {
+            is_drawn: state.opacity_compensated,
+            low_pass: state.low_pass_variance.into(),
+            least_ratio: footprint.compensation_floor.into(),
+            log2_floor: libm::log2(state.alpha_floor.into()),
+        });
+        Some(Self { is_square, deviations: footprint.deviations.into(), compensation, corner: viewport_corner })
     }
 
     /// True if its tiles are the device's.
@@ -46,9 +83,9 @@ impl TileCutOff {
         libm::floor((centre - self.corner[axis]) / CUT_TILE)
     }
 
-    /// The first tile, and the one after the last, along x and y, of a Gaussian with a mean, in framebuffer pixels, and the
-    /// scaled Cholesky factor of its conic.
-    pub(crate) fn tiles(&self, mean: [f64; 2], factor: [f64; 3]) -> [[f64; 2]; 2] {
+    /// The first tile, and the one after the last, along x and y, of a Gaussian with a mean, in framebuffer pixels, the scaled
+    /// Cholesky factor of its conic, and the logarithm of its opacity.
+    pub(crate) fn tiles(&self, mean: [f64; 2], factor: [f64; 3], log2_opacity: f32) -> [[f64; 2]; 2] {
         let [xx, xy, yy] = covariance(factor);
         let from_corner = [0, 1].map(|axis| mean[axis] - self.corner[axis]);
         if self.is_square {
@@ -62,7 +99,14 @@ impl TileCutOff {
                 [libm::floor((mean - radius) / CUT_TILE), libm::floor((mean + radius + (CUT_TILE - 1.0)) / CUT_TILE)]
             });
         }
-        self.rectangle(mean, [xx, yy].map(f64::sqrt))
+        let halves = [xx, yy].map(f64::sqrt);
+        let Some(compensation) = &self.compensation else {
+            return self.rectangle(mean, halves);
+        };
+        compensation.reach([xx, xy, yy], log2_opacity).map_or([[0.0; 2]; 2], |reach| {
+            let deviations = self.deviations.min(reach);
+            Self { deviations, ..*self }.rectangle(mean, halves)
+        })
     }
 
     /// The first tile, and the one after the last, along x and y, of a rectangle about a place in framebuffer pixels. `halves` are
@@ -91,7 +135,7 @@ pub(crate) fn list_cut_off(state: &GaussianState, camera: &Camera, viewport: &Vi
 
 /// The covariance xx, xy, yy in px^2 whose conic has this scaled Cholesky factor.
 fn covariance([a, b, c]: [f64; 3]) -> [f64; 3] {
-    let unit2 = 0.5 / std::f64::consts::LN_2;
+    let unit2 = 0.5 / LN_2;
     let xx = unit2 / (a * a);
     let slope = -b / c;
     // The determinant is xx unit^2 / c^2.
@@ -110,7 +154,7 @@ mod tests {
         ) {
             let xy = correlation * (xx * yy).sqrt();
             let determinant = xx * yy - xy * xy;
-            let unit = (0.5 / std::f64::consts::LN_2).sqrt();
+            let unit = (0.5 / LN_2).sqrt();
             let vertical = (xx / determinant).sqrt() * unit;
             let back = covariance([unit / xx.sqrt(), -(xy / xx) * vertical, vertical]);
             for (back, given) in back.into_iter().zip([xx, xy, yy]) {

@@ -48,7 +48,8 @@ impl CutOff {
                 low | half_within(simd, splat, middle, *most, 8) << 8
             }
             Self::Tiles(cut_off) => {
-                let tiles = surfel.map_or_else(|| cut_off.tiles(splat.mean, splat.factor), |surfel| surfel.tiles);
+                let of_volume = || cut_off.tiles(splat.mean, splat.factor, splat.log2_opacity);
+                let tiles = surfel.map_or_else(of_volume, |surfel| surfel.tiles);
                 (0..BLOCK_PIXELS).fold(0, |bits, lane| {
                     let centre = [middle[0] + LANE_X_64[lane], middle[1] + LANE_Y_64[lane]];
                     let is_within = [0, 1].into_iter().all(|axis| {

@@ -201,6 +201,7 @@ mutants! {
     "footprint": {
         CUT_OFF = "Nothing is cut off",
         CUT_OFF_RECTANGLE = "Tiles of a rectangle are tiles of a square",
+        CUT_OFF_COMPENSATED = "The rectangle of the compensated opacity is the one of all deviations",
         CUT_OFF_DEVIATIONS = "Gaussians are cut off at three deviations",
         COMPENSATION_FLOOR = "The compensation of the opacity has no floor",
     }

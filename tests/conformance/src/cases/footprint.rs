@@ -9,12 +9,16 @@ use gaurast::vk::{
 use super::chapter::Chapter;
 use super::modes::ORDERS;
 use super::scenes::{Gaussian, ball, cameras, cloud, dense, layered, many, parallels, pinholes, strange};
-use crate::draw::{Depth, Draw, Footprint};
+use crate::draw::{Depth, Draw, Footprint, Unscented};
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-const CUT_OFFS: [(&str, CutOff); 3] =
-    [("ellipse", CutOff::ELLIPSE), ("tile_square", CutOff::TILE_SQUARE), ("tile_rectangle", CutOff::TILE_RECTANGLE)];
+const CUT_OFFS: [(&str, CutOff); 4] = [
+    ("ellipse", CutOff::ELLIPSE),
+    ("tile_square", CutOff::TILE_SQUARE),
+    ("tile_rectangle", CutOff::TILE_RECTANGLE),
+    ("tile_rectangle_compensated", CutOff::TILE_RECTANGLE_COMPENSATED),
+];
 
 pub(super) fn footprint(chapter: &mut Chapter<'_>) {
     for (name, cut_off) in CUT_OFFS {
@@ -93,6 +97,7 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
         });
     }
     discs(chapter);
+    compensated(chapter);
     for floor in [0.000_025, 0.1, 0.5, 1.0] {
         for low_pass in [0.05, 0.3, 1.0] {
             chapter.add(format!("floor_{floor}.low_pass_{low_pass}"), move || Draw {
@@ -106,6 +111,39 @@ pub(super) fn footprint(chapter: &mut Chapter<'_>) {
     chapter.add("floor_without_compensation", || Draw {
         footprint: Some(Footprint::default().compensation_floor(1.0)),
         ..Draw::new(cloud(315, 800, 0))
+    });
+}
+
+/// Rectangles that the compensated opacity makes smaller, by filters, floors, compensation and the unscented transform's points.
+fn compensated(chapter: &mut Chapter<'_>) {
+    let footprint = |floor| {
+        Footprint::default()
+            .cut_off(CutOff::TILE_RECTANGLE_COMPENSATED)
+            .cut_off_deviations(3.33)
+            .compensation_floor(floor)
+    };
+    for (floor_name, floor) in [("least", 0.0), ("gsplat", 0.000_025), ("half", 0.5), ("one", 1.0)] {
+        for low_pass in [0.0, 0.3, 8.0] {
+            chapter.add(format!("smaller.floor_{floor_name}.low_pass_{low_pass}"), move || Draw {
+                footprint: Some(footprint(floor)),
+                ..Draw::new(cloud(324, 800, 0)).in_state(|state| state.low_pass_variance(low_pass))
+            });
+        }
+    }
+    chapter.add("smaller.compensated", move || Draw {
+        footprint: Some(footprint(0.000_025)),
+        ..Draw::new(cloud(325, 800, 0))
+            .in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED).low_pass_variance(2.0))
+    });
+    chapter.add("smaller.gsplat", move || Draw {
+        footprint: Some(footprint(0.000_025)),
+        unscented: Some(Unscented::default().alpha(0.1).picture_margin(0.1)),
+        ..Draw::new(dense(326, 1)).in_state(|state| state.linearization(Linearization::UNSCENTED))
+    });
+    chapter.add("smaller.viewport", move || Draw {
+        footprint: Some(footprint(0.000_025)),
+        viewport: Some(vk::Viewport::default().x(13.0).y(7.0).width(61.0).height(58.0).max_depth(1.0)),
+        ..Draw::new(cloud(327, 800, 0)).in_state(|state| state.low_pass_variance(2.0))
     });
 }
 

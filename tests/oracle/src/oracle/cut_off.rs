@@ -5,6 +5,7 @@
 //! of the ellipse.
 
 use super::error_model::{PrecisionClass, Rounding, UNIT_ROUNDOFF};
+use super::splat::CompensatedOpacity;
 use super::{OracleCutOff, OracleState};
 
 /// Pixels along a tile's side.
@@ -24,6 +25,8 @@ pub(super) struct Place {
     pub(super) mean: [f64; 2],
     /// The covariance xx, xy, yy.
     pub(super) covariance: [f64; 3],
+    /// The opacity of the Gaussian after compensation.
+    pub(super) compensated: CompensatedOpacity,
     /// The quadratic form there.
     pub(super) q: f64,
     /// The relative error of alpha there.
@@ -63,9 +66,11 @@ pub(super) fn is_cut(place: &Place, state: &OracleState) -> (bool, bool) {
             let near = (place.q - most).abs() <= 2.0 * place.error + place.of_radius() * most;
             (place.q > most, near)
         }
-        OracleCutOff::TileSquare | OracleCutOff::TileRectangle => {
+        OracleCutOff::TileSquare | OracleCutOff::TileRectangle | OracleCutOff::TileRectangleCompensated => {
             let is_within = |slack: f64| {
-                let boxed = boxed(place, state, slack);
+                let Some(boxed) = boxed(place, state, slack) else {
+                    return false;
+                };
                 [0, 1].iter().all(|&axis| {
                     let tile = (place.centre[axis] / TILE).floor();
                     let [first, end] = boxed[axis];
@@ -77,9 +82,22 @@ pub(super) fn is_cut(place: &Place, state: &OracleState) -> (bool, bool) {
     }
 }
 
-/// The first tile and the one after the last along x and y, of a box whose sides are moved out by `slack` times their error.
-fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
+/// The standard deviations of a box, none if nothing is drawn, of an opacity that is greater by `slack` times its error.
+fn deviations(place: &Place, state: &OracleState, slack: f64) -> Option<f64> {
     let k = f64::from(state.cut_off_deviations);
+    let floor = f64::from(state.alpha_floor);
+    if state.cut_off != OracleCutOff::TileRectangleCompensated || floor == 0.0 {
+        return Some(k);
+    }
+    let CompensatedOpacity { value, error } = place.compensated;
+    let above = value * (1.0 + slack * error) / floor;
+    (above >= 1.0).then(|| k.min((2.0 * above.ln()).sqrt()))
+}
+
+/// The first tile and the one after the last along x and y, of a box whose sides are moved out by `slack` times their error; none
+/// if nothing is drawn.
+fn boxed(place: &Place, state: &OracleState, slack: f64) -> Option<[[f64; 2]; 2]> {
+    let k = deviations(place, state, slack)?;
     let [xx, xy, yy] = place.covariance;
     let radius = |variance: f64| (k * variance.sqrt() * (1.0 + slack * place.of_radius())).ceil();
     let side = |axis: usize, mean: f64, radius: f64| slack * place.of_side(axis, mean.abs() + radius + TILE);
@@ -88,15 +106,15 @@ fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
         let half_difference = 0.5 * (xx - yy);
         let spread = (half_difference * half_difference + xy * xy).max(LEAST_SPREAD);
         let radius = radius(0.5 * (xx + yy) + spread.sqrt());
-        return [0, 1].map(|axis| {
+        return Some([0, 1].map(|axis| {
             let mean = place.mean[axis] - 0.5;
             let slack = side(axis, mean, radius);
             [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack + (TILE - 1.0)) / TILE).floor()]
-        });
+        }));
     }
-    [0, 1].map(|axis| {
+    Some([0, 1].map(|axis| {
         let (mean, radius) = (place.mean[axis], radius([xx, yy][axis]));
         let slack = side(axis, mean, radius);
         [((mean - radius - slack) / TILE).floor(), ((mean + radius + slack) / TILE).ceil()]
-    })
+    }))
 }

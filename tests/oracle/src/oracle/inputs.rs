@@ -140,6 +140,8 @@ pub enum OracleCutOff {
     TileSquare,
     /// The tiles that a rectangle touches.
     TileRectangle,
+    /// The same, of no more deviations than those at which the compensated opacity reaches the alpha floor.
+    TileRectangleCompensated,
 }
 
 /// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
@@ -228,6 +230,7 @@ impl OracleState {
                 GaussianCutOffGAURAST::ELLIPSE => OracleCutOff::Ellipse,
                 GaussianCutOffGAURAST::TILE_SQUARE => OracleCutOff::TileSquare,
                 GaussianCutOffGAURAST::TILE_RECTANGLE => OracleCutOff::TileRectangle,
+                GaussianCutOffGAURAST::TILE_RECTANGLE_COMPENSATED => OracleCutOff::TileRectangleCompensated,
                 _ => OracleCutOff::None,
             },
             cut_off_deviations: footprint.cut_off_deviations,
@@ -249,12 +252,12 @@ impl OracleState {
         Self { sigma_points, ..self }
     }
 
-    /// The factor of the opacity, and the root of the determinant whose error it has, if opacity is compensated. `area` is the
-    /// root of the determinant before the low-pass.
-    pub(super) fn compensation(&self, area: f64, determinant: f64) -> Option<[f64; 2]> {
+    /// The factor that compensates opacity, and the root of the determinant whose error it has. `area` is the root of the
+    /// determinant before the low-pass.
+    pub(super) fn compensation(&self, area: f64, determinant: f64) -> [f64; 2] {
         let floor = f64::from(self.compensation_floor);
         let area = area.max((floor * determinant).sqrt());
-        self.opacity_compensated.then(|| [area / determinant.sqrt(), area])
+        [area / determinant.sqrt(), area]
     }
 }
 

@@ -7,7 +7,7 @@ use super::panorama;
 use super::projection::{depth_variable, ideal_radius, mean_and_jacobian};
 use super::rules::ColorDirection;
 use super::spherical_harmonics;
-use super::splat::{Cholesky, Splat};
+use super::splat::{Cholesky, CompensatedOpacity, Splat};
 use super::surfel::{self, Surfel};
 use super::unscented::{self, Deviation, Transformed};
 use super::vectors::{dot, length, multiply_row, subtract, transform};
@@ -107,11 +107,10 @@ pub fn project(
         return Err(SkipReason::DegenerateCovariance);
     }
     let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
-    let mut opacity = f64::from(scene.opacity(index));
-    let compensation = state.compensation(area, determinant);
-    if let Some([factor, _]) = compensation {
-        opacity *= factor;
-    }
+    let given_opacity = f64::from(scene.opacity(index));
+    let [factor, least_area] = state.compensation(area, determinant);
+    let compensated_opacity = given_opacity * factor;
+    let opacity = if state.opacity_compensated { compensated_opacity } else { given_opacity };
 
     // Step 5. Colour.
     let toward = match rules.color_direction {
@@ -155,7 +154,6 @@ pub fn project(
         let terms = model.linear.map(|row| dot(row.map(f64::abs), position.map(f64::abs)));
         4.0 * f64::EPSILON * (length(terms) + length(model.translation) + length(camera.eye))
     };
-    let area_for_opacity = compensation.map(|[_, area]| area);
     let disc = [0, 1].map(|axis| {
         let own = [axes[axis], axes[3 + axis], axes[6 + axis]];
         transform(&rotation, own.map(|c| c * scale[axis]))
@@ -176,6 +174,7 @@ pub fn project(
         period: panorama::period(camera, rules),
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
+        compensated: CompensatedOpacity::new(compensated_opacity, least_area, spread, rounding),
         color,
         key: rules.key_rounding.key(sort_by),
         z,
@@ -198,7 +197,7 @@ pub fn project(
         may_be_folded: fold.is_some_and(|fold| radius >= fold.least),
         key_undecidable: state.order.has_keys() && key_is_undecidable(&rotation, offset, lost, sort_by),
         key_terms: [0, 1, 2].map(|i| rotation[6 + i] * model.point(position)[i]),
-        error: ErrorModel::new(spread, opacity, area_for_opacity, rounding),
+        error: ErrorModel::new(spread, opacity, state.opacity_compensated.then_some(least_area), rounding),
     })
 }
 

@@ -3,7 +3,7 @@
 use super::error_model::{ErrorModel, PrecisionClass, Rounding, relaxed};
 use super::own_axes::OwnAxes;
 use super::render::{Projected, Reference, bounded};
-use super::splat::{Cholesky, Splat};
+use super::splat::{Cholesky, CompensatedOpacity, Splat};
 use super::{OracleOrder, OracleState, SkipReason};
 
 /// A vertex shader's outputs for one Gaussian.
@@ -68,12 +68,10 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         return Err(SkipReason::DegenerateCovariance);
     }
     let area = area2.max(0.0).sqrt();
-    let mut opacity = f64::from(outputs.opacity);
-    let compensation = state.compensation(area, determinant);
-    if let Some([factor, _]) = compensation {
-        opacity *= factor;
-    }
-    let area_for_opacity = compensation.map(|[_, area]| area);
+    let given_opacity = f64::from(outputs.opacity);
+    let [factor, least_area] = state.compensation(area, determinant);
+    let compensated_opacity = given_opacity * factor;
+    let opacity = if state.opacity_compensated { compensated_opacity } else { given_opacity };
     let rounding = match state.rules.precision {
         PrecisionClass::Full => Rounding::FULL,
         PrecisionClass::Relaxed => Rounding {
@@ -83,6 +81,7 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
             ..Rounding::FULL
         },
     };
+    let spread = [covariance[0].sqrt(), covariance[2].sqrt()];
     Ok(Splat {
         index: 0,
         distance: w as f32,
@@ -95,6 +94,7 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         may_be_folded: false,
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
+        compensated: CompensatedOpacity::new(compensated_opacity, least_area, spread, rounding),
         color: outputs.color.map(f64::from),
         key: match state.order {
             OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
@@ -106,7 +106,7 @@ pub fn project(outputs: &OracleOutputs, viewport: &OracleViewport, state: &Oracl
         depth_error: 0.0,
         key_undecidable: false,
         key_terms: [0.0; 3],
-        error: ErrorModel::new([covariance[0].sqrt(), covariance[2].sqrt()], opacity, area_for_opacity, rounding),
+        error: ErrorModel::new(spread, opacity, state.opacity_compensated.then_some(least_area), rounding),
     })
 }
 

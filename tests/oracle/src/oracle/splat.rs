@@ -2,7 +2,7 @@
 
 use super::OracleState;
 use super::cut_off::{Place, is_cut};
-use super::error_model::ErrorModel;
+use super::error_model::{ErrorModel, Rounding};
 use super::own_axes::OwnAxes;
 use super::panorama;
 use super::surfel::Surfel;
@@ -24,6 +24,8 @@ pub struct Splat {
     pub cholesky: Cholesky,
     /// Opacity, after compensation if the state asks for it.
     pub opacity: f64,
+    /// Opacity after compensation, which a cut-off may know.
+    pub compensated: CompensatedOpacity,
     /// Colour, at least 0.
     pub color: [f64; 3],
     /// The value by which it is sorted, rounded to binary32 unless the rules are others.
@@ -49,6 +51,22 @@ pub struct Splat {
     pub may_be_folded: bool,
     /// The bound on the error of a binary32 implementation for this Gaussian.
     pub error: ErrorModel,
+}
+
+/// The opacity of a Gaussian after compensation for the low-pass filter.
+#[derive(Clone, Copy, Debug)]
+pub struct CompensatedOpacity {
+    /// The opacity.
+    pub value: f64,
+    /// The bound on its relative error.
+    pub error: f64,
+}
+
+impl CompensatedOpacity {
+    /// The opacity of a Gaussian whose error model has this spread. `area` is the root of the determinant that compensation takes.
+    pub(super) fn new(value: f64, area: f64, spread: [f64; 2], rounding: Rounding) -> Self {
+        Self { value, error: ErrorModel::new(spread, value, Some(area), rounding).alpha([0.0; 2], 0.0) }
+    }
 }
 
 /// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
@@ -130,7 +148,15 @@ impl Splat {
             Some((middle, [xx, yy])) => (middle, [xx, 0.0, yy]),
             None => ([centre[0] - d[0], centre[1] - d[1]], self.covariance),
         };
-        let place = Place { centre, mean, covariance, q, error: relative, rounding: *self.error.rounding() };
+        let place = Place {
+            centre,
+            mean,
+            covariance,
+            compensated: self.compensated,
+            q,
+            error: relative,
+            rounding: *self.error.rounding(),
+        };
         let (is_cut, cut_undecidable) = is_cut(&place, state);
         let cut_undecidable = cut_undecidable || self.may_be_folded;
         let whole = Alpha { is_cut, cut_undecidable, ..Alpha::NOTHING };

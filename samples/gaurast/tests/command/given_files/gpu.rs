@@ -149,19 +149,19 @@ fn flat_pictures_of_gsplat() {
     Set { least: 84.2, most: 6, ..Set::new("gsplat_2d", 4_096.0, options) }.check();
 }
 
-/// gsplat leaves out, and ends earlier, what its opacity would be if it were compensated for the low-pass: thin needles.
+/// Of the pixel over 1/255 one splat's alpha is 1.0025 times the floor: gsplat sums its mean in binary32, with weights of -99 and 16.7.
 #[gaurast_runner::test(needs = NEEDS)]
 fn unscented_pictures_of_gsplat() {
     let options = &["--as", "gsplat-unscented", "--near", "0.2"];
-    Set { least: 76.3, most: 35, views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
+    Set { least: 81.4, most: 1, views: &ALL[..4], ..Set::new("gsplat_unscented", 4_096.0, options) }.check();
 }
 
 #[gaurast_runner::test(needs = NEEDS)]
 fn distorted_pictures_of_gsplat() {
     let lens = Some(("FULL_OPENCV", "0.12 -0.05 0.002 -0.003 0.01 0 0 0"));
     Set {
-        least: 76.9,
-        most: 29,
+        least: 81.0,
+        most: 1,
         views: &["plant-0", "playbot-0"],
         lens,
         ..Set::new("gsplat_distorted", 4_096.0, GSPLAT)
@@ -173,8 +173,8 @@ fn distorted_pictures_of_gsplat() {
 fn distorted_fisheyes_of_gsplat() {
     let lens = Some(("OPENCV_FISHEYE", "0.05 -0.01 0.002 -0.0005"));
     Set {
-        least: 75.9,
-        most: 39,
+        least: 80.9,
+        most: 0,
         views: &["plant-0", "playbot-0"],
         lens,
         ..Set::new("gsplat_distorted_fisheye", 4_096.0, GSPLAT)

@@ -143,6 +143,9 @@ fn change_approximations(request: &mut Request) {
         if footprint.cut_off == CutOff::TILE_RECTANGLE {
             CUT_OFF_RECTANGLE.replaces(&mut footprint.cut_off, CutOff::TILE_SQUARE);
         }
+        if footprint.cut_off == CutOff::TILE_RECTANGLE_COMPENSATED {
+            CUT_OFF_COMPENSATED.replaces(&mut footprint.cut_off, CutOff::TILE_RECTANGLE);
+        }
         if footprint.cut_off != CutOff::NONE {
             CUT_OFF_DEVIATIONS.replaces(&mut footprint.cut_off_deviations, 3.0);
         }
