@@ -4,8 +4,8 @@
 //! radius before it is rounded up, as many of the magnitudes that a side of a box is a sum of, and the error that alpha has,
 //! of the ellipse.
 
+use super::compensation::CompensatedOpacity;
 use super::error_model::{PrecisionClass, Rounding, UNIT_ROUNDOFF};
-use super::splat::CompensatedOpacity;
 use super::{OracleCutOff, OracleState};
 
 /// Pixels along a tile's side.

@@ -57,6 +57,7 @@
 
 pub mod activation;
 mod binary16;
+pub mod compensation;
 mod cut_off;
 pub mod decoding;
 pub mod error_model;

@@ -1,5 +1,6 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
+use super::compensation::CompensatedOpacity;
 use super::error_model::{ErrorModel, PrecisionClass, Rounding, UNIT_ROUNDOFF, relaxed};
 use super::instance::Model;
 use super::own_axes::OwnAxes;
@@ -7,7 +8,7 @@ use super::panorama;
 use super::projection::{depth_variable, ideal_radius, mean_and_jacobian};
 use super::rules::ColorDirection;
 use super::spherical_harmonics;
-use super::splat::{Cholesky, CompensatedOpacity, Splat};
+use super::splat::{Cholesky, Splat};
 use super::surfel::{self, Surfel};
 use super::unscented::{self, Deviation, Transformed};
 use super::vectors::{dot, length, multiply_row, subtract, transform};

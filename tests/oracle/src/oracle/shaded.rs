@@ -1,9 +1,10 @@
 //! Vertex-shader projection: from a vertex shader's outputs for a Gaussian to the numbers that a pixel needs.
 
+use super::compensation::CompensatedOpacity;
 use super::error_model::{ErrorModel, PrecisionClass, Rounding, relaxed};
 use super::own_axes::OwnAxes;
 use super::render::{Projected, Reference, bounded};
-use super::splat::{Cholesky, CompensatedOpacity, Splat};
+use super::splat::{Cholesky, Splat};
 use super::{OracleOrder, OracleState, SkipReason};
 
 /// A vertex shader's outputs for one Gaussian.

@@ -1,8 +1,9 @@
 //! A projected Gaussian, and step 6: its alpha at a pixel centre.
 
 use super::OracleState;
+use super::compensation::CompensatedOpacity;
 use super::cut_off::{Place, is_cut};
-use super::error_model::{ErrorModel, Rounding};
+use super::error_model::ErrorModel;
 use super::own_axes::OwnAxes;
 use super::panorama;
 use super::surfel::Surfel;
@@ -51,22 +52,6 @@ pub struct Splat {
     pub may_be_folded: bool,
     /// The bound on the error of a binary32 implementation for this Gaussian.
     pub error: ErrorModel,
-}
-
-/// The opacity of a Gaussian after compensation for the low-pass filter.
-#[derive(Clone, Copy, Debug)]
-pub struct CompensatedOpacity {
-    /// The opacity.
-    pub value: f64,
-    /// The bound on its relative error.
-    pub error: f64,
-}
-
-impl CompensatedOpacity {
-    /// The opacity of a Gaussian whose error model has this spread. `area` is the root of the determinant that compensation takes.
-    pub(super) fn new(value: f64, area: f64, spread: [f64; 2], rounding: Rounding) -> Self {
-        Self { value, error: ErrorModel::new(spread, value, Some(area), rounding).alpha([0.0; 2], 0.0) }
-    }
 }
 
 /// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
