@@ -25,7 +25,7 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("cameras", &["camera.pinhole", "camera.parallel"], 15),
     ("passes", &["passes"], 12),
     ("instances", &["instances.one", "instances.pinhole"], 10),
-    ("footprints", &["footprint.ellipse", "footprint.tile_square", "footprint.smaller", "footprint.disc"], 68),
+    ("footprints", &["footprint.ellipse", "footprint.tile_square", "footprint.smaller", "footprint.disc.strange"], 35),
     ("dynamic states", &["dynamic_state"], 15),
     ("numerics", &["numerics.needles", "numerics.discs"], 12),
     ("views", &["views"], 14),
@@ -40,7 +40,7 @@ const PARTS: &[(&str, &[&str], usize)] = &[
     ("depths", &["depth.d16", "depth.d24", "depth.d32", "depth.samples", "depth.median"], 60),
     ("stencils", &["stencil.pass", "stencil.fail", "stencil.depth_fail", "stencil.compare", "stencil.masks"], 35),
     ("logarithms and logits", &["activation"], 12),
-    ("codes", &["decoding.as_in", "decoding.end.*.in_part", "decoding.rotation", "decoding.surfel"], 18),
+    ("codes", &["decoding.as_in", "decoding.end.codebook", "decoding.end.labels", "decoding.rotation"], 18),
     ("projecting shaders", &["projection"], 19),
     ("areas", &["interactions.viewport", "interactions.scissor", "interactions.area"], 38),
 ];

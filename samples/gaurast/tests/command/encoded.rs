@@ -50,7 +50,7 @@ fn renderer() -> Renderer {
 }
 
 /// A compressed PLY of `count` Gaussians with harmonics of degree 2.
-fn compressed_ply(count: usize) -> String {
+pub(super) fn compressed_ply(count: usize) -> String {
     let mut state = 7_u64;
     let mut number = |low: f32, high: f32| {
         // Knuth's generator of 64 bits.

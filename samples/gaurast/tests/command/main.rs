@@ -3,6 +3,7 @@
 mod c_program;
 mod command_line;
 mod compliance;
+mod devices;
 mod encoded;
 mod evaluation;
 mod files;
