@@ -16,7 +16,8 @@ need() { # need PACKAGE COMMAND-OR-FILE
 need gcc cc
 need g++ c++
 need libvulkan-dev /usr/include/vulkan/vulkan.h
-need mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.x86_64.json
+# Newer Debian has it without the architecture.
+need mesa-vulkan-drivers "$(echo /usr/share/vulkan/icd.d/lvp_icd*.json)"
 need libvulkan1 "/usr/lib/$(uname -m)-linux-gnu/libvulkan.so.1"
 need vulkan-tools vulkaninfo
 need vulkan-validationlayers /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json

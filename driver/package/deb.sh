@@ -5,6 +5,9 @@
 set -eu
 . "$(dirname "$0")/arguments.sh"
 architecture=$(dpkg --print-architecture)
+# The newest version of glibc's symbols that a built file asks for; 2.17 where zig has built them.
+glibc=$(cat "$build/gaurast" "$build/libvulkan_gaurast.so" "$build/libVkLayer_gaurast_validation.so" |
+    grep --text --only-matching 'GLIBC_2\.[0-9]*' | sed 's/GLIBC_//' | sort --version-sort --unique | tail -n 1)
 DESTDIR=$work PREFIX=/usr LIBDIR=/usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH 2>/dev/null || echo "$(uname -m)-linux-gnu") \
     "$here/install.sh" "$build"
 find "$work/usr/share/man" -name '*.1' -exec gzip -9n {} +
@@ -20,7 +23,7 @@ Version: $version
 Architecture: $architecture
 Maintainer: The GauRast project <gaurast@invalid>
 Installed-Size: $(du -sk "$work/usr" | cut -f 1)
-Depends: libc6 (>= 2.17), libgcc-s1
+Depends: libc6 (>= $glibc), libgcc-s1
 Recommends: libvulkan1
 Suggests: ffmpeg
 Section: graphics

@@ -14,12 +14,13 @@ https://*) (cd "$folder" && curl --fail --silent --show-error --location --remot
 *) cp "$archive" "$archive.sha256" "$folder" ;;
 esac
 (cd "$folder" && sha256sum --check --quiet "$(basename "$archive").sha256")
-tar -C "$folder" --strip-components=1 -xf "$folder/$(basename "$archive")"
-if ! command -v vulkaninfo >/dev/null; then
+# Images of containers may lack either.
+if ! command -v vulkaninfo >/dev/null || ! command -v xz >/dev/null; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update -qq
-    $sudo apt-get install -y -qq --no-install-recommends libvulkan1 vulkan-tools >/dev/null
+    $sudo apt-get install -y -qq --no-install-recommends libvulkan1 vulkan-tools xz-utils >/dev/null
 fi
+tar -C "$folder" --strip-components=1 -xf "$folder/$(basename "$archive")"
 variables=$("$folder/bin/gaurast" icd)
 eval "$variables"
 for name in VK_DRIVER_FILES VK_ICD_FILENAMES VK_ADD_LAYER_PATH; do

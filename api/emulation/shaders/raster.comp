@@ -253,6 +253,11 @@ void main() {
         cut_rows = uvec4(floor(max(rows - viewport.y, vec4(0.0)) / 16.0));
     }
 
+    // lavapipe runs bodies of loops that no invocation enters, and 26.2 then reads at addresses that are the same for all of them: members
+    // must be Gaussians even so.
+    members[l] = members[l + INVOCATIONS] = 0u;
+    barrier();
+
     // Where the pairs did not fit, every Gaussian that is seen is looked at.
     uint copies_ = HAS_ANGLES ? copies() : 1u;
     bool is_overflow = push.set.counters.at[PAIRS] != push.set.counters.at[STORED];
@@ -350,7 +355,7 @@ void main() {
             }
         }
         for (k = steep == 0u ? count : 0u; k < count; k++) {
-            Record r = record_of(members[k]);
+            Record r = record_of(members[min(k, BATCH - 1u)]);
             vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
             vec4 exponent, rest = vec4(0.0);
             if (IS_SURFEL) {

@@ -60,6 +60,8 @@ fn emulation_manifest(folder: &Path) {
     let library = gaurast_runner::built_library("gaurast-emulation-layer", name);
     let library = library.to_str().expect("a path of Unicode");
     let template = include_str!("../../../api/emulation/layer/gaurast_emulation.json");
+    let revision = format!("\"spec_version\": \"{}\"", gaurast::gaussian_primitive_topology::SPEC_VERSION);
+    assert!(template.contains(&revision), "the template names the extension's revision");
     let text = template.replace(&format!("../../../target/release/{name}"), library);
     assert!(text.contains(library), "the template names the library");
     std::fs::write(folder.join("gaurast_emulation.json"), text).expect("the manifest is written");
