@@ -355,7 +355,8 @@ void main() {
             }
         }
         for (k = steep == 0u ? count : 0u; k < count; k++) {
-            Record r = record_of(members[min(k, BATCH - 1u)]);
+            uint member = members[min(k, BATCH - 1u)];
+            Record r = record_of(member);
             vec2 x = add(two_sum(center.x, -r.mean_x.x), pair(-r.mean_x.y));
             vec4 exponent, rest = vec4(0.0);
             if (IS_SURFEL) {
@@ -363,7 +364,7 @@ void main() {
                 vec4 u, v, w, square;
                 Rectangle rectangle = Rectangle(vec2(0.0), vec2(0.0), 0u, 0u);
                 if (HAS_CUT_TILES) {
-                    rectangle = push.set.rectangles.at[members[k]];
+                    rectangle = push.set.rectangles.at[member];
                 }
                 vec2 from_x = sub(x, rectangle.shift_x);
                 for (uint j = 0u; j < ROWS; j++) {
