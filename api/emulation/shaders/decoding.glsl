@@ -13,25 +13,14 @@ uint decoding_of(uint place) {
     return push.set.decodings >> place & 3u;
 }
 
-bool is_finite_pair(vec2 a) {
-    return !isnan(a.x) && !isinf(a.x);
-}
-
 // A binary64 number as a pair.
 vec2 pair_of_bits(uvec2 bits) {
-    int exponent = int(bits.y >> 20 & 0x7ffu) - 1075;
-    if (exponent == -1075) {
-        return vec2(0.0);
+    if ((bits.y & 0x7ff00000u) == 0x7ff00000u) {
+        bool is_infinite = (bits.y & 0xfffffu) == 0u && bits.x == 0u;
+        return pair(uintBitsToFloat((is_infinite ? 0x7f800000u : 0x7fc00000u) | bits.y & 0x80000000u));
     }
-    if (exponent == 972) {
-        return pair(uintBitsToFloat(0x7f800000u | (any(notEqual(uvec2(bits.x, bits.y & 0xfffffu), uvec2(0u))) ? 1u : 0u) | bits.y & 0x80000000u));
-    }
-    // 53 bits: 24, 24 and 5.
-    uint top = 0x100000u | bits.y & 0xfffffu;
-    float high = ldexp(float(top << 3 | bits.x >> 29), exponent + 29);
-    float middle = ldexp(float(bits.x >> 5 & 0xffffffu), exponent + 5), low = ldexp(float(bits.x & 31u), exponent);
-    vec2 value = whole_add(quick_two_sum(high, middle), pair(low));
-    return bits.y >> 31 != 0u ? -value : value;
+    vec3 parts = in_three(bits);
+    return whole_add(quick_two_sum(parts.x, parts.y), pair(parts.z));
 }
 
 // A number of a table; 0 if it does not lie within.
@@ -62,7 +51,7 @@ vec2 of_chunk(Table table, uint vertex, uint component, uint components, uint co
     vec2 t = whole_div(pair(float(code)), pair(float(most)));
     vec2 number = whole_add(whole_mul(low, whole_add(pair(1.0), -t)), whole_mul(high, t));
     // Of what is no finite number a pair is none.
-    return is_finite_pair(number) ? number : pair(low.x * (1.0 - t.x) + high.x * t.x);
+    return is_finite(number.x) ? number : pair(low.x * (1.0 - t.x) + high.x * t.x);
 }
 
 // The integers of an element: the first components of 8 or 16 bits, or a word.

@@ -144,3 +144,17 @@ vec2 dot3(vec2 a0, vec2 a1, vec2 a2, vec2 b0, vec2 b1, vec2 b2) {
 vec2 cross2(vec2 a, vec2 b, vec2 c, vec2 d) {
     return sub(mul(a, b), mul(c, d));
 }
+
+// A binary64 number as the sum of three binary32.
+vec3 in_three(uvec2 bits) {
+    int exponent = int(bits.y >> 20 & 0x7ffu);
+    if (exponent == 0) {
+        return vec3(0.0);
+    }
+    // 53 bits: 24, 24 and 5.
+    uint top = 0x100000u | bits.y & 0xfffffu;
+    uint high = top << 3 | bits.x >> 29, middle = bits.x >> 5 & 0xffffffu, low = bits.x & 31u;
+    int e = exponent - 1075;
+    vec3 value = vec3(ldexp(float(high), e + 29), ldexp(float(middle), e + 5), ldexp(float(low), e));
+    return bits.y >> 31 != 0u ? -value : value;
+}

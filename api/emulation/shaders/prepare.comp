@@ -53,20 +53,6 @@ uint resolve(uint index) {
     return high != 0u ? 0xffffffu : min(low, 0xffffffu);
 }
 
-// A binary64 number as the sum of three binary32.
-vec3 in_three(uvec2 bits) {
-    int exponent = int(bits.y >> 20 & 0x7ffu);
-    if (exponent == 0) {
-        return vec3(0.0);
-    }
-    // 53 bits: 24, 24 and 5.
-    uint top = 0x100000u | bits.y & 0xfffffu;
-    uint high = top << 3 | bits.x >> 29, middle = bits.x >> 5 & 0xffffffu, low = bits.x & 31u;
-    int e = exponent - 1075;
-    vec3 value = vec3(ldexp(float(high), e + 29), ldexp(float(middle), e + 5), ldexp(float(low), e));
-    return bits.y >> 31 != 0u ? -value : value;
-}
-
 bool is_finite(float x) {
     return !isnan(x) && !isinf(x);
 }

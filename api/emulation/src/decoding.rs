@@ -7,6 +7,9 @@ use gaurast::vk::{
     PipelineGaussianDecodingStateCreateInfoGAURAST as DecodingState,
 };
 
+/// The place of the first harmonic in the kernels' list of attributes.
+pub(crate) const HARMONICS: usize = 8;
+
 /// The decodings of a pipeline.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Decodings {
@@ -43,9 +46,13 @@ impl Decodings {
 
     /// True if the attribute at a place of the kernels' list holds integers.
     pub(crate) fn has_codes(&self, place: usize) -> bool {
-        // Harmonics begin at 8.
-        let shift = if place == 8 { 8 } else { 2 * place };
-        (place < 4 || place == 8) && self.word >> shift & 3 != 0
+        let shift = match place {
+            // Position, scale, rotation, opacity.
+            0..4 => 2 * place,
+            HARMONICS => 8,
+            _ => return false,
+        };
+        self.word >> shift & 3 != 0
     }
 
     /// The tables of a draw; `None` if it lacks one and draws nothing.

@@ -56,15 +56,6 @@ pub(crate) fn code(format: vk::Format) -> Option<u32> {
         F::A2R10G10B10_USCALED_PACK32 => (17, 4),
         F::A2R10G10B10_SSCALED_PACK32 => (18, 4),
         F::B10G11R11_UFLOAT_PACK32 => (19, 3),
-        _ => return None,
-    };
-    Some(kind | components << 8)
-}
-
-/// The format of integers that are decoded, likewise.
-pub(crate) fn code_of_integers(format: vk::Format) -> Option<u32> {
-    use vk::Format as F;
-    let (kind, components) = match format {
         F::R8_UINT => (20, 1),
         F::R8G8_UINT => (20, 2),
         F::R8G8B8_UINT => (20, 3),
@@ -77,6 +68,11 @@ pub(crate) fn code_of_integers(format: vk::Format) -> Option<u32> {
         _ => return None,
     };
     Some(kind | components << 8)
+}
+
+/// Reports whether a format's code is that of integers, which attributes that are decoded have.
+pub(crate) fn has_integers(code: u32) -> bool {
+    code & 0xFF >= 20
 }
 
 /// Reports whether a format's code is that of 32-bit floats, with as many components as are wanted or more.

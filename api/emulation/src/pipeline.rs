@@ -17,7 +17,7 @@ use gaurast::vk::{
 };
 use gaurast_layer_interface::{find, slice};
 
-use crate::decoding::Decodings;
+use crate::decoding::{Decodings, HARMONICS};
 use crate::depth_stencil::{self, TestState};
 use crate::draw_call::SHADED;
 use crate::formats;
@@ -229,9 +229,6 @@ struct Attributes {
     harmonics_step: Option<u32>,
 }
 
-/// The place of the first harmonic in the list of attributes.
-const HARMONICS: usize = 8;
-
 /// Bytes from each harmonic's attribute to the next one's, if they are the same.
 fn step(harmonics: &[Attribute]) -> Option<u32> {
     let [first, ..] = harmonics else {
@@ -304,8 +301,8 @@ impl Attributes {
             let attribute = attributes.iter().find(|attribute| attribute.location == location);
             let attribute =
                 attribute.ok_or_else(|| format!("no attribute has location {location}, which Gaussians use"))?;
-            let code = if decodings.has_codes(place) { formats::code_of_integers } else { formats::code };
-            let format = code(attribute.format)
+            let format = formats::code(attribute.format)
+                .filter(|code| formats::has_integers(*code) == decodings.has_codes(place))
                 .ok_or_else(|| format!("attributes of format {:?} are not read", attribute.format))?;
             let binding = bindings.iter().find(|binding| binding.binding == attribute.binding);
             let binding = binding.ok_or_else(|| format!("there is no vertex binding {}", attribute.binding))?;

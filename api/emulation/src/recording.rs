@@ -304,7 +304,10 @@ impl Recording {
             draw_count: call.draw_count,
             harmonics: harmonics.map_or(0, |buffer| buffer.address),
             harmonics_bytes: harmonics.map_or(0, |buffer| u32::try_from(buffer.size).unwrap_or(u32::MAX)),
-            harmonics_format: harmonics.and_then(|buffer| formats::code(buffer.format)).unwrap_or(0),
+            harmonics_format: harmonics
+                .and_then(|buffer| formats::code(buffer.format))
+                .filter(|code| !formats::has_integers(*code))
+                .unwrap_or(0),
             harmonics_stride: harmonics.map_or(0, |buffer| buffer.stride),
             harmonics_coefficient_stride: harmonics
                 .map_or(0, |buffer| u32::try_from(buffer.coefficient_stride).unwrap_or(u32::MAX)),

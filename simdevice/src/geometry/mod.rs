@@ -76,9 +76,10 @@ const PART_SEGMENTS: u64 = 512;
 /// The number of patches in a segment.
 const SEGMENT_OF_PATCHES: u64 = 16;
 
-/// The least number of primitives in a segment of which a geometry program makes others, and the number of vertices that it
-/// may give for a larger one.
+/// The least number of primitives in a segment of which a geometry program makes others.
 const SEGMENT_OF_GEOMETRY: u64 = 256;
+
+/// The most vertices that a geometry program may give for a segment of more primitives than that.
 const GEOMETRY_VERTICES: u64 = 8192;
 
 /// The number of such segments that are processed before the memory of the part is looked at.

@@ -20,7 +20,7 @@ pub(crate) struct TileCutOff {
     is_square: bool,
     /// Standard deviations.
     deviations: f64,
-    /// What makes the deviations fewer, if anything does.
+    /// The compensation that makes the deviations fewer, if one does.
     compensation: Option<Compensation>,
     /// The upper left corner of the viewport's area, from which tiles count.
     corner: [f64; 2],

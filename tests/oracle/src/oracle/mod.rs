@@ -9,6 +9,7 @@
 //! | before | attributes from the integers of compressed files | [`decoding`] |
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
+//! | 4 | the compensated opacity that a cut-off may know | [`compensation`] |
 //! | 3 | the distortion of a lens | [`lens`] |
 //! | 1 to 5 | the same for outputs of a vertex shader | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
