@@ -144,13 +144,14 @@ fn measure(bencher: Bencher, sampling: &Sampling, table: &ImageTable) {
     let first = SampleRequest { compare, ..request(sampling.texels_per_pixel) };
     let offsets = offsets(sampling.texels_per_pixel);
     bencher.counter(ItemsCount::new(16 * offsets.len())).bench_local(|| {
-        let mut request = first;
+        let (mut request, mut texel) = (first, [[0; 16]; 4]);
         for offset in &offsets {
             for (axis, offset) in offset.iter().enumerate() {
                 let from = first.coordinate[axis].map(f32::from_bits);
                 request.coordinate[axis] = from.map(|at| (at + offset).to_bits());
             }
-            black_box(table.sample(0, 0, black_box(&request)));
+            table.sample(0, 0, black_box(&request), &mut texel);
+            black_box(texel);
         }
     });
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, FPRoundingMode, Op};
+use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, FPRoundingMode, MemoryAccess, MemoryModel, Op};
 
 use super::decoder::{HEADER_WORDS, decode};
 use super::error::Error;
@@ -234,6 +234,26 @@ impl Module {
     pub(crate) fn declares(&self, capability: Capability) -> bool {
         let mut declared = self.sections.capabilities.iter();
         declared.any(|it| it.enumerant(0, Capability::from_u32) == Some(capability))
+    }
+
+    /// Reports whether some accesses may see what other invocations write meanwhile: any by Vulkan's memory model, those to
+    /// coherent or volatile variables, and volatile loads.
+    pub(crate) fn has_coherent_accesses(&self) -> bool {
+        let model = self.sections.memory_model.as_ref();
+        let is_coherent = |decorated: &Decorated| matches!(decorated.decoration, Decoration::Coherent | Decoration::Volatile);
+        let is_volatile = |instruction: &Instruction| {
+            let access = match instruction.opcode {
+                Op::Load => instruction.enumerant(1, MemoryAccess::from_bits),
+                Op::CopyMemory => instruction.enumerant(2, MemoryAccess::from_bits),
+                _ => None,
+            };
+            access.is_some_and(|access| access.contains(MemoryAccess::VOLATILE))
+        };
+        let mut decorations = self.decorations.values().chain(self.member_decorations.values()).flatten();
+        let blocks = self.sections.functions.iter().flat_map(|function| &function.blocks);
+        model.and_then(|model| model.enumerant(1, MemoryModel::from_u32)) == Some(MemoryModel::Vulkan)
+            || decorations.any(is_coherent)
+            || blocks.flat_map(|block| &block.instructions).any(is_volatile)
     }
 
     /// Reports whether an id has a decoration.

@@ -138,13 +138,14 @@ pub struct TexelRequest {
 }
 
 /// The images and samplers that a program is bound to, by bind point. If a bind point isn't bound, or coordinates are
-/// out of range, reads give zero and writes do nothing. Results are floats or integers as the image's format says.
+/// out of range, reads give zero and writes do nothing. Results are floats or integers as the image's format says. Texels
+/// are written where the caller wants them, since copies of vectors from function to function take time.
 pub trait ImageUnit: Sync {
-    /// Samples with filtering. Returns red, green, blue, alpha.
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4];
+    /// Samples with filtering. Sets red, green, blue, alpha.
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest, texel: &mut [LaneWords; 4]);
 
-    /// Reads texels. Returns red, green, blue, alpha.
-    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4];
+    /// Reads texels. Sets red, green, blue, alpha.
+    fn read(&self, image: u32, request: &TexelRequest, texel: &mut [LaneWords; 4]);
 
     /// Writes texels, in order of lanes.
     fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]);
@@ -177,12 +178,12 @@ pub trait ImageUnit: Sync {
 pub struct NoImages;
 
 impl ImageUnit for NoImages {
-    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [LaneWords; 4] {
-        Default::default()
+    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest, texel: &mut [LaneWords; 4]) {
+        *texel = Default::default();
     }
 
-    fn read(&self, _image: u32, _request: &TexelRequest) -> [LaneWords; 4] {
-        Default::default()
+    fn read(&self, _image: u32, _request: &TexelRequest, texel: &mut [LaneWords; 4]) {
+        *texel = Default::default();
     }
 
     fn write(&self, _image: u32, _request: &TexelRequest, _texel: &[LaneWords; 4]) {}

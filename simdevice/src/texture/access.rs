@@ -29,7 +29,10 @@ struct Places<S: Simd> {
 fn level<'a>(surface: &'a Surface, request: &TexelRequest) -> Option<(&'a VectorLayout, &'a PackedLevel)> {
     let layout = surface.layout.as_ref()?;
     let first = request.level[0];
-    let differences = request.level.iter().fold(0, |all, level| all | level ^ first);
+    let mut differences = 0;
+    for lane in 0..VECTOR_LANES {
+        differences |= request.level[lane] ^ first;
+    }
     if request.shape.multisampled || differences != 0 || first as usize >= surface.levels.len() {
         return None;
     }
@@ -72,14 +75,19 @@ fn places<S: Simd>(simd: S, surface: &Surface, level: &PackedLevel, request: &Te
     Places { inside, index }
 }
 
-/// Reads texels; `None` if they must be read lane by lane.
+/// Reads texels. Returns false if they must be read lane by lane.
 #[inline(always)]
-pub(super) fn read<S: Simd>(simd: S, surface: &Surface, request: &TexelRequest) -> Option<[LaneWords; 4]> {
-    let (layout, level) = level(surface, request)?;
-    Some(simd.vectorize(
+pub(super) fn read<S: Simd>(simd: S, surface: &Surface, request: &TexelRequest, texel: &mut [LaneWords; 4]) -> bool {
+    simd.vectorize(
         #[inline(always)]
-        || read_level(simd, surface, layout, level, request),
-    ))
+        || match level(surface, request) {
+            Some((layout, level)) => {
+                read_level(simd, surface, layout, level, request, texel);
+                true
+            }
+            None => false,
+        },
+    )
 }
 
 /// The stored components of 16 texels.
@@ -142,50 +150,43 @@ fn read_level<S: Simd>(
     layout: &VectorLayout,
     level: &PackedLevel,
     request: &TexelRequest,
-) -> [LaneWords; 4] {
+    texel: &mut [LaneWords; 4],
+) {
     let words = layout.words(&surface.memory);
     let Places { inside, index } = places(simd, surface, level, request);
     let stored = for_codec!(layout.codec, stored(simd, words, index));
     if inside == u16::MAX {
-        return layout.arrange(stored, surface.one());
+        return layout.arrange(stored, surface.one(), texel);
     }
     let zero = u32x16::splat(simd, 0);
     let one = u32x16::splat(simd, surface.one());
     let components = layout.codec.components();
-    let mut texel = [zero, zero, zero, one];
+    let mut found = [zero, zero, zero, one];
     for c in 0..4 {
         if layout.order[c] < components {
-            texel[c] = stored[layout.order[c]];
+            found[c] = stored[layout.order[c]];
         }
     }
     let is_inside = simd.from_bitmask_mask32x16(u64::from(inside));
     let outside = surface.outside();
     for c in 0..4 {
-        texel[c] = is_inside.select(texel[c], u32x16::splat(simd, outside[c]));
+        found[c] = is_inside.select(found[c], u32x16::splat(simd, outside[c]));
     }
-    let mut out = [[0; VECTOR_LANES]; 4];
-    for (out, from) in out.iter_mut().zip(surface.swizzle) {
-        *out = from.pick(&texel, zero, one).into();
+    let is_active = simd.from_bitmask_mask32x16(u64::from(request.mask));
+    for (texel, from) in texel.iter_mut().zip(surface.swizzle) {
+        *texel = is_active.select(from.pick(&found, zero, one), zero).into();
     }
-    if request.mask != u16::MAX {
-        for (lane, inactive) in (0..VECTOR_LANES).map(|lane| (lane, request.mask >> lane & 1 == 0)) {
-            for out in &mut out {
-                out[lane] = if inactive { 0 } else { out[lane] };
-            }
-        }
-    }
-    out
 }
 
 /// Writes texels, in order of lanes. Returns false if they must be written lane by lane.
 #[inline(always)]
 pub(super) fn write<S: Simd>(simd: S, surface: &Surface, request: &TexelRequest, texel: &[LaneWords; 4]) -> bool {
-    let Some((layout, level)) = level(surface, request).filter(|_| surface.writable) else {
-        return false;
-    };
     simd.vectorize(
         #[inline(always)]
-        || write_level(simd, surface, layout, level, request, texel),
+        || match level(surface, request) {
+            Some((layout, level)) if surface.writable => write_level(simd, surface, layout, level, request, texel),
+            _ => false,
+        },
     )
 }
 

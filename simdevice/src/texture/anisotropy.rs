@@ -26,7 +26,7 @@ pub(super) fn sample(
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-    once: impl Fn(&SampleRequest) -> [LaneWords; 4],
+    once: impl Fn(&SampleRequest, &mut [LaneWords; 4]),
 ) -> Option<[LaneWords; 4]> {
     let applies = sampler.max_anisotropy > 1.0
         && request.shape.dimension == Dimension::D2
@@ -43,6 +43,7 @@ pub(super) fn sample(
         return None;
     }
     let mut sums = [[0f32; VECTOR_LANES]; 4];
+    let mut texel = [[0; VECTOR_LANES]; 4];
     for number in 1..=most {
         let mut part = *request;
         part.lod = LodRequest::Explicit(footprints.lod);
@@ -63,7 +64,7 @@ pub(super) fn sample(
         if part.mask == 0 {
             continue;
         }
-        let texel = once(&part);
+        once(&part, &mut texel);
         for lane in (0..VECTOR_LANES).filter(|lane| part.mask >> lane & 1 != 0) {
             let weight = 1.0 / footprints.counts[lane] as f32;
             for (sum, component) in sums.iter_mut().zip(&texel) {

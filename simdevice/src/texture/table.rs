@@ -56,27 +56,26 @@ impl ImageTable {
 
     /// Takes an isotropic sample. It has the kernels of all codecs, so there is one copy of it.
     #[inline(never)]
-    fn sample_once(&self, surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [LaneWords; 4] {
+    fn sample_once(&self, surface: &Surface, sampler: &Sampler, request: &SampleRequest, texel: &mut [LaneWords; 4]) {
         let has_seams = sampler.has_seams && request.shape.dimension == Dimension::Cube;
-        let batched = if self.batched && !has_seams {
-            dispatch!(self.level, simd => {
-                match vector::bilinear(simd, surface, sampler, request) {
-                    None => vector::general(simd, surface, sampler, request),
-                    found => found,
-                }
-            })
-        } else {
-            None
-        };
-        batched.unwrap_or_else(|| scalar::sample(surface, sampler, request))
+        let is_batched = self.batched
+            && !has_seams
+            && dispatch!(self.level, simd => {
+                vector::bilinear(simd, surface, sampler, request, texel)
+                    || vector::general(simd, surface, sampler, request, texel)
+            });
+        if !is_batched {
+            *texel = scalar::sample(surface, sampler, request);
+        }
     }
 
     /// Reads texels. It has the kernels of all codecs, so there is one copy of it.
     #[inline(never)]
-    fn read_texels(&self, surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] {
-        let batched =
-            if self.batched { dispatch!(self.level, simd => access::read(simd, surface, request)) } else { None };
-        batched.unwrap_or_else(|| scalar::read(surface, request))
+    fn read_texels(&self, surface: &Surface, request: &TexelRequest, texel: &mut [LaneWords; 4]) {
+        let is_batched = self.batched && dispatch!(self.level, simd => access::read(simd, surface, request, texel));
+        if !is_batched {
+            *texel = scalar::read(surface, request);
+        }
     }
 
     fn pair(&self, image: u32, sampler: u32) -> Option<(&Surface, &Sampler)> {
@@ -86,22 +85,29 @@ impl ImageTable {
 }
 
 impl ImageUnit for ImageTable {
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4] {
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest, texel: &mut [LaneWords; 4]) {
         let Some((surface, sampler)) = self.pair(image, sampler) else {
-            return Default::default();
+            *texel = Default::default();
+            return;
         };
-        let once = |request: &SampleRequest| self.sample_once(surface, sampler, request);
+        let once = |request: &SampleRequest, texel: &mut [LaneWords; 4]| {
+            self.sample_once(surface, sampler, request, texel);
+        };
         if sampler.max_anisotropy > 1.0
             && sampler.reduction == Reduction::WeightedAverage
             && let Some(found) = anisotropy::sample(surface, sampler, request, once)
         {
-            return found;
+            *texel = found;
+            return;
         }
-        once(request)
+        once(request, texel);
     }
 
-    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
-        self.surface(image).map_or_else(Default::default, |surface| self.read_texels(surface, request))
+    fn read(&self, image: u32, request: &TexelRequest, texel: &mut [LaneWords; 4]) {
+        match self.surface(image) {
+            Some(surface) => self.read_texels(surface, request, texel),
+            None => *texel = Default::default(),
+        }
     }
 
     fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]) {

@@ -81,15 +81,14 @@ impl VectorLayout {
         self.sources = swizzle.map(|from| from.pick(&found, ZERO, ONE));
     }
 
-    /// The result registers for the stored components of 16 texels, given the bits of 1.
+    /// Sets the result registers for the stored components of 16 texels, given the bits of 1.
     #[inline(always)]
-    pub fn arrange<S: Simd>(&self, stored: [u32x16<S>; 4], one: u32) -> [LaneWords; 4] {
-        let mut out = [[0; VECTOR_LANES]; 4];
+    pub fn arrange<S: Simd>(&self, stored: [u32x16<S>; 4], one: u32, texel: &mut [LaneWords; 4]) {
         if self.sources == [0, 1, 2, 3] {
             for c in 0..4 {
-                out[c] = stored[c].into();
+                texel[c] = stored[c].into();
             }
-            return out;
+            return;
         }
         let mut found = [[0; VECTOR_LANES]; 6];
         for c in 0..4 {
@@ -97,9 +96,8 @@ impl VectorLayout {
         }
         found[ONE] = [one; VECTOR_LANES];
         for c in 0..4 {
-            out[c] = found[self.sources[c]];
+            texel[c] = found[self.sources[c]];
         }
-        out
     }
 
     /// The words of the surface's memory from which texels are read.

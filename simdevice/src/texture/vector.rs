@@ -41,19 +41,22 @@ struct Batch<'a, S> {
     reference: Option<(CompareOp, Floats)>,
 }
 
-/// Filters for all lanes; `None` if this request must be filtered lane by lane.
+/// Filters for all lanes. Returns false if this request must be filtered lane by lane.
 #[inline(always)]
 pub(super) fn general<S: Simd>(
     simd: S,
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-) -> Option<[LaneWords; 4]> {
-    let layout = surface.layout.as_ref().filter(|layout| layout.is_filterable)?;
+    texel: &mut [LaneWords; 4],
+) -> bool {
+    let Some(layout) = surface.layout.as_ref().filter(|layout| layout.is_filterable) else {
+        return false;
+    };
     let shape = request.shape;
     let is_mean = sampler.reduction == Reduction::WeightedAverage;
     if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() || !is_mean {
-        return None;
+        return false;
     }
     let reference = match (sampler.compare_op, &request.compare) {
         (Some(op), Some(bits)) => Some((op, references(surface, bits))),
@@ -61,8 +64,11 @@ pub(super) fn general<S: Simd>(
     };
     let batch = Batch { simd, surface, layout, sampler, request, reference };
     let selection = lod::select(surface, sampler, request);
-    let texels = batch.select_filter(&selection)?;
-    Some(batch.registers(&texels))
+    let Some(texels) = batch.select_filter(&selection) else {
+        return false;
+    };
+    *texel = batch.registers(&texels);
+    true
 }
 
 /// The reference values of a comparison.
@@ -378,36 +384,35 @@ fn mix(a: &Components, b: &Components, weight: &Floats) -> Components {
     mixed
 }
 
-/// Filters for all lanes; `None` if the request is not plain.
+/// Filters for all lanes. Returns false if the request is not plain.
 #[inline(always)]
 pub(super) fn bilinear<S: Simd>(
     simd: S,
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-) -> Option<[LaneWords; 4]> {
-    let layout = surface.layout.as_ref().filter(|layout| layout.is_filterable)?;
-    if !is_plain(surface, sampler, request) {
-        return None;
-    }
-    let comparison = match (sampler.compare_op, &request.compare) {
-        (Some(_), Some(_)) if !layout.codec.is_depth() => return None,
-        (Some(op), Some(bits)) => Some((op, references(surface, bits))),
-        _ => None,
+    texel: &mut [LaneWords; 4],
+) -> bool {
+    let Some(layout) = surface.layout.as_ref().filter(|layout| layout.is_filterable) else {
+        return false;
     };
-    let (mut texels, edges) = simd.vectorize(
+    let compares_colors = sampler.compare_op.is_some() && request.compare.is_some() && !layout.codec.is_depth();
+    if compares_colors || !is_plain(surface, sampler, request) {
+        return false;
+    }
+    let edges = simd.vectorize(
         #[inline(always)]
-        || filter(simd, surface, layout, sampler, request, comparison),
+        || filter(simd, surface, layout, sampler, request, texel),
     );
     if edges != 0 {
         let across = scalar::sample(surface, sampler, &SampleRequest { mask: edges, ..*request });
         for lane in (0..VECTOR_LANES).filter(|lane| edges >> lane & 1 != 0) {
-            for (texel, across) in texels.iter_mut().zip(&across) {
+            for (texel, across) in texel.iter_mut().zip(&across) {
                 texel[lane] = across[lane];
             }
         }
     }
-    Some(texels)
+    true
 }
 
 /// True if a request needs nothing but bilinear filtering and mip levels per quad.
@@ -489,7 +494,8 @@ impl<S: Simd> Points<S> {
     }
 }
 
-/// The result registers, and the active lanes whose texels are across an edge of a cube: their result is undefined.
+/// Sets the result registers. Returns the active lanes whose texels are across an edge of a cube: their result is
+/// undefined.
 #[inline(always)]
 fn filter<S: Simd>(
     simd: S,
@@ -497,13 +503,15 @@ fn filter<S: Simd>(
     layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
-    comparison: Option<(CompareOp, Floats)>,
-) -> ([LaneWords; 4], u16) {
+    registers: &mut [LaneWords; 4],
+) -> u16 {
     let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
-    let comparison = match comparison {
-        Some((op, reference)) => Some(Comparison { op, reference: f32x16::simd_from(simd, reference) }),
-        None => None,
+    let comparison = match (sampler.compare_op, &request.compare) {
+        (Some(op), Some(bits)) => {
+            Some(Comparison { op, reference: f32x16::simd_from(simd, references(surface, bits)) })
+        }
+        _ => None,
     };
     let points = Points::new(simd, sampler, request);
     let mut texel = [f32x16::splat(simd, 0.0); 4];
@@ -534,7 +542,8 @@ fn filter<S: Simd>(
     for c in 0..4 {
         stored[c] = bits_of(texel[c]);
     }
-    (layout.arrange(stored, 1f32.to_bits()), edges)
+    layout.arrange(stored, 1f32.to_bits(), registers);
+    edges
 }
 
 /// The weighted mean of the texels around each point.

@@ -37,7 +37,7 @@ mod vertex_places;
 
 use std::collections::HashMap;
 
-use isa::ir::MAX_LANES;
+use isa::ir::{MAX_LANES, Program};
 use spirv::{AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel, StorageClass};
 
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
@@ -242,7 +242,9 @@ fn finish(mut t: Translator, declaration: &Instruction, named: &[u32]) -> Result
     t.interface.per_sample = t.io.per_sample || variables::has_an_input_of_samples(&t, named);
     t.interface.inputs = t.io.inputs;
     t.interface.outputs = t.io.outputs;
-    Ok(Shader { program: t.emit.builder.finish()?, interface: t.interface })
+    let has_coherent_accesses = t.module.has_coherent_accesses();
+    let program = Program { has_coherent_accesses, ..t.emit.builder.finish()? };
+    Ok(Shader { program, interface: t.interface })
 }
 
 fn empty_interface(stage: Stage) -> Interface {

@@ -75,15 +75,18 @@ pub struct Program {
     /// Bytes of private memory of each lane, a multiple of 4, at most [`MAX_MEMORY_BYTES`]. Its contents are undefined
     /// when a batch begins.
     pub private_bytes: u32,
+    /// True if some accesses are coherent or volatile, so that they see what other invocations write meanwhile.
+    pub has_coherent_accesses: bool,
     /// The statements.
     pub body: Block,
 }
 
 impl Program {
-    /// True if an invocation may wait for what one of another workgroup writes: if there are atomics, or a loop reads
-    /// memory that the program writes. Such workgroups must not run in lockstep.
+    /// True if an invocation may wait for what one of another workgroup writes: if there are atomics, or coherent accesses
+    /// and a loop that reads memory that the program writes. Such workgroups must not run in lockstep.
     pub fn may_wait(&self) -> bool {
-        Accesses::of(&self.body).may_wait()
+        let accesses = Accesses::of(&self.body);
+        accesses.has_atomics || self.has_coherent_accesses && accesses.may_see_writes()
     }
 }
 

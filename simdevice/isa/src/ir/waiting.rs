@@ -13,7 +13,7 @@ pub(super) struct Accesses {
     writes_addresses: bool,
     reads_images_in_loops: bool,
     writes_images: bool,
-    has_atomics: bool,
+    pub(super) has_atomics: bool,
 }
 
 impl Accesses {
@@ -24,13 +24,12 @@ impl Accesses {
         found
     }
 
-    /// True if an invocation may wait for what one of another workgroup writes.
-    pub(super) fn may_wait(&self) -> bool {
+    /// True if a loop may read what an invocation of another workgroup writes.
+    pub(super) fn may_see_writes(&self) -> bool {
         let overlap = |&(a, count_a): &(u32, u32)| {
             self.written.iter().any(|&(b, count_b)| a < b.saturating_add(count_b) && b < a.saturating_add(count_a))
         };
-        self.has_atomics
-            || self.read_in_loops.iter().any(overlap)
+        self.read_in_loops.iter().any(overlap)
             || self.reads_images_in_loops && self.writes_images
             || self.writes_addresses && (self.reads_addresses_in_loops || !self.read_in_loops.is_empty())
             || self.reads_addresses_in_loops && !self.written.is_empty()
@@ -67,7 +66,7 @@ mod tests {
     use crate::builder::Builder;
     use crate::ir::{Address, Format, Label, Program, Rate, Type};
 
-    /// A program that reads a buffer, in a loop or before it, and writes a buffer.
+    /// A program that reads a buffer, in a loop or before it, and writes a buffer, by coherent accesses.
     fn program(in_loop: bool, read: u32, written: u32) -> Program {
         let mut b = Builder::new();
         let x = b.input(0, Type::B32, Rate::Varying);
@@ -75,6 +74,7 @@ mod tests {
         b.load(at(read), Format::B32, 1);
         b.store(at(written), Format::B32, &[x]);
         let mut program = b.finish().expect("a valid program");
+        program.has_coherent_accesses = true;
         if in_loop {
             let load = program.body.remove(0);
             let body = vec![load, Statement::Break(Label(0))];
@@ -88,5 +88,6 @@ mod tests {
         assert!(program(true, 3, 3).may_wait());
         assert!(!program(true, 3, 4).may_wait());
         assert!(!program(false, 3, 3).may_wait());
+        assert!(!Program { has_coherent_accesses: false, ..program(true, 3, 3) }.may_wait());
     }
 }

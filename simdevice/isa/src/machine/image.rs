@@ -9,16 +9,26 @@ use crate::resources::{LaneWords, LodRequest, SampleRequest, TexelRequest};
 /// The bind point that means none.
 const UNBOUND: u32 = u32::MAX;
 
+#[inline(always)]
 fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> LaneWords {
     batch.file.lanes(batch.slot(reg), vector)
 }
 
+#[inline(always)]
 fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, vector: usize) -> LaneWords {
-    reg.map_or([0; VECTOR_LANES], |reg| words(batch, reg, vector))
+    match reg {
+        Some(reg) => words(batch, reg, vector),
+        None => [0; VECTOR_LANES],
+    }
 }
 
+#[inline(always)]
 fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> [LaneWords; N] {
-    std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), vector))
+    let mut all = [[0; VECTOR_LANES]; N];
+    for (words_of_one, reg) in all.iter_mut().zip(regs) {
+        *words_of_one = words(batch, *reg, vector);
+    }
+    all
 }
 
 /// The bind points of 16 lanes.
@@ -64,6 +74,7 @@ fn lod_request(batch: &Batch<'_>, lod: &Lod, vector: usize) -> LodRequest {
     }
 }
 
+#[inline(always)]
 pub fn sample(batch: &Batch<'_>, sample: &Sample) {
     // Fields that aren't operands keep these values for all vectors.
     let mut request = SampleRequest {
@@ -76,6 +87,7 @@ pub fn sample(batch: &Batch<'_>, sample: &Sample) {
         gather: sample.gather,
     };
     let bound = fixed_point(&sample.image).zip(fixed_point(&sample.sampler));
+    let mut texel = [[0; VECTOR_LANES]; 4];
     for vector in 0..batch.file.width() {
         let active = batch.masks.bits(MaskId::ACTIVE, vector);
         if active == 0 {
@@ -93,18 +105,19 @@ pub fn sample(batch: &Batch<'_>, sample: &Sample) {
         if let Some(reg) = sample.compare {
             request.compare = Some(words(batch, reg, vector));
         }
-        let texel = match bound {
+        match bound {
             Some((image, sampler)) => {
                 request.mask = active;
-                batch.resources.images.sample(image, sampler, &request)
+                batch.resources.images.sample(image, sampler, &request, &mut texel);
             }
-            None => sample_each(batch, sample, &mut request, vector, active),
-        };
+            None => texel = sample_each(batch, sample, &mut request, vector, active),
+        }
         put_texel(batch, &sample.dst, vector, &texel);
     }
 }
 
 /// Samples for 16 lanes that may use different images or samplers.
+#[inline(never)]
 fn sample_each(
     batch: &Batch<'_>,
     sample: &Sample,
@@ -114,10 +127,10 @@ fn sample_each(
 ) -> [LaneWords; 4] {
     let images = bind_points(batch, &sample.image, vector);
     let samplers = bind_points(batch, &sample.sampler, vector);
-    let mut texel = [[0; VECTOR_LANES]; 4];
+    let (mut texel, mut found) = ([[0; VECTOR_LANES]; 4], [[0; VECTOR_LANES]; 4]);
     for_each_binding(&images, &samplers, active, |image, sampler, lanes| {
         request.mask = lanes;
-        let found = batch.resources.images.sample(image, sampler, request);
+        batch.resources.images.sample(image, sampler, request, &mut found);
         merge(&mut texel, &found, lanes);
     });
     texel
@@ -130,6 +143,7 @@ fn no_texels(shape: ImageShape) -> TexelRequest {
 }
 
 /// Sets the position of the texels that 16 lanes access.
+#[inline(always)]
 fn place(
     request: &mut TexelRequest,
     batch: &Batch<'_>,
@@ -149,30 +163,48 @@ fn place(
     }
 }
 
+#[inline(always)]
 pub fn read(batch: &Batch<'_>, read: &ImageRead) {
     let mut request = no_texels(read.shape);
     let bound = fixed_point(&read.image);
+    let mut texel = [[0; VECTOR_LANES]; 4];
     for vector in 0..batch.file.width() {
         let active = batch.masks.bits(MaskId::ACTIVE, vector);
         if active == 0 {
             continue;
         }
         place(&mut request, batch, &read.coordinate, read.level, read.sample, vector);
-        if let Some(image) = bound {
-            request.mask = active;
-            put_texel(batch, &read.dst, vector, &batch.resources.images.read(image, &request));
-            continue;
+        match bound {
+            Some(image) => {
+                request.mask = active;
+                batch.resources.images.read(image, &request, &mut texel);
+            }
+            None => texel = read_each(batch, read, &mut request, vector, active),
         }
-        let images = bind_points(batch, &read.image, vector);
-        let mut texel = [[0; VECTOR_LANES]; 4];
-        for_each_binding(&images, &[0; VECTOR_LANES], active, |image, _, lanes| {
-            request.mask = lanes;
-            merge(&mut texel, &batch.resources.images.read(image, &request), lanes);
-        });
         put_texel(batch, &read.dst, vector, &texel);
     }
 }
 
+/// Reads for 16 lanes that may use different images.
+#[inline(never)]
+fn read_each(
+    batch: &Batch<'_>,
+    read: &ImageRead,
+    request: &mut TexelRequest,
+    vector: usize,
+    active: u16,
+) -> [LaneWords; 4] {
+    let images = bind_points(batch, &read.image, vector);
+    let (mut texel, mut found) = ([[0; VECTOR_LANES]; 4], [[0; VECTOR_LANES]; 4]);
+    for_each_binding(&images, &[0; VECTOR_LANES], active, |image, _, lanes| {
+        request.mask = lanes;
+        batch.resources.images.read(image, request, &mut found);
+        merge(&mut texel, &found, lanes);
+    });
+    texel
+}
+
+#[inline(always)]
 pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
     let mut request = no_texels(write.shape);
     let bound = fixed_point(&write.image);
@@ -188,12 +220,24 @@ pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
             batch.resources.images.write(image, &request, &texel);
             continue;
         }
-        let images = bind_points(batch, &write.image, vector);
-        for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
-            request.mask = lanes;
-            batch.resources.images.write(image, &request, &texel);
-        });
+        write_each(batch, write, &mut request, vector, &texel);
     }
+}
+
+/// Writes for 16 lanes that may use different images.
+#[inline(never)]
+fn write_each(
+    batch: &Batch<'_>,
+    write: &ImageWrite,
+    request: &mut TexelRequest,
+    vector: usize,
+    texel: &[LaneWords; 4],
+) {
+    let images = bind_points(batch, &write.image, vector);
+    for_each_binding(&images, &[0; VECTOR_LANES], batch.masks.writing(vector), |image, _, lanes| {
+        request.mask = lanes;
+        batch.resources.images.write(image, request, texel);
+    });
 }
 
 pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
@@ -267,6 +311,7 @@ fn query_lod(
 }
 
 /// The bind point of all lanes, if the binding has no index.
+#[inline(always)]
 fn fixed_point(binding: &Binding) -> Option<u32> {
     (binding.index.is_none() && binding.count > 0).then_some(binding.slot)
 }

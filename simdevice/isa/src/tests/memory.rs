@@ -311,12 +311,12 @@ fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
 struct Recorder(Mutex<Vec<(u32, u16)>>);
 
 impl ImageUnit for Recorder {
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4] {
-        NoImages.sample(image, sampler, request)
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest, texel: &mut [LaneWords; 4]) {
+        NoImages.sample(image, sampler, request, texel);
     }
 
-    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
-        [request.coordinate[0], request.coordinate[1], [image; 16], [u32::from(request.mask); 16]]
+    fn read(&self, image: u32, request: &TexelRequest, texel: &mut [LaneWords; 4]) {
+        *texel = [request.coordinate[0], request.coordinate[1], [image; 16], [u32::from(request.mask); 16]];
     }
 
     fn write(&self, image: u32, request: &TexelRequest, _texel: &[LaneWords; 4]) {

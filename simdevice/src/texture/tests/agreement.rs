@@ -73,8 +73,8 @@ fn assert_agree(case: &Case, image: &SampledImage, sampler: Sampler, request: &S
     let level = token_of(case);
     let binding = ImageBinding::Sampled(image.clone());
     let table = ImageTable::new(level, [binding], [Some(sampler)]);
-    let batched = table.sample(0, 0, request);
-    let one_by_one = table.lane_by_lane().sample(0, 0, request);
+    let batched = table.sampled(0, 0, request);
+    let one_by_one = table.lane_by_lane().sampled(0, 0, request);
     for lane in (0..16).filter(|lane| request.mask >> lane & 1 != 0) {
         let (a, b) = (floats(&batched, lane), floats(&one_by_one, lane));
         let same = a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
@@ -259,7 +259,7 @@ fn a_level_of_weight_zero_is_not_read(case: &Case) {
     let mut request = request(Dimension::D2, &[[0.3, 0.3, 0.0, 0.0]]);
     request.lod = LodRequest::Explicit(std::array::from_fn(|lane| (lane as f32 % 2.0).to_bits()));
     assert_agree(case, &image, sampler, &request);
-    let answer = table(image, sampler).sample(0, 0, &request);
+    let answer = table(image, sampler).sampled(0, 0, &request);
     assert_eq!(floats(&answer, 0)[0], 0.5);
     assert_eq!(floats(&answer, 1)[0], f32::INFINITY);
 }

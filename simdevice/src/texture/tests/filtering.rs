@@ -12,7 +12,7 @@ fn the_level_of_detail_chooses_levels_and_filters() {
         ..request(Dimension::D2, &[[0.5; 4]])
     };
     let read = |sampler: Sampler| {
-        let answer = table(levels.clone(), sampler).sample(0, 0, &request(&lods));
+        let answer = table(levels.clone(), sampler).sampled(0, 0, &request(&lods));
         std::array::from_fn::<f32, 12, _>(|lane| floats(&answer, lane)[0])
     };
     assert_eq!(read(Sampler::default()), [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0, 0.0, 3.0]);
@@ -23,13 +23,13 @@ fn the_level_of_detail_chooses_levels_and_filters() {
 
     let mut view = levels.clone();
     (view.view.base_mip_level, view.view.level_count) = (1, 2);
-    let answer = table(view, linear).sample(0, 0, &request(&lods));
+    let answer = table(view, linear).sampled(0, 0, &request(&lods));
     assert_eq!(floats(&answer, 0)[0], 1.0);
     assert_eq!(floats(&answer, 9)[0], 2.0);
 
     let split = Sampler { mag_filter: Filter::Nearest, min_filter: Filter::Linear, ..Sampler::default() };
     let ramp = image(desc, |_, _, [x, ..]| [x as f32, 0.0, 0.0, 1.0]);
-    let answer = table(ramp, split).sample(0, 0, &request(&[0.0, 0.25]));
+    let answer = table(ramp, split).sampled(0, 0, &request(&[0.0, 0.25]));
     assert_eq!(floats(&answer, 0)[0], 4.0, "magnified");
     assert_eq!(floats(&answer, 1)[0], 3.5, "minified");
 }
@@ -44,12 +44,12 @@ fn a_gather_begins_lower_left_and_goes_round() {
     let mut request = request(Dimension::D2, &[[0.5, 0.5, 0.0, 0.0]]);
     request.gather = Some(0);
     let one = |answer: [LaneWords; 4]| answer.map(|lanes| lanes[0]);
-    assert_eq!(one(table.sample(0, 0, &request)), [21, 22, 12, 11]);
+    assert_eq!(one(table.sampled(0, 0, &request)), [21, 22, 12, 11]);
     request.gather = Some(1);
-    assert_eq!(one(table.sample(0, 0, &request)), [101, 102, 102, 101]);
+    assert_eq!(one(table.sampled(0, 0, &request)), [101, 102, 102, 101]);
     request.offset = [[1; 16], [u32::MAX; 16], [0; 16]];
     request.gather = Some(0);
-    assert_eq!(one(table.sample(0, 0, &request)), [12, 13, 3, 2]);
+    assert_eq!(one(table.sampled(0, 0, &request)), [12, 13, 3, 2]);
 }
 
 #[gaurast_runner::test]
@@ -66,12 +66,12 @@ fn comparisons_come_before_the_filter() {
         let mut request = request(Dimension::D2, &[[0.4, 0.5, 0.0, 0.0]]);
         let references = [0.1f32, 0.5, 0.9, f32::NAN, 7.0];
         request.compare = Some(std::array::from_fn(|lane| references[lane.min(4)].to_bits()));
-        let answer = table.sample(0, 0, &request);
+        let answer = table.sampled(0, 0, &request);
         let passed = [0, 1, 2, 3].map(|lane| floats(&answer, lane)[0]);
         assert_eq!([passed[0], passed[2], passed[3]], [1.0, 0.0, 0.0]);
         assert!((passed[1] - 0.3).abs() < 1e-6, "the second texel's weight");
         request.gather = Some(0);
-        let gathered = floats(&table.sample(0, 0, &request), 1);
+        let gathered = floats(&table.sampled(0, 0, &request), 1);
         assert_eq!(gathered, [0.0, 1.0, 1.0, 0.0]);
     }
 }
@@ -83,7 +83,7 @@ fn a_reference_is_clamped_for_unsigned_normalized_depth_only() {
         let sampler = Sampler { compare_op: Some(CompareOp::LessOrEqual), ..Sampler::default() };
         let mut request = request(Dimension::D2, &[[0.5; 4]]);
         request.compare = Some([1.5f32.to_bits(); 16]);
-        let answer = table(image, sampler).sample(0, 0, &request);
+        let answer = table(image, sampler).sampled(0, 0, &request);
         assert_eq!(floats(&answer, 0)[0], expected);
     }
 }
@@ -105,7 +105,7 @@ fn borders_have_the_components_of_the_format() {
                 ..filtered(filter)
             };
             let table = table(image(desc(ImageKind::D2, format, [4, 4, 1]), |_, _, _| [1.0; 4]), sampler);
-            let answer = table.sample(0, 0, &request(Dimension::D2, &[[1.5, 0.5, 0.0, 0.0]]));
+            let answer = table.sampled(0, 0, &request(Dimension::D2, &[[1.5, 0.5, 0.0, 0.0]]));
             assert_eq!(floats(&answer, 0), expected, "{format:?} {filter:?}");
         }
     }
@@ -120,7 +120,7 @@ fn layers_are_rounded_to_even_and_clamped() {
     let at = layers.map(|layer| [0.5, 0.5, layer, 0.0]);
     let mut request = request(Dimension::D2, &at);
     request.shape.arrayed = true;
-    let answer = table.sample(0, 0, &request);
+    let answer = table.sampled(0, 0, &request);
     let found: [f32; 9] = std::array::from_fn(|lane| floats(&answer, lane)[0]);
     assert_eq!(found, [0.0, 0.0, 1.0, 2.0, 2.0, 3.0, 3.0, 0.0, 0.0]);
 }
@@ -149,7 +149,7 @@ fn cubes_are_smooth_across_edges_and_corners() {
     let values: Vec<f32> = at
         .chunks(16)
         .flat_map(|lanes| {
-            let answer = table.sample(0, 0, &request(Dimension::Cube, lanes));
+            let answer = table.sampled(0, 0, &request(Dimension::Cube, lanes));
             (0..lanes.len()).map(move |lane| floats(&answer, lane)[0])
         })
         .collect();
@@ -172,7 +172,7 @@ fn a_constant_cube_is_constant_everywhere() {
         for y in -3..4 {
             for z in -3..4 {
                 let direction = [x as f32, y as f32, z as f32, 0.0];
-                let answer = table.sample(0, 0, &request(Dimension::Cube, &[direction]));
+                let answer = table.sampled(0, 0, &request(Dimension::Cube, &[direction]));
                 let found = floats(&answer, 0);
                 for c in 0..4 {
                     assert!((found[c] - color[c]).abs() < 1e-6, "{direction:?}: {found:?}");
@@ -186,7 +186,7 @@ fn a_constant_cube_is_constant_everywhere() {
 fn srgb_is_decoded_before_it_is_filtered() {
     let image = image(desc(ImageKind::D2, Format::R8G8B8A8Srgb, [2, 1, 1]), |_, _, [x, ..]| [x as f32; 4]);
     let sampler = Sampler { address_modes: [AddressMode::ClampToEdge; 3], ..filtered(Filter::Linear) };
-    let answer = table(image, sampler).sample(0, 0, &request(Dimension::D2, &[[0.5; 4]]));
+    let answer = table(image, sampler).sampled(0, 0, &request(Dimension::D2, &[[0.5; 4]]));
     assert_eq!(floats(&answer, 0), [0.5; 4]);
 }
 
@@ -196,7 +196,7 @@ fn integers_are_never_mixed() {
         [-(x as i32) - 1, y as i32, -128, 127].map(|i| f32::from_bits(i as u32))
     });
     let table = table(image, filtered(Filter::Linear));
-    let answer = table.sample(0, 0, &request(Dimension::D2, &[[0.9, 0.6, 0.0, 0.0]]));
+    let answer = table.sampled(0, 0, &request(Dimension::D2, &[[0.9, 0.6, 0.0, 0.0]]));
     let found = answer.map(|lanes| lanes[0].cast_signed());
     assert_eq!(found, [-2, 1, -128, 127]);
 }
@@ -213,7 +213,7 @@ fn unnormalized_coordinates_count_texels() {
     };
     let table = table(image, sampler);
     let at = [[1.5, 1.5, 0.0, 0.0], [2.0, 1.5, 0.0, 0.0], [99.0, -7.0, 0.0, 0.0]];
-    let answer = table.sample(0, 0, &request(Dimension::D2, &at));
+    let answer = table.sampled(0, 0, &request(Dimension::D2, &at));
     assert_eq!([0, 1, 2].map(|lane| floats(&answer, lane)[0]), [11.0, 11.5, 4.0]);
 }
 
@@ -223,7 +223,7 @@ fn what_is_not_bound_reads_zero() {
     let table = ImageTable::new(level, [ImageBinding::Unbound], [None, Some(Sampler::default())]);
     let request = request(Dimension::D2, &[[0.5; 4]]);
     for (image, sampler) in [(0, 0), (0, 1), (9, 1), (u32::MAX, u32::MAX)] {
-        assert_eq!(table.sample(image, sampler, &request), [[0; 16]; 4]);
+        assert_eq!(table.sampled(image, sampler, &request), [[0; 16]; 4]);
         assert_eq!(table.lod(image, sampler, &request), [[0; 16]; 2]);
     }
 }

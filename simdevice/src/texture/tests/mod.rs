@@ -13,7 +13,7 @@ use crate::image::{ImageDesc, ImageKind};
 use crate::runtime::SimdLevel;
 use crate::state::CompareOp;
 use crate::{Allocation, Format, Image, ImageView};
-use isa::ir::{Dimension, ImageShape};
+use isa::ir::{Dimension, ImageShape, VECTOR_LANES};
 use isa::resources::{ImageUnit, LaneWords, LodRequest, SampleRequest, TexelRequest};
 
 /// A shape that is neither arrayed nor multisampled.
@@ -54,6 +54,24 @@ fn image(desc: ImageDesc, texel: impl Fn(u32, u32, [u32; 3]) -> [f32; 4]) -> Sam
         swizzle: IDENTITY,
     }
 }
+
+/// The answers of an image unit as values.
+trait Answers: ImageUnit {
+    fn sampled(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4] {
+        // What was there before must not matter.
+        let mut texel = [[0xDEAD_BEEF; VECTOR_LANES]; 4];
+        self.sample(image, sampler, request, &mut texel);
+        texel
+    }
+
+    fn texels(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
+        let mut texel = [[0xDEAD_BEEF; VECTOR_LANES]; 4];
+        self.read(image, request, &mut texel);
+        texel
+    }
+}
+
+impl Answers for ImageTable {}
 
 /// A table of one sampled image and one sampler, at the best SIMD level.
 fn table(image: SampledImage, sampler: Sampler) -> ImageTable {

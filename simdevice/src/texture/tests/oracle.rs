@@ -66,7 +66,7 @@ fn filters_are_weighted_means() {
             let mut request = request(Dimension::D3, &coordinates);
             let offsets = [(); 3].map(|()| rng.random_range(-8..8));
             request.offset = offsets.map(|offset: i32| [offset as u32; 16]);
-            let answer = table.sample(0, 0, &request);
+            let answer = table.sampled(0, 0, &request);
             for (lane, at) in coordinates.iter().enumerate() {
                 let axes = [0, 1, 2].map(|axis| {
                     let size = extent[axis] as i32;
@@ -109,7 +109,7 @@ fn nearest_texels_are_those_that_hold_the_point() {
         let table = table(image, sampler);
         for step in -60..60 {
             let s = (step as f32 + 0.25) / 20.0;
-            let answer = table.sample(0, 0, &request(Dimension::D2, &[[s, -s, 0.0, 0.0]]));
+            let answer = table.sampled(0, 0, &request(Dimension::D2, &[[s, -s, 0.0, 0.0]]));
             let x = walk(mode, (f64::from(s) * 5.0).floor() as i32, 5);
             let y = walk(mode, (f64::from(-s) * 3.0).floor() as i32, 3);
             let expected = x.zip(y).map_or(-1.0, |(x, y)| (x + 10 * y) as f32);

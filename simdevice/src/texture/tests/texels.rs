@@ -41,7 +41,7 @@ fn fetches_reach_levels_layers_and_samples_within_bounds() {
     request.level[1] = 1;
     request.level[2] = 1;
     request.level[6] = 2;
-    let answer = table.read(0, &request);
+    let answer = table.texels(0, &request);
     let found: [[u32; 4]; 7] = std::array::from_fn(|lane| answer.map(|lanes| lanes[lane]));
     assert_eq!(found[0], [23, 1, 0, 1]);
     assert_eq!(found[1], [11, 102, 0, 1]);
@@ -62,7 +62,7 @@ fn samples_are_told_apart() {
     let multisampled = ImageShape { multisampled: true, ..shape(Dimension::D2) };
     let mut request = texels(multisampled, &[[0; 4]; 5]);
     request.sample = std::array::from_fn(|lane| lane as u32);
-    assert_eq!(table.read(0, &request)[0][..5], [7, 8, 9, 10, 0]);
+    assert_eq!(table.texels(0, &request)[0][..5], [7, 8, 9, 10, 0]);
     assert_eq!(table.samples(0), 4);
 }
 
@@ -85,9 +85,9 @@ fn what_is_written_is_read_back() {
         let inside = texels(ARRAY, &[[4, 2, 1, 0]]);
         let value = written.map(|component| [component; 16]);
         table.write(0, &inside, &value);
-        assert_eq!(table.read(0, &inside).map(|lanes| lanes[0]), expected, "{format:?}");
+        assert_eq!(table.texels(0, &inside).map(|lanes| lanes[0]), expected, "{format:?}");
         let neighbours = texels(ARRAY, &[[3, 2, 1, 0], [4, 1, 1, 0], [4, 2, 0, 0]]);
-        let untouched = table.read(0, &neighbours);
+        let untouched = table.texels(0, &neighbours);
         assert_eq!(untouched[0][..3], [0; 3], "{format:?}");
     }
 }
@@ -101,7 +101,7 @@ fn of_lane(request: &TexelRequest, lane: usize) -> TexelRequest {
 fn read_alone(table: &ImageTable, request: &TexelRequest) -> [LaneWords; 4] {
     let mut out: [LaneWords; 4] = [[0; 16]; 4];
     for lane in 0..16 {
-        let found = table.read(0, &of_lane(request, lane));
+        let found = table.texels(0, &of_lane(request, lane));
         for (out, found) in out.iter_mut().zip(found) {
             out[lane] = found[lane];
         }
@@ -128,7 +128,7 @@ fn lanes_together_do_as_each_alone() {
         let at: Vec<[u32; 4]> = (0..16).map(|lane| [lane % 6, lane / 3, 0, 0]).collect();
         let mut request = texels(shape(Dimension::D2), &at);
         request.mask = 0b1101_1110_1011_0111;
-        let (all, each) = (together.read(0, &request), read_alone(&alone, &request));
+        let (all, each) = (together.texels(0, &request), read_alone(&alone, &request));
         assert_eq!(all, each, "{format:?}");
         let value = |factor: u32, lane: u32| match format.is_integer() {
             true => factor * lane * 4,
@@ -223,7 +223,7 @@ fn bytes_of(memory: &Allocation) -> Vec<u8> {
 /// Asserts that an access at once reads and writes what it reads and writes lane by lane.
 fn assert_agree(rng: &mut ChaCha8Rng, table: &ImageTable, memory: &Allocation, request: &TexelRequest, format: Format) {
     let alone = table.clone().lane_by_lane();
-    let (found, expected) = (table.read(0, request), alone.read(0, request));
+    let (found, expected) = (table.texels(0, request), alone.texels(0, request));
     assert_eq!(found, expected, "{format:?} {request:?}");
     let values: [LaneWords; 4] = [(); 4].map(|()| std::array::from_fn(|_| random_value(rng)));
     let before = bytes_of(memory);
@@ -315,7 +315,7 @@ fn sampled_images_are_not_written() {
     let request = texels(shape(Dimension::D2), &[[1, 1, 0, 0]]);
     table.write(0, &request, &[[7; 16]; 4]);
     table.atomic(0, &request, AtomicOp::IAdd, &[7; 16], &[0; 16]);
-    assert_eq!(table.read(0, &request)[0][0], 0);
+    assert_eq!(table.texels(0, &request)[0][0], 0);
 }
 
 #[gaurast_runner::test]
@@ -327,7 +327,7 @@ fn atomics_act_in_order_of_lanes() {
     assert_eq!(old[..5], [0, 5, 10, 15, 0]);
     let old = table.atomic(0, &request, AtomicOp::CompareExchange, &[1; 16], &[20; 16]);
     assert_eq!(old[..4], [20, 1, 1, 1]);
-    assert_eq!(table.read(0, &request)[0][0], 1);
+    assert_eq!(table.texels(0, &request)[0][0], 1);
 }
 
 #[gaurast_runner::test]
@@ -344,12 +344,12 @@ fn texel_buffers_end_where_their_range_does() {
     assert_eq!(table.size(0, shape, 0), [2, 0, 0, 0]);
     let request = texels(shape, &[[0; 4], [1, 0, 0, 0], [2, 0, 0, 0]]);
     table.write(0, &request, &[[1; 16], [2; 16], [3; 16], [4; 16]]);
-    let answer = table.read(0, &request);
+    let answer = table.texels(0, &request);
     assert_eq!(answer[1][..3], [2, 2, 0]);
     assert_eq!(memory.load_u32(24), Some(0));
     let outside = buffer(60, 8);
     assert_eq!(outside.size(0, shape, 0), [0; 4]);
-    assert_eq!(outside.read(0, &request), [[0; 16]; 4]);
+    assert_eq!(outside.texels(0, &request), [[0; 16]; 4]);
 }
 
 #[gaurast_runner::test]
@@ -375,7 +375,7 @@ fn stencil_and_depth_are_planes_of_their_own() {
     let layout = desc.subresource(Aspect::Stencil, 0, 0).unwrap();
     depth.view.image.write_row(&layout, [1, 1, 0], &[77]).unwrap();
     let request = texels(shape(Dimension::D2), &[[1, 1, 0, 0]]);
-    let read = |image| table(image, Sampler::default()).read(0, &request).map(|lanes| lanes[0]);
+    let read = |image| table(image, Sampler::default()).texels(0, &request).map(|lanes| lanes[0]);
     assert_eq!(read(depth), [0.5f32.to_bits(), 0, 0, 1f32.to_bits()]);
     assert_eq!(read(stencil), [77, 0, 0, 1]);
 }
