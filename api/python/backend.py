@@ -1,4 +1,4 @@
-"""Builds the Python package: maturin's backend (PEP 517), which first builds the driver, the layer and the command.
+"""Builds the Python package: maturin's backend (PEP 517), which first builds the driver, the layers and the command.
 
 `python backend.py wheel FOLDER` builds the wheel of a release: by zig, for manylinux2014, with a Vulkan loader if GAURAST_LOADER
 names one's file. It needs maturin, cargo-zigbuild and ziglang from PyPI. `python backend.py sdist FOLDER` makes the source archive.
@@ -21,9 +21,13 @@ _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE if (_HERE / "Cargo.lock").exists() else _HERE.parent.parent
 _PACKAGE = _ROOT / "api/python"
 _TARGET = "x86_64-unknown-linux-gnu"
-_PACKAGES = ["gaurast-icd", "gaurast-layer", "gaurast-cli"]
-_MANIFESTS = {"gaurast_icd.json": "driver/icd", "gaurast_layer.json": "api/layer"}
-_LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so"]
+_PACKAGES = ["gaurast-icd", "gaurast-layer", "gaurast-emulation-layer", "gaurast-cli"]
+_MANIFESTS = {
+    "gaurast_icd.json": "driver/icd",
+    "gaurast_layer.json": "api/layer",
+    "gaurast_emulation.json": "api/emulation/layer",
+}
+_LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so", "libVkLayer_gaurast_emulation.so"]
 
 
 def _target_folder() -> Path:
@@ -31,7 +35,7 @@ def _target_folder() -> Path:
 
 
 def _build(subcommand: list[str], target: list[str]) -> Path:
-    """Builds the driver, the layer and the command, and returns their folder."""
+    """Builds the driver, the layers and the command, and returns their folder."""
     if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
         sys.exit("gaurast: the driver is built for Linux on x86-64 alone")
     packages = [word for package in _PACKAGES for word in ("-p", package)]

@@ -6,7 +6,7 @@ set -eu
 . "$(dirname "$0")/arguments.sh"
 architecture=$(dpkg --print-architecture)
 # The newest version of glibc's symbols that a built file asks for; 2.17 where zig has built them.
-glibc=$(cat "$build/gaurast" "$build/libvulkan_gaurast.so" "$build/libVkLayer_gaurast_validation.so" |
+glibc=$(cat "$build/gaurast" "$build/libvulkan_gaurast.so" "$build"/libVkLayer_gaurast_*.so |
     grep --text --only-matching 'GLIBC_2\.[0-9]*' | sed 's/GLIBC_//' | sort --version-sort --unique | tail -n 1)
 DESTDIR=$work PREFIX=/usr LIBDIR=/usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH 2>/dev/null || echo "$(uname -m)-linux-gnu") \
     "$here/install.sh" "$build"
@@ -30,8 +30,9 @@ Section: graphics
 Priority: optional
 Description: Vulkan driver that runs on the CPU and draws 3D Gaussians
  GauRast is a software Vulkan driver in which a 3D Gaussian is a primitive, as a
- triangle is. The package has the driver for the Vulkan loader, the layer that
- checks the use of its extension, and the command that draws scenes.
+ triangle is. The package has the driver for the Vulkan loader, a layer that
+ checks the use of its extension, a layer that gives the extension to other
+ devices, and the command that draws scenes.
 CONTROL
 chmod 755 "$work"
 dpkg-deb --root-owner-group -Zxz --build "$work" "$out/gaurast_${version}_$architecture.deb" >/dev/null

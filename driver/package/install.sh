@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs the driver, the layer, the command, its manual pages and completions, and the C header.
+# Installs the driver, the layers, the command, its manual pages and completions, and the C header.
 #
 #   install.sh BUILD        BUILD has the built files, such as target/release
 #
@@ -29,7 +29,9 @@ file() { # file MODE FROM TO
 }
 file 755 "$build/gaurast" "$prefix/bin/gaurast"
 file 644 "$build/libvulkan_gaurast.so" "$libraries/libvulkan_gaurast.so"
-file 644 "$build/libVkLayer_gaurast_validation.so" "$libraries/libVkLayer_gaurast_validation.so"
+for layer in validation emulation; do
+    file 644 "$build/libVkLayer_gaurast_$layer.so" "$libraries/libVkLayer_gaurast_$layer.so"
+done
 file 644 "$source/api/include/vulkan_gaurast.h" "$prefix/include/vulkan/vulkan_gaurast.h"
 file 644 "$source/api/include/vulkan_gaurast_defaults.h" "$prefix/include/vulkan/vulkan_gaurast_defaults.h"
 file 644 "$source/LICENSE-MIT" "$prefix/share/doc/gaurast/LICENSE-MIT"
@@ -44,6 +46,7 @@ manifest() { # manifest FROM TO
 }
 manifest "$source/driver/icd/gaurast_icd.json" "$prefix/share/vulkan/icd.d/gaurast_icd.json"
 manifest "$source/api/layer/gaurast_layer.json" "$prefix/share/vulkan/explicit_layer.d/gaurast_layer.json"
+manifest "$source/api/emulation/layer/gaurast_emulation.json" "$prefix/share/vulkan/explicit_layer.d/gaurast_emulation.json"
 
 pages=$root$prefix/share/man/man1
 mkdir -p "$pages"

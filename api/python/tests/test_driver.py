@@ -21,7 +21,8 @@ def run(*words, **options):
 
 
 def test_manifests_name_what_is_there():
-    for path in [Path(gaurast.icd_path()), Path(gaurast.layer_path()) / "gaurast_layer.json"]:
+    layers = Path(gaurast.layer_path())
+    for path in [Path(gaurast.icd_path()), layers / "gaurast_layer.json", layers / "gaurast_emulation.json"]:
         manifest = json.loads(path.read_text())
         library = manifest.get("ICD", manifest.get("layer"))["library_path"]
         assert library.startswith("./") and (path.parent / library).exists()

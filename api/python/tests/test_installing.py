@@ -28,7 +28,8 @@ def test_an_installed_tree_may_be_moved(built, tmp_path, libraries):
     subprocess.run([_INSTALL, built], check=True, env=variables)
     root = tmp_path / "moved"
     shutil.move(str(tmp_path / "opt/gaurast"), root)
-    for manifest in ["icd.d/gaurast_icd.json", "explicit_layer.d/gaurast_layer.json"]:
+    layers = ["explicit_layer.d/gaurast_layer.json", "explicit_layer.d/gaurast_emulation.json"]
+    for manifest in ["icd.d/gaurast_icd.json", *layers]:
         path = root / "share/vulkan" / manifest
         content = json.loads(path.read_text())
         library = content.get("ICD", content.get("layer"))["library_path"]

@@ -240,7 +240,8 @@ impl Module {
     /// coherent or volatile variables, and volatile loads.
     pub(crate) fn has_coherent_accesses(&self) -> bool {
         let model = self.sections.memory_model.as_ref();
-        let is_coherent = |decorated: &Decorated| matches!(decorated.decoration, Decoration::Coherent | Decoration::Volatile);
+        let is_coherent =
+            |decorated: &Decorated| matches!(decorated.decoration, Decoration::Coherent | Decoration::Volatile);
         let is_volatile = |instruction: &Instruction| {
             let access = match instruction.opcode {
                 Op::Load => instruction.enumerant(1, MemoryAccess::from_bits),

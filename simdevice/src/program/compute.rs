@@ -14,6 +14,9 @@ const SHARED_LANES: usize = 256;
 /// The greatest private memory of an invocation, in bytes, with which they do: it should stay in the nearest caches.
 const SHARED_PRIVATE_BYTES: u32 = 256;
 
+/// The greatest workgroup memory of all of them, in bytes, for the same reason.
+const SHARED_WORKGROUP_BYTES: u32 = 16 << 10;
+
 /// A compute program that is compiled for one device.
 #[derive(Debug)]
 pub struct ComputeProgram {
@@ -57,9 +60,10 @@ impl ComputeProgram {
 /// They run in lockstep, so that none may wait for another.
 fn groups_of_batch(program: &Program, invocations: usize, subgroup_size: usize) -> usize {
     let fits = |lanes: usize| lanes != 0 && invocations.is_multiple_of(lanes);
-    let is_small = program.shared_bytes == 0 && program.private_bytes <= SHARED_PRIVATE_BYTES;
+    let is_small = program.private_bytes <= SHARED_PRIVATE_BYTES && program.preloaded_bytes == 0;
     if fits(VECTOR_LANES) && fits(subgroup_size) && is_small && !program.may_wait() {
-        (SHARED_LANES / invocations.max(1)).max(1)
+        let by_memory = SHARED_WORKGROUP_BYTES / program.shared_bytes.max(1);
+        (SHARED_LANES / invocations.max(1)).min(by_memory as usize).max(1)
     } else {
         1
     }

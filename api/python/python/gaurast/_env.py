@@ -20,7 +20,7 @@ def icd_path() -> str:
 
 
 def layer_path() -> str:
-    """The folder of the manifest of `VK_LAYER_GAURAST_validation`, for `VK_ADD_LAYER_PATH`."""
+    """The folder of the manifests of `VK_LAYER_GAURAST_validation` and `VK_LAYER_GAURAST_emulation`, for `VK_ADD_LAYER_PATH`."""
     return str(_LIBRARIES)
 
 

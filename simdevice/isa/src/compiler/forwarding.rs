@@ -51,7 +51,7 @@ fn assignments(block: &Block, variable: Reg) -> usize {
 mod tests {
     use super::*;
     use crate::builder::Builder;
-    use crate::compiler::uniformity::varying_registers;
+    use crate::compiler::uniformity::{SameInAllLanes, varying_registers};
     use crate::ir::{Rate, Type};
 
     /// Reports whether the only output of a program is read from the register that computes it.
@@ -61,7 +61,7 @@ mod tests {
         let output = builder.output(0, Type::B32);
         write(&mut builder, input, output);
         let mut program = builder.finish().expect("a valid program");
-        let varying = varying_registers(&program, false);
+        let varying = varying_registers(&program, SameInAllLanes { private: false, shared: true });
         forward(&mut program, &varying);
         program.outputs[0].reg != output
     }

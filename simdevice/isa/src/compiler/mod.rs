@@ -22,6 +22,7 @@ use crate::ir::{Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, 
 use crate::kernels::registers::RegisterSlot;
 use linearize::Linearized;
 use step::{RunCost, Step};
+use uniformity::SameInAllLanes;
 
 /// The most vectors in a register file: 256 MiB.
 const MAX_VECTORS: usize = 1 << 22;
@@ -109,8 +110,8 @@ impl CompiledProgram {
             if !divides(lanes, workgroup) || !divides(workgroup, VECTOR_LANES) || !divides(workgroup, subgroup_size) {
                 return structure("the lanes of workgroups don't fit the batch's vectors and subgroups");
             }
-            if program.shared_bytes > 0 {
-                return structure("workgroups with memory don't share a batch");
+            if program.preloaded_bytes > 0 {
+                return structure("workgroups with preloaded memory don't share a batch");
             }
         }
         validate(&program)?;
@@ -121,7 +122,8 @@ impl CompiledProgram {
         dead_code::remove_dead(&mut program);
         sink::sink(&mut program);
         let table = constant_table::promote_constants(&mut program);
-        let varying = uniformity::varying_registers(&program, table.is_some());
+        let same = SameInAllLanes { private: table.is_some(), shared: workgroup == lanes };
+        let varying = uniformity::varying_registers(&program, same);
         forwarding::forward(&mut program, &varying);
         let allocation = allocate::allocate(&program, &varying, lanes / VECTOR_LANES);
         if allocation.vectors > MAX_VECTORS {
@@ -152,6 +154,16 @@ impl CompiledProgram {
             subgroup_size,
             workgroup,
         })
+    }
+
+    /// True if a batch has several workgroups.
+    pub fn has_several_workgroups(&self) -> bool {
+        self.workgroup != self.lanes
+    }
+
+    /// Words of memory that each workgroup has for itself.
+    pub fn shared_words(&self) -> usize {
+        self.shared_bytes.div_ceil(4) as usize
     }
 
     /// Words of private memory that each lane has for itself.

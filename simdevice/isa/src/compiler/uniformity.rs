@@ -3,18 +3,25 @@
 use super::scopes::{VariableScopes, variable_scopes};
 use crate::ir::{Block, Label, Program, Rate, Reg, Space, Statement};
 
+/// The memories that all lanes of a batch share, so that they load the same from one address.
+#[derive(Clone, Copy)]
+pub struct SameInAllLanes {
+    /// Private memory, since it is a table of constants.
+    pub private: bool,
+    /// Workgroup memory, since the batch is one workgroup.
+    pub shared: bool,
+}
+
 /// True for each register that may differ between lanes of a batch.
 ///
 /// A value is uniform if it is computed from uniform values. A variable is uniform if every value assigned to it is,
 /// and no assignment can be masked for a lane that reads it later. For that, no assignment may lie in a branch on a
 /// varying condition within the variable's scope (see [`VariableScopes`]), nor in a construct there that some lanes
 /// leave before others and outside which it is read. (Lanes that return don't come back.)
-///
-/// `private_is_uniform` says that private memory holds the same in all lanes.
-pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<bool> {
+pub fn varying_registers(program: &Program, same: SameInAllLanes) -> Vec<bool> {
     let mut search = Search {
         varying: vec![false; program.registers.len()],
-        private_is_uniform,
+        same,
         scopes: variable_scopes(program),
         left: Vec::new(),
         continued: Vec::new(),
@@ -58,7 +65,7 @@ impl Around {
 
 struct Search {
     varying: Vec<bool>,
-    private_is_uniform: bool,
+    same: SameInAllLanes,
     scopes: VariableScopes,
     /// Constructs that some lanes break out of before others.
     left: Vec<Label>,
@@ -182,7 +189,11 @@ impl Search {
     /// Reports whether a statement's results may differ between lanes even if its operands don't.
     fn differs_by_itself(&self, statement: &Statement) -> bool {
         match statement {
-            Statement::Load { address, .. } => address.space == Space::Private && !self.private_is_uniform,
+            Statement::Load { address, .. } => match address.space {
+                Space::Private => !self.same.private,
+                Space::Shared => !self.same.shared,
+                Space::Buffer(_) | Space::PushConstants | Space::Global => false,
+            },
             Statement::Compute { .. }
             | Statement::Clock { .. }
             | Statement::BufferSize { .. }

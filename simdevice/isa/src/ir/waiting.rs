@@ -51,7 +51,9 @@ impl Accesses {
                 },
                 Statement::ImageRead(_) | Statement::Sample(_) if in_loop => self.reads_images_in_loops = true,
                 Statement::ImageWrite(_) => self.writes_images = true,
-                Statement::Atomic { .. } | Statement::ImageAtomic(_) => self.has_atomics = true,
+                // Workgroup memory is not seen by other workgroups.
+                Statement::Atomic { address, .. } => self.has_atomics |= address.space != Space::Shared,
+                Statement::ImageAtomic(_) => self.has_atomics = true,
                 _ => {}
             }
             let in_loop = in_loop || matches!(statement, Statement::Loop { .. });

@@ -8,8 +8,8 @@ use fearless_simd::{Simd, prelude::*};
 use super::masks::{Masks, bits_to_mask};
 use crate::compiler::CompiledProgram;
 use crate::compiler::step::MaskId;
-use crate::ir::{Reg, Type};
-use crate::kernels::registers::{RegisterFile, RegisterSlot, Vector, load_vector, store_vector};
+use crate::ir::{Reg, Space, Type, VECTOR_LANES};
+use crate::kernels::registers::{RegisterFile, RegisterSlot, Span, Vector, load_vector, store_vector};
 use crate::resources::Resources;
 
 /// The state that a batch's steps work on.
@@ -19,7 +19,7 @@ pub struct Batch<'a> {
     pub resources: &'a Resources<'a>,
     pub file: RegisterFile<'a>,
     pub masks: Masks<'a>,
-    /// Workgroup memory.
+    /// The memory of each workgroup, one after the other.
     pub shared: &'a [AtomicU32],
     /// True if all lanes that the batch began with are active in the vectors that the file spans.
     pub whole: bool,
@@ -27,11 +27,36 @@ pub struct Batch<'a> {
     pub private: &'a [Cell<Vector>],
 }
 
-impl Batch<'_> {
+impl<'a> Batch<'a> {
     /// The place of a register in the register file.
     #[inline(always)]
     pub fn slot(&self, reg: Reg) -> RegisterSlot {
         self.program.slots[reg.0 as usize]
+    }
+
+    /// Calls `access` once for each memory that lanes of the batch reach at the same address: with each workgroup for
+    /// workgroup memory, otherwise with the whole batch.
+    #[inline(always)]
+    pub fn for_each_memory(&self, space: &Space, access: impl Fn(&Self)) {
+        if *space == Space::Shared && self.program.has_several_workgroups() {
+            self.workgroups().for_each(|part| access(&part));
+        } else {
+            access(self);
+        }
+    }
+
+    /// The parts of the batch that belong to one workgroup each, with its memory.
+    fn workgroups(&self) -> impl Iterator<Item = Self> {
+        let batch = *self;
+        let vectors = batch.program.workgroup / VECTOR_LANES;
+        let words = batch.program.shared_words();
+        let span = batch.file.span();
+        (span.start / vectors..span.end.div_ceil(vectors)).map(move |group| {
+            let first = span.start.max(vectors * group);
+            let end = span.end.min(vectors * (group + 1));
+            let file = batch.file.with_span(Span { first, count: end - first });
+            Self { file, shared: &batch.shared[words * group..][..words], ..batch }
+        })
     }
 
     /// Recomputes the span of vectors that have active lanes, after the masks have changed.

@@ -241,10 +241,17 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
                 batch.file.set(batch.slot(*dst), vector, [time; 16]);
             }
         }
-        Statement::Load { dst, address, format } => memory::load(batch, simd, dst, address, *format),
-        Statement::Store { src, address, format } => memory::store(batch, simd, src, address, *format),
+        Statement::Load { dst, address, format } => {
+            batch.for_each_memory(&address.space, |batch| memory::load(batch, simd, dst, address, *format));
+        }
+        Statement::Store { src, address, format } => {
+            batch.for_each_memory(&address.space, |batch| memory::store(batch, simd, src, address, *format));
+        }
         Statement::Atomic { op, dst, address, format, value, comparator } => {
-            memory::atomic(batch, simd, *op, *dst, address, *format, *value, *comparator);
+            let (value, comparator) = (*value, *comparator);
+            batch.for_each_memory(&address.space, |batch| {
+                memory::atomic(batch, simd, *op, *dst, address, *format, value, comparator);
+            });
         }
         Statement::BufferSize { dst, buffer } => memory::buffer_size(batch, *dst, buffer),
         Statement::Sample(sample) => simd.vectorize(

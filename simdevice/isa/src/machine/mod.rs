@@ -75,10 +75,11 @@ impl Machine {
     /// A machine for an executable; all inputs are zero.
     pub fn new(executable: Arc<Executable>) -> Self {
         let width = executable.program.lanes / 16;
+        let workgroups = executable.program.lanes / executable.program.workgroup;
         let mut machine = Self {
             registers: host::filled(Vector::default(), executable.program.vectors),
             masks: host::zeroed(executable.program.masks * executable.program.lanes.div_ceil(64)),
-            shared: host::collect((0..executable.program.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0))),
+            shared: host::collect((0..workgroups * executable.program.shared_words()).map(|_| AtomicU32::new(0))),
             private: host::filled(Vector::default(), executable.program.private_words() * width),
             work: Work::default(),
             runs: vec![(0, 0); executable.program.runs.len()],

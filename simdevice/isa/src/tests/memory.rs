@@ -4,11 +4,12 @@ use std::sync::{Arc, Mutex};
 
 use crate::builder::Builder;
 use crate::clock::host_time;
+use crate::compiler::Options;
 use crate::ir::{
     Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program, Rate, Reg, Space,
     Statement, Type,
 };
-use crate::machine::{LaneMask, Watchdog};
+use crate::machine::{Executable, LaneMask, Machine, Watchdog};
 use crate::op::Op;
 use crate::resources::{GlobalMemory, ImageUnit, LaneWords, NoImages, Resources, SampleRequest, TexelRequest, words};
 use devmem::Allocation;
@@ -249,6 +250,46 @@ fn workgroup_memory_is_shared_between_lanes_and_starts_as_zero(case: &Case) {
     for _ in 0..2 {
         run(&mut machine, LANES, &Resources::default());
         (0..LANES).for_each(|lane| assert_eq!(machine.output(0, lane) as usize, LANES - 1 - lane));
+    }
+}
+
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn workgroups_that_share_a_batch_have_memory_of_their_own(case: &Case) {
+    const GROUP: usize = 32;
+    let (_, level) = level(case);
+    let mut b = Builder::new();
+    let base = b.allocate_shared(4 * (GROUP as u32 + 1), 4);
+    let (value, index) = (b.input(0, Type::B32, Rate::Varying), b.lane_index());
+    let (two, zero, count) = (b.u32(2), b.u32(0), b.u32(4 * GROUP as u32));
+    let own = b.compute(Op::Shl, &[index, two]);
+    let shared = |at| Address { space: Space::Shared, base: Some(at), offset: base };
+    let beyond = Address { space: Space::Shared, base: Some(count), offset: base + 4 };
+    let before = b.load(shared(own), Format::B32, 1)[0];
+    b.store(shared(own), Format::B32, &[value]);
+    b.store(beyond, Format::B32, &[value]);
+    b.barrier();
+    let of_first = b.load(shared(zero), Format::B32, 1)[0];
+    let of_none = b.load(beyond, Format::B32, 1)[0];
+    let old = b.atomic(AtomicOp::IAdd, shared(count), Format::B32, value, None);
+    let sum = b.load(shared(count), Format::B32, 1)[0];
+    for (slot, found) in [before, of_first, of_none, old, sum].into_iter().enumerate() {
+        let out = b.output(slot as u32, Type::B32);
+        b.assign(out, found);
+    }
+    let program = b.finish().expect("a valid program");
+    let options = Options { lanes: LANES, workgroup: Some(GROUP), subgroup_size: 16, ..Options::new(level) };
+    let mut machine = Machine::new(Arc::new(Executable::new(program, &options).expect("a valid program")));
+    let value = |lane: usize| 100 + lane as u32;
+    (0..LANES).for_each(|lane| machine.set_input(0, lane, value(lane)));
+    for active in [LANES, LANES - 5, GROUP + 1, GROUP, 3] {
+        run(&mut machine, active, &Resources::default());
+        for lane in 0..active {
+            let group = lane / GROUP * GROUP..(lane / GROUP * GROUP + GROUP).min(active);
+            let found = [0, 1, 2, 3, 4].map(|slot| machine.output(slot, lane));
+            let (earlier, all) = (group.start..lane, group.clone());
+            let expected = [0, value(group.start), 0, earlier.map(value).sum::<u32>(), all.map(value).sum::<u32>()];
+            assert_eq!(found, expected, "lane {lane} of {active}");
+        }
     }
 }
 
