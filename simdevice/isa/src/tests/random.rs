@@ -1,5 +1,6 @@
 //! Random structured programs. The batch engine's results must equal the scalar interpreter's, lane by lane.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -82,6 +83,8 @@ struct Grower {
     budget: usize,
     /// The functions of one float.
     unary: &'static [&'static [Op]],
+    /// The memory that is read and written.
+    memory: Space,
 }
 
 /// The numbers of registers of each kind that are in scope.
@@ -112,6 +115,7 @@ impl Grower {
             breakable: Vec::new(),
             budget,
             unary: &[ROUNDING],
+            memory: Space::Private,
         };
         for word in 0..PRIVATE_WORDS {
             let zero = grower.b.u32(0);
@@ -131,6 +135,15 @@ impl Grower {
     /// A generator of programs with elementary functions.
     fn with_elementary(seed: u64, budget: usize) -> Self {
         Self { unary: &[ROUNDING, ELEMENTARY, ELEMENTARY], ..Self::new(seed, budget) }
+    }
+
+    /// A generator of programs with workgroup memory.
+    fn with_workgroup_memory(seed: u64, budget: usize) -> Self {
+        let mut grower = Self::new(seed, budget);
+        grower.b.allocate_shared(4 * PRIVATE_WORDS, 4);
+        let lane = grower.b.lane_index();
+        grower.integers.push(lane);
+        Self { memory: Space::Shared, ..grower }
     }
 
     fn enter(&self) -> Scope {
@@ -234,14 +247,15 @@ impl Grower {
         }
     }
 
-    fn private(&mut self) {
+    fn access(&mut self) {
         let index = self.integer();
         // Some addresses are slightly out of range.
         let bound = self.b.u32(PRIVATE_WORDS + 1);
         let word = self.b.compute(Op::URem, &[index, bound]);
         let two = self.b.u32(2);
         let base = self.b.compute(Op::Shl, &[word, two]);
-        let address = Address { space: Space::Private, base: Some(base), offset: 4 * self.random.below(2) as u32 };
+        let offset = 4 * self.random.below(2) as u32;
+        let address = Address { space: self.memory, base: Some(base), offset };
         if self.random.once_in(2) {
             let value = self.integer();
             self.b.store(address, Format::B32, &[value]);
@@ -262,7 +276,7 @@ impl Grower {
             match self.random.below(if depth < 5 { 16 } else { 9 }) {
                 0..4 => self.value(),
                 4..7 => self.assign(),
-                7 => self.private(),
+                7 => self.access(),
                 8 => {
                     if self.leave_statement() {
                         break;
@@ -424,10 +438,11 @@ fn expected(program: &Program, seed: u64) -> Vec<(Vec<u64>, bool)> {
     (0..ACTIVE).map(lane).collect()
 }
 
-fn set_inputs(machine: &mut Machine, seed: u64) {
-    for lane in 0..LANES {
+/// Sets the inputs of a batch to those of consecutive lanes.
+fn set_inputs(machine: &mut Machine, seed: u64, lanes: Range<usize>) {
+    for (place, lane) in lanes.enumerate() {
         for (slot, value) in inputs(seed, lane).into_iter().enumerate() {
-            machine.set_input(slot as u32, lane, value as u32);
+            machine.set_input(slot as u32, place, value as u32);
         }
     }
     machine.fill_input(0, inputs(seed, 0)[0] as u32);
@@ -443,7 +458,7 @@ fn check(case: &Case, seed: u64, budget: usize) {
     let wanted = rounds.map(|seed| expected(&as_written, seed));
     let mut machine = machine(&program, level, LANES);
     for (round, seed) in rounds.into_iter().enumerate() {
-        set_inputs(&mut machine, seed);
+        set_inputs(&mut machine, seed, 0..LANES);
         run(&mut machine, ACTIVE, &Resources::default());
         let killed: LaneMask = machine.killed();
         for (lane, (outputs, was_killed)) in wanted[round].iter().enumerate() {
@@ -480,7 +495,7 @@ fn random_programs_give_the_same_bits_at_every_level(case: &Case) {
             Grower::with_elementary(seed, 20 + seed as usize % 60).finish().finish().expect("a valid program");
         let mut machines = [level, least].map(|level| machine(&program, level, LANES));
         for machine in &mut machines {
-            set_inputs(machine, seed);
+            set_inputs(machine, seed, 0..LANES);
             run(machine, ACTIVE, &Resources::default());
         }
         let [ours, theirs] = &machines;
@@ -492,6 +507,40 @@ fn random_programs_give_the_same_bits_at_every_level(case: &Case) {
                     "seed {seed}, lane {lane}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
                     output.slot
                 );
+            }
+        }
+    }
+}
+
+/// Random programs with workgroup memory: two workgroups in one batch against each in a batch of its own.
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn workgroups_that_share_a_batch_give_the_bits_of_each_alone(case: &Case) {
+    const GROUP: usize = 48;
+    let (name, level) = level(case);
+    let programs = if gaurast_runner::is_long() { 100_000 } else { 2000 };
+    for seed in 0..programs {
+        let grower = Grower::with_workgroup_memory(seed, 4 + seed as usize % 80);
+        let program = grower.finish().finish().expect("a valid program");
+        let [mut together, mut alone] = [2 * GROUP, GROUP].map(|lanes| {
+            let options = Options { lanes, workgroup: Some(GROUP), subgroup_size: 16, ..Options::new(level) };
+            Machine::new(Arc::new(Executable::new(program.clone(), &options).expect("a valid program")))
+        });
+        set_inputs(&mut together, seed, 0..2 * GROUP);
+        run(&mut together, 2 * GROUP, &Resources::default());
+        for first in [0, GROUP] {
+            set_inputs(&mut alone, seed, first..first + GROUP);
+            run(&mut alone, GROUP, &Resources::default());
+            for lane in 0..GROUP {
+                for output in &program.outputs {
+                    let (got, expected) = (together.output(output.slot, first + lane), alone.output(output.slot, lane));
+                    assert!(
+                        equal(got, expected),
+                        "seed {seed}, lane {lane} of {first}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
+                        output.slot
+                    );
+                }
+                let killed = [together.killed().contains(first + lane), alone.killed().contains(lane)];
+                assert_eq!(killed[0], killed[1], "seed {seed}, lane {lane} of {first} at {name}");
             }
         }
     }
@@ -535,7 +584,7 @@ fn broken_programs_are_refused_or_run_without_harm() {
             Err(_) => refused += 1,
             Ok(executable) => {
                 let mut machine = Machine::new(Arc::new(executable));
-                set_inputs(&mut machine, seed);
+                set_inputs(&mut machine, seed, 0..LANES);
                 let done = machine.run(&LaneMask::first(32), &LaneMask::none(), &Resources::default(), watchdog);
                 ended += u32::from(done.is_ok());
             }
