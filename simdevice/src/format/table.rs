@@ -26,10 +26,11 @@ macro_rules! formats {
 
             /// The bytes per texel, or per block of a compressed format. A format with both depth and stencil has no
             /// texel of both: see [`Format::plane`].
+            #[inline]
             pub const fn texel_size(self) -> usize {
-                match self {
-                    $(Self::$variant => (0 $(+ $bits)+) / 8,)*
-                }
+                // In the order of the variants.
+                const SIZES: &[usize] = &[$((0 $(+ $bits)+) / 8,)*];
+                SIZES[self as usize]
             }
 
             /// The components of the format, least significant bits first. A texel is little-endian.

@@ -6,7 +6,7 @@ use super::allocate::Allocation;
 use super::scopes::loop_private_variables;
 use super::step::{MaskId, RunCost, Step, Target};
 use crate::ir::op::{Kind, Op};
-use crate::ir::{Block, Case, Label, Program, Reg, Statement, Type};
+use crate::ir::{Block, Case, Label, Program, Reg, Statement, Type, contains};
 use crate::kernels::registers::RegisterSlot;
 
 /// The linear form of a program: its steps, masks and costs.
@@ -377,10 +377,6 @@ fn count_uses(program: &Program) -> Vec<u32> {
     let mut uses = vec![0; program.registers.len()];
     count(&program.body, &mut uses);
     uses
-}
-
-fn contains(block: &Block, wanted: &Statement) -> bool {
-    block.iter().any(|statement| statement == wanted || statement.blocks().iter().any(|block| contains(block, wanted)))
 }
 
 /// The kind of a statement that isn't arithmetic.

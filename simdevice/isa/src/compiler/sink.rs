@@ -1,18 +1,25 @@
 //! Moves computations down to the assignment of their result.
 
-use crate::ir::{Block, Program, Register, Role, Statement};
+use crate::ir::{Block, Program, Register, Role, Statement, contains};
 
 /// The number of statements before an assignment in which [`sink`] looks for the computation.
 const NEARBY: usize = 64;
 
 /// Moves each computation whose result is only assigned to a variable to just before that assignment, so that the two
-/// can be one step.
+/// can be one step. A loop's continuing part becomes the end of its body where no lane continues early, for the same
+/// reason: values for the next iteration are assigned there.
 pub fn sink(program: &mut Program) {
     sink_block(&mut program.body, &program.registers);
 }
 
 fn sink_block(block: &mut Block, registers: &[Register]) {
     for statement in block.iter_mut() {
+        if let Statement::Loop { label, body, continuing } = statement
+            && !contains(body, &Statement::Continue(*label))
+        {
+            // All lanes that continue reach the end of the body.
+            body.append(continuing);
+        }
         statement.blocks_mut().into_iter().for_each(|inner| sink_block(inner, registers));
     }
     for at in 0..block.len() {

@@ -15,4 +15,5 @@ pub use program::{
     Constant, Input, MAX_LANES, MAX_MEMORY_BYTES, MAX_NESTING, MAX_SUBGROUP_SIZE, Output, Program, Rate,
 };
 pub use register::{Reg, Register, Role, Type, VECTOR_LANES};
+pub(crate) use statement::contains;
 pub use statement::{Axis, Block, Case, Label, Statement, SubgroupOp, is_reducible};

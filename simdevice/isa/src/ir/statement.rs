@@ -10,6 +10,11 @@ use super::register::{List, Reg};
 /// Statements in order.
 pub type Block = Vec<Statement>;
 
+/// Reports whether a statement is in a block or within its statements.
+pub(crate) fn contains(block: &Block, wanted: &Statement) -> bool {
+    block.iter().any(|statement| statement == wanted || statement.blocks().iter().any(|block| contains(block, wanted)))
+}
+
 /// The name of a construct that `Break` and `Continue` may leave. Unique in a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Label(pub u32);

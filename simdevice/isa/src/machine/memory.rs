@@ -465,6 +465,11 @@ fn load_elements<'a, S: Simd, const COUNT: usize>(
         || {
             let slots = slots(batch, regs);
             let window = Window::new(view, address.offset);
+            if has_one_address(batch, address)
+                && let Some(starts) = window.starts(simd, bases(batch, simd, address, 0), u16::MAX, COUNT)
+            {
+                return load_one(batch, simd, slots, element(window.words, starts[0]));
+            }
             for vector in batch.file.span() {
                 let lanes = batch.masks.bits(MaskId::ACTIVE, vector);
                 if lanes == 0 {
@@ -478,6 +483,31 @@ fn load_elements<'a, S: Simd, const COUNT: usize>(
             }
         },
     );
+}
+
+/// Reports whether all lanes access the same address.
+#[inline(always)]
+fn has_one_address(batch: &Batch<'_>, address: &Address) -> bool {
+    match address.base {
+        Some(base) => !batch.slot(base).is_varying(),
+        None => true,
+    }
+}
+
+/// Loads one element into varying registers.
+#[inline(always)]
+fn load_one<S: Simd, const COUNT: usize>(
+    batch: &Batch<'_>,
+    simd: S,
+    slots: [RegisterSlot; COUNT],
+    element: &[AtomicU32; COUNT],
+) {
+    for index in 0..COUNT {
+        let value = u32x16::splat(simd, element[index].load(Relaxed));
+        for vector in batch.file.span() {
+            store_vector(batch.file.vector(slots[index], vector), value);
+        }
+    }
 }
 
 #[inline(always)]
