@@ -1,7 +1,7 @@
 //! Tests of shaders on the shader cores, most of them in SPIR-V assembly because GLSL can't express them. Each row of
 //! results is compared with the host's.
 
-use crate::common::{Dispatch, Random, buffer, contents, translated, words_of};
+use crate::common::{Dispatch, Random, buffer, contents, rewritten, translated, words_of};
 use devmem::BufferRange;
 use gaurast_spirv::{Module, Specialization};
 
@@ -388,16 +388,8 @@ fn dot_products_of_integers() {
 
 /// A module's words without the declarations of a capability.
 fn without(words: &[u32], capability: spirv::Capability) -> Vec<u32> {
-    let mut kept = words[..5].to_vec();
-    let mut rest = &words[5..];
-    while let [first, ..] = rest {
-        let (instruction, others) = rest.split_at((first >> 16) as usize);
-        if instruction != [2 << 16 | spirv::Op::Capability as u32, capability as u32] {
-            kept.extend_from_slice(instruction);
-        }
-        rest = others;
-    }
-    kept
+    let declaration = [2 << 16 | spirv::Op::Capability as u32, capability as u32];
+    rewritten(words, |instruction| if instruction == declaration { Vec::new() } else { instruction.to_vec() })
 }
 
 #[gaurast_runner::test]

@@ -21,6 +21,18 @@ pub fn words_of(name: &str) -> Vec<u32> {
     bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect()
 }
 
+/// A module's words with each instruction replaced by what `change` makes of it.
+pub fn rewritten(words: &[u32], mut change: impl FnMut(&[u32]) -> Vec<u32>) -> Vec<u32> {
+    let (header, mut rest) = words.split_at(5);
+    let mut all = header.to_vec();
+    while let [first, ..] = rest {
+        let (instruction, others) = rest.split_at((first >> 16) as usize);
+        all.append(&mut change(instruction));
+        rest = others;
+    }
+    all
+}
+
 /// The stage in a shader's file name.
 pub fn stage_of(name: &str) -> Stage {
     match name.rsplit('.').next() {

@@ -1,6 +1,6 @@
 //! Tests of functions of GLSL.std.450 against f64 or exact models, within the precision that Vulkan requires.
 
-use crate::common::{Dispatch, OPTIONS, Random, buffer, contents, float_contents, translated, words_of};
+use crate::common::{Dispatch, OPTIONS, Random, buffer, contents, float_contents, rewritten, translated, words_of};
 use gaurast_spirv::{Module, Shader, Specialization, Stage, translate};
 
 /// The allowed difference between a result and the model's.
@@ -181,23 +181,20 @@ fn float_functions() {
     check_floats(&shader, &inputs);
 
     // The same with NMin, NMax and NClamp in place of FMin, FMax and FClamp.
-    let mut words = words_of("glsl_floats.comp");
-    let mut at = 5;
     let mut replaced = 0;
-    while at < words.len() {
-        let count = (words[at] >> 16) as usize;
-        if words[at] & 0xffff == 12 {
-            let other = match words[at + 4] {
+    let words = rewritten(&words_of("glsl_floats.comp"), |instruction| {
+        let mut changed = instruction.to_vec();
+        if instruction[0] & 0xffff == 12 {
+            changed[4] = match instruction[4] {
                 37 => 79,
                 40 => 80,
                 43 => 81,
                 same => same,
             };
-            replaced += u32::from(words[at + 4] != other);
-            words[at + 4] = other;
+            replaced += u32::from(changed[4] != instruction[4]);
         }
-        at += count;
-    }
+        changed
+    });
     assert_eq!(replaced, 3);
     let module = Module::parse(&words).unwrap();
     let specialization = Specialization::default();

@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::{OPTIONS, all_shaders, folder, translated, words_of};
+use crate::common::{OPTIONS, all_shaders, folder, rewritten, translated, words_of};
 use gaurast_runner::{Missing, Need, ignore};
 use gaurast_spirv::{Module, Specialization, Stage, translate};
+use spirv::{Decoration, MemoryAccess, MemoryModel, Op};
 
 #[gaurast_runner::test]
 fn every_kept_shader_translates() {
@@ -17,47 +18,44 @@ fn every_kept_shader_translates() {
     }
 }
 
-/// A module of which the first instruction with an opcode is replaced by what `change` makes of its words.
-fn changed(name: &str, opcode: u32, change: impl Fn(&[u32]) -> Vec<u32>) -> Module {
-    const HEADER: usize = 5;
-    let words = words_of(name);
-    let mut at = HEADER;
-    while words[at] & 0xFFFF != opcode {
-        at += (words[at] >> 16) as usize;
-    }
-    let end = at + (words[at] >> 16) as usize;
-    let all = [&words[..at], &change(&words[at..end]), &words[end..]].concat();
-    Module::parse(&all).unwrap()
+/// A module of which the first instruction of an operation is replaced by what `change` makes of its words.
+fn changed(name: &str, op: Op, change: impl Fn(&[u32]) -> Vec<u32>) -> Module {
+    let mut is_first = true;
+    let words = rewritten(&words_of(name), |instruction| {
+        if instruction[0] & 0xffff == op as u32 && std::mem::take(&mut is_first) {
+            change(instruction)
+        } else {
+            instruction.to_vec()
+        }
+    });
+    Module::parse(&words).unwrap()
 }
 
 #[gaurast_runner::test]
 fn coherent_and_volatile_accesses_are_noticed() {
-    const MEMORY_MODEL: u32 = 14;
-    const LOAD: u32 = 61;
-    const DECORATE: u32 = 71;
-    const MEMBER_DECORATE: u32 = 72;
-    const VOLATILE: u32 = 21;
-    const COHERENT: u32 = 23;
     let name = "blur.comp";
     let is_coherent = |module: &Module| {
         let shader = translate(module, "main", Stage::Compute, &Specialization::default(), &OPTIONS).unwrap();
         shader.program.has_coherent_accesses
     };
     assert!(!is_coherent(&Module::parse(&words_of(name)).unwrap()));
-    for decoration in [VOLATILE, COHERENT] {
+    let opening = |words: u32, op: Op| words << 16 | op as u32;
+    for decoration in [Decoration::Volatile, Decoration::Coherent] {
+        let decoration = decoration as u32;
         // Another decoration of the same thing is added before the first one.
-        let variable = changed(name, DECORATE, |first| [&[3 << 16 | DECORATE, first[1], decoration], first].concat());
+        let variable =
+            changed(name, Op::Decorate, |first| [&[opening(3, Op::Decorate), first[1], decoration], first].concat());
         assert!(is_coherent(&variable));
-        let member = changed(name, MEMBER_DECORATE, |first| {
-            [&[4 << 16 | MEMBER_DECORATE, first[1], first[2], decoration], first].concat()
+        let member = changed(name, Op::MemberDecorate, |first| {
+            [&[opening(4, Op::MemberDecorate), first[1], first[2], decoration], first].concat()
         });
         assert!(is_coherent(&member));
     }
-    let volatile = 1;
-    let load = changed(name, LOAD, |load| [&[5 << 16 | LOAD], &load[1..4], &[volatile]].concat());
+    let volatile = MemoryAccess::VOLATILE.bits();
+    let load = changed(name, Op::Load, |load| [&[opening(5, Op::Load)], &load[1..4], &[volatile]].concat());
     assert!(is_coherent(&load));
-    let vulkan = 3;
-    let model = changed(name, MEMORY_MODEL, |model| vec![model[0], model[1], vulkan]);
+    let vulkan = MemoryModel::Vulkan as u32;
+    let model = changed(name, Op::MemoryModel, |model| vec![model[0], model[1], vulkan]);
     assert!(is_coherent(&model));
 }
 

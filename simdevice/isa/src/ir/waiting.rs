@@ -13,6 +13,7 @@ pub(super) struct Accesses {
     writes_addresses: bool,
     reads_images_in_loops: bool,
     writes_images: bool,
+    /// Atomics on memory that other workgroups see.
     pub(super) has_atomics: bool,
 }
 
@@ -51,7 +52,6 @@ impl Accesses {
                 },
                 Statement::ImageRead(_) | Statement::Sample(_) if in_loop => self.reads_images_in_loops = true,
                 Statement::ImageWrite(_) => self.writes_images = true,
-                // Workgroup memory is not seen by other workgroups.
                 Statement::Atomic { address, .. } => self.has_atomics |= address.space != Space::Shared,
                 Statement::ImageAtomic(_) => self.has_atomics = true,
                 _ => {}

@@ -75,7 +75,7 @@ fn run_steps<S: Simd>(
     let mut next = 0;
     while let Some(step) = steps.get(next) {
         next += 1;
-        // By far the most frequent step. A branch of its own is predicted better than one with the others.
+        // By far the most frequent step is tested first.
         if let Step::Compute { op, dst, src } = step {
             kernels.by_op[usize::from(*op as u8)](simd, &batch.file, *dst, src);
             continue;

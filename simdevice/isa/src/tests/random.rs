@@ -23,7 +23,7 @@ const LANES: usize = 80;
 /// A partial batch: the last lanes are not active.
 const ACTIVE: usize = 75;
 const INPUTS: usize = 4;
-const PRIVATE_WORDS: u32 = 8;
+const MEMORY_WORDS: u32 = 8;
 
 const INTEGER: &[Op] = &[
     Op::IAdd,
@@ -102,7 +102,7 @@ impl Grower {
         let bools = vec![b.bool(true)];
         let integer_variables: Vec<Reg> = (0..4).map(|_| b.variable(Type::B32)).collect();
         let float_variables: Vec<Reg> = (0..3).map(|_| b.variable(Type::B32)).collect();
-        b.allocate_private(4 * PRIVATE_WORDS);
+        b.allocate_private(4 * MEMORY_WORDS);
         let mut grower = Self {
             b,
             random,
@@ -117,7 +117,7 @@ impl Grower {
             unary: &[ROUNDING],
             memory: Space::Private,
         };
-        for word in 0..PRIVATE_WORDS {
+        for word in 0..MEMORY_WORDS {
             let zero = grower.b.u32(0);
             grower.b.store(Address { space: Space::Private, base: None, offset: 4 * word }, Format::B32, &[zero]);
         }
@@ -140,7 +140,7 @@ impl Grower {
     /// A generator of programs with workgroup memory.
     fn with_workgroup_memory(seed: u64, budget: usize) -> Self {
         let mut grower = Self::new(seed, budget);
-        grower.b.allocate_shared(4 * PRIVATE_WORDS, 4);
+        grower.b.allocate_shared(4 * MEMORY_WORDS, 4);
         let lane = grower.b.lane_index();
         grower.integers.push(lane);
         Self { memory: Space::Shared, ..grower }
@@ -250,7 +250,7 @@ impl Grower {
     fn access(&mut self) {
         let index = self.integer();
         // Some addresses are slightly out of range.
-        let bound = self.b.u32(PRIVATE_WORDS + 1);
+        let bound = self.b.u32(MEMORY_WORDS + 1);
         let word = self.b.compute(Op::URem, &[index, bound]);
         let two = self.b.u32(2);
         let base = self.b.compute(Op::Shl, &[word, two]);
