@@ -4,6 +4,7 @@ use std::mem::MaybeUninit;
 
 use bytemuck::Pod;
 use gaurast_scene::{GaussianShape, MAX_SH_DEGREE, SH_C0};
+use twox_hash::XxHash3_128;
 
 use crate::error::RenderError;
 use crate::pipeline::BINDINGS;
@@ -97,22 +98,51 @@ impl Arrays<'_> {
         Ok(())
     }
 
-    /// Returns true if `buffers` have the bits of these arrays.
-    pub(crate) fn are_in(&self, [positions, shapes, harmonics]: &[Buffer; BINDINGS]) -> Result<bool, RenderError> {
-        let (count, (_, stride)) = (self.positions.len(), self.harmonics());
-        let bits = |floats: &[f32; 3]| floats.map(f32::to_bits);
-        Ok(positions.look(count * 12, |held: &[u8]| held == bytemuck::cast_slice::<_, u8>(self.positions))?
-            && shapes.look(count, |held: &[GaussianShape]| {
-                self.shapes().zip(held).all(|(shape, held)| bytemuck::bytes_of(&shape) == bytemuck::bytes_of(held))
-            })?
-            && match self.colors {
-                Colors::Harmonics { coefficients, .. } => harmonics
-                    .look(count * stride * 12, |held: &[u8]| held == bytemuck::cast_slice::<_, u8>(coefficients))?,
-                Colors::Channels { stride, first, low, values } => harmonics.look(count, |held: &[[f32; 3]]| {
-                    constant_harmonics(values, stride, first, low).zip(held).all(|(a, b)| bits(&a) == bits(b))
-                })?,
-            })
+    /// A hash of the arrays' bits and of which of them are drawn. Equal arrays have equal hashes, and others the same one by a
+    /// chance of 2^-128. `threads` threads compute it.
+    pub(crate) fn hash(&self, threads: usize) -> u128 {
+        let colors: &[u8] = match self.colors {
+            Colors::Harmonics { coefficients, .. } => bytemuck::cast_slice(coefficients),
+            Colors::Channels { values, .. } => bytemuck::cast_slice(values),
+        };
+        let attributes: [&[u8]; 5] = [
+            bytemuck::cast_slice(self.positions),
+            bytemuck::cast_slice(self.scales),
+            bytemuck::cast_slice(self.rotations),
+            bytemuck::cast_slice(self.opacities),
+            colors,
+        ];
+        let chosen = match self.colors {
+            Colors::Harmonics { degree, stride, .. } => [0, u64::from(degree), stride as u64, 0, 0, 0],
+            Colors::Channels { stride, first, low, .. } => {
+                let [x, y, z] = low.map(|low| u64::from(low.to_bits()));
+                [1, first as u64, stride as u64, x, y, z]
+            }
+        };
+        let mut hashes = hashes_of_pieces(&attributes, threads);
+        hashes.push(XxHash3_128::oneshot(bytemuck::cast_slice(&chosen)));
+        XxHash3_128::oneshot(bytemuck::cast_slice(&hashes))
     }
+}
+
+/// The bytes that are hashed together. Threads that share memory read it no faster by smaller pieces.
+const PIECE: usize = 1 << 20;
+
+/// The hashes of the lengths of `arrays`, and of each piece of them in turn.
+fn hashes_of_pieces(arrays: &[&[u8]], threads: usize) -> Vec<u128> {
+    let mut hashes: Vec<u128> = arrays.iter().map(|array| array.len() as u128).collect();
+    let pieces: Vec<&[u8]> = arrays.iter().flat_map(|array| array.chunks(PIECE)).collect();
+    let of = |pieces: &[&[u8]]| pieces.iter().map(|piece| XxHash3_128::oneshot(piece)).collect::<Vec<_>>();
+    let share = pieces.len().div_ceil(threads.max(1)).max(1);
+    let (own, others) = pieces.split_at(share.min(pieces.len()));
+    std::thread::scope(|scope| {
+        let others: Vec<_> = others.chunks(share).map(|pieces| scope.spawn(move || of(pieces))).collect();
+        hashes.extend(of(own));
+        for other in others {
+            hashes.extend(other.join().expect("hashing does not panic"));
+        }
+    });
+    hashes
 }
 
 /// The constant harmonics whose colours are the channels.
@@ -131,4 +161,84 @@ fn write_each<T: Pod>(buffer: &Buffer, count: usize, values: impl Iterator<Item 
             place.write(value);
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Arrays of so many Gaussians that their harmonics are hashed in three pieces.
+    struct Owned {
+        vectors: Vec<[f32; 3]>,
+        rotations: Vec<[f32; 4]>,
+        opacities: Vec<f32>,
+        coefficients: Vec<[f32; 3]>,
+    }
+
+    impl Owned {
+        const COUNT: usize = PIECE / 64;
+
+        fn new() -> Self {
+            Self {
+                vectors: vec![[0.5; 3]; Self::COUNT],
+                rotations: vec![[1.0, 0.0, 0.0, 0.0]; Self::COUNT],
+                opacities: vec![0.25; Self::COUNT],
+                coefficients: vec![[0.1; 3]; Self::COUNT * 16],
+            }
+        }
+
+        fn hash(&self, threads: usize, degree: u32) -> u128 {
+            let colors = Colors::Harmonics { degree, stride: 16, coefficients: &self.coefficients };
+            self.with(colors).hash(threads)
+        }
+
+        fn with<'a>(&'a self, colors: Colors<'a>) -> Arrays<'a> {
+            Arrays {
+                positions: &self.vectors,
+                scales: &self.vectors,
+                rotations: &self.rotations,
+                opacities: &self.opacities,
+                colors,
+            }
+        }
+    }
+
+    #[test]
+    fn the_hash_does_not_depend_on_threads() {
+        let arrays = Owned::new();
+        let one = arrays.hash(1, 3);
+        for threads in [0, 2, 3, 7, 1000] {
+            assert_eq!(arrays.hash(threads, 3), one, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn every_attribute_and_the_choice_of_colors_change_the_hash() {
+        let mut arrays = Owned::new();
+        let mut seen = vec![arrays.hash(2, 3), arrays.hash(2, 2)];
+        // The least change that there is, at the last place of each array.
+        arrays.vectors[Owned::COUNT - 1][2] = 0.5_f32.next_up();
+        seen.push(arrays.hash(2, 3));
+        arrays.rotations[Owned::COUNT - 1][3] = -0.0;
+        seen.push(arrays.hash(2, 3));
+        arrays.opacities[Owned::COUNT - 1] = 0.25_f32.next_up();
+        seen.push(arrays.hash(2, 3));
+        arrays.coefficients[Owned::COUNT * 16 - 1][2] = 0.1_f32.next_up();
+        seen.push(arrays.hash(2, 3));
+        for (first, low) in [(0, [0.0; 3]), (1, [0.0; 3]), (1, [0.0, 0.0, 1.0])] {
+            let values = arrays.coefficients.as_flattened();
+            seen.push(arrays.with(Colors::Channels { stride: 48, first, low, values }).hash(2));
+        }
+        let count = seen.len();
+        seen.sort_unstable();
+        seen.dedup();
+        assert_eq!(seen.len(), count, "hashes of different arrays");
+    }
+
+    #[test]
+    fn no_arrays_have_a_hash() {
+        let colors = Colors::Harmonics { degree: 0, stride: 1, coefficients: &[] };
+        let empty = Arrays { positions: &[], scales: &[], rotations: &[], opacities: &[], colors };
+        assert_eq!(empty.hash(1), empty.hash(4));
+    }
 }

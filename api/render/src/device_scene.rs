@@ -40,6 +40,8 @@ pub(crate) struct DecodedVertices {
     pub(crate) buffers: [Buffer; BINDINGS],
     /// Copies of them in the device's own memory, which are drawn instead.
     pub(crate) resident: Option<[Buffer; BINDINGS]>,
+    /// The hash of the arrays that the buffers hold, if they are from arrays.
+    pub(crate) hash: Option<u128>,
 }
 
 impl Vertices {

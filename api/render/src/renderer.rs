@@ -40,6 +40,8 @@ pub struct Renderer {
     target: Option<Target>,
     commands: CommandBuffers<2>,
     gaussian: gaussian_primitive_topology::Device,
+    /// The number of threads that hash arrays.
+    threads: usize,
     device: Arc<Device>,
 }
 
@@ -80,11 +82,16 @@ impl Renderer {
     /// As [`Renderer::new`]; also for an option that the driver refuses.
     pub fn with_options(entry: ash::Entry, options: &DeviceOptions) -> Result<Self, RenderError> {
         let device = Arc::new(Device::new(entry, Purpose::Gaussians, options)?);
+        let threads = match options.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            threads => threads as usize,
+        };
         Ok(Self {
             query: CounterQuery::new(&device, false)?,
             target: None,
             commands: CommandBuffers::new(&device)?,
             gaussian: device.gaussian_functions(),
+            threads,
             device,
         })
     }
@@ -169,7 +176,7 @@ impl Renderer {
             stored_degree: scene.sh_degree(),
             settings,
             pipeline,
-            vertices: Vertices::Decoded(DecodedVertices { strides, resident: None, buffers }),
+            vertices: Vertices::Decoded(DecodedVertices { strides, resident: None, buffers, hash: None }),
         })
     }
 
@@ -378,6 +385,7 @@ impl Renderer {
         used: Option<DeviceScene>,
     ) -> Result<DeviceScene, RenderError> {
         arrays.check();
+        let hash = arrays.hash(self.threads);
         let count = self.checked_count(arrays.positions.len())?;
         let (stored_degree, sh_stride) = arrays.harmonics();
         let strides = [size_of::<[f32; 3]>(), size_of::<GaussianShape>(), sh_stride * size_of::<[f32; 3]>()];
@@ -398,13 +406,12 @@ impl Renderer {
             Some(DeviceScene {
                 vertices: Vertices::Decoded(held),
                 pipeline,
-                count: held_count,
                 stored_degree: held_degree,
                 settings: held_settings,
                 ..
             }) => {
                 let keeps_pipeline = (held_degree, held_settings) == (stored_degree, settings);
-                let is_same = (held_count, held.strides) == (count, strides) && arrays.are_in(&held.buffers)?;
+                let is_same = held.hash == Some(hash);
                 let pipeline = if keeps_pipeline && held.strides == strides {
                     pipeline
                 } else {
@@ -413,12 +420,12 @@ impl Renderer {
                 if is_same {
                     return Ok(scene(self.made_resident(held, bytes)?, pipeline));
                 }
-                (DecodedVertices { strides, resident: None, ..held }, pipeline)
+                (DecodedVertices { strides, resident: None, hash: None, ..held }, pipeline)
             }
             _ => {
                 let buffers = [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?];
                 let pipeline = self.pipeline(&layout, stored_degree, settings, false)?;
-                (DecodedVertices { strides, buffers, resident: None }, pipeline)
+                (DecodedVertices { strides, buffers, resident: None, hash: None }, pipeline)
             }
         };
         for (buffer, bytes) in vertices.buffers.iter_mut().zip(bytes) {
@@ -427,6 +434,7 @@ impl Renderer {
             }
         }
         arrays.write_to(&vertices.buffers)?;
+        vertices.hash = Some(hash);
         Ok(scene(vertices, pipeline))
     }
 
