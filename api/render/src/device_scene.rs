@@ -28,7 +28,7 @@ pub struct DeviceScene {
 /// The attributes of Gaussians in device memory.
 pub(crate) enum Vertices {
     /// As numbers.
-    Decoded(DecodedVertices),
+    Decoded(Box<DecodedVertices>),
     /// As the integers of a compressed scene.
     Encoded(Box<EncodedVertices>),
 }

@@ -176,7 +176,7 @@ impl Renderer {
             stored_degree: scene.sh_degree(),
             settings,
             pipeline,
-            vertices: Vertices::Decoded(DecodedVertices { strides, resident: None, buffers, hash: None }),
+            vertices: Vertices::Decoded(Box::new(DecodedVertices { strides, resident: None, buffers, hash: None })),
         })
     }
 
@@ -392,7 +392,7 @@ impl Renderer {
         let strides = strides.map(|stride| stride as u32);
         let bytes = strides.map(|stride| u64::from(stride) * u64::from(count));
         let layout = VertexLayout::Decoded(strides);
-        let scene = |vertices: DecodedVertices, pipeline: GaussianPipeline| DeviceScene {
+        let scene = |vertices: Box<DecodedVertices>, pipeline: GaussianPipeline| DeviceScene {
             mesh: None,
             origin: DVec3::ZERO,
             turn: DMat3::IDENTITY,
@@ -420,12 +420,12 @@ impl Renderer {
                 if is_same {
                     return Ok(scene(self.made_resident(held, bytes)?, pipeline));
                 }
-                (DecodedVertices { strides, resident: None, hash: None, ..held }, pipeline)
+                (Box::new(DecodedVertices { strides, resident: None, hash: None, ..*held }), pipeline)
             }
             _ => {
                 let buffers = [self.vertices(bytes[0])?, self.vertices(bytes[1])?, self.vertices(bytes[2])?];
                 let pipeline = self.pipeline(&layout, stored_degree, settings, false)?;
-                (DecodedVertices { strides, buffers, resident: None, hash: None }, pipeline)
+                (Box::new(DecodedVertices { strides, buffers, resident: None, hash: None }), pipeline)
             }
         };
         for (buffer, bytes) in vertices.buffers.iter_mut().zip(bytes) {
@@ -441,9 +441,9 @@ impl Renderer {
     /// The vertices with copies in the device's memory, of which the first `bytes` are drawn.
     fn made_resident(
         &mut self,
-        mut vertices: DecodedVertices,
+        mut vertices: Box<DecodedVertices>,
         bytes: [u64; BINDINGS],
-    ) -> Result<DecodedVertices, RenderError> {
+    ) -> Result<Box<DecodedVertices>, RenderError> {
         if vertices.resident.is_none() && bytes[0] > 0 {
             let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
             let copy = |bytes: u64| Buffer::new(&self.device, bytes, usage, Memory::Device);
