@@ -1,6 +1,6 @@
 //! The image unit: the images and samplers that are bound to a program's slots.
 
-use devmem::{dispatch, host};
+use devmem::dispatch;
 use fearless_simd::Level;
 
 use super::sampler::{Reduction, Sampler};
@@ -37,7 +37,7 @@ impl ImageTable {
             ImageBinding::Unbound => None,
             ImageBinding::Sampled(image) => {
                 if let Some(planes) = &image.chroma {
-                    host::push(&mut chroma, (slot, ChromaSurfaces::new(&image, planes)?));
+                    chroma.push((slot, ChromaSurfaces::new(&image, planes)?));
                 }
                 Surface::sampled(&image)
             }

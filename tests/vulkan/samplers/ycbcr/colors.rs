@@ -254,8 +254,7 @@ fn disjoint_planes_are_sampled_as_others() {
     for plan in ImagePlan::all(SIZE).into_iter().filter(|plan| plan.arrangement.planes() > 1) {
         let picture = Picture::random(plan, &mut noise);
         let places = coordinates(&mut noise, SIZE);
-        let [model, range] = [2, 1];
-        let conversion = Conversion::numbered(MODELS[model], RANGES[range], 15);
+        let conversion = Conversion::numbered(MODELS[2], RANGES[1], 15);
         let [joint, disjoint] = [YcbcrImage::joint(gpu, plan), YcbcrImage::disjoint(gpu, plan)].map(|image| {
             image.upload(&picture);
             sample(gpu, &image, &conversion, &places)
