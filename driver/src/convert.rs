@@ -10,7 +10,8 @@ use simdevice::state::{
     StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
-    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
+    AddressMode, BorderColor, ChromaLocation, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
+    YcbcrModel, YcbcrRange,
 };
 use std::ffi::{CStr, c_char};
 
@@ -341,6 +342,45 @@ pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<Reduction, Err
         vk::SamplerReductionMode::MIN => Ok(Reduction::Min),
         vk::SamplerReductionMode::MAX => Ok(Reduction::Max),
         other => Err(Error::FeatureNotPresent(format!("reduction mode {other:?}"))),
+    }
+}
+
+/// The device's model of luma and chroma.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for an unknown value.
+pub(crate) fn ycbcr_model(model: vk::SamplerYcbcrModelConversion) -> Result<YcbcrModel, Error> {
+    match model {
+        vk::SamplerYcbcrModelConversion::RGB_IDENTITY => Ok(YcbcrModel::RgbIdentity),
+        vk::SamplerYcbcrModelConversion::YCBCR_IDENTITY => Ok(YcbcrModel::YcbcrIdentity),
+        vk::SamplerYcbcrModelConversion::YCBCR_709 => Ok(YcbcrModel::Ycbcr709),
+        vk::SamplerYcbcrModelConversion::YCBCR_601 => Ok(YcbcrModel::Ycbcr601),
+        vk::SamplerYcbcrModelConversion::YCBCR_2020 => Ok(YcbcrModel::Ycbcr2020),
+        other => Err(unknown("VUID-VkSamplerYcbcrConversionCreateInfo-ycbcrModel-parameter", &other)),
+    }
+}
+
+/// The device's range of codes of luma and chroma.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for an unknown value.
+pub(crate) fn ycbcr_range(range: vk::SamplerYcbcrRange) -> Result<YcbcrRange, Error> {
+    match range {
+        vk::SamplerYcbcrRange::ITU_FULL => Ok(YcbcrRange::Full),
+        vk::SamplerYcbcrRange::ITU_NARROW => Ok(YcbcrRange::Narrow),
+        other => Err(unknown("VUID-VkSamplerYcbcrConversionCreateInfo-ycbcrRange-parameter", &other)),
+    }
+}
+
+/// The device's place of chroma.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
+pub(crate) fn chroma_location(location: vk::ChromaLocation, vuid: &'static str) -> Result<ChromaLocation, Error> {
+    match location {
+        vk::ChromaLocation::COSITED_EVEN => Ok(ChromaLocation::CositedEven),
+        vk::ChromaLocation::MIDPOINT => Ok(ChromaLocation::Midpoint),
+        other => Err(unknown(vuid, &other)),
     }
 }
 

@@ -438,9 +438,10 @@ pub(crate) unsafe fn queue_present(queue: &Queue, present_info: &vk::PresentInfo
 pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_>]) -> Result<(), Error> {
     bind_infos.iter().try_for_each(|info| {
         // SAFETY: the caller's promise.
-        let (image, of_swapchain) = unsafe {
+        let (image, of_swapchain, plane) = unsafe {
             let of_swapchain = valid::find_in_chain::<vk::BindImageMemorySwapchainInfoKHR<'_>>(info.p_next);
-            (handle::get(info.image)?, of_swapchain)
+            let plane = valid::find_in_chain::<vk::BindImagePlaneMemoryInfo<'_>>(info.p_next);
+            (handle::get(info.image)?, of_swapchain, plane)
         };
         if let Some(info) = of_swapchain {
             // SAFETY: the caller's promise.
@@ -458,7 +459,7 @@ pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_
         }
         // SAFETY: the caller's promise.
         let memory = unsafe { handle::get(info.memory)? };
-        bind_image_memory(image, memory, info.memory_offset)
+        image.bind(memory.allocation(), info.memory_offset, plane.map(|info| info.plane_aspect))
     })
 }
 

@@ -48,6 +48,7 @@ fn image(format: Format) -> ImageBinding {
         },
         aspect: format.aspects()[0],
         swizzle: IDENTITY,
+        chroma: None,
     })
 }
 

@@ -6,7 +6,7 @@ use crate::abi::error::Error;
 use crate::abi::valid;
 use crate::convert;
 use crate::resource::buffer::{Buffer, BufferRules};
-use crate::resource::image::{Image, count};
+use crate::resource::image::{Image, PlaneAspects, count};
 use ash::vk;
 use simdevice::BufferRange;
 use simdevice::format::{Aspect, ClearValue, Numeric};
@@ -42,7 +42,9 @@ pub(crate) fn cmd_copy_image2(
     regions: &[vk::ImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    recorder.packet(copy_image(src_image, dst_image, regions)?);
+    for copy in copy_image(src_image, dst_image, regions)? {
+        recorder.packet(Packet::CopyImage(copy));
+    }
     Ok(())
 }
 
@@ -79,8 +81,9 @@ pub(crate) fn cmd_copy_buffer_to_image2(
     regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    let copy = copy_buffer_image(src_buffer, dst_image, regions, &COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE)?;
-    recorder.packet(Packet::CopyBufferToImage(copy));
+    for copy in copy_buffer_image(src_buffer, dst_image, regions, &COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE)? {
+        recorder.packet(Packet::CopyBufferToImage(copy));
+    }
     Ok(())
 }
 
@@ -92,8 +95,9 @@ pub(crate) fn cmd_copy_image_to_buffer2(
     regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    let copy = copy_buffer_image(dst_buffer, src_image, regions, &COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE)?;
-    recorder.packet(Packet::CopyImageToBuffer(copy));
+    for copy in copy_buffer_image(dst_buffer, src_image, regions, &COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE)? {
+        recorder.packet(Packet::CopyImageToBuffer(copy));
+    }
     Ok(())
 }
 
@@ -341,7 +345,7 @@ fn copy_buffer(source: &Buffer, target: &Buffer, regions: &[vk::BufferCopy2]) ->
     }))
 }
 
-/// The body of `vkCmdCopyBufferToImage` and `vkCmdCopyImageToBuffer`.
+/// The body of `vkCmdCopyBufferToImage` and `vkCmdCopyImageToBuffer`: a copy for each plane of the image.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] if the buffer or image is not bound or the image has no such subresource.
@@ -351,35 +355,53 @@ fn copy_buffer_image(
     regions: &[vk::BufferImageCopy2],
     buffer_rules: &BufferRules,
     image_rules: &ImageRules,
-) -> Result<CopyBufferImage, Error> {
+) -> Result<Vec<CopyBufferImage>, Error> {
+    let buffer = buffer.whole(buffer_rules)?;
     let side = image.desc.format.block_side();
-    let region = |region: &vk::BufferImageCopy2| {
-        Ok(BufferImageRegion {
+    let mut copies = ByPlanes::default();
+    for region in regions {
+        let (plane, subresource) =
+            layers(image, &region.image_subresource, image_rules, "VUID-VkBufferImageCopy-aspectMask-00212")?;
+        let converted = BufferImageRegion {
             buffer_offset: region.buffer_offset,
             buffer_row_length: region.buffer_row_length.div_ceil(side),
             buffer_image_height: region.buffer_image_height.div_ceil(side),
-            subresource: layers(
-                image,
-                &region.image_subresource,
-                image_rules,
-                "VUID-VkBufferImageCopy-aspectMask-00212",
-            )?,
+            subresource,
             image_offset: block_offset(image, region.image_offset),
             image_extent: block_extent(image, region.image_extent),
-        })
+        };
+        copies.add(plane, converted);
+    }
+    let copy = |(plane, regions)| {
+        let image = Arc::clone(image.bound_plane(plane, image_rules.memory)?);
+        Ok(CopyBufferImage { buffer: buffer.clone(), image, regions })
     };
-    Ok(CopyBufferImage {
-        buffer: buffer.whole(buffer_rules)?,
-        image: Arc::clone(image.bound(image_rules.memory)?),
-        regions: regions.iter().map(region).collect::<Result<_, Error>>()?,
-    })
+    copies.0.into_iter().map(copy).collect()
 }
 
-/// `vkCmdCopyImage`.
+/// The regions of a command, apart for each plane or pair of planes between which they copy. Planes are images of the device.
+struct ByPlanes<P, R>(Vec<(P, Vec<R>)>);
+
+impl<P, R> Default for ByPlanes<P, R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<P: Copy + PartialEq, R> ByPlanes<P, R> {
+    fn add(&mut self, planes: P, region: R) {
+        match self.0.iter_mut().find(|(known, _)| *known == planes) {
+            Some((_, regions)) => simdevice::host::push(regions, region),
+            None => self.0.push((planes, vec![region])),
+        }
+    }
+}
+
+/// `vkCmdCopyImage`: a copy for each pair of planes.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] if an image is not bound, has no such subresource, or differs from the other in its samples.
-fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Result<Packet, Error> {
+fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Result<Vec<CopyImage>, Error> {
     let (from, to) = (source.desc.samples, target.desc.samples);
     if from != to {
         return Err(Error::usage(
@@ -388,25 +410,31 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
         ));
     }
     let (source_image, target_image) = (source, target);
-    let mut converted = simdevice::host::with_capacity(regions.len());
+    let mut copies = ByPlanes::default();
     for region in regions {
-        let pairs = layer_pairs(
+        let (planes, pairs) = layer_pairs(
             &CopySide { image: source_image, layers: region.src_subresource, rules: &COPY_SOURCE },
             &CopySide { image: target_image, layers: region.dst_subresource, rules: &COPY_TARGET },
         )?;
-        converted.extend(pairs.into_iter().map(|(source, target)| ImageCopyRegion {
-            source,
-            source_offset: block_offset(source_image, region.src_offset),
-            target,
-            target_offset: block_offset(target_image, region.dst_offset),
-            extent: block_extent(source_image, region.extent),
-        }));
+        for (source, target) in pairs {
+            let converted = ImageCopyRegion {
+                source,
+                source_offset: block_offset(source_image, region.src_offset),
+                target,
+                target_offset: block_offset(target_image, region.dst_offset),
+                extent: block_extent(source_image, region.extent),
+            };
+            copies.add(planes, converted);
+        }
     }
-    Ok(Packet::CopyImage(CopyImage {
-        source: Arc::clone(source.bound(COPY_SOURCE.memory)?),
-        target: Arc::clone(target.bound(COPY_TARGET.memory)?),
-        regions: converted,
-    }))
+    let copy = |([source, target], regions): ([usize; 2], _)| {
+        Ok(CopyImage {
+            source: Arc::clone(source_image.bound_plane(source, COPY_SOURCE.memory)?),
+            target: Arc::clone(target_image.bound_plane(target, COPY_TARGET.memory)?),
+            regions,
+        })
+    };
+    copies.0.into_iter().map(copy).collect()
 }
 
 /// `vkCmdBlitImage`.
@@ -415,6 +443,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
 /// [`Error::InvalidUsage`] if an image is not bound, has no such subresource or several samples, or if the formats
 /// don't convert to each other; [`Error::FeatureNotPresent`] for filters of extensions.
 fn blit_image(source: &Image, target: &Image, filter: vk::Filter, regions: &[vk::ImageBlit2]) -> Result<Packet, Error> {
+    require_no_chroma("VUID-vkCmdBlitImage-srcImage-06421", source)?;
+    require_no_chroma("VUID-vkCmdBlitImage-dstImage-06422", target)?;
     require_one_sample("VUID-vkCmdBlitImage-srcImage-00233", source)?;
     require_one_sample("VUID-vkCmdBlitImage-dstImage-00234", target)?;
     let (from, to) = (source.desc.format, target.desc.format);
@@ -427,7 +457,7 @@ fn blit_image(source: &Image, target: &Image, filter: vk::Filter, regions: &[vk:
     }
     let mut converted = simdevice::host::with_capacity(regions.len());
     for region in regions {
-        let pairs = layer_pairs(
+        let (_, pairs) = layer_pairs(
             &CopySide { image: source, layers: region.src_subresource, rules: &BLIT_SOURCE },
             &CopySide { image: target, layers: region.dst_subresource, rules: &BLIT_TARGET },
         )?;
@@ -452,6 +482,7 @@ fn blit_image(source: &Image, target: &Image, filter: vk::Filter, regions: &[vk:
 /// [`Error::InvalidUsage`] if an image is not bound or has no such subresource, if the target has several samples, or
 /// if the formats differ.
 fn resolve_image(source: &Image, target: &Image, regions: &[vk::ImageResolve2]) -> Result<Packet, Error> {
+    require_no_chroma("VUID-vkCmdResolveImage-srcImage-00257", source)?;
     require_one_sample("VUID-vkCmdResolveImage-dstImage-00259", target)?;
     let (from, to) = (source.desc.format, target.desc.format);
     if from != to || from.aspects() != [Aspect::Color] {
@@ -462,9 +493,9 @@ fn resolve_image(source: &Image, target: &Image, regions: &[vk::ImageResolve2]) 
     }
     let region = |region: &vk::ImageResolve2| {
         Ok(ImageCopyRegion {
-            source: layers(source, &region.src_subresource, &RESOLVE_SOURCE, RESOLVE_SOURCE.aspect)?,
+            source: layers(source, &region.src_subresource, &RESOLVE_SOURCE, RESOLVE_SOURCE.aspect)?.1,
             source_offset: convert::offset(region.src_offset),
-            target: layers(target, &region.dst_subresource, &RESOLVE_TARGET, RESOLVE_TARGET.aspect)?,
+            target: layers(target, &region.dst_subresource, &RESOLVE_TARGET, RESOLVE_TARGET.aspect)?.1,
             target_offset: convert::offset(region.dst_offset),
             extent: convert::extent(region.extent),
         })
@@ -475,6 +506,13 @@ fn resolve_image(source: &Image, target: &Image, regions: &[vk::ImageResolve2]) 
         mode: ResolveMode::Average,
         regions: regions.iter().map(region).collect::<Result<_, Error>>()?,
     }))
+}
+
+fn require_no_chroma(vuid: &'static str, image: &Image) -> Result<(), Error> {
+    match image.ycbcr {
+        None => Ok(()),
+        Some(format) => Err(Error::usage(vuid, format!("{:?} requires a sampler Y'CbCr conversion", format.format))),
+    }
 }
 
 fn require_one_sample(vuid: &'static str, image: &Image) -> Result<(), Error> {
@@ -553,9 +591,10 @@ fn clear_image(
     ranges: &[vk::ImageSubresourceRange],
     rules: &ImageRules,
 ) -> Result<Packet, Error> {
+    require_no_chroma("VUID-vkCmdClearColorImage-image-01545", image)?;
     let mut converted = simdevice::host::with_capacity(ranges.len());
     for range in ranges {
-        for aspect in aspects(image, range.aspect_mask, rules)? {
+        for aspect in aspects(image, range.aspect_mask, rules)?.aspects {
             converted.push(subresource_range(image, aspect, range, rules)?);
         }
     }
@@ -584,15 +623,16 @@ fn subresource_range(
     }
 }
 
-/// The subresources of a copy that must name exactly one aspect; `single` is the id of that rule.
+/// The plane and the subresources of a copy that must name exactly one aspect; `single` is the id of that rule.
 fn layers(
     image: &Image,
     layers: &vk::ImageSubresourceLayers,
     rules: &ImageRules,
     single: &'static str,
-) -> Result<SubresourceLayers, Error> {
-    match *aspect_layers(image, layers, rules)?.as_slice() {
-        [layers] => Ok(layers),
+) -> Result<(usize, SubresourceLayers), Error> {
+    let (plane, found) = aspect_layers(image, layers, rules)?;
+    match *found.as_slice() {
+        [layers] => Ok((plane, layers)),
         _ => Err(no_subresource(single, layers)),
     }
 }
@@ -604,48 +644,50 @@ struct CopySide<'a> {
     rules: &'a ImageRules,
 }
 
-/// The subresources on both sides of a copy, aspect by aspect.
+/// The planes and the subresources on both sides of a copy, aspect by aspect.
 fn layer_pairs(
     source: &CopySide<'_>,
     target: &CopySide<'_>,
-) -> Result<Vec<(SubresourceLayers, SubresourceLayers)>, Error> {
-    let sources = aspect_layers(source.image, &source.layers, source.rules)?;
-    let targets = aspect_layers(target.image, &target.layers, target.rules)?;
+) -> Result<([usize; 2], Vec<(SubresourceLayers, SubresourceLayers)>), Error> {
+    let (source_plane, sources) = aspect_layers(source.image, &source.layers, source.rules)?;
+    let (target_plane, targets) = aspect_layers(target.image, &target.layers, target.rules)?;
     if sources.len() != targets.len() {
         return Err(Error::usage(
             "VUID-vkCmdCopyImage-srcImage-01551",
             format!("a region goes from {:?} to other aspects, {:?}", source.layers, target.layers),
         ));
     }
-    Ok(sources.into_iter().zip(targets).collect())
+    Ok(([source_plane, target_plane], sources.into_iter().zip(targets).collect()))
 }
 
-/// The subresources of a copy, aspect by aspect.
+/// The plane and the subresources of a copy, aspect by aspect.
 fn aspect_layers(
     image: &Image,
     layers: &vk::ImageSubresourceLayers,
     rules: &ImageRules,
-) -> Result<Vec<SubresourceLayers>, Error> {
+) -> Result<(usize, Vec<SubresourceLayers>), Error> {
     let layer_count =
         count(layers.base_array_layer, layers.layer_count, vk::REMAINING_ARRAY_LAYERS, image.desc.array_layers);
     if layers.mip_level >= image.desc.mip_levels {
         return Err(no_subresource(rules.level, layers));
     }
     let layer_count = layer_count.ok_or_else(|| no_subresource(rules.layers, layers))?;
-    let aspects = aspects(image, layers.aspect_mask, rules)?.into_iter();
-    Ok(aspects
+    let PlaneAspects { plane, aspects } = aspects(image, layers.aspect_mask, rules)?;
+    let found = aspects
+        .into_iter()
         .map(|aspect| SubresourceLayers {
             aspect,
             mip_level: layers.mip_level,
             base_layer: layers.base_array_layer,
             layer_count,
         })
-        .collect())
+        .collect();
+    Ok((plane, found))
 }
 
 /// The aspects of a mask, all of which the image has.
-fn aspects(image: &Image, mask: vk::ImageAspectFlags, rules: &ImageRules) -> Result<Vec<Aspect>, Error> {
-    convert::aspects(image.desc.format, mask).ok_or_else(|| no_subresource(rules.aspect, &mask))
+fn aspects(image: &Image, mask: vk::ImageAspectFlags, rules: &ImageRules) -> Result<PlaneAspects, Error> {
+    image.aspects(mask).ok_or_else(|| no_subresource(rules.aspect, &mask))
 }
 
 fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {

@@ -499,6 +499,10 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR;
     }
+    Device, DeviceExtension(&[c"VK_KHR_sampler_ycbcr_conversion"]) => {
+        vkCreateSamplerYcbcrConversionKHR = vkCreateSamplerYcbcrConversion;
+        vkDestroySamplerYcbcrConversionKHR = vkDestroySamplerYcbcrConversion;
+    }
     Instance, InstanceExtension(&[c"VK_KHR_surface"]) => {
         vkDestroySurfaceKHR: vk::PFN_vkDestroySurfaceKHR;
     }
@@ -2540,6 +2544,7 @@ unsafe extern "system" fn vkGetImageMemoryRequirements2(
         let info = valid::input(p_info)?;
         resource::image::get_image_memory_requirements2(
             handle::get(info.image)?,
+            valid::find_in_chain::<vk::ImagePlaneMemoryRequirementsInfo<'_>>(info.p_next),
             OutputChain::new(p_memory_requirements)?,
         )
     })
@@ -2795,19 +2800,25 @@ unsafe extern "system" fn vkGetDescriptorSetLayoutSupport(
 
 unsafe extern "system" fn vkCreateSamplerYcbcrConversion(
     device: vk::Device,
-    _: *const vk::SamplerYcbcrConversionCreateInfo<'_>,
+    p_create_info: *const vk::SamplerYcbcrConversionCreateInfo<'_>,
     _: *const vk::AllocationCallbacks<'_>,
-    _: *mut vk::SamplerYcbcrConversion,
+    p_ycbcr_conversion: *mut vk::SamplerYcbcrConversion,
 ) -> vk::Result {
-    refuse(device, "vkCreateSamplerYcbcrConversion")
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkCreateSamplerYcbcrConversion", || unsafe {
+        let ycbcr_conversion =
+            resource::ycbcr_conversion::create_sampler_ycbcr_conversion(valid::input(p_create_info)?)?;
+        valid::output(p_ycbcr_conversion, handle::create(ycbcr_conversion))
+    })
 }
 
 unsafe extern "system" fn vkDestroySamplerYcbcrConversion(
     device: vk::Device,
-    _: vk::SamplerYcbcrConversion,
+    ycbcr_conversion: vk::SamplerYcbcrConversion,
     _: *const vk::AllocationCallbacks<'_>,
 ) {
-    refuse(device, "vkDestroySamplerYcbcrConversion")
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkDestroySamplerYcbcrConversion", || unsafe { handle::destroy(ycbcr_conversion) })
 }
 
 unsafe extern "system" fn vkResetQueryPool(
@@ -3178,6 +3189,7 @@ unsafe extern "system" fn vkGetDeviceImageMemoryRequirements(
         let info = valid::input(p_info)?;
         resource::image::get_device_image_memory_requirements(
             valid::input(info.p_create_info)?,
+            info.plane_aspect,
             OutputChain::new(p_memory_requirements)?,
         )
     })

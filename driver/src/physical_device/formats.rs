@@ -4,6 +4,9 @@
 mod required;
 #[cfg(test)]
 mod tests;
+mod ycbcr;
+
+pub(crate) use ycbcr::{YcbcrFormat, ycbcr_format};
 
 use super::{limits, memory};
 use crate::abi::error::Error;
@@ -23,6 +26,12 @@ pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
     match format {
         vk::Format::A4R4G4B4_UNORM_PACK16 => Some(Format::A4R4G4B4UnormPack16),
         vk::Format::A4B4G4R4_UNORM_PACK16 => Some(Format::A4B4G4R4UnormPack16),
+        vk::Format::R10X6_UNORM_PACK16 => Some(Format::R10X6UnormPack16),
+        vk::Format::R10X6G10X6_UNORM_2PACK16 => Some(Format::R10X6G10X6Unorm2Pack16),
+        vk::Format::R10X6G10X6B10X6A10X6_UNORM_4PACK16 => Some(Format::R10X6G10X6B10X6A10X6Unorm4Pack16),
+        vk::Format::R12X4_UNORM_PACK16 => Some(Format::R12X4UnormPack16),
+        vk::Format::R12X4G12X4_UNORM_2PACK16 => Some(Format::R12X4G12X4Unorm2Pack16),
+        vk::Format::R12X4G12X4B12X4A12X4_UNORM_4PACK16 => Some(Format::R12X4G12X4B12X4A12X4Unorm4Pack16),
         _ => *FORMATS.get(usize::try_from(format.as_raw()).ok()?)?,
     }
 }
@@ -109,15 +118,15 @@ fn is_atomic(format: Format) -> bool {
 }
 
 /// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware;
-/// neither can a shared exponent.
+/// neither can a shared exponent, nor those of ten or twelve bits in words of sixteen.
 fn is_rendered(format: Format) -> bool {
-    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
+    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two() && !format.has(Channel::X)
 }
 
 /// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB and shared exponents.
-/// Programs can read texels of any format that isn't scaled or compressed.
+/// Programs can read texels of any format that isn't scaled or compressed, and has no unused bits.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
-    if !is_color(format) || is_compressed(format) {
+    if !is_color(format) || is_compressed(format) || format.has(Channel::X) {
         return vk::FormatFeatureFlags::empty();
     }
     if is_scaled(format) {
@@ -138,6 +147,14 @@ fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
 
 /// `VkFormatProperties`. Formats that the device lacks have no features.
 pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
+    if let Some(planar) = ycbcr_format(format) {
+        let features = planar.image_features();
+        return vk::FormatProperties {
+            linear_tiling_features: features,
+            optimal_tiling_features: features,
+            buffer_features: vk::FormatFeatureFlags::empty(),
+        };
+    }
     let Some(format) = device_format(format) else {
         return vk::FormatProperties::default();
     };
@@ -171,6 +188,7 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
+        | vk::ImageCreateFlags::DISJOINT.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw(),
@@ -255,9 +273,12 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         vk::ImageTiling::LINEAR => properties.linear_tiling_features,
         _ => return refuse(format!("image tiling {tiling:?} is not supported")),
     };
-    let features = match device_format(format) {
-        Some(format) if !features.is_empty() && flags.contains(VIEWED_FORMATS) => features | features_of_views(format),
-        _ => features,
+    let planar = ycbcr_format(format);
+    let features = match (planar, device_format(format)) {
+        _ if features.is_empty() || !flags.contains(VIEWED_FORMATS) => features,
+        (Some(planar), _) => planar.planes.iter().fold(features, |all, plane| all | features_of_views(plane.format)),
+        (None, Some(format)) => features | features_of_views(format),
+        (None, None) => features,
     };
     if features.is_empty() {
         return refuse(format!("{tiling:?} images of format {format:?} are not supported"));
@@ -265,8 +286,18 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     if !supports_usage(features, usage) {
         return refuse(format!("images of format {format:?} do not support all of {usage:?}"));
     }
-    if !IMAGE_FLAGS.contains(flags) {
+    // The memory of an image that is an alias of a plane of others is apart in any case.
+    let may_be_disjoint =
+        features.contains(vk::FormatFeatureFlags::DISJOINT) || flags.contains(vk::ImageCreateFlags::ALIAS);
+    if !IMAGE_FLAGS.contains(flags) || flags.contains(vk::ImageCreateFlags::DISJOINT) && !may_be_disjoint {
         return refuse(format!("image flags {flags:?} are not supported"));
+    }
+    if planar.is_some() {
+        let is_flat = ty == vk::ImageType::TYPE_2D && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
+        return match is_flat {
+            true => Ok(limits_of_chroma()),
+            false => refuse(format!("{ty:?} images of format {format:?} are not supported")),
+        };
     }
     let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
     let is_compressed = device_format(format).is_some_and(is_compressed);
@@ -296,6 +327,17 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
         max_resource_size: memory::heap_size(),
     })
+}
+
+/// The limits of images whose luma and chroma are apart.
+fn limits_of_chroma() -> vk::ImageFormatProperties {
+    vk::ImageFormatProperties {
+        max_extent: extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1),
+        max_mip_levels: 1,
+        max_array_layers: 1,
+        sample_counts: vk::SampleCountFlags::TYPE_1,
+        max_resource_size: memory::heap_size(),
+    }
 }
 
 fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {

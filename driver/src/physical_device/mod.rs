@@ -145,6 +145,9 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
         if let Some(out) = structure.cast::<vk::ExternalImageFormatProperties<'_>>() {
             out.external_memory_properties = vk::ExternalMemoryProperties::default();
         }
+        if let Some(out) = structure.cast::<vk::SamplerYcbcrConversionImageFormatProperties<'_>>() {
+            out.combined_image_sampler_descriptor_count = 1;
+        }
     });
     // SAFETY: the caller's promise.
     let stencil = unsafe { valid::find_in_chain::<vk::ImageStencilUsageCreateInfo>(info.p_next) };

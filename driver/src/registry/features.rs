@@ -77,7 +77,7 @@ features! {
         variablePointersStorageBuffer => variable_pointers_storage_buffer: true;
         variablePointers => variable_pointers: true;
         protectedMemory => protected_memory: false;
-        samplerYcbcrConversion => sampler_ycbcr_conversion: false;
+        samplerYcbcrConversion => sampler_ycbcr_conversion: true;
         shaderDrawParameters => shader_draw_parameters: true, mandatory 1.1;
     }
     structure vk::PhysicalDeviceVulkan12Features {
@@ -321,6 +321,9 @@ features! {
     }
     structure vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT: c"VK_EXT_vertex_input_dynamic_state" {
         vertexInputDynamicState => vertex_input_dynamic_state: true;
+    }
+    structure vk::PhysicalDeviceYcbcr2Plane444FormatsFeaturesEXT: c"VK_EXT_ycbcr_2plane_444_formats" {
+        ycbcr2plane444Formats => ycbcr2plane444_formats: true;
     }
     structure gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST:
         c"VK_GAURAST_gaussian_primitive_topology" {

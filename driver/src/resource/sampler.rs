@@ -1,5 +1,6 @@
 //! Samplers.
 
+use super::ycbcr_conversion::chained_conversion;
 use crate::abi::error::Error;
 use crate::abi::handle::objects;
 use crate::abi::valid;
@@ -67,7 +68,7 @@ impl Sampler {
 }
 
 /// # Safety
-/// The create info's chain is valid.
+/// The create info's chain and its handles are valid.
 #[doc(alias = "vkCreateSampler")]
 pub(crate) unsafe fn create_sampler(create_info: &vk::SamplerCreateInfo<'_>) -> Result<Arc<Sampler>, Error> {
     // SAFETY: the caller's promise.
@@ -77,6 +78,14 @@ pub(crate) unsafe fn create_sampler(create_info: &vk::SamplerCreateInfo<'_>) -> 
             valid::find_in_chain::<vk::SamplerCustomBorderColorCreateInfoEXT<'_>>(create_info.p_next),
         )
     };
+    // SAFETY: the caller's promise.
+    let conversion = unsafe { chained_conversion(create_info.p_next)? };
+    if conversion.is_some() && create_info.unnormalized_coordinates != vk::FALSE {
+        return Err(Error::usage(
+            "VUID-VkSamplerCreateInfo-addressModeU-01646",
+            "a sampler with a conversion has unnormalized coordinates, which chroma cannot have",
+        ));
+    }
     let is_custom =
         matches!(create_info.border_color, vk::BorderColor::FLOAT_CUSTOM_EXT | vk::BorderColor::INT_CUSTOM_EXT);
     if is_custom && border.is_none() {

@@ -4,8 +4,9 @@
 //! 32-bit registers in the order R, G, B, A. Registers of integer formats hold the integer's bits, as shader registers
 //! do; depth and stencil are held in the first register. Components that a format lacks are read as (0, 0, 0, 1). The
 //! table has the formats of Vulkan 1.0 with components of up to 32 bits, and those of compressed blocks of texels (see
-//! [`Format::decompressed`]), whose blocks are read and written as a whole, as if each were a texel. The driver decides
-//! which format can be used for which purpose.
+//! [`Format::decompressed`]), whose blocks are read and written as a whole, as if each were a texel; and those of ten and
+//! twelve bits in words of sixteen, in which luma and chroma are kept. The driver decides which format can be used for
+//! which purpose.
 
 mod block;
 mod component;

@@ -180,6 +180,12 @@ formats! {
     Bc6hSfloatBlock: Sfloat, X 32 X 32 X 32 X 32;
     Bc7UnormBlock: Unorm, X 32 X 32 X 32 X 32;
     Bc7SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    R10X6UnormPack16: Unorm, X 6 R 10;
+    R10X6G10X6Unorm2Pack16: Unorm, X 6 R 10 X 6 G 10;
+    R10X6G10X6B10X6A10X6Unorm4Pack16: Unorm, X 6 R 10 X 6 G 10 X 6 B 10 X 6 A 10;
+    R12X4UnormPack16: Unorm, X 4 R 12;
+    R12X4G12X4Unorm2Pack16: Unorm, X 4 R 12 X 4 G 12;
+    R12X4G12X4B12X4A12X4Unorm4Pack16: Unorm, X 4 R 12 X 4 G 12 X 4 B 12 X 4 A 12;
 }
 
 /// The most bytes of a texel.

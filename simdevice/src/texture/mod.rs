@@ -7,12 +7,14 @@
 //!
 //! An anisotropic sample (`anisotropy`) is the mean of several isotropic ones. There are two implementations of those:
 //! lane by lane (`scalar`), which supports everything, and 16 lanes at once (`vector`), which supports the common
-//! formats. Single texels are read and written lane by lane or 16 at once too (`access`). They agree bit for bit, at every
+//! formats. An image whose luma and chroma are apart has a sample of each plane (`ycbcr`), which are converted to a colour
+//! (`conversion`). Single texels are read and written lane by lane or 16 at once too (`access`). They agree bit for bit, at every
 //! SIMD level.
 
 mod access;
 mod addressing;
 mod anisotropy;
+mod conversion;
 mod cube;
 mod lod;
 mod sampler;
@@ -24,7 +26,11 @@ mod tests;
 mod texels;
 mod vector;
 mod view;
+mod ycbcr;
 
+pub use conversion::{ChromaLocation, YcbcrConversion, YcbcrModel, YcbcrRange};
 pub use sampler::{AddressMode, BorderColor, Filter, MipmapMode, Reduction, Sampler};
 pub use table::ImageTable;
-pub use view::{ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer};
+pub use view::{
+    Chroma, ComponentSwizzle, IDENTITY, ImageBinding, PlaneComponent, SampledImage, StorageImage, Swizzle, TexelBuffer,
+};

@@ -54,9 +54,13 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The surface of a sampled image; `None` if the view has no texels of this aspect and format.
+    /// The surface of a sampled image; `None` if the view has no texels of this aspect and format. That of an image with
+    /// chroma is its luma, not swizzled.
     pub fn sampled(image: &SampledImage) -> Option<Self> {
         let mut surface = Self::image(&image.view, image.aspect)?;
+        if image.chroma.is_some() {
+            return Some(surface);
+        }
         surface.swizzle = image.swizzle;
         if let Some(layout) = &mut surface.layout {
             layout.set_swizzle(image.swizzle);
@@ -72,7 +76,8 @@ impl Surface {
         Some(surface)
     }
 
-    fn image(view: &ImageView, aspect: Aspect) -> Option<Self> {
+    /// The surface of one aspect of a view, only read, with its components in their order; `None` if there are no texels.
+    pub fn image(view: &ImageView, aspect: Aspect) -> Option<Self> {
         let view = &view.decompressed()?;
         let image = &view.image;
         let format = view.format.plane(aspect)?;

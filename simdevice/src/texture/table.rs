@@ -6,6 +6,7 @@ use fearless_simd::Level;
 use super::sampler::{Reduction, Sampler};
 use super::surface::Surface;
 use super::view::ImageBinding;
+use super::ycbcr::ChromaSurfaces;
 use super::{access, anisotropy, lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, LaneWords, SampleRequest, TexelRequest};
@@ -18,6 +19,8 @@ use isa::resources::{ImageUnit, LaneWords, SampleRequest, TexelRequest};
 pub struct ImageTable {
     level: Level,
     surfaces: Vec<Option<Surface>>,
+    /// The chroma of the surfaces that are the luma of an image, by slot in ascending order.
+    chroma: Vec<(usize, ChromaSurfaces)>,
     samplers: Vec<Option<Sampler>>,
     batched: bool,
 }
@@ -29,18 +32,20 @@ impl ImageTable {
         images: impl IntoIterator<Item = ImageBinding>,
         samplers: impl IntoIterator<Item = Option<Sampler>>,
     ) -> Self {
-        let surface = |binding| match binding {
+        let mut chroma = Vec::new();
+        let surface = |(slot, binding)| match binding {
             ImageBinding::Unbound => None,
-            ImageBinding::Sampled(image) => Surface::sampled(&image),
+            ImageBinding::Sampled(image) => {
+                if let Some(planes) = &image.chroma {
+                    chroma.push((slot, ChromaSurfaces::new(&image, planes)?));
+                }
+                Surface::sampled(&image)
+            }
             ImageBinding::Storage(image) => Surface::storage(&image),
             ImageBinding::TexelBuffer(buffer) => Surface::buffer(&buffer),
         };
-        Self {
-            level,
-            surfaces: images.into_iter().map(surface).collect(),
-            samplers: samplers.into_iter().collect(),
-            batched: true,
-        }
+        let surfaces = images.into_iter().enumerate().map(surface).collect();
+        Self { level, surfaces, chroma, samplers: samplers.into_iter().collect(), batched: true }
     }
 
     /// The same table, but every lane is filtered, read and written by itself: slower, with the same bits. For tests.
@@ -90,6 +95,13 @@ impl ImageUnit for ImageTable {
             *texel = Default::default();
             return;
         };
+        if let Ok(place) = self.chroma.binary_search_by_key(&(image as usize), |(slot, _)| *slot) {
+            let once = |plane: &Surface, sampler: &Sampler, request: &SampleRequest, texel: &mut [LaneWords; 4]| {
+                self.sample_once(plane, sampler, request, texel);
+            };
+            *texel = self.chroma[place].1.sample(surface, sampler, request, once);
+            return;
+        }
         let once = |request: &SampleRequest, texel: &mut [LaneWords; 4]| {
             self.sample_once(surface, sampler, request, texel);
         };

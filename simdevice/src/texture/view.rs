@@ -1,8 +1,10 @@
 //! The bindings of image slots: plain data that correspond to descriptors.
 
+use super::conversion::YcbcrConversion;
 use crate::format::{Aspect, Format};
 use crate::image::ImageView;
 use devmem::BufferRange;
+use std::sync::Arc;
 
 /// The source of a component that a program reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,8 +53,31 @@ pub struct SampledImage {
     pub view: ImageView,
     /// The aspect that is read.
     pub aspect: Aspect,
-    /// The swizzle of its components.
+    /// The swizzle of its components. If it has chroma, the swizzle comes before the conversion.
     pub swizzle: Swizzle,
+    /// The chroma of the image and its conversion, if the view is of its luma.
+    pub chroma: Option<Arc<Chroma>>,
+}
+
+/// The place of a component: its plane and its index in the plane's texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PlaneComponent {
+    /// The number of the plane. The luma's is 0.
+    pub plane: usize,
+    /// The index: 0 to 3 for red to alpha.
+    pub component: usize,
+}
+
+/// The planes that an image has beside that of its luma, and the conversion of all to a colour. A plane has one mip level.
+/// It may have fewer texels than the luma; then each is for two texels of luma along each axis on which the extents differ.
+#[derive(Clone, Debug)]
+pub struct Chroma {
+    /// The views of the planes from number 1 on.
+    pub planes: Vec<ImageView>,
+    /// The places of red, green and blue.
+    pub components: [PlaneComponent; 3],
+    /// The conversion.
+    pub conversion: YcbcrConversion,
 }
 
 /// An image that is read, written and updated texel by texel. Only the first level of its view is accessible.

@@ -158,7 +158,7 @@ impl Gpu {
     ///
     /// # Panics
     /// If there is none.
-    pub(crate) fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> u32 {
+    pub fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> u32 {
         let types = self.0.opened.memory.memory_types_as_slice();
         let fits = |index: &u32| bits & (1 << index) != 0 && types[*index as usize].property_flags.contains(flags);
         (0..types.len() as u32).find(fits).expect("a memory type that fits")
@@ -269,7 +269,7 @@ impl Commands {
     }
 
     /// Records the transition of an image's aspects from the undefined layout to `GENERAL`.
-    pub(crate) fn become_general(&self, image: vk::Image, range: vk::ImageSubresourceRange) {
+    pub fn become_general(&self, image: vk::Image, range: vk::ImageSubresourceRange) {
         let ignored = vk::QUEUE_FAMILY_IGNORED;
         self.barriers(&[vk::ImageMemoryBarrier::default()
             .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)

@@ -2,3 +2,4 @@
 
 mod modes;
 mod sampling;
+mod ycbcr;

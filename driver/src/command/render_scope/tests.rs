@@ -12,6 +12,7 @@ fn view(format: Format, samples: u32) -> Arc<ImageView> {
         view: image::ImageView { image, format, base_mip_level: 0, level_count: 1, base_layer: 0, layer_count: 1 },
         aspect: format.aspects()[0],
         swizzle: IDENTITY,
+        chroma: None,
     })
 }
 

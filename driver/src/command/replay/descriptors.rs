@@ -93,11 +93,11 @@ fn place(
 
 /// An image view as a variable of this kind reads it.
 fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
-    let (aspect, swizzle) = (view.aspect, view.swizzle);
+    let (aspect, swizzle, chroma) = (view.aspect, view.swizzle, view.chroma.clone());
     let view = view.view.clone();
     match kind {
         DescriptorKind::StorageImage => ImageBinding::Storage(StorageImage { view }),
-        _ => ImageBinding::Sampled(SampledImage { view, aspect, swizzle }),
+        _ => ImageBinding::Sampled(SampledImage { view, aspect, swizzle, chroma }),
     }
 }
 

@@ -3,11 +3,14 @@ use std::collections::HashSet;
 
 #[test]
 fn every_format_of_the_device_has_a_vulkan_name() {
-    // The first block of core formats, and the two formats of four bits that were added later.
+    // The first block of core formats, the two formats of four bits that were added later, and those beside formats with
+    // chroma.
     let later = [vk::Format::A4R4G4B4_UNORM_PACK16, vk::Format::A4B4G4R4_UNORM_PACK16];
+    let ycbcr = vk::Format::G8B8G8R8_422_UNORM.as_raw()..=vk::Format::G16_B16_R16_3PLANE_444_UNORM.as_raw();
     let found: HashSet<_> = (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
         .map(vk::Format::from_raw)
         .chain(later)
+        .chain(ycbcr.map(vk::Format::from_raw))
         .filter_map(device_format)
         .collect();
     assert_eq!(found, Format::ALL.iter().copied().collect());

@@ -4,6 +4,7 @@ mod agreement;
 mod filtering;
 mod oracle;
 mod texels;
+mod ycbcr;
 
 use std::sync::Arc;
 
@@ -52,6 +53,7 @@ fn image(desc: ImageDesc, texel: impl Fn(u32, u32, [u32; 3]) -> [f32; 4]) -> Sam
         },
         aspect,
         swizzle: IDENTITY,
+        chroma: None,
     }
 }
 

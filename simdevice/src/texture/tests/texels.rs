@@ -265,7 +265,12 @@ fn accesses_at_once_are_those_one_by_one(case: &Case) {
         } else {
             let swizzle =
                 [ComponentSwizzle::Blue, ComponentSwizzle::One, ComponentSwizzle::Alpha, ComponentSwizzle::Red];
-            ImageBinding::Sampled(SampledImage { view, aspect, swizzle: if rng.random() { swizzle } else { IDENTITY } })
+            ImageBinding::Sampled(SampledImage {
+                view,
+                aspect,
+                swizzle: if rng.random() { swizzle } else { IDENTITY },
+                chroma: None,
+            })
         };
         let table = ImageTable::new(token_of(case), [binding], []);
         for _ in 0..4 {
