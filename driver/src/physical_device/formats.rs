@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
     /// The formats by the values of Vulkan's core formats, which are consecutive.
     static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
-        (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
+        (0..=vk::Format::ASTC_12X12_SRGB_BLOCK.as_raw())
             .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
             .collect()
     });

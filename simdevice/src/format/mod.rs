@@ -7,10 +7,12 @@
 //! [`Format::decompressed`]), whose blocks are read and written as a whole, as if each were a texel. The driver decides
 //! which format can be used for which purpose.
 
-mod block;
+mod astc;
+pub(crate) mod block;
 mod component;
 mod convert;
 pub(crate) mod depth;
+mod etc;
 mod table;
 #[cfg(test)]
 mod tests;
