@@ -1,4 +1,5 @@
 //! The chapter *Samplers*.
 
+mod blocks;
 mod modes;
 mod sampling;

@@ -49,8 +49,8 @@ enum Expansion {
 pub(super) fn linear(bytes: &[u8; 16], extent: [u32; 2], texels: &mut [u8]) {
     let mut decoded = [ERROR; MAX_TEXELS];
     decode(u128::from_le_bytes(*bytes), extent, Expansion::Linear, &mut decoded);
-    for (out, texel) in texels.as_chunks_mut::<8>().0.iter_mut().zip(&decoded) {
-        *out = bytemuck::cast(texel.map(half));
+    for (out, &component) in texels.as_chunks_mut::<2>().0.iter_mut().zip(decoded.as_flattened()) {
+        *out = half(component).to_le_bytes();
     }
 }
 
@@ -64,17 +64,16 @@ pub(super) fn srgb(bytes: &[u8; 16], extent: [u32; 2], texels: &mut [u8]) {
 }
 
 /// The bits of a component in binary16.
+#[inline]
 fn half(component: u16) -> u16 {
+    // In binary32 the component is exact. Its exponent is larger by 127 - 15, and by the 16 of the division.
+    let bits = f32::from(component).to_bits() >> 13;
+    let normal = bits.wrapping_sub((127 - 15 + 16) << 10) as u16;
     match component {
         u16::MAX => 0x3C00,
         // Below 2^-14 units are 2^-24.
         0..4 => component << 8,
-        _ => {
-            // The greatest bit is implied by the exponent.
-            let exponent = component.ilog2() as u16;
-            let fraction = (u32::from(component) << 10 >> exponent) as u16;
-            ((exponent - 2) << 10) + fraction
-        }
+        _ => normal,
     }
 }
 
