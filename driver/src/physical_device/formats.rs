@@ -170,6 +170,7 @@ pub(crate) fn features2(format: vk::Format, features: vk::FormatFeatureFlags) ->
 const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
+        | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()
@@ -217,10 +218,10 @@ const VIEWED_FORMATS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
 );
 
 /// The features of all formats that views of an image of the format may have. Uncompressed colours of one size are
-/// compatible.
-fn features_of_views(format: Format) -> vk::FormatFeatureFlags {
+/// compatible, and with blocks of that size if the image's flags say so.
+fn features_of_views(format: Format, flags: vk::ImageCreateFlags) -> vk::FormatFeatureFlags {
     let is_plain = |format: Format| is_color(format) && !is_compressed(format);
-    if !is_plain(format) {
+    if !is_plain(format) && !flags.contains(vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE) {
         return image_features(format);
     }
     let compatible = Format::ALL.iter().filter(|&&it| is_plain(it) && it.texel_size() == format.texel_size());
@@ -256,7 +257,9 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         _ => return refuse(format!("image tiling {tiling:?} is not supported")),
     };
     let features = match device_format(format) {
-        Some(format) if !features.is_empty() && flags.contains(VIEWED_FORMATS) => features | features_of_views(format),
+        Some(format) if !features.is_empty() && flags.contains(VIEWED_FORMATS) => {
+            features | features_of_views(format, flags)
+        }
         _ => features,
     };
     if features.is_empty() {
@@ -265,11 +268,12 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     if !supports_usage(features, usage) {
         return refuse(format!("images of format {format:?} do not support all of {usage:?}"));
     }
-    if !IMAGE_FLAGS.contains(flags) {
+    let is_compressed = device_format(format).is_some_and(is_compressed);
+    let has_block_views = flags.contains(vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE);
+    if !IMAGE_FLAGS.contains(flags) || (has_block_views && !is_compressed) {
         return refuse(format!("image flags {flags:?} are not supported"));
     }
     let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
-    let is_compressed = device_format(format).is_some_and(is_compressed);
     let (max_extent, layers) = match ty {
         vk::ImageType::TYPE_1D if !is_compressed => (extent(limits::MAX_IMAGE_DIMENSION, 1, 1), limits::MAX_LAYERS),
         vk::ImageType::TYPE_2D => {
@@ -287,6 +291,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
+        && !is_compressed
         && ty == vk::ImageType::TYPE_2D
         && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     Ok(vk::ImageFormatProperties {

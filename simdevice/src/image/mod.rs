@@ -486,6 +486,41 @@ mod decompression_tests {
     }
 
     #[gaurast_runner::test]
+    fn a_view_has_the_texels_of_its_format() {
+        let desc =
+            ImageDesc { format: Format::Astc5x4SrgbBlock, extent: [6, 4, 1], mip_levels: 1, ..image(false).desc };
+        let memory = Allocation::new(desc.memory_size().unwrap(), false).unwrap();
+        let image = Arc::new(Image::new(desc, memory, 0).unwrap());
+        // The second column of blocks is white; blocks of zeros are not valid, and magenta.
+        let mut white = [0xFF; 16];
+        white[..2].copy_from_slice(&[0xFC, 0xFD]);
+        let layout = image.subresource(Aspect::Color, 0, 0).unwrap();
+        assert_eq!(layout.extent, [2, 1, 1]);
+        image.write_row(&layout, [1, 0, 0], &white).unwrap();
+        image.memory.bump_generation();
+        let view = |format: Format| {
+            let image = Arc::clone(&image);
+            ImageView { image, format, base_mip_level: 0, level_count: 1, base_layer: 0, layer_count: 1 }.decompressed()
+        };
+        let (magenta, white) = ([1.0, 0.0, 1.0, 1.0], [1.0; 4]);
+        for format in [Format::Astc5x4SrgbBlock, Format::Astc5x4UnormBlock, Format::Astc5x4SrgbBlock] {
+            let plain = view(format).unwrap();
+            assert_eq!((Some(plain.format), plain.image.desc.format), (format.decompressed(), plain.format));
+            let layout = plain.image.subresource(Aspect::Color, 0, 0).unwrap();
+            let mut row = vec![0; 6 * plain.format.texel_size()];
+            plain.image.read_row(&layout, [0, 3, 0], &mut row).unwrap();
+            let texels = row.chunks_exact(plain.format.texel_size()).map(|texel| plain.format.decode(texel));
+            assert!(texels.eq([magenta, magenta, magenta, magenta, magenta, white]), "{format:?}");
+            // It is kept beside that of the other format.
+            assert!(Arc::ptr_eq(&plain.image, &view(format).unwrap().image));
+        }
+        assert!(view(Format::Astc5x5SrgbBlock).is_none() && view(Format::Bc1RgbSrgbBlock).is_none());
+        // A view of words has a texel for each block.
+        let words = view(Format::R32G32B32A32Uint).unwrap();
+        assert!(Arc::ptr_eq(&words.image, &image));
+    }
+
+    #[gaurast_runner::test]
     fn images_without_compression_stay_as_they_are() {
         let desc = ImageDesc { format: Format::R8Unorm, ..image(false).desc };
         let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();

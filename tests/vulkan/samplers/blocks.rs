@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast_testkit::devices::own;
 use gaurast_testkit::shader::GLSLANG;
-use gaurast_testkit::{Image, ImageOptions, fetch, range};
+use gaurast_testkit::{Bindings, Image, ImageOptions, Kernel, Resource, fetch, range};
 use vk::ImageUsageFlags as Usage;
 
 const COLOR: vk::ImageAspectFlags = vk::ImageAspectFlags::COLOR;
@@ -120,23 +120,30 @@ fn every_texel_is_of_its_block() {
     }
 }
 
+/// Gives `use_it` a view of another format than the image's.
+fn with_view<R>(image: &Image, format: vk::Format, usage: Usage, use_it: impl FnOnce(vk::ImageView) -> R) -> R {
+    let device = image.gpu().device();
+    let mut usage = vk::ImageViewUsageCreateInfo::default().usage(usage);
+    let info = vk::ImageViewCreateInfo::default()
+        .image(image.raw)
+        .view_type(vk::ImageViewType::TYPE_2D)
+        .format(format)
+        .subresource_range(range(COLOR))
+        .push_next(&mut usage);
+    // SAFETY: see the crate.
+    let view = unsafe { device.create_image_view(&info, None) }.expect("a view");
+    let result = use_it(view);
+    // SAFETY: nothing uses the view any more.
+    unsafe { device.destroy_image_view(view, None) };
+    result
+}
+
 /// Views decode an image by their own format, of which results differ in precision and in sign.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn a_view_decodes_by_its_format() {
     let flags = vk::ImageCreateFlags::MUTABLE_FORMAT;
     let first = |image: &Image, format: vk::Format| {
-        let gpu = image.gpu();
-        let info = vk::ImageViewCreateInfo::default()
-            .image(image.raw)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(format)
-            .subresource_range(range(COLOR));
-        // SAFETY: see the crate.
-        let view = unsafe { gpu.device().create_image_view(&info, None) }.expect("a view");
-        let texel = fetch::texels(image, view, 0)[0];
-        // SAFETY: nothing uses the view any more.
-        unsafe { gpu.device().destroy_image_view(view, None) };
-        texel
+        with_view(image, format, Usage::SAMPLED, |view| fetch::texels(image, view, 0)[0])
     };
     let image = |format: vk::Format, block: &[u8]| {
         let image = Image::new(own(), &ImageOptions { flags, ..ImageOptions::new(format, [4, 4], Usage::SAMPLED) });
@@ -160,4 +167,35 @@ fn a_view_decodes_by_its_format() {
     let bc = image(vk::Format::BC4_SNORM_BLOCK, &[0x81, 0x81, 0, 0, 0, 0, 0, 0]);
     assert_eq!(first(&bc, vk::Format::BC4_SNORM_BLOCK)[0], -1.0);
     assert!((first(&bc, vk::Format::BC4_UNORM_BLOCK)[0] - 129.0 / 255.0).abs() < 1e-6);
+}
+
+/// A program writes blocks through a view whose texels are words.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn blocks_are_written_as_words() {
+    let flags = vk::ImageCreateFlags::MUTABLE_FORMAT
+        | vk::ImageCreateFlags::EXTENDED_USAGE
+        | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE;
+    let format = vk::Format::ASTC_8X5_UNORM_BLOCK;
+    let usage = Usage::SAMPLED | Usage::STORAGE;
+    let image = Image::new(own(), &ImageOptions { flags, ..ImageOptions::new(format, [20, 12], usage) });
+    with_view(&image, vk::Format::R32G32B32A32_UINT, Usage::STORAGE, |words| {
+        let bindings = Bindings::new(own(), &[Resource::StorageImage(words)]);
+        let source = "
+            layout(local_size_x = 1) in;
+            layout(binding = 0, rgba32ui) uniform writeonly uimage2D words;
+            layout(push_constant) uniform Constants { uint level; };
+            void main() {
+                uvec2 at = gl_WorkGroupID.xy;
+                uvec2 color = uvec2(level << 12 | at.x << 28, at.y << 12);
+                imageStore(words, ivec2(at), uvec4(0xFFFFFDFCu, 0xFFFFFFFFu, color));
+            }";
+        let kernel = Kernel::new(own(), source, &bindings);
+        for level in [1, 2] {
+            kernel.run(&[bindings.set], &[level], [3, 3, 1]);
+            for (index, found) in (0..).zip(fetch::texels(&image, image.view, 0)) {
+                let sixteenths = [level, index % 20 / 8, index / 20 / 5, 0];
+                assert_eq!(found, sixteenths.map(|count| count as f32 / 16.0), "texel {index}");
+            }
+        }
+    });
 }

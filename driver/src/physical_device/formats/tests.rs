@@ -56,6 +56,7 @@ fn images_that_cannot_be_are_refused() {
             ..query
         },
         ImageQuery { flags: vk::ImageCreateFlags::SPARSE_BINDING, ..query },
+        ImageQuery { flags: vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE, ..query },
         ImageQuery {
             format: vk::Format::D32_SFLOAT,
             ty: vk::ImageType::TYPE_3D,
@@ -67,6 +68,21 @@ fn images_that_cannot_be_are_refused() {
         let error = image_properties(query).unwrap_err();
         assert_eq!(error.result(), vk::Result::ERROR_FORMAT_NOT_SUPPORTED, "{query:?}");
     }
+}
+
+#[test]
+fn blocks_may_be_viewed_as_texels_of_their_size() {
+    let query = ImageQuery {
+        format: vk::Format::ASTC_8X5_UNORM_BLOCK,
+        ty: vk::ImageType::TYPE_2D,
+        tiling: vk::ImageTiling::OPTIMAL,
+        usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE,
+        flags: VIEWED_FORMATS,
+    };
+    assert!(image_properties(query).is_err());
+    let flags = query.flags | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE;
+    let found = image_properties(ImageQuery { flags, ..query }).unwrap();
+    assert_eq!(found.sample_counts, vk::SampleCountFlags::TYPE_1);
 }
 
 #[test]

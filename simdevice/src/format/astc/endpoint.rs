@@ -30,7 +30,7 @@ impl Endpoints {
         let grey = |luminance: i32, alpha: i32| [luminance, luminance, luminance, alpha];
         let scaled = |alphas: [i32; 2]| {
             let base = [v[0], v[1], v[2]];
-            let [r, g, b] = base.map(|component| component * v[3] >> 8);
+            let [r, g, b] = base.map(|component| (component * v[3]) >> 8);
             [[r, g, b, alphas[0]], [base[0], base[1], base[2], alphas[1]]]
         };
         let colors = match mode {
