@@ -1,12 +1,14 @@
 //! The texture unit: `cargo bench -p gaurast-simdevice --bench texture [NAME]`, by the SIMD level in `GAURAST_SIMD`.
 //!
-//! Quads of a slightly turned surface sample all over a 1024x1024 image. An item is a sample.
+//! Quads of a slightly turned surface sample all over a 1024x1024 image. An item is a sample; where an image is decoded, it is
+//! a texel.
 
 use std::hint::black_box;
 use std::sync::Arc;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use fearless_simd::Level;
 
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::ir::{Dimension, ImageShape};
@@ -132,11 +134,15 @@ fn main() {
     divan::main();
 }
 
-/// A table of one image and one sampler, at the level in `GAURAST_SIMD`.
-fn table(sampling: &Sampling) -> ImageTable {
+/// The SIMD level in `GAURAST_SIMD`.
+fn level() -> Level {
     let name = std::env::var("GAURAST_SIMD").unwrap_or_else(|_| "best".to_owned());
-    let level = SimdLevel::from_name(&name).and_then(SimdLevel::resolve).expect("a SIMD level in GAURAST_SIMD");
-    ImageTable::new(level, [image(sampling.format)], [Some(sampling.sampler)])
+    SimdLevel::from_name(&name).and_then(SimdLevel::resolve).expect("a SIMD level in GAURAST_SIMD")
+}
+
+/// A table of one image and one sampler.
+fn table(sampling: &Sampling) -> ImageTable {
+    ImageTable::new(level(), [image(sampling.format)], [Some(sampling.sampler)])
 }
 
 /// Samples at all offsets.
@@ -166,4 +172,42 @@ fn sample(bencher: Bencher, sampling: &Sampling) {
 #[divan::bench(args = samplings())]
 fn sample_lane_by_lane(bencher: Bencher, sampling: &Sampling) {
     measure(bencher, sampling, &table(sampling).lane_by_lane());
+}
+
+/// A compressed image whose blocks are random. Those of ASTC have endpoints of red, green and blue, and a grid of 4x4
+/// weights.
+fn blocks(format: Format) -> SampledImage {
+    let ImageBinding::Sampled(sampled) = image(format) else { unreachable!("the image is sampled") };
+    if format as usize >= Format::Astc4x4UnormBlock as usize {
+        let memory = &sampled.view.image.memory;
+        for offset in (0..memory.len()).step_by(16) {
+            let noise = (offset as u32).wrapping_mul(0x9E37_79B1);
+            memory.store_u32(offset, noise & !0x1_FFFF | 8 << 13 | 0x42);
+        }
+    }
+    sampled
+}
+
+/// Decodes all levels of a compressed image.
+#[divan::bench(args = [
+    Format::Bc7UnormBlock,
+    Format::Etc2R8G8B8UnormBlock,
+    Format::Etc2R8G8B8A8UnormBlock,
+    Format::EacR11G11UnormBlock,
+    Format::Astc4x4UnormBlock,
+    Format::Astc4x4SrgbBlock,
+    Format::Astc8x8UnormBlock,
+    Format::Astc8x8SrgbBlock,
+    Format::Astc12x12UnormBlock,
+])]
+fn decode(bencher: Bencher, format: &Format) {
+    let image = blocks(*format);
+    let level = level();
+    let texels: u32 = (0..LEVELS).map(|level| (SIZE >> level).pow(2)).sum();
+    bencher.counter(ItemsCount::new(texels)).bench_local(|| {
+        // What was decoded before is not used again.
+        image.view.image.memory.bump_generation();
+        let binding = ImageBinding::Sampled(image.clone());
+        black_box(ImageTable::new(level, [binding], [Some(Sampler::default())]));
+    });
 }

@@ -357,15 +357,15 @@ fn copy_buffer_image(
     image_rules: &ImageRules,
 ) -> Result<Vec<CopyBufferImage>, Error> {
     let buffer = buffer.whole(buffer_rules)?;
-    let side = image.desc.format.block_side();
+    let [across, down] = image.desc.format.block_extent();
     let mut copies = ByPlanes::default();
     for region in regions {
         let (plane, subresource) =
             layers(image, &region.image_subresource, image_rules, "VUID-VkBufferImageCopy-aspectMask-00212")?;
         let converted = BufferImageRegion {
             buffer_offset: region.buffer_offset,
-            buffer_row_length: region.buffer_row_length.div_ceil(side),
-            buffer_image_height: region.buffer_image_height.div_ceil(side),
+            buffer_row_length: region.buffer_row_length.div_ceil(across),
+            buffer_image_height: region.buffer_image_height.div_ceil(down),
             subresource,
             image_offset: block_offset(image, region.image_offset),
             image_extent: block_extent(image, region.image_extent),
@@ -696,13 +696,13 @@ fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
 
 /// Converts an offset from texels to the blocks in which an image is stored.
 fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
-    // Valid usage requires multiples of a block's side.
-    let side = image.desc.format.block_side().cast_signed();
-    [offset.x / side, offset.y / side, offset.z]
+    // Valid usage requires multiples of a block's extent.
+    let [across, down] = image.desc.format.block_extent().map(u32::cast_signed);
+    [offset.x / across, offset.y / down, offset.z]
 }
 
 /// Converts an extent from texels to the blocks in which an image is stored.
 fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
-    let side = image.desc.format.block_side();
-    [extent.width.div_ceil(side), extent.height.div_ceil(side), extent.depth]
+    let [across, down] = image.desc.format.block_extent();
+    [extent.width.div_ceil(across), extent.height.div_ceil(down), extent.depth]
 }

@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
     /// The formats by the values of Vulkan's core formats, which are consecutive.
     static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
-        (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
+        (0..=vk::Format::ASTC_12X12_SRGB_BLOCK.as_raw())
             .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
             .collect()
     });
@@ -187,6 +187,7 @@ pub(crate) fn features2(format: vk::Format, features: vk::FormatFeatureFlags) ->
 const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
+        | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::DISJOINT.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
@@ -235,10 +236,10 @@ const VIEWED_FORMATS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
 );
 
 /// The features of all formats that views of an image of the format may have. Uncompressed colours of one size are
-/// compatible.
-fn features_of_views(format: Format) -> vk::FormatFeatureFlags {
+/// compatible, and with blocks of that size if the image's flags say so.
+fn features_of_views(format: Format, flags: vk::ImageCreateFlags) -> vk::FormatFeatureFlags {
     let is_plain = |format: Format| is_color(format) && !is_compressed(format);
-    if !is_plain(format) {
+    if !is_plain(format) && !flags.contains(vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE) {
         return image_features(format);
     }
     let compatible = Format::ALL.iter().filter(|&&it| is_plain(it) && it.texel_size() == format.texel_size());
@@ -276,8 +277,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let planar = ycbcr_format(format);
     let features = match (planar, device_format(format)) {
         _ if features.is_empty() || !flags.contains(VIEWED_FORMATS) => features,
-        (Some(planar), _) => planar.planes.iter().fold(features, |all, plane| all | features_of_views(plane.format)),
-        (None, Some(format)) => features | features_of_views(format),
+        (Some(planar), _) => {
+            planar.planes.iter().fold(features, |all, plane| all | features_of_views(plane.format, flags))
+        }
+        (None, Some(format)) => features | features_of_views(format, flags),
         (None, None) => features,
     };
     if features.is_empty() {
@@ -289,7 +292,12 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     // The memory of an image that is an alias of a plane of others is apart in any case.
     let may_be_disjoint =
         features.contains(vk::FormatFeatureFlags::DISJOINT) || flags.contains(vk::ImageCreateFlags::ALIAS);
-    if !IMAGE_FLAGS.contains(flags) || flags.contains(vk::ImageCreateFlags::DISJOINT) && !may_be_disjoint {
+    let is_compressed = device_format(format).is_some_and(is_compressed);
+    let has_block_views = flags.contains(vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE);
+    if !IMAGE_FLAGS.contains(flags)
+        || flags.contains(vk::ImageCreateFlags::DISJOINT) && !may_be_disjoint
+        || has_block_views && !is_compressed
+    {
         return refuse(format!("image flags {flags:?} are not supported"));
     }
     if planar.is_some() {
@@ -300,7 +308,6 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         };
     }
     let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
-    let is_compressed = device_format(format).is_some_and(is_compressed);
     let (max_extent, layers) = match ty {
         vk::ImageType::TYPE_1D if !is_compressed => (extent(limits::MAX_IMAGE_DIMENSION, 1, 1), limits::MAX_LAYERS),
         vk::ImageType::TYPE_2D => {
@@ -318,6 +325,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
+        && !is_compressed
         && ty == vk::ImageType::TYPE_2D
         && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     Ok(vk::ImageFormatProperties {

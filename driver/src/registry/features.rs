@@ -30,8 +30,8 @@ features! {
         alphaToOne => alpha_to_one: true;
         multiViewport => multi_viewport: true;
         samplerAnisotropy => sampler_anisotropy: true;
-        textureCompressionETC2 => texture_compression_etc2: false;
-        textureCompressionASTC_LDR => texture_compression_astc_ldr: false;
+        textureCompressionETC2 => texture_compression_etc2: true;
+        textureCompressionASTC_LDR => texture_compression_astc_ldr: true;
         textureCompressionBC => texture_compression_bc: true;
         occlusionQueryPrecise => occlusion_query_precise: true;
         pipelineStatisticsQuery => pipeline_statistics_query: true;

@@ -1,121 +1,102 @@
-//! Compressed formats: blocks of 4x4 texels (BC1 to BC7, also known as DXT, RGTC and BPTC).
+//! BC1 to BC7 (also known as DXT, RGTC and BPTC): blocks of 4x4 texels.
+//!
+//! A decoder of blocks writes their texels row by row, in the format of [`Format::decompressed`](crate::Format).
 
 use half::f16;
 
-/// The number of texels along a block's side.
+/// The number of texels along a side of the blocks of BC, ETC2 and EAC.
 pub(super) const SIDE: usize = 4;
 
-/// The number of texels of a block.
-const TEXELS: usize = SIDE * SIDE;
+/// The number of texels of such a block.
+pub(super) const TEXELS: usize = SIDE * SIDE;
 
-/// The texels of a decoded block, row by row, in a format without compression.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Block {
-    bytes: [u8; TEXELS * 8],
-    texel_size: usize,
-}
+/// The most bytes of a decoded block: 12x12 texels of 8 bytes.
+pub(crate) const MAX_DECODED_SIZE: usize = 12 * 12 * 8;
 
-impl Block {
-    fn of<T: bytemuck::NoUninit>(texels: &[T]) -> Self {
-        let bytes: &[u8] = bytemuck::cast_slice(texels);
-        let mut block = Self { bytes: [0; TEXELS * 8], texel_size: bytes.len() / TEXELS };
-        block.bytes[..bytes.len()].copy_from_slice(bytes);
-        block
-    }
-
-    /// The bytes of a row of four texels.
-    pub(crate) fn row(&self, row: usize) -> &[u8] {
-        let pitch = SIDE * self.texel_size;
-        &self.bytes[row * pitch..][..pitch]
-    }
-
-    /// The block with the alpha of all its texels set to 1. Texels must have four bytes each.
-    pub(super) fn opaque(mut self) -> Self {
-        for texel in self.bytes[..4 * TEXELS].as_chunks_mut::<4>().0 {
-            texel[3] = u8::MAX;
-        }
-        self
-    }
-}
-
-/// A block of texels of four bytes each. `decode` gets the compressed bytes, the output, and the bytes from one row to
-/// the next.
-fn rgba(bytes: &[u8; 16], decode: impl Fn(&[u8], &mut [u8], usize)) -> Block {
-    let mut rgba = [0u8; 4 * TEXELS];
-    decode(bytes, &mut rgba, 4 * SIDE);
-    Block::of(&rgba)
+/// Writes texels as bytes.
+fn write<T: bytemuck::NoUninit>(texels: &[T], out: &mut [u8]) {
+    out.copy_from_slice(bytemuck::cast_slice(texels));
 }
 
 /// Decodes BC1: two colours and a palette between them, perhaps with transparent black.
-pub(super) fn bc1(bytes: &[u8; 16]) -> Block {
-    rgba(bytes, bcdec_rs::bc1)
+pub(super) fn bc1(bytes: &[u8; 16], texels: &mut [u8]) {
+    bcdec_rs::bc1(bytes, texels, 4 * SIDE);
+}
+
+/// Decodes BC1 without alpha: transparent texels are opaque.
+pub(super) fn bc1_rgb(bytes: &[u8; 16], texels: &mut [u8]) {
+    bc1(bytes, texels);
+    for texel in texels.as_chunks_mut::<4>().0 {
+        texel[3] = u8::MAX;
+    }
 }
 
 /// Decodes BC2: the colours of [`bc1`], and four bits of alpha for each texel.
-pub(super) fn bc2(bytes: &[u8; 16]) -> Block {
-    rgba(bytes, bcdec_rs::bc2)
+pub(super) fn bc2(bytes: &[u8; 16], texels: &mut [u8]) {
+    bcdec_rs::bc2(bytes, texels, 4 * SIDE);
 }
 
 /// Decodes BC3: the colours of [`bc1`], and a palette of alphas.
-pub(super) fn bc3(bytes: &[u8; 16]) -> Block {
-    rgba(bytes, bcdec_rs::bc3)
+pub(super) fn bc3(bytes: &[u8; 16], texels: &mut [u8]) {
+    bcdec_rs::bc3(bytes, texels, 4 * SIDE);
 }
 
 /// Decodes BC4: a palette of red, as floats.
-pub(super) fn bc4(bytes: &[u8; 16], signed: bool) -> Block {
+pub(super) fn bc4(bytes: &[u8; 16], signed: bool, texels: &mut [u8]) {
     let mut red = [0f32; TEXELS];
     bcdec_rs::bc4_float(bytes, &mut red, SIDE, signed);
-    Block::of(&red)
+    write(&red, texels);
 }
 
 /// Decodes BC5: a palette of red and one of green, as floats.
-pub(super) fn bc5(bytes: &[u8; 16], signed: bool) -> Block {
+pub(super) fn bc5(bytes: &[u8; 16], signed: bool, texels: &mut [u8]) {
     let mut both = [0f32; 2 * TEXELS];
     bcdec_rs::bc5_float(bytes, &mut both, 2 * SIDE, signed);
-    Block::of(&both)
+    write(&both, texels);
 }
 
 /// Decodes BC6H: red, green and blue in binary16, with an alpha of 1.
-pub(super) fn bc6h(bytes: &[u8; 16], signed: bool) -> Block {
+pub(super) fn bc6h(bytes: &[u8; 16], signed: bool, texels: &mut [u8]) {
     let mut rgb = [0u16; 3 * TEXELS];
     bcdec_rs::bc6h_half(bytes, &mut rgb, 3 * SIDE, signed);
     let mut halves = [f16::ONE.to_bits(); 4 * TEXELS];
-    let texels = halves.as_chunks_mut::<4>().0.iter_mut();
-    for (texel, rgb) in texels.zip(rgb.as_chunks::<3>().0) {
+    for (texel, rgb) in halves.as_chunks_mut::<4>().0.iter_mut().zip(rgb.as_chunks::<3>().0) {
         texel[..3].copy_from_slice(rgb);
     }
-    Block::of(&halves)
+    write(&halves, texels);
 }
 
 /// Decodes BC7: red, green, blue and alpha by up to three palettes.
-pub(super) fn bc7(bytes: &[u8; 16]) -> Block {
-    rgba(bytes, bcdec_rs::bc7)
+pub(super) fn bc7(bytes: &[u8; 16], texels: &mut [u8]) {
+    bcdec_rs::bc7(bytes, texels, 4 * SIDE);
 }
 
 #[cfg(test)]
 mod tests {
+    use super::MAX_DECODED_SIZE;
     use crate::Format;
-
-    /// The components of each texel of a block.
-    fn texels(format: Format, block: &[u8]) -> Vec<[f32; 4]> {
-        let mut whole = [0; 16];
-        whole[..block.len()].copy_from_slice(block);
-        let decoded = format.decode_block(&whole).unwrap();
-        let plain = format.decompressed().unwrap();
-        let rows = (0..4).flat_map(|row| decoded.row(row).chunks_exact(plain.texel_size()));
-        rows.map(|texel| plain.decode(texel)).collect()
-    }
+    use crate::format::tests::block_texels as texels;
 
     #[gaurast_runner::test]
     fn only_compressed_formats_have_blocks() {
         for &format in Format::ALL {
             let name = format!("{format:?}");
-            assert_eq!(format.block_side() == 4, name.ends_with("Block"), "{name}");
-            let block = format.decode_block(&[0x5A; 16]);
-            assert_eq!(block.is_some(), name.ends_with("Block"), "{name}");
-            if format.block_side() == 4 {
-                let large = ["Bc1", "Bc4"].iter().all(|small| !name.starts_with(small));
-                assert_eq!(format.texel_size(), if large { 16 } else { 8 }, "{name}");
+            let is_compressed = name.ends_with("Block");
+            assert_eq!(format.decompressed().is_some(), is_compressed, "{name}");
+            assert_eq!(format.block_extent() != [1, 1], is_compressed, "{name}");
+            let mut out = [0; MAX_DECODED_SIZE];
+            let plain = format.decompressed().map_or(1, Format::texel_size);
+            let out = &mut out[..format.block_extent().iter().product::<u32>() as usize * plain];
+            assert_eq!(format.decode_block(&[0x5A; 16], out).is_some(), is_compressed, "{name}");
+            if is_compressed {
+                let is_small =
+                    ["Bc1", "Bc4", "Etc2R8G8B8Unorm", "Etc2R8G8B8Srgb", "Etc2R8G8B8A1", "EacR11Unorm", "EacR11Snorm"]
+                        .iter()
+                        .any(|small| name.starts_with(small));
+                assert_eq!(format.texel_size(), if is_small { 8 } else { 16 }, "{name}");
+                let [width, height] = format.block_extent();
+                let has_name = name.starts_with(&format!("Astc{width}x{height}"));
+                assert!(has_name || (!name.starts_with("Astc") && [width, height] == [4, 4]), "{name}");
             }
         }
     }

@@ -8,10 +8,12 @@
 //! twelve bits in words of sixteen, in which luma and chroma are kept. The driver decides which format can be used for
 //! which purpose.
 
-mod block;
+mod astc;
+pub(crate) mod block;
 mod component;
 mod convert;
 pub(crate) mod depth;
+mod etc;
 mod table;
 #[cfg(test)]
 mod tests;

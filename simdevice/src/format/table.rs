@@ -1,7 +1,6 @@
 //! The table of formats, and the decoding and encoding of rows of texels.
 
-use super::block::{self, Block};
-use super::convert;
+use super::{astc, block, convert, etc};
 use crate::format::{Aspect, Channel, ClearValue, Component, Numeric};
 
 macro_rules! formats {
@@ -186,6 +185,44 @@ formats! {
     R12X4UnormPack16: Unorm, X 4 R 12;
     R12X4G12X4Unorm2Pack16: Unorm, X 4 R 12 X 4 G 12;
     R12X4G12X4B12X4A12X4Unorm4Pack16: Unorm, X 4 R 12 X 4 G 12 X 4 B 12 X 4 A 12;
+    Etc2R8G8B8UnormBlock: Unorm, X 32 X 32;
+    Etc2R8G8B8SrgbBlock: Srgb, X 32 X 32;
+    Etc2R8G8B8A1UnormBlock: Unorm, X 32 X 32;
+    Etc2R8G8B8A1SrgbBlock: Srgb, X 32 X 32;
+    Etc2R8G8B8A8UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Etc2R8G8B8A8SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    EacR11UnormBlock: Unorm, X 32 X 32;
+    EacR11SnormBlock: Snorm, X 32 X 32;
+    EacR11G11UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    EacR11G11SnormBlock: Snorm, X 32 X 32 X 32 X 32;
+    Astc4x4UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc4x4SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc5x4UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc5x4SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc5x5UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc5x5SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc6x5UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc6x5SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc6x6UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc6x6SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc8x5UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc8x5SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc8x6UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc8x6SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc8x8UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc8x8SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc10x5UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc10x5SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc10x6UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc10x6SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc10x8UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc10x8SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc10x10UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc10x10SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc12x10UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc12x10SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Astc12x12UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Astc12x12SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
 }
 
 /// The most bytes of a texel.
@@ -406,9 +443,25 @@ pub(super) fn encode_components(numeric: Numeric, components: &[Component], texe
 }
 
 impl Format {
-    /// The number of texels along the side of a storage unit: 4 for compressed formats, otherwise 1.
-    pub const fn block_side(self) -> u32 {
-        if self.decompressed().is_some() { block::SIDE as u32 } else { 1 }
+    /// The width and height of a storage unit in texels: those of a compressed format's blocks, otherwise 1 and 1.
+    pub const fn block_extent(self) -> [u32; 2] {
+        match self {
+            Self::Astc5x4UnormBlock | Self::Astc5x4SrgbBlock => [5, 4],
+            Self::Astc5x5UnormBlock | Self::Astc5x5SrgbBlock => [5, 5],
+            Self::Astc6x5UnormBlock | Self::Astc6x5SrgbBlock => [6, 5],
+            Self::Astc6x6UnormBlock | Self::Astc6x6SrgbBlock => [6, 6],
+            Self::Astc8x5UnormBlock | Self::Astc8x5SrgbBlock => [8, 5],
+            Self::Astc8x6UnormBlock | Self::Astc8x6SrgbBlock => [8, 6],
+            Self::Astc8x8UnormBlock | Self::Astc8x8SrgbBlock => [8, 8],
+            Self::Astc10x5UnormBlock | Self::Astc10x5SrgbBlock => [10, 5],
+            Self::Astc10x6UnormBlock | Self::Astc10x6SrgbBlock => [10, 6],
+            Self::Astc10x8UnormBlock | Self::Astc10x8SrgbBlock => [10, 8],
+            Self::Astc10x10UnormBlock | Self::Astc10x10SrgbBlock => [10, 10],
+            Self::Astc12x10UnormBlock | Self::Astc12x10SrgbBlock => [12, 10],
+            Self::Astc12x12UnormBlock | Self::Astc12x12SrgbBlock => [12, 12],
+            _ if self.decompressed().is_some() => [block::SIDE as u32; 2],
+            _ => [1; 2],
+        }
     }
 
     /// The uncompressed format that holds a compressed format's texels without loss; `None` if this format is not
@@ -419,35 +472,74 @@ impl Format {
             | Self::Bc1RgbaUnormBlock
             | Self::Bc2UnormBlock
             | Self::Bc3UnormBlock
-            | Self::Bc7UnormBlock => Self::R8G8B8A8Unorm,
+            | Self::Bc7UnormBlock
+            | Self::Etc2R8G8B8UnormBlock
+            | Self::Etc2R8G8B8A1UnormBlock
+            | Self::Etc2R8G8B8A8UnormBlock => Self::R8G8B8A8Unorm,
             Self::Bc1RgbSrgbBlock
             | Self::Bc1RgbaSrgbBlock
             | Self::Bc2SrgbBlock
             | Self::Bc3SrgbBlock
-            | Self::Bc7SrgbBlock => Self::R8G8B8A8Srgb,
-            Self::Bc4UnormBlock | Self::Bc4SnormBlock => Self::R32Sfloat,
-            Self::Bc5UnormBlock | Self::Bc5SnormBlock => Self::R32G32Sfloat,
+            | Self::Bc7SrgbBlock
+            | Self::Etc2R8G8B8SrgbBlock
+            | Self::Etc2R8G8B8A1SrgbBlock
+            | Self::Etc2R8G8B8A8SrgbBlock => Self::R8G8B8A8Srgb,
+            Self::Bc4UnormBlock | Self::Bc4SnormBlock | Self::EacR11UnormBlock | Self::EacR11SnormBlock => {
+                Self::R32Sfloat
+            }
+            Self::Bc5UnormBlock | Self::Bc5SnormBlock | Self::EacR11G11UnormBlock | Self::EacR11G11SnormBlock => {
+                Self::R32G32Sfloat
+            }
             Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => Self::R16G16B16A16Sfloat,
-            _ => return None,
+            _ => match self.astc() {
+                // The results have 16 bits unless they are sRGB.
+                Some(Numeric::Srgb) => Self::R8G8B8A8Srgb,
+                Some(_) => Self::R16G16B16A16Sfloat,
+                None => return None,
+            },
         })
     }
 
-    /// The texels of a block, in the format of [`Format::decompressed`]; `None` if this format is not compressed.
-    pub(crate) fn decode_block(self, bytes: &[u8; 16]) -> Option<Block> {
-        Some(match self {
-            // Transparent texels are opaque in formats without alpha.
-            Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => block::bc1(bytes).opaque(),
-            Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => block::bc1(bytes),
-            Self::Bc2UnormBlock | Self::Bc2SrgbBlock => block::bc2(bytes),
-            Self::Bc3UnormBlock | Self::Bc3SrgbBlock => block::bc3(bytes),
-            Self::Bc4UnormBlock => block::bc4(bytes, false),
-            Self::Bc4SnormBlock => block::bc4(bytes, true),
-            Self::Bc5UnormBlock => block::bc5(bytes, false),
-            Self::Bc5SnormBlock => block::bc5(bytes, true),
-            Self::Bc6hUfloatBlock => block::bc6h(bytes, false),
-            Self::Bc6hSfloatBlock => block::bc6h(bytes, true),
-            Self::Bc7UnormBlock | Self::Bc7SrgbBlock => block::bc7(bytes),
-            _ => return None,
-        })
+    /// The interpretation of the texels of an ASTC format; `None` for other formats.
+    const fn astc(self) -> Option<Numeric> {
+        let (first, last) = (Self::Astc4x4UnormBlock as usize, Self::Astc12x12SrgbBlock as usize);
+        let is_astc = first <= self as usize && self as usize <= last;
+        if is_astc { Some(self.numeric()) } else { None }
+    }
+
+    /// True if blocks of a compressed format of the same size have the same decoded bytes in both formats.
+    pub(crate) fn decodes_like(self, other: Self) -> bool {
+        let has_bytes = |format: Self| matches!(format.decompressed(), Some(Self::R8G8B8A8Unorm | Self::R8G8B8A8Srgb));
+        self == other || (has_bytes(self) && has_bytes(other) && self.astc() == other.astc())
+    }
+
+    /// Writes the texels of a block row by row, in the format of [`Format::decompressed`]; `None` if this format is not
+    /// compressed. `texels` has the bytes of a block of such texels.
+    pub(crate) fn decode_block(self, bytes: &[u8; 16], texels: &mut [u8]) -> Option<()> {
+        match self {
+            Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => block::bc1_rgb(bytes, texels),
+            Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => block::bc1(bytes, texels),
+            Self::Bc2UnormBlock | Self::Bc2SrgbBlock => block::bc2(bytes, texels),
+            Self::Bc3UnormBlock | Self::Bc3SrgbBlock => block::bc3(bytes, texels),
+            Self::Bc4UnormBlock => block::bc4(bytes, false, texels),
+            Self::Bc4SnormBlock => block::bc4(bytes, true, texels),
+            Self::Bc5UnormBlock => block::bc5(bytes, false, texels),
+            Self::Bc5SnormBlock => block::bc5(bytes, true, texels),
+            Self::Bc6hUfloatBlock => block::bc6h(bytes, false, texels),
+            Self::Bc6hSfloatBlock => block::bc6h(bytes, true, texels),
+            Self::Bc7UnormBlock | Self::Bc7SrgbBlock => block::bc7(bytes, texels),
+            Self::Etc2R8G8B8UnormBlock | Self::Etc2R8G8B8SrgbBlock => etc::rgb(bytes, texels),
+            Self::Etc2R8G8B8A1UnormBlock | Self::Etc2R8G8B8A1SrgbBlock => etc::rgb_a1(bytes, texels),
+            Self::Etc2R8G8B8A8UnormBlock | Self::Etc2R8G8B8A8SrgbBlock => etc::rgba(bytes, texels),
+            Self::EacR11UnormBlock => etc::eac::<1>(bytes, false, texels),
+            Self::EacR11SnormBlock => etc::eac::<1>(bytes, true, texels),
+            Self::EacR11G11UnormBlock => etc::eac::<2>(bytes, false, texels),
+            Self::EacR11G11SnormBlock => etc::eac::<2>(bytes, true, texels),
+            _ => match self.astc()? {
+                Numeric::Srgb => astc::srgb(bytes, self.block_extent(), texels),
+                _ => astc::linear(bytes, self.block_extent(), texels),
+            },
+        }
+        Some(())
     }
 }

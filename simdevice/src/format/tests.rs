@@ -7,6 +7,17 @@ fn first<const N: usize>(texel: &[u8; MAX_TEXEL_SIZE]) -> [u8; N] {
     *texel.first_chunk().unwrap()
 }
 
+/// The components of each texel of a compressed format's block, row by row.
+pub(super) fn block_texels(format: Format, block: &[u8]) -> Vec<[f32; 4]> {
+    let mut whole = [0; MAX_TEXEL_SIZE];
+    whole[..block.len()].copy_from_slice(block);
+    let plain = format.decompressed().unwrap();
+    let [width, height] = format.block_extent();
+    let mut decoded = vec![0; (width * height) as usize * plain.texel_size()];
+    format.decode_block(&whole, &mut decoded).unwrap();
+    decoded.chunks_exact(plain.texel_size()).map(|texel| plain.decode(texel)).collect()
+}
+
 /// The formats whose components are decoded and encoded independently of each other.
 fn simple() -> impl Iterator<Item = Format> {
     Format::ALL.iter().copied().filter(|format| {

@@ -8,8 +8,8 @@
 
 pub(crate) mod resolve;
 
-use crate::format::MAX_TEXEL_SIZE;
-use crate::format::{Aspect, Format};
+use crate::format::block::MAX_DECODED_SIZE;
+use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use devmem::{Allocation, OutOfBounds, host};
 use std::sync::Arc;
 use std::sync::{Mutex, PoisonError};
@@ -126,9 +126,9 @@ impl ImageDesc {
     /// The layout of a mip level. `offset` and `array_pitch` are zero.
     fn level_layout(&self, aspect: Aspect, level: u32) -> Option<SubresourceLayout> {
         let format = self.format.plane(aspect)?;
-        let side = format.block_side();
+        let [across, down] = format.block_extent();
         let [width, height, depth] = self.mip_extent(level);
-        let extent = [width.div_ceil(side), height.div_ceil(side), depth];
+        let extent = [width.div_ceil(across), height.div_ceil(down), depth];
         let [width, height, depth] = extent.map(u64::from);
         let row_pitch = (width * format.texel_size() as u64).next_multiple_of(ROW_ALIGNMENT);
         let depth_pitch = row_pitch.checked_mul(height)?;
@@ -241,39 +241,57 @@ pub struct ImageView {
     pub layer_count: u32,
 }
 
-/// The cache of a compressed image's texels, with the generation of the memory from which they were decoded.
+/// The texels of a compressed image as a format has them, with the generation of the memory from which they were
+/// decoded.
+#[derive(Debug)]
+struct Decoded {
+    format: Format,
+    generation: u64,
+    image: Arc<Image>,
+}
+
+/// The cache of a compressed image's texels, for each format of its views that has others.
 #[derive(Debug, Default)]
-struct Decompressed(Mutex<Option<(u64, Arc<Image>)>>);
+struct Decompressed(Mutex<Vec<Decoded>>);
 
 impl Image {
     /// An image of the same texels without compression; `None` if this one is not compressed, or memory is exhausted.
     pub(crate) fn decompressed(&self) -> Option<Arc<Self>> {
+        self.decompressed_as(self.desc.format)
+    }
+
+    /// An image of the texels that the blocks of this one have in a format of a view, without compression; `None` if
+    /// that format or this image is not compressed, their blocks differ in size, or memory is exhausted.
+    fn decompressed_as(&self, format: Format) -> Option<Arc<Self>> {
         self.desc.format.decompressed()?;
+        let shape = |format: Format| (format.block_extent(), format.texel_size());
+        if shape(format) != shape(self.desc.format) {
+            return None;
+        }
         if self.memory.is_host_visible() {
-            return self.decompress();
+            return self.decompress(format);
         }
         // A panic while the lock was held leaves a valid value. Decoding twice is harmless.
         let mut kept = self.decompressed.0.lock().unwrap_or_else(PoisonError::into_inner);
         let generation = self.memory.generation();
-        if let Some((known, image)) = &*kept
-            && *known == generation
-        {
-            return Some(Arc::clone(image));
+        kept.retain(|decoded| decoded.generation == generation);
+        if let Some(decoded) = kept.iter().find(|decoded| decoded.format.decodes_like(format)) {
+            return Some(Arc::clone(&decoded.image));
         }
-        let image = self.decompress()?;
-        *kept = Some((generation, Arc::clone(&image)));
+        let image = self.decompress(format)?;
+        host::push(&mut kept, Decoded { format, generation, image: Arc::clone(&image) });
         Some(image)
     }
 
-    fn decompress(&self) -> Option<Arc<Self>> {
-        let desc = ImageDesc { format: self.desc.format.decompressed()?, ..self.desc };
+    fn decompress(&self, format: Format) -> Option<Arc<Self>> {
+        let desc = ImageDesc { format: format.decompressed()?, ..self.desc };
         let memory = Allocation::new_zeroed(desc.memory_size()?).ok()?;
         let plain = Self::new(desc, memory, 0).ok()?;
         for layer in 0..desc.array_layers {
             for level in 0..desc.mip_levels {
                 let blocks = self.subresource(Aspect::Color, level, layer)?;
                 let texels = plain.subresource(Aspect::Color, level, layer)?;
-                self.decompress_subresource(&blocks, &plain, &texels)?;
+                self.decompress_subresource(&SubresourceLayout { format, ..blocks }, &plain, &texels)?;
             }
         }
         Some(Arc::new(plain))
@@ -285,13 +303,15 @@ impl Image {
         plain: &Self,
         texels: &SubresourceLayout,
     ) -> Option<()> {
-        let format = self.desc.format;
-        let side = format.block_side();
+        let format = blocks.format;
+        let [across, down] = format.block_extent();
         let [columns, rows, slices] = blocks.extent;
         let block_size = format.texel_size();
         let mut bytes: Vec<u8> = host::zeroed(columns as usize * block_size);
-        let pitch = side as usize * texels.format.texel_size();
-        let mut decoded: Vec<Vec<u8>> = host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
+        let pitch = across as usize * texels.format.texel_size();
+        let mut decoded = [0; MAX_DECODED_SIZE];
+        let decoded = &mut decoded[..down as usize * pitch];
+        let mut lines: Vec<Vec<u8>> = host::collect((0..down).map(|_| host::zeroed(columns as usize * pitch)));
         let row_size = texels.extent[0] as usize * texels.format.texel_size();
         for z in 0..slices {
             for row in 0..rows {
@@ -299,15 +319,15 @@ impl Image {
                 for (column, bytes) in bytes.chunks_exact(block_size).enumerate() {
                     let mut block = [0; MAX_TEXEL_SIZE];
                     block[..block_size].copy_from_slice(bytes);
-                    let block = format.decode_block(&block)?;
-                    for (line, out) in decoded.iter_mut().enumerate() {
-                        out[column * pitch..][..pitch].copy_from_slice(block.row(line));
+                    format.decode_block(&block, decoded)?;
+                    for (line, texels) in lines.iter_mut().zip(decoded.chunks_exact(pitch)) {
+                        line[column * pitch..][..pitch].copy_from_slice(texels);
                     }
                 }
                 // Blocks at the edges may extend beyond the image.
-                let height = side.min(texels.extent[1] - side * row);
-                for (line, texels_of_line) in (0..height).zip(&decoded) {
-                    let at = [0, side * row + line, z];
+                let height = down.min(texels.extent[1] - down * row);
+                for (line, texels_of_line) in (0..height).zip(&lines) {
+                    let at = [0, down * row + line, z];
                     plain.write_row(texels, at, &texels_of_line[..row_size])?;
                 }
             }
@@ -322,7 +342,10 @@ impl ImageView {
     pub(crate) fn decompressed(&self) -> Option<Self> {
         match self.format.decompressed() {
             None => Some(self.clone()),
-            Some(format) => Some(Self { image: self.image.decompressed()?, format, ..self.clone() }),
+            Some(format) => {
+                let image = self.image.decompressed_as(self.format)?;
+                Some(Self { image, format, ..self.clone() })
+            }
         }
     }
 }
@@ -460,6 +483,41 @@ mod decompression_tests {
             assert_eq!(texel(&image, 0, [9, 3, 0]), black);
             assert_eq!(texel(&image, 2, [1, 0, 0]), [255; 4]);
         }
+    }
+
+    #[gaurast_runner::test]
+    fn a_view_has_the_texels_of_its_format() {
+        let desc =
+            ImageDesc { format: Format::Astc5x4SrgbBlock, extent: [6, 4, 1], mip_levels: 1, ..image(false).desc };
+        let memory = Allocation::new(desc.memory_size().unwrap(), false).unwrap();
+        let image = Arc::new(Image::new(desc, memory, 0).unwrap());
+        // The second column of blocks is white; blocks of zeros are not valid, and magenta.
+        let mut white = [0xFF; 16];
+        white[..2].copy_from_slice(&[0xFC, 0xFD]);
+        let layout = image.subresource(Aspect::Color, 0, 0).unwrap();
+        assert_eq!(layout.extent, [2, 1, 1]);
+        image.write_row(&layout, [1, 0, 0], &white).unwrap();
+        image.memory.bump_generation();
+        let view = |format: Format| {
+            let image = Arc::clone(&image);
+            ImageView { image, format, base_mip_level: 0, level_count: 1, base_layer: 0, layer_count: 1 }.decompressed()
+        };
+        let (magenta, white) = ([1.0, 0.0, 1.0, 1.0], [1.0; 4]);
+        for format in [Format::Astc5x4SrgbBlock, Format::Astc5x4UnormBlock, Format::Astc5x4SrgbBlock] {
+            let plain = view(format).unwrap();
+            assert_eq!((Some(plain.format), plain.image.desc.format), (format.decompressed(), plain.format));
+            let layout = plain.image.subresource(Aspect::Color, 0, 0).unwrap();
+            let mut row = vec![0; 6 * plain.format.texel_size()];
+            plain.image.read_row(&layout, [0, 3, 0], &mut row).unwrap();
+            let texels = row.chunks_exact(plain.format.texel_size()).map(|texel| plain.format.decode(texel));
+            assert!(texels.eq([magenta, magenta, magenta, magenta, magenta, white]), "{format:?}");
+            // It is kept beside that of the other format.
+            assert!(Arc::ptr_eq(&plain.image, &view(format).unwrap().image));
+        }
+        assert!(view(Format::Astc5x5SrgbBlock).is_none() && view(Format::Bc1RgbSrgbBlock).is_none());
+        // A view of words has a texel for each block.
+        let words = view(Format::R32G32B32A32Uint).unwrap();
+        assert!(Arc::ptr_eq(&words.image, &image));
     }
 
     #[gaurast_runner::test]

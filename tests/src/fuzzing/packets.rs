@@ -28,7 +28,7 @@ const BUFFER: u64 = 8192;
 const GUARD: u64 = 1024;
 const GUARDED: u8 = 0xA5;
 /// Formats of images.
-const FORMATS: [Format; 8] = [
+const FORMATS: [Format; 11] = [
     Format::R8G8B8A8Unorm,
     Format::R32G32B32A32Sfloat,
     Format::B8G8R8A8Srgb,
@@ -37,6 +37,9 @@ const FORMATS: [Format; 8] = [
     Format::D32Sfloat,
     Format::D24UnormS8Uint,
     Format::Bc1RgbUnormBlock,
+    Format::Etc2R8G8B8A1SrgbBlock,
+    Format::Astc5x4SrgbBlock,
+    Format::Astc12x10UnormBlock,
 ];
 /// The greatest number of packets of a run.
 const PACKETS: usize = 60;

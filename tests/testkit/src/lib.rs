@@ -19,6 +19,7 @@
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
 //! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
 //! | [`presenter`] | a device that presents to a surface |
+//! | [`fetch`] | texels of images as programs fetch them |
 //! | [`texels`], [`exact_lavapipe`] | random texels, and a lavapipe that samples them as accurately as it can |
 //!
 //! The reason for all `unsafe` is the same. These are Vulkan calls on objects of one [`Gpu`], which every resource
@@ -34,6 +35,7 @@ pub mod devices;
 pub mod difference;
 pub mod drawn;
 pub mod exact_lavapipe;
+pub mod fetch;
 pub mod for_levels;
 pub mod gaussians;
 pub mod gpu;

@@ -208,9 +208,9 @@ impl ImageOptions {
 
     /// Texels, or blocks of texels, of a level of all layers.
     pub fn level_texels(&self, level: u32) -> usize {
-        let side = device_format(self.format).block_side();
+        let [across, down] = device_format(self.format).block_extent();
         let [width, height, depth] = self.level_size(level);
-        (width.div_ceil(side) * height.div_ceil(side) * depth * self.layers) as usize
+        (width.div_ceil(across) * height.div_ceil(down) * depth * self.layers) as usize
     }
 
     /// Texels, or blocks of texels, of all levels and layers.

@@ -92,13 +92,13 @@ fn what_is_not_there_is_refused() {
     assert!(messages.iter().any(|message| message.text.contains("VK_EXT_mesh_shader")), "{messages:?}");
 
     let mut features = vk::PhysicalDeviceFeatures2::default();
-    features.features.texture_compression_etc2 = vk::TRUE;
+    features.features.sparse_residency16_samples = vk::TRUE;
     let (error, messages) = refusal(&[], &mut features);
     assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
     assert_eq!(messages.len(), 1, "{messages:?}");
     let Message { id, text } = &messages[0];
     assert_eq!(id, "GAURAST-error");
-    assert!(text.contains("vkCreateDevice") && text.contains("textureCompressionETC2"), "{text}");
+    assert!(text.contains("vkCreateDevice") && text.contains("sparseResidency16Samples"), "{text}");
 
     let mut chained = vk::PhysicalDeviceVulkan13Features::default().texture_compression_astc_hdr(true);
     let (error, _) = refusal(

@@ -11,15 +11,15 @@ struct Shape {
     size: [u32; 3],
     levels: u32,
     layers: u32,
-    /// The texels on a side of a block, and the bytes of a block.
-    block: (u32, usize),
+    /// The width and height of a block in texels, and its bytes.
+    block: ([u32; 2], usize),
 }
 
 impl Shape {
     /// The blocks of a level, along each axis.
     fn blocks(&self, level: u32) -> [usize; 3] {
         let [width, height, depth] = self.size.map(|size| (size >> level).max(1));
-        [width.div_ceil(self.block.0), height.div_ceil(self.block.0), depth].map(|count| count as usize)
+        [width.div_ceil(self.block.0[0]), height.div_ceil(self.block.0[1]), depth].map(|count| count as usize)
     }
 }
 
@@ -84,12 +84,15 @@ fn subresources_lie_where_their_layouts_say() {
     let (one, two, three) = (vk::ImageType::TYPE_1D, vk::ImageType::TYPE_2D, vk::ImageType::TYPE_3D);
     let shape = |format, ty, size, levels, layers, block| Shape { format, ty, size, levels, layers, block };
     for shape in [
-        shape(vk::Format::R8G8B8A8_UNORM, two, [13, 9, 1], 4, 3, (1, 4)),
-        shape(vk::Format::R16_SFLOAT, one, [37, 1, 1], 6, 2, (1, 2)),
-        shape(vk::Format::R32_UINT, three, [7, 6, 5], 3, 1, (1, 4)),
-        shape(vk::Format::BC1_RGB_UNORM_BLOCK, two, [22, 17, 1], 1, 1, (4, 8)),
-        shape(vk::Format::BC7_SRGB_BLOCK, two, [24, 24, 1], 5, 2, (4, 16)),
-        shape(vk::Format::R8G8_SSCALED, two, [11, 5, 1], 1, 1, (1, 2)),
+        shape(vk::Format::R8G8B8A8_UNORM, two, [13, 9, 1], 4, 3, ([1, 1], 4)),
+        shape(vk::Format::R16_SFLOAT, one, [37, 1, 1], 6, 2, ([1, 1], 2)),
+        shape(vk::Format::R32_UINT, three, [7, 6, 5], 3, 1, ([1, 1], 4)),
+        shape(vk::Format::BC1_RGB_UNORM_BLOCK, two, [22, 17, 1], 1, 1, ([4, 4], 8)),
+        shape(vk::Format::BC7_SRGB_BLOCK, two, [24, 24, 1], 5, 2, ([4, 4], 16)),
+        shape(vk::Format::EAC_R11_SNORM_BLOCK, two, [22, 17, 1], 3, 1, ([4, 4], 8)),
+        shape(vk::Format::ASTC_10X6_UNORM_BLOCK, two, [31, 40, 1], 4, 2, ([10, 6], 16)),
+        shape(vk::Format::ASTC_5X4_SRGB_BLOCK, three, [12, 7, 4], 3, 1, ([5, 4], 16)),
+        shape(vk::Format::R8G8_SSCALED, two, [11, 5, 1], 1, 1, ([1, 1], 2)),
     ] {
         check(own(), &shape);
     }

@@ -1,5 +1,6 @@
 //! The chapter *Samplers*.
 
+mod blocks;
 mod modes;
 mod sampling;
 mod ycbcr;

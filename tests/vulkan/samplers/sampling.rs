@@ -188,7 +188,7 @@ impl<'a> Bench<'a> {
             let is_flat = !matches!(kind, Kind::One | Kind::Three | Kind::Ones);
             let format = match kind {
                 _ if kind.compares() => depth,
-                _ if is_flat || device_format(color).block_side() == 1 => color,
+                _ if is_flat || device_format(color).decompressed().is_none() => color,
                 _ => COLOR,
             };
             let shape = kind.shape(format);

@@ -7,7 +7,7 @@ fn every_format_of_the_device_has_a_vulkan_name() {
     // chroma.
     let later = [vk::Format::A4R4G4B4_UNORM_PACK16, vk::Format::A4B4G4R4_UNORM_PACK16];
     let ycbcr = vk::Format::G8B8G8R8_422_UNORM.as_raw()..=vk::Format::G16_B16_R16_3PLANE_444_UNORM.as_raw();
-    let found: HashSet<_> = (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
+    let found: HashSet<_> = (0..=vk::Format::ASTC_12X12_SRGB_BLOCK.as_raw())
         .map(vk::Format::from_raw)
         .chain(later)
         .chain(ycbcr.map(vk::Format::from_raw))
@@ -17,7 +17,9 @@ fn every_format_of_the_device_has_a_vulkan_name() {
     assert_eq!(device_format(vk::Format::A2B10G10R10_UNORM_PACK32), Some(Format::A2B10G10R10UnormPack32));
     assert_eq!(device_format(vk::Format::UNDEFINED), None);
     assert_eq!(device_format(vk::Format::from_raw(-1)), None);
-    assert_eq!(device_format(vk::Format::ETC2_R8G8B8_UNORM_BLOCK), None);
+    assert_eq!(device_format(vk::Format::EAC_R11G11_SNORM_BLOCK), Some(Format::EacR11G11SnormBlock));
+    assert_eq!(device_format(vk::Format::ASTC_10X8_SRGB_BLOCK), Some(Format::Astc10x8SrgbBlock));
+    assert_eq!(device_format(vk::Format::ASTC_4X4_SFLOAT_BLOCK), None);
 }
 
 #[test]
@@ -57,6 +59,7 @@ fn images_that_cannot_be_are_refused() {
             ..query
         },
         ImageQuery { flags: vk::ImageCreateFlags::SPARSE_BINDING, ..query },
+        ImageQuery { flags: vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE, ..query },
         ImageQuery {
             format: vk::Format::D32_SFLOAT,
             ty: vk::ImageType::TYPE_3D,
@@ -68,6 +71,21 @@ fn images_that_cannot_be_are_refused() {
         let error = image_properties(query).unwrap_err();
         assert_eq!(error.result(), vk::Result::ERROR_FORMAT_NOT_SUPPORTED, "{query:?}");
     }
+}
+
+#[test]
+fn blocks_may_be_viewed_as_texels_of_their_size() {
+    let query = ImageQuery {
+        format: vk::Format::ASTC_8X5_UNORM_BLOCK,
+        ty: vk::ImageType::TYPE_2D,
+        tiling: vk::ImageTiling::OPTIMAL,
+        usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE,
+        flags: VIEWED_FORMATS,
+    };
+    assert!(image_properties(query).is_err());
+    let flags = query.flags | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE;
+    let found = image_properties(ImageQuery { flags, ..query }).unwrap();
+    assert_eq!(found.sample_counts, vk::SampleCountFlags::TYPE_1);
 }
 
 #[test]
