@@ -1,6 +1,5 @@
 //! Endpoints: the two colours between which the texels of a partition lie.
 
-use super::Expansion;
 use super::sequence::{Digit, Range};
 
 /// The most integers of a block's endpoints.
@@ -9,6 +8,15 @@ pub(super) const MAX_VALUES: usize = 18;
 /// The two colours of a partition: red, green, blue and alpha of 8 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Endpoints([[u8; 4]; 2]);
+
+/// How the components of endpoints become 16 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Expansion {
+    /// The byte twice.
+    Linear,
+    /// The byte, and half of its unit.
+    Srgb,
+}
 
 /// The number of integers of an endpoint mode.
 pub(super) fn value_count(mode: u32) -> usize {

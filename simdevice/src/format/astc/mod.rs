@@ -15,7 +15,7 @@ mod sequence;
 mod tests;
 mod weight;
 
-use endpoint::Endpoints;
+use endpoint::{Endpoints, Expansion};
 use mode::Mode;
 use partition::Partitions;
 use sequence::Range;
@@ -32,15 +32,6 @@ type Texel = [u16; 4];
 
 /// The texels of what is not valid.
 const ERROR: Texel = [u16::MAX, 0, u16::MAX, u16::MAX];
-
-/// How the components of endpoints become 16 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Expansion {
-    /// The byte twice.
-    Linear,
-    /// The byte, and half of its unit.
-    Srgb,
-}
 
 /// Decodes a block of `extent` texels to red, green, blue and alpha in binary16.
 ///
