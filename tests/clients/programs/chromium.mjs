@@ -1,5 +1,5 @@
 // Runs pages in Chromium, whose ANGLE draws WebGL 2 by Vulkan: chromium.mjs MODULES OUT. Pictures are compared with those of the SwiftShader
-// that Chromium brings.
+// that Chromium brings, and a page whose layers are put together by Vulkan with one that the processor puts together.
 import { createServer } from 'node:http';
 import { readFile, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
@@ -21,7 +21,7 @@ const server = createServer(async (request, response) => {
         : path.join(here, 'chromium', path.basename(pathname));
     // The browser asks for an icon, too, which there is not.
     const text = pathname === '/' ? PAGE : await readFile(file).catch(() => null);
-    const type = pathname === '/' ? 'text/html' : file.endsWith('.wasm') ? 'application/wasm' : 'text/javascript';
+    const type = pathname === '/' || file.endsWith('.html') ? 'text/html' : file.endsWith('.wasm') ? 'application/wasm' : 'text/javascript';
     response.writeHead(text === null ? 204 : 200, { 'Content-Type': type }).end(text ?? '');
 });
 await new Promise((listening) => server.listen(0, '127.0.0.1', listening));
@@ -71,6 +71,40 @@ async function run(angle) {
     return { device, failures, pictures };
 }
 
+// A page as a browser shows it that composites with `args`, and what it says of its compositor.
+async function composited(name, env, args) {
+    const browser = await chromium.launch({
+        env,
+        executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+        args: ['--no-sandbox', ...args],
+    });
+    const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+    await page.goto(`${address}page.html`);
+    const file = await page.screenshot({ path: path.join(out, `page-${name}.png`) });
+    const pixels = await page.evaluate(async (text) => {
+        const picture = new Image();
+        picture.src = `data:image/png;base64,${text}`;
+        await picture.decode();
+        const context = new OffscreenCanvas(640, 480).getContext('2d', { willReadFrequently: true });
+        context.drawImage(picture, 0, 0);
+        return Array.from(context.getImageData(0, 0, 640, 480).data);
+    }, file.toString('base64'));
+    await page.goto('chrome://gpu');
+    const status = await page.evaluate(async () => {
+        // The text is in shadow trees, and comes after a while.
+        const texts = (node) => [node, ...(node.shadowRoot ? texts(node.shadowRoot) : [])].flatMap((root) =>
+            [...root.childNodes].flatMap((child) => (child.nodeType === Node.TEXT_NODE ? [child.textContent.trim()] : texts(child))));
+        for (let wait = 0; wait < 100; wait += 1) {
+            const text = texts(document.body).filter((line) => line).join('\n');
+            if (text.includes('Compositing:')) return text;
+            await new Promise((done) => setTimeout(done, 100));
+        }
+        return '';
+    });
+    await browser.close();
+    return { pixels, status };
+}
+
 function fail(reason) {
     console.log(reason);
     process.exit(1);
@@ -82,6 +116,13 @@ if (process.env.DEVICE && !drawn.device.includes(process.env.DEVICE)) fail(`WebG
 if (drawn.failures.length) fail(drawn.failures.map(([name, found]) => `${name}: ${found}`).join('; '));
 const reference = await run('swiftshader');
 if (!reference.device.includes('SwiftShader')) fail(`the other pictures are by ${reference.device}`);
+const byVulkan = ['--use-gl=angle', '--use-angle=vulkan', '--enable-features=Vulkan', '--ignore-gpu-blocklist'];
+const shown = await composited('vulkan', process.env, byVulkan);
+for (const found of ['Vulkan:\nEnabled', 'Compositing:\nHardware accelerated', 'Rasterization:\nHardware accelerated']) {
+    if (!shown.status.includes(found)) fail(`the compositor does not say ${found.replace('\n', ' ')}`);
+}
+drawn.pictures.page = shown.pixels;
+reference.pictures.page = (await composited('software', process.env, ['--disable-gpu'])).pixels;
 const texts = [];
 for (const [name, pixels] of Object.entries(drawn.pictures)) {
     const differences = pixels.map((value, i) => Math.abs(value - reference.pictures[name][i]));
@@ -92,4 +133,4 @@ for (const [name, pixels] of Object.entries(drawn.pictures)) {
     if (colors < 50 || mean > 1 || far > 0.01) fail(`${name} differs from SwiftShader's: ${texts.at(-1)}, ${colors} shades`);
 }
 server.close();
-console.log(`five checks of WebGL 2 equal; pictures differ from SwiftShader's by: ${texts.join('; ')}`);
+console.log(`five checks of WebGL 2 equal; pictures differ from SwiftShader's and the processor's by: ${texts.join('; ')}`);
