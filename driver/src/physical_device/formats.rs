@@ -173,7 +173,8 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()
-        | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw(),
+        | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw()
+        | vk::ImageCreateFlags::SPLIT_INSTANCE_BIND_REGIONS.as_raw(),
 );
 
 /// The features that usages require; other usages are not supported.
@@ -284,6 +285,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
+    let is_split = flags.contains(vk::ImageCreateFlags::SPLIT_INSTANCE_BIND_REGIONS);
+    if is_split && (is_linear || ty != vk::ImageType::TYPE_2D) {
+        return refuse(format!("{tiling:?} images of {ty:?} are not split over devices"));
+    }
     let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
@@ -291,8 +296,8 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     Ok(vk::ImageFormatProperties {
         max_extent,
-        max_mip_levels: max_extent.width.ilog2() + 1,
-        max_array_layers: layers,
+        max_mip_levels: if is_split { 1 } else { max_extent.width.ilog2() + 1 },
+        max_array_layers: if is_split { 1 } else { layers },
         sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
         max_resource_size: memory::heap_size(),
     })
