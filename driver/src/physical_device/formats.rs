@@ -108,10 +108,11 @@ fn is_atomic(format: Format) -> bool {
     is_one_word && (format.is_integer() || format.numeric() == Numeric::Sfloat)
 }
 
-/// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware;
-/// neither can a shared exponent.
+/// Reports whether a colour format can be rendered to. Formats of three components of 8 or 16 bits can't, as on other
+/// hardware; neither can a shared exponent.
 fn is_rendered(format: Format) -> bool {
-    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
+    let size = format.texel_size();
+    format.numeric() != Numeric::SharedExponent && (size.is_power_of_two() || size == 12)
 }
 
 /// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB and shared exponents.

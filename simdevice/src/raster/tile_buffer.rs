@@ -371,6 +371,7 @@ fn fill(bytes: &mut [u8], texel: &[u8]) {
         2 => fill_each::<2>(bytes, texel),
         4 => fill_each::<4>(bytes, texel),
         8 => fill_each::<8>(bytes, texel),
+        12 => fill_each::<12>(bytes, texel),
         16 => fill_each::<16>(bytes, texel),
         size => bytes.chunks_exact_mut(size).for_each(|chunk| chunk.copy_from_slice(texel)),
     }
@@ -389,6 +390,7 @@ fn get_row(texels: &[u8], size: usize, y: usize, first: usize, row: &mut [u8]) {
         2 => get_each::<2>(texels, y, first, row),
         4 => get_each::<4>(texels, y, first, row),
         8 => get_each::<8>(texels, y, first, row),
+        12 => get_each::<12>(texels, y, first, row),
         16 => get_each::<16>(texels, y, first, row),
         size => {
             for (x, texel) in row.chunks_exact_mut(size).enumerate() {
@@ -420,6 +422,7 @@ fn set_row(texels: &mut [u8], size: usize, y: usize, first: usize, row: &[u8]) {
         2 => set_each::<2>(texels, y, first, row),
         4 => set_each::<4>(texels, y, first, row),
         8 => set_each::<8>(texels, y, first, row),
+        12 => set_each::<12>(texels, y, first, row),
         16 => set_each::<16>(texels, y, first, row),
         size => {
             for (x, texel) in row.chunks_exact(size).enumerate() {

@@ -2,3 +2,4 @@
 
 mod attachments;
 mod stencil_export;
+mod three_components;

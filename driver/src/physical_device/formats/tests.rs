@@ -27,7 +27,8 @@ fn formats_can_do_what_they_are_for() {
     assert!(depth.linear_tiling_features.is_empty());
     let vertex = properties(vk::Format::R32G32B32_SFLOAT);
     assert!(vertex.buffer_features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
-    assert!(!vertex.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT));
+    assert!(vertex.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT));
+    assert!(!vertex.optimal_tiling_features.contains(vk::FormatFeatureFlags::STORAGE_IMAGE));
 }
 
 #[test]
