@@ -270,14 +270,13 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     if !IMAGE_FLAGS.contains(flags) {
         return refuse(format!("image flags {flags:?} are not supported"));
     }
-    let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
     let is_compressed = device_format(format).is_some_and(is_compressed);
     let (max_extent, layers) = match ty {
         vk::ImageType::TYPE_1D if !is_compressed => (extent(limits::MAX_IMAGE_DIMENSION, 1, 1), limits::MAX_LAYERS),
         vk::ImageType::TYPE_2D => {
             (extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1), limits::MAX_LAYERS)
         }
-        vk::ImageType::TYPE_3D if !is_depth_stencil => {
+        vk::ImageType::TYPE_3D => {
             let side = limits::MAX_IMAGE_DIMENSION_3D;
             (extent(side, side, side), 1)
         }

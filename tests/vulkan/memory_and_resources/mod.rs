@@ -6,3 +6,4 @@ mod device_groups;
 mod device_memory;
 mod extended_usage;
 mod linear_images;
+mod volumes_of_depths;
