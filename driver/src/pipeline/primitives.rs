@@ -105,6 +105,7 @@ impl PrimitivePipeline {
             second_source: graphics.fragment_output.blend.iter().any(reads_second_source)
                 || graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points
+                || graphics.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
                 || shaders.geometry.is_some()
                 || shaders.tessellation.is_some()
                 || graphics.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)

@@ -661,7 +661,7 @@ pub(crate) enum Class {
     Patches,
 }
 
-/// The class of a topology. A dynamic topology must stay in its class.
+/// The class of a topology.
 pub(crate) fn class(topology: Topology) -> Class {
     match topology {
         Topology::PointList => Class::Points,
