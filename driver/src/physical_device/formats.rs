@@ -171,6 +171,7 @@ pub(crate) fn features2(format: vk::Format, features: vk::FormatFeatureFlags) ->
 const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
+        | vk::ImageCreateFlags::MULTISAMPLED_RENDER_TO_SINGLE_SAMPLED_EXT.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()

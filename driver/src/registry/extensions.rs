@@ -55,6 +55,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_load_store_op_none", 1),
     (c"VK_EXT_memory_budget", 1),
     (c"VK_EXT_multi_draw", 1),
+    (c"VK_EXT_multisampled_render_to_single_sampled", 1),
     (c"VK_EXT_non_seamless_cube_map", 1),
     (c"VK_EXT_pipeline_creation_cache_control", 3),
     (c"VK_EXT_pipeline_creation_feedback", 1),

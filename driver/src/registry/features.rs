@@ -259,6 +259,10 @@ features! {
     structure vk::PhysicalDeviceMultiDrawFeaturesEXT: c"VK_EXT_multi_draw" {
         multiDraw => multi_draw: true;
     }
+    structure vk::PhysicalDeviceMultisampledRenderToSingleSampledFeaturesEXT:
+        c"VK_EXT_multisampled_render_to_single_sampled" {
+        multisampledRenderToSingleSampled => multisampled_render_to_single_sampled: true;
+    }
     structure vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT: c"VK_EXT_non_seamless_cube_map" {
         nonSeamlessCubeMap => non_seamless_cube_map: true;
     }

@@ -320,6 +320,7 @@ fn begin_pass(resources: &Resources, clear: Option<([f32; 4], f32)>) -> Packet {
             load: value.map_or(LoadOp::Load, LoadOp::Clear),
             store: StoreOp::Store,
             resolve: None,
+            multisampled: None,
         })
     };
     let color = clear.map(|(color, _)| ClearValue::Float(color));

@@ -3,6 +3,7 @@
 //! Unit tests: `driver/src/render_pass.rs`.
 
 mod feedback_loop;
+mod multisampled_to_single;
 mod multiview;
 mod passes;
 mod subpasses;
