@@ -337,6 +337,7 @@ impl FixedFunctionState {
             logic_op: None,
             blend: Vec::new(),
             blend_constants: [0.0; 4],
+            reads_attachments: graphics.reads_attachments(),
         };
         let mut state = Self {
             draw,

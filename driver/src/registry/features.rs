@@ -279,6 +279,12 @@ features! {
         provokingVertexLast => provoking_vertex_last: true;
         transformFeedbackPreservesProvokingVertex => transform_feedback_preserves_provoking_vertex: true;
     }
+    structure vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT:
+        c"VK_EXT_rasterization_order_attachment_access" {
+        rasterizationOrderColorAttachmentAccess => rasterization_order_color_attachment_access: true;
+        rasterizationOrderDepthAttachmentAccess => rasterization_order_depth_attachment_access: true;
+        rasterizationOrderStencilAttachmentAccess => rasterization_order_stencil_attachment_access: true;
+    }
     structure vk::PhysicalDeviceRobustness2FeaturesEXT: c"VK_EXT_robustness2" {
         robustBufferAccess2 => robust_buffer_access2: true;
         robustImageAccess2 => robust_image_access2: true;

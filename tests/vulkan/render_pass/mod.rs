@@ -6,4 +6,5 @@ mod feedback_loop;
 mod multisampled_to_single;
 mod multiview;
 mod passes;
+mod rasterization_order;
 mod subpasses;

@@ -103,6 +103,7 @@ impl<'a> TriangleTileDraw<'a> {
             && !effects.removes
             && !state.alpha_to_one
             && state.line_mode != LineMode::Smooth
+            && !state.reads_attachments
             // A recording describes hardware that processes quads.
             && draw.record.is_none();
         let path = match interface {

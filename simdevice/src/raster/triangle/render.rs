@@ -202,7 +202,13 @@ impl Renderer<'_, '_> {
                     range: self.depth_range(primitive),
                 };
                 let corner = [whole.x, whole.y];
+                if draw.draw.state.reads_attachments {
+                    self.write_through(setup.bounds);
+                }
                 self.primitive(simd, &mut raster, &mut coverage, deferred, corner)?;
+                if draw.draw.state.reads_attachments {
+                    self.flush()?;
+                }
             }
         }
         if N == 1 && matches!(draw.path, Path::Deferred { .. }) {
@@ -211,6 +217,16 @@ impl Renderer<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Writes the tiles within `bounds` to the attachments' memory, where fragments read them.
+    fn write_through(&mut self, bounds: Rect) {
+        let MacroTile { layer, at, size } = self.macro_tile;
+        for tile in Tile::of_macro_tile(size, at, self.draw.area) {
+            if !tile.pixels.intersect(bounds).is_empty() {
+                self.buffers.write_through(self.draw.targets, layer, &tile);
+            }
+        }
     }
 
     /// The range to which a primitive's depth is clamped.
