@@ -115,7 +115,20 @@ fn is_rendered(format: Format) -> bool {
     format.numeric() != Numeric::SharedExponent && (size.is_power_of_two() || size == 12)
 }
 
-/// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB and shared exponents.
+/// The number of components of a format whose components have 64 bits, which is for vertex attributes alone; 0 for other
+/// formats.
+pub(crate) fn wide_components(format: vk::Format) -> u32 {
+    use vk::Format as F;
+    match format {
+        F::R64_UINT | F::R64_SINT | F::R64_SFLOAT => 1,
+        F::R64G64_UINT | F::R64G64_SINT | F::R64G64_SFLOAT => 2,
+        F::R64G64B64_UINT | F::R64G64B64_SINT | F::R64G64B64_SFLOAT => 3,
+        F::R64G64B64A64_UINT | F::R64G64B64A64_SINT | F::R64G64B64A64_SFLOAT => 4,
+        _ => 0,
+    }
+}
+
+/// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB.
 /// Programs can read texels of any format that isn't scaled or compressed.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) || is_compressed(format) {
@@ -125,7 +138,7 @@ fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
         return vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
     let mut features = vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
-    if !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent) {
+    if format.numeric() != Numeric::Srgb {
         features |= vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
     if is_stored(format) {
@@ -140,7 +153,9 @@ fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
 /// `VkFormatProperties`. Formats that the device lacks have no features.
 pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
     let Some(format) = device_format(format) else {
-        return vk::FormatProperties::default();
+        let is_wide = wide_components(format) > 0;
+        let vertices = if is_wide { vk::FormatFeatureFlags::VERTEX_BUFFER } else { vk::FormatFeatureFlags::empty() };
+        return vk::FormatProperties { buffer_features: vertices, ..vk::FormatProperties::default() };
     };
     // Texels, or blocks of them, lie in rows with either tiling.
     let linear = if is_color(format) { image_features(format) } else { vk::FormatFeatureFlags::empty() };

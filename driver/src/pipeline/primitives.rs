@@ -113,7 +113,7 @@ impl PrimitivePipeline {
             views: graphics.pre_rasterization.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link(shaders, stream, live_outputs)?;
+        let programs = link::link(shaders, stream, live_outputs);
         let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static = dynamic.is_empty() && viewports == ViewportSource::Static && scissors == ViewportSource::Static;
