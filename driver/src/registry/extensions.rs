@@ -60,6 +60,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_non_seamless_cube_map", 1),
     (c"VK_EXT_pipeline_creation_cache_control", 3),
     (c"VK_EXT_pipeline_creation_feedback", 1),
+    (c"VK_EXT_post_depth_coverage", 1),
     (c"VK_EXT_primitive_topology_list_restart", 1),
     (c"VK_EXT_primitives_generated_query", 1),
     (c"VK_EXT_private_data", 1),

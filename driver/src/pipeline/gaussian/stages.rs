@@ -140,6 +140,7 @@ impl ResolveStage {
             inputs: (0..4).map(input).collect(),
             outputs: (0..4).map(output).collect(),
             early_tests: false,
+            post_depth_coverage: false,
             discards: false,
             per_sample: false,
             has_side_effects: false,

@@ -137,6 +137,18 @@ impl<'a> TriangleTileDraw<'a> {
         }
     }
 
+    /// True if fragments read the samples that their primitive covers, of which early tests may remove some.
+    pub(super) fn reads_samples_before_tests(&self) -> bool {
+        let reads = |stage: &FragmentStage| {
+            let mut inputs = stage.interface.inputs.iter();
+            !stage.interface.post_depth_coverage && inputs.any(|(_, input, _)| *input == FragmentInput::SampleMask)
+        };
+        self.early.is_some()
+            && self.samples.positions.len() > 1
+            && !self.samples.each_shaded
+            && self.stage.is_some_and(reads)
+    }
+
     /// True if all covered samples are written.
     pub(super) fn writes_all(&self) -> bool {
         !self.tests.any() && !self.removes

@@ -108,6 +108,7 @@ fn fragments(inputs: Vec<FragmentInput>, outputs: Vec<FragmentOutput>, discards:
         inputs: inputs.into_iter().map(Some).collect(),
         outputs: outputs.into_iter().map(Some).collect(),
         early_tests: false,
+        post_depth_coverage: false,
         discards,
         per_sample: false,
         has_side_effects: false,
