@@ -21,6 +21,7 @@ pub(crate) const INSTANCE: &[Extension] = &[
     (c"VK_KHR_get_physical_device_properties2", 2),
     (c"VK_KHR_get_surface_capabilities2", 1),
     (c"VK_KHR_surface", 25),
+    (c"VK_KHR_surface_protected_capabilities", 1),
     (c"VK_KHR_wayland_surface", 6),
     (c"VK_KHR_xcb_surface", 6),
     (c"VK_KHR_xlib_surface", 6),
